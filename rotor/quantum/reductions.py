@@ -98,7 +98,7 @@ def _converted(
     constants: Constants, reduction: str | None, representation: str, covariance: Covariance | None
 ) -> Conversion:
     _refuse(constants, reduction, representation)
-    covariance = covariance or Covariance.of_uncertainties(constants)
+    covariance = covariance or Covariance.from_uncertainties(constants)
     if {*constants.values} <= {*"ABC"}:
         note = f"rigid top in {constants.representation} to {representation}, where A, B, C are the same"
         same = _labelled(constants, dict(constants.values), reduction, representation, note)

@@ -1,9 +1,9 @@
-"""What symmetry allows of a dipole and of a polarizability, and the refusal of what it forbids.
+"""Dipole and polarizability components that symmetry allows; forbidden components are refused.
 
-A vector or tensor of a molecule is left alike by every operation of its point group; what is left of it after averaging over
-the operations is allowed. Where only constants are known, nuclear-spin weights tell: μ_a joins levels (Ka, Kc) of species
-whose parities differ in Kc alone, μ_c in Ka alone, μ_b in both, and α_bc, α_ab, α_ac likewise; no such component exists that
-joins species of different weight, since light does not turn ortho into para.
+A vector or tensor of a molecule is invariant under each operation of its point group; its mean over the operations is the allowed
+part. If only constants are known, nuclear-spin weights decide: μ_a joins levels (Ka, Kc) of species whose parities differ in Kc alone,
+μ_c in Ka alone, μ_b in both, and likewise α_bc, α_ab, α_ac. A component that would join species of different weight is zero, since
+light does not convert ortho into para.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     from rotor.geometry.inertia import PrincipalFrame
     from rotor.molecules.symmetry.point_group import Symmetry
 
-NOISE_DEBYE = 1e-3  # forbidden components below it are round-off or noise, and left out
-NOISE = 1e-3  # the same of a polarizability, relative to the whole
-DEBYE_PER_ANGSTROM = 10.0  # what nuclei that are off their symmetry may add to a dipole, about two electron charges
-PER_ANGSTROM = 1.0  # the same of a polarizability, relative to the whole
+NOISE_DEBYE = 1e-3  # smaller forbidden components are rounding or noise, and removed
+NOISE = 1e-3  # the same for a polarizability, relative to its norm
+DEBYE_PER_ANGSTROM = 10.0  # dipole that displaced nuclei may add, about two elementary charges
+PER_ANGSTROM = 1.0  # the same for a polarizability, relative to its norm
 _JOINED = {"a": (("ee", "eo"), ("oe", "oo")), "b": (("ee", "oo"), ("eo", "oe")), "c": (("ee", "oe"), ("eo", "oo"))}
-_TENSOR = {"ab": "c", "ac": "b", "bc": "a"}  # an element of α joins the species that this component of μ joins
+_TENSOR = {"ab": "c", "ac": "b", "bc": "a"}  # an element of α joins the same species as this component of μ
 
 
 def allowed_dipole(dipole: ArrayLike, symmetry: Symmetry) -> Floats:
-    """The part of a dipole that every operation leaves alike, where the rest is noise; else the whole.
+    """The part of a dipole (D) that is invariant under the point group, if the rest is noise; else the whole.
 
-    Noise is up to 0.001 D, and 10 D for every Å that nuclei are off exact symmetry.
+    Noise is up to 0.001 D, plus 10 D for each Å by which nuclei deviate from exact symmetry.
     """
     vector = np.asarray(dipole, dtype=float)
     part = invariant_vector(vector, symmetry)
@@ -47,15 +47,15 @@ def _noise(symmetry: Symmetry) -> float:
 
 
 def allowed_polarizability(tensor: ArrayLike, symmetry: Symmetry) -> Floats:
-    """The part of a (3, 3) tensor that every operation leaves alike, where the rest is noise, 0.001 of it; else the whole."""
+    """The invariant part of a (3, 3) tensor if the rest is noise (0.001 of its norm); else the whole."""
     whole = np.asarray(tensor, dtype=float)
     part = invariant_tensor(whole, symmetry)
     return part if np.linalg.norm(whole - part) < _noise(symmetry) * np.linalg.norm(whole) else whole
 
 
 def invariant_vector(vector: Floats, symmetry: Symmetry) -> Floats:
-    """The mean of a vector (3,) over the operations, in the frame of the geometry."""
-    if symmetry.rotation_group == "C∞":  # no operation but the identity is listed
+    """Mean of a vector (3,) over the operations, in the frame of the geometry."""
+    if symmetry.rotation_group == "C∞":  # only the identity is listed
         return np.asarray(symmetry.axes_abc[0] * (symmetry.axes_abc[0] @ vector))
     operations = [operation.matrix for operation in (*symmetry.rotations, *symmetry.improper)]
     mean = np.mean([matrix @ vector for matrix in operations], axis=0)
@@ -63,7 +63,7 @@ def invariant_vector(vector: Floats, symmetry: Symmetry) -> Floats:
 
 
 def invariant_tensor(whole: Floats, symmetry: Symmetry) -> Floats:
-    """The mean of a tensor (3, 3) over the operations, in the frame of the geometry."""
+    """Mean of a tensor (3, 3) over the operations, in the frame of the geometry."""
     if symmetry.linear:
         along = symmetry.axes_abc[0]
         parallel = along @ whole @ along
@@ -76,25 +76,25 @@ def invariant_tensor(whole: Floats, symmetry: Symmetry) -> Floats:
 def refuse_forbidden_dipole(
     dipole_abc: ArrayLike, symmetry: Symmetry | None, frame: PrincipalFrame | None, weights: SpinWeights
 ) -> None:
-    """Refuse a dipole with more than 0.001 D along an axis that symmetry forbids.
+    """Refuse a dipole with more than 0.001 D along a forbidden axis.
 
-    Without a geometry the spin weights decide: a component that joins levels of different weight is forbidden.
+    Without a geometry, a component that joins levels of different spin weight is forbidden.
 
     Parameters
     ----------
     dipole_abc : (3,) array
         Debye, along the principal axes.
     symmetry : Symmetry or None
-        The point group, where the geometry is known.
+        Point group of the geometry, if known.
     frame : PrincipalFrame or None
-        Principal axes of that geometry.
+        Principal axes of the geometry.
     weights : SpinWeights
         Nuclear-spin weights.
 
     Raises
     ------
     ValueError
-        For such a dipole, with what is allowed.
+        For such a dipole, with the allowed axes.
     """
     values = np.asarray(dipole_abc, dtype=float)
     if symmetry is not None and frame is not None:
@@ -112,30 +112,30 @@ def refuse_forbidden_dipole(
     if wrong:
         components = ", ".join(f"μ{axis} = {values['abc'.index(axis)]:g} D" for axis in wrong)
         raise ValueError(
-            f"dipole {components}: {by} has none along {' and '.join(wrong)}; {_what_is_allowed('μ', allowed)}"
+            f"dipole {components}: {by} has none along {' and '.join(wrong)}; {_allowed_text('μ', allowed)}"
         )
 
 
 def refuse_forbidden_polarizability(
     tensor_abc: ArrayLike, symmetry: Symmetry | None, frame: PrincipalFrame | None, weights: SpinWeights
 ) -> None:
-    """Refuse a polarizability with more than 0.001 of it in what symmetry forbids.
+    """Refuse a polarizability whose forbidden part exceeds 0.001 of its norm.
 
     Parameters
     ----------
     tensor_abc : (3, 3) array
         Å³, along the principal axes.
     symmetry : Symmetry or None
-        The point group, where the geometry is known.
+        Point group of the geometry, if known.
     frame : PrincipalFrame or None
-        Principal axes of that geometry.
+        Principal axes of the geometry.
     weights : SpinWeights
-        Nuclear-spin weights, which decide without a geometry.
+        Nuclear-spin weights, used without a geometry.
 
     Raises
     ------
     ValueError
-        For such a polarizability, with the part that is allowed.
+        For such a polarizability, with the allowed part.
     """
     whole = np.asarray(tensor_abc, dtype=float)
     if symmetry is not None and frame is not None:
@@ -144,8 +144,8 @@ def refuse_forbidden_polarizability(
             elements = [f"α{'abc'[i]}{'abc'[j]} = {whole[i, j]:g}" for i in range(3) for j in range(i, 3)]
             allowed = [f"{part[i, j]:.4g}" for i in range(3) for j in range(i, 3)]
             raise ValueError(
-                f"polarizability {', '.join(elements)} Å³: not what {symmetry.point_group} leaves alike; the part that it "
-                f"does is {', '.join(allowed)} in the same order"
+                f"polarizability {', '.join(elements)} Å³: not invariant under {symmetry.point_group}; the "
+                f"invariant part is {', '.join(allowed)} in the same order"
             )
         return
     for name, axis in _TENSOR.items():
@@ -158,17 +158,17 @@ def refuse_forbidden_polarizability(
 
 
 def _allowed_axes(symmetry: Symmetry, frame: PrincipalFrame) -> list[str]:
-    """The principal axes along which a dipole may lie."""
+    """The principal axes along which symmetry allows a dipole."""
     shares = [frame.axes @ invariant_vector(axis, symmetry) for axis in frame.axes]
     return [name for i, name in enumerate("abc") if abs(shares[i][i]) > 0.5]
 
 
-def _what_is_allowed(letter: str, axes: list[str]) -> str:
+def _allowed_text(letter: str, axes: list[str]) -> str:
     return f"symmetry allows {' and '.join(letter + axis for axis in axes)} alone" if axes else "symmetry allows none"
 
 
 def _joins_equals(axis: str, weights: SpinWeights) -> bool:
-    """Whether a dipole component joins levels of equal weight alone, by the classes of the weights."""
+    """Whether a dipole component joins only levels of equal weight, according to the classes of the weights."""
     weight_of = dict(zip(weights.classes, weights.values, strict=True))
     if weights.rule == "KaKc":
         return all(weight_of[first] == weight_of[other] for first, other in _JOINED[axis])

@@ -1,4 +1,4 @@
-"""Dipoles and polarizabilities as components along the principal axes a, b, c, checked."""
+"""Dipoles and polarizabilities as checked components along the principal axes a, b, c."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ Tensor = tuple[Vector, Vector, Vector]
 
 
 def in_frame(frame: PrincipalFrame, dipole: Floats) -> Vector | None:
-    """Components along a, b, c; those below 1e-6 of the whole are round-off of the frame, and 0."""
+    """Components along a, b, c; those below 1e-6 of the norm are rounding of the frame and set to 0."""
     components = frame.axes @ dipole
     return dipole_vector(np.where(np.abs(components) < 1e-6 * np.linalg.norm(components), 0.0, components))
 
 
 def tensor_in_frame(frame: PrincipalFrame, tensor: Floats) -> Tensor:
-    """The tensor in a, b, c; elements below 1e-6 of the whole are round-off of the frame, and 0."""
-    turned = frame.axes @ tensor @ frame.axes.T
-    return symmetric_tensor(np.where(np.abs(turned) < 1e-6 * np.linalg.norm(turned), 0.0, (turned + turned.T) / 2))
+    """The tensor along a, b, c; elements below 1e-6 of the norm are rounding of the frame and set to 0."""
+    rotated = frame.axes @ tensor @ frame.axes.T
+    return symmetric_tensor(np.where(np.abs(rotated) < 1e-6 * np.linalg.norm(rotated), 0.0, (rotated + rotated.T) / 2))
 
 
 def symmetric_tensor(tensor: ArrayLike) -> Tensor:
-    """A polarizability as nested tuples, checked: (3, 3), finite, symmetric within 1e-9 of its size.
+    """A polarizability as nested tuples; checked to be (3, 3), finite, and symmetric within 1e-9 of its size.
 
     >>> symmetric_tensor([[2, 0, 0], [0, 1, 0], [0, 0, 1]])
     ((2.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -34,13 +34,13 @@ def symmetric_tensor(tensor: ArrayLike) -> Tensor:
     if values.shape != (3, 3) or not np.isfinite(values).all():
         raise ValueError(f"a polarizability is a (3, 3) tensor of finite numbers in Å³, not {values.tolist()}")
     if not np.allclose(values, values.T, rtol=0, atol=1e-9 * float(np.abs(values).max())):
-        raise ValueError(f"a polarizability is a symmetric tensor; this one is not: {values.tolist()}")
+        raise ValueError(f"a polarizability is a symmetric tensor, this one is not: {values.tolist()}")
     a, b, c = ((float(x), float(y), float(z)) for x, y, z in values)
     return a, b, c
 
 
 def dipole_vector(vector: ArrayLike | None) -> Vector | None:
-    """A dipole in debye as three numbers, checked; None where there is none.
+    """A dipole in debye as three checked numbers; None for None.
 
     >>> dipole_vector([1, 0, 2])
     (1.0, 0.0, 2.0)

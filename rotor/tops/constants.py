@@ -1,8 +1,7 @@
-"""Rotational constants by the names the field publishes, in MHz, with reduction, representation and uncertainty.
+"""Rotational constants by their published names, in MHz, with reduction, representation and uncertainties.
 
-A set of constants is a complete statement: the numbers, the reduction (A or S) and the axes (representation) in
-which they are meant, and the kind of top whose Hamiltonian they belong to. Nothing is converted silently; what the
-names mean as operators stands in `rotor.tops.operators`.
+A set of constants is complete: it has the values, the reduction (A or S) and the axes (representation) that they refer to, and the kind
+of top whose Hamiltonian they belong to. Nothing is converted silently; `rotor.tops.operators` defines the operators of the names.
 """
 
 from __future__ import annotations
@@ -22,38 +21,38 @@ from rotor.tops.uncertain_numbers import parse_named, write_number
 from rotor.units import parse_quantity
 
 _GREEK = {"Δ": "Delta", "∆": "Delta", "δ": "delta", "Φ": "Phi", "φ": "phi", "ϕ": "phi"}
-_WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # what linear and spherical tops call them
-LEAST_MHZ, MOST_MHZ = 1e-12, 1e12  # far below that of any body of atoms, far above that of H2 (1.8e6 MHz)
-_OF_SPIN_OR_STATE = re.compile(r"(chi|eps|[CTDGF])_?[abc]{1,2}|(b_?F|W|E|gamma|lambda|[CJ]_?iso)\b")
+_WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # names for linear and spherical tops
+LEAST_MHZ, MOST_MHZ = 1e-12, 1e12  # far below any molecule, far above H2 (1.8e6 MHz)
+_SPIN_OR_STATE = re.compile(r"(chi|eps|[CTDGF])_?[abc]{1,2}|(b_?F|W|E|gamma|lambda|[CJ]_?iso)\b")
 _SETTINGS = ("reduction", "representation", "kind", "uncertainties", "sources")
 
 
 @dataclass(frozen=True, init=False, repr=False)
 class Constants:
-    """Named rotational constants in MHz, immutable, equal when all their content is equal.
+    """Named rotational constants in MHz; immutable, equal if all their content is equal.
 
     Parameters
     ----------
     reduction : "A", "S" or None
-        Watson's reduction, for asymmetric tops only; taken from the names where they tell it.
+        Watson's reduction, for asymmetric tops only; by default inferred from the names.
     representation : one of Ir, Il, IIr, IIl, IIIr, IIIl, or None
-        Axes of an asymmetric top; Ir for Ray's κ <= 0 and IIIl for κ > 0 unless given.
+        Axes of an asymmetric top; Ir for Ray's κ <= 0 and IIIl for κ > 0 by default.
     kind : "linear", "spherical", "prolate", "oblate", "asymmetric" or None
-        Otherwise by the rule: B alone is linear, A and B prolate, B and C oblate; A, B and C are what their exact
-        equality says. A given kind wins as long as the constants do not contradict it.
+        By default inferred: B alone is linear, A and B prolate, B and C oblate; for A, B and C exact equality decides.
+        A given kind must not contradict the constants.
     uncertainties, sources : mapping by name
-        One standard deviation in MHz; where the number was published.
+        One standard deviation in MHz; publication of the number.
     terms : mapping {(p, q, n): value in MHz}
-        Terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ that no published name stands for; they are stored under names such as
-        `J4Jz2Jpm6`, which text and files may use as well.
+        Terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ without a published name; stored under names such as
+        `J4Jz2Jpm6`, which texts and files may also use.
     **values_mhz
-        The constants: float in MHz or text with a unit. A, B, C with A >= B >= C > 0; distortion constants of the
-        tables above, signs as published (ΔJ, DJ > 0 for a normal molecule). Greek letters and underscores are read.
+        The constants: float in MHz or text with a unit. A, B, C with A >= B >= C > 0; distortion constants with
+        published signs (ΔJ, DJ > 0 for a normal molecule). Greek letters and underscores are accepted.
 
     Raises
     ------
     ValueError
-        For a name that is unknown or of another kind of top, both reductions in one set, constants that are not
+        For unknown names and names of another kind of top, both reductions in one set, constants that are not
         finite or out of order, and a kind, reduction or representation that does not fit.
 
     Examples
@@ -106,8 +105,8 @@ class Constants:
             "uncertainties": MappingProxyType({name: _spread(name, errors[name]) for name in values if name in errors}),
             "sources": MappingProxyType(origins),
         }
-        for field, thing in content.items():
-            object.__setattr__(self, field, thing)
+        for field, value in content.items():
+            object.__setattr__(self, field, value)
 
     def __hash__(self) -> int:
         return hash((self.kind, self.reduction, self.representation, frozenset(self.values.items())))
@@ -123,18 +122,18 @@ class Constants:
         return _rebuilt, (self._settings(), dict(self.values))
 
     def __getitem__(self, name: str) -> float:
-        """The constant of that name in MHz; KeyError when the set has none."""
+        """The constant of this name in MHz; KeyError if it is missing."""
         return self.values[_name_in(self.kind, _published_name(name))]
 
     def __contains__(self, name: str) -> bool:
         return _name_in(self.kind, _published_name(name)) in self.values
 
     def get(self, name: str, default: float = 0.0) -> float:
-        """The constant of that name in MHz, `default` when the set has none."""
+        """The constant of this name in MHz, or `default` if it is missing."""
         return self.values.get(_name_in(self.kind, _published_name(name)), default)
 
     def own_name(self, name: str) -> str:
-        """How this set spells a name: Greek letters written out, no underscores, D for DJ of a linear molecule.
+        """The spelling of a name in this set: Greek letters written out, no underscores, D for DJ of a linear molecule.
 
         >>> Constants(B=5.0).own_name("D_J")
         'D'
@@ -143,9 +142,9 @@ class Constants:
 
     @property
     def rigid(self) -> tuple[float, float, float]:
-        """A, B, C in MHz for every kind of top, the equal ones filled in.
+        """A, B, C in MHz for any kind of top; equal constants are filled in.
 
-        A linear molecule has no moment about its axis: A is infinite, so that ħ/(4πA) is the moment 0 it stands for.
+        A linear molecule has zero moment about its axis, so that A is infinite.
 
         >>> Constants(B=5.0, kind="spherical").rigid, Constants(B=5.0).rigid
         ((5.0, 5.0, 5.0), (inf, 5.0, 5.0))
@@ -157,7 +156,7 @@ class Constants:
 
     @property
     def terms(self) -> dict[Powers, float]:
-        """The terms without a published name, {(p, q, n): value in MHz}.
+        """Terms without a published name, {(p, q, n): value in MHz}.
 
         >>> Constants(A=9.0, B=3.0, C=2.0, terms={(1, 0, 4): 1e-9}).terms
         {(1, 0, 4): 1e-09}
@@ -165,21 +164,21 @@ class Constants:
         return {powers: value for name, value in self.values.items() if (powers := powers_of_spelled(name))}
 
     def replace(self, **changes: Any) -> Constants:
-        """A changed copy; a constant set to None is left out, kind, reduction or representation None is found anew.
+        """A changed copy. A constant set to None is removed; kind, reduction or representation None is inferred again.
 
-        A changed constant loses its uncertainty and source unless the change brings new ones.
+        A changed constant loses its uncertainty and source unless new ones are given.
 
         >>> Constants(A=9.0, B=3.0, C=2.0).replace(C=2.5).text()
         'A=9.0 B=3.0 C=2.5 MHz'
         """
         changes |= _spelled(changes.pop("terms", None))
         typed = {name: value for name, value in changes.items() if name not in _SETTINGS}
-        moved = _renamed(typed.items(), lambda name: _name_in(self.kind, _published_name(name)))
-        as_typed = dict(zip(moved, typed, strict=True))  # errors quote the names that were typed
-        values = {as_typed.get(n, n): value for n, value in {**self.values, **moved}.items() if value is not None}
+        changed = _renamed(typed.items(), lambda name: _name_in(self.kind, _published_name(name)))
+        as_typed = dict(zip(changed, typed, strict=True))  # errors quote the names that were typed
+        values = {as_typed.get(n, n): value for n, value in {**self.values, **changed}.items() if value is not None}
         settings = self._settings()
         for table in ("uncertainties", "sources"):
-            settings[table] = {name: thing for name, thing in settings[table].items() if name not in moved}
+            settings[table] = {name: entry for name, entry in settings[table].items() if name not in changed}
         settings.update({name: value for name, value in changes.items() if name in _SETTINGS})
         return Constants(**settings, **values)
 
@@ -194,14 +193,14 @@ class Constants:
     ) -> Constants:
         """Constants from text such as "A=835840.288(12) B=435351.717 C=278138.7 MHz".
 
-        The digits in brackets are the uncertainty in the last digits. Each item may carry a unit; a unit at the end,
-        after a space, serves every item that carries none; without any, numbers are MHz.
+        Digits in brackets are the uncertainty in the last digits. Each item may carry a unit; a unit at the end, after a space,
+        serves all items without one; without any unit, numbers are MHz.
 
         Parameters
         ----------
         text : str
             Names and values.
-        reduction, representation, kind : str, optional
+            "A" or "S"; axes at x, y, z ("Ir", ...); kind of top. By default inferred from names and values.
             "A" or "S"; which axes are x, y, z ("Ir", ...); kind of top. By default what the names and values say.
 
         Returns
@@ -212,7 +211,7 @@ class Constants:
         Raises
         ------
         ValueError
-            For text that cannot be read, and for a set of constants that contradicts itself.
+            For unreadable text, and for contradictory constants.
 
         Examples
         --------
@@ -226,17 +225,17 @@ class Constants:
         return cls(**settings, uncertainties=uncertainties, **values)  # type: ignore[arg-type]
 
     def text(self, unit: str = "MHz") -> str:
-        """The constants in one line, uncertainty in brackets, with the fewest digits that `parse` reads back exactly.
+        """The constants in one line, with uncertainties in brackets and the fewest digits that `parse` reads back exactly.
 
         >>> Constants.parse("B=57635.968(12) D=0.1835 MHz").text("GHz")
         'B=57.635968(12) D=0.0001835 GHz'
         """
-        spreads = self.uncertainties
-        items = (f"{name}={write_number(value, spreads.get(name), unit)}" for name, value in self.values.items())
+        errors = self.uncertainties
+        items = (f"{name}={write_number(value, errors.get(name), unit)}" for name, value in self.values.items())
         return f"{' '.join(items)} {unit}"
 
     def _settings(self) -> dict[str, Any]:
-        """Everything but the values, as the constructor takes it."""
+        """The arguments of the constructor without the values."""
         return {
             "reduction": self.reduction,
             "representation": self.representation,
@@ -250,7 +249,7 @@ class Constants:
 
 
 def _published_name(name: str) -> str:
-    """Greek letters spelled out, underscores taken away: `Δ_JK` is `DeltaJK`; a name that no constant has stays as it was typed."""
+    """The name with Greek letters spelled out and without underscores: `Δ_JK` is `DeltaJK`; unknown names are unchanged."""
     plain = name.replace("_", "")
     plain = _GREEK.get(plain[:1], plain[:1]) + plain[1:]
     return plain if plain in KNOWN or powers_of_spelled(plain) else name
@@ -264,31 +263,31 @@ def _spelled(values: Mapping[Powers, Any] | None) -> dict[str, Any]:
     return {spelled_term(*powers): value for powers, value in (values or {}).items()}
 
 
-def _renamed(things: Iterable[tuple[str, Any]], rename: Callable[[str], str]) -> dict[str, Any]:
+def _renamed(items: Iterable[tuple[str, Any]], rename: Callable[[str], str]) -> dict[str, Any]:
     renamed: dict[str, Any] = {}
     typed: dict[str, str] = {}
-    for text, thing in things:
+    for text, value in items:
         name = rename(text)
         if name in typed:
             raise ValueError(f"{typed[name]} and {text} are one constant, {name}, which is given twice; leave one out")
-        typed[name], renamed[name] = text, thing
+        typed[name], renamed[name] = text, value
     return renamed
 
 
 class UnknownConstantError(ValueError):
-    """A name that is none of a rotational constant."""
+    """A name that is not one of a rotational constant."""
 
 
 def _refuse_unknown(names: Iterable[str]) -> None:
     for name in names:
         if name not in KNOWN and not powers_of_spelled(name):
-            near = [known for known in KNOWN if known.casefold() == name.casefold()]
+            near = [candidate for candidate in KNOWN if candidate.casefold() == name.casefold()]
             near = near or difflib.get_close_matches(name.replace("_", ""), KNOWN, n=3)
             hint = f"did you mean {' or '.join(near)}? " if near else ""
             if re.fullmatch("mu_?[abc]", name):
-                hint = "the dipole is no rotational constant; a molecule file has it as dipole = { a = 1.0 }, some commands as --dipole. "
-            elif _OF_SPIN_OR_STATE.match(name):
-                hint = "constants of spins and of further states go to a Top, as spin_constants and states, such as chi_aa(14N). "
+                hint = "the dipole is not a rotational constant; molecule files have dipole = { a = 1.0 }, some commands --dipole. "
+            elif _SPIN_OR_STATE.match(name):
+                hint = "constants of spins and of further states belong to a Top, as spin_constants and states, such as chi_aa(14N). "
             raise UnknownConstantError(
                 f"{name!r} is not a rotational constant known here: {hint}{'K' if hint else 'k'}nown are {first_names(KNOWN)}, and terms "
                 "spelled out such as J4Jz2Jpm6"
@@ -302,7 +301,7 @@ def _refuse_strays(what: str, names: Iterable[str], values: Mapping[str, float])
 
 
 def _refuse_misplaced(kind: str, reduction: str | None, typed: Mapping[str, str]) -> None:
-    """ValueError for a name that this kind of top lacks; typed: every name as it was typed."""
+    """Raise ValueError for a name that this kind of top does not have. typed: names as typed, by published name."""
     allowed = vocabulary(kind, reduction)
     for name in typed:
         if powers := powers_of_spelled(name):
@@ -313,20 +312,20 @@ def _refuse_misplaced(kind: str, reduction: str | None, typed: Mapping[str, str]
             if kind in ("prolate", "oblate") and {*RIGID} <= {*typed}:
                 ways.append("say kind='asymmetric'")
             hint = f"{' or '.join(ways)}; " if ways else ""
-            raise ValueError(f"{typed[name]} is no constant of kind {kind!r}: {hint}that has {', '.join(allowed)}")
+            raise ValueError(f"{typed[name]} is not a constant of kind {kind!r}: {hint}that has {', '.join(allowed)}")
 
 
 def _refuse_named_term(kind: str, reduction: str | None, name: str, powers: Powers) -> None:
-    """A term has one name; and it must be one that this kind of top can have."""
+    """Refuse a spelled-out term that has a published name, or that this kind of top cannot have."""
     if published := published_name(powers, kind, reduction):
         raise ValueError(f"{name} is the operator of {published}; give it by that name, with the sign of that name")
     letters = {"linear": "J", "spherical": "J", "prolate": "J and Jz", "oblate": "J and Jz"}.get(kind)
     if letters and (powers[2] or (powers[1] and letters == "J")):
-        raise ValueError(f"{name} is no term of kind {kind!r}, where terms have powers of {letters} alone")
+        raise ValueError(f"{name} is not a term of kind {kind!r}, whose terms have powers of {letters} only")
 
 
 def _counterpart(name: str, allowed: tuple[str, ...]) -> str:
-    """The allowed name of the same operator: DJ for DeltaJ or D, HJK for PhiJK, nothing for d1."""
+    """The allowed name of the same operator, such as DJ for DeltaJ or D, and HJK for PhiJK; empty for d1."""
     match = re.fullmatch(r"(Delta|Phi|[DHL])(J?J?K?K?J?)", name)
     if not match:
         return ""
@@ -345,18 +344,18 @@ def _finite(name: str, value: float | str) -> float:
 
 
 def _spread(name: str, value: float | str) -> float:
-    spread = _finite(f"uncertainty of {name}", value)
-    if spread < 0:
-        raise ValueError(f"uncertainty of {name} = {spread!r} MHz: a standard deviation is 0 or more")
-    return spread
+    error = _finite(f"uncertainty of {name}", value)
+    if error < 0:
+        raise ValueError(f"uncertainty of {name} = {error!r} MHz: a standard deviation is 0 or more")
+    return error
 
 
 class AxisOrderError(ValueError):
-    """Rotational constants whose names are not in the order of their values; given: names and values."""
+    """Rotational constants whose names are not in the order of their values. constants: their text."""
 
     def __init__(self, constants: str, names: Sequence[str]) -> None:
         super().__init__(f"{constants}: the names follow the order {' >= '.join(names)}; exchange them")
-        self.given = constants
+        self.constants = constants
 
 
 def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:

@@ -1,4 +1,4 @@
-"""Error budget of A, B and C (`rotor.requests.budget`), the largest of each source over one top or several."""
+"""Error budget of A, B and C (`rotor.requests.budget`): the largest error of each source over one or several tops."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ RIGID = ("A", "B", "C")
 
 
 def constants_budget(tops: Sequence[Top]) -> ErrorBudget:
-    """The errors of the rotational constants of tops.
+    """Error budget of the rotational constants of tops.
 
     >>> from rotor.molecules.molecule import Molecule
     >>> co = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]], source="a guess", uncertainty=0.01)
@@ -37,21 +37,21 @@ def _rigid(top: Top) -> list[str]:
 
 
 def _estimated(tops: Sequence[Top]) -> ErrorTerm:
-    """The estimated error of constants from a geometry, or scaled from another isotopologue."""
+    """Estimated error of constants from a geometry, or scaled from another isotopologue."""
     errors = {top: max(estimated_errors_mhz(top).values(), default=0.0) for top in tops}
     top, error = max(errors.items(), key=lambda pair: pair[1], default=(None, 0.0))
     if top is None or not error:
         return ErrorTerm(0.0, "constants that define the Hamiltonian")
     molecule = top.molecule
-    of_geometry = molecule is not None and top.source == molecule.source
-    source = "error of the geometry" if of_geometry else "scaling from another isotopologue"
+    from_geometry = molecule is not None and top.source == molecule.source
+    source = "error of the geometry" if from_geometry else "scaling from another isotopologue"
     return ErrorTerm(error, source, "measured constants")
 
 
 def _measured(tops: Sequence[Top]) -> ErrorTerm:
-    """The largest standard deviation of A, B and C."""
+    """Largest standard deviation of A, B and C."""
     measured = [(top, name) for top in tops for name in _rigid(top) if name not in estimated_errors_mhz(top)]
-    known = [top.constants.uncertainties.get(name) for top, name in measured]
-    if not known or None in known:
+    errors = [top.constants.uncertainties.get(name) for top, name in measured]
+    if not errors or None in errors:
         return ErrorTerm(None, "no uncertainties of the constants are known")
-    return ErrorTerm(max(error for error in known if error is not None), "constants", "more precise constants")
+    return ErrorTerm(max(error for error in errors if error is not None), "constants", "more precise constants")

@@ -1,4 +1,4 @@
-"""The covariance of rotational constants, as a fit leaves it and as errors of levels and lines need it."""
+"""Covariance of rotational constants, from fits, for errors of levels and lines."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.tops.constants import Constants
 
-_NEGATIVE = 1e-4  # a correlation matrix printed with few digits has eigenvalues below zero by so much
+_NEGATIVE = 1e-4  # rounding of printed correlation matrices may make eigenvalues negative by this much
 
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Covariance of some constants of a set.
+    """Covariance of constants.
 
-    names: which. matrix_mhz2: (n, n), symmetric, MHz². Constants that are not named are taken as exact.
-    Raises ValueError for names given twice, a matrix of another shape, and a matrix that is no covariance.
+    names: of the constants. matrix_mhz2: (n, n), symmetric, MHz². Other constants count as exact.
+    Raises ValueError for repeated names, a matrix of another shape, and a matrix that is not a covariance.
     """
 
     names: tuple[str, ...]
@@ -31,10 +31,10 @@ class Covariance:
         object.__setattr__(self, "matrix_mhz2", matrix)
 
     @classmethod
-    def of_uncertainties(cls, constants: Constants) -> Covariance | None:
-        """Uncorrelated constants with the uncertainties they carry; None where they carry none.
+    def from_uncertainties(cls, constants: Constants) -> Covariance | None:
+        """Covariance without correlations from the stated uncertainties; None without any.
 
-        Published constants are correlated, which is not printed as often as it should be: errors of lines from
+        Published constants are correlated, though correlations are often not printed: errors of lines from
         uncertainties alone are mostly too large.
         """
         if not constants.uncertainties:
@@ -42,10 +42,12 @@ class Covariance:
         return cls(tuple(constants.uncertainties), np.diag([s**2 for s in constants.uncertainties.values()]))
 
     @classmethod
-    def of_correlations(cls, names: Sequence[str], uncertainties_mhz: ArrayLike, correlations: ArrayLike) -> Covariance:
-        """From standard deviations (n,) in MHz and their correlation coefficients (n, n).
+    def from_correlations(
+        cls, names: Sequence[str], uncertainties_mhz: ArrayLike, correlations: ArrayLike
+    ) -> Covariance:
+        """Covariance from standard deviations (n,) in MHz and correlation coefficients (n, n).
 
-        >>> Covariance.of_correlations(["B", "D"], [0.1, 0.01], [[1, 0.5], [0.5, 1]]).matrix_mhz2.round(6).tolist()
+        >>> Covariance.from_correlations(["B", "D"], [0.1, 0.01], [[1, 0.5], [0.5, 1]]).matrix_mhz2.round(6).tolist()
         [[0.01, 0.0005], [0.0005, 0.0001]]
         """
         sigma = np.asarray(uncertainties_mhz, dtype=np.float64)
@@ -60,7 +62,7 @@ class Covariance:
         return cls(tuple(names), matrix * np.outer(sigma, sigma))
 
     def of(self, names: Collection[str]) -> Covariance | None:
-        """The part of those constants that are among some names, the others left aside; None where there is none.
+        """The covariance of the constants in `names`, ignoring the others; None if there are none.
 
         >>> Covariance(("B", "D"), np.diag([4.0, 1.0])).of({"D", "H"}).names
         ('D',)
@@ -75,7 +77,7 @@ class Covariance:
         )
 
     def beside(self, uncertainties_mhz: Mapping[str, float]) -> Covariance:
-        """With further constants that are correlated with none, by their standard deviations.
+        """The covariance extended by uncorrelated constants with these standard deviations.
 
         >>> Covariance(("B",), np.diag([4.0])).beside({"chi_aa(14N)": 3.0}).matrix_mhz2.tolist()
         [[4.0, 0.0], [0.0, 9.0]]
@@ -87,7 +89,7 @@ class Covariance:
 
     @property
     def correlations(self) -> Floats:
-        """Correlation coefficients (n, n); 0 beside a constant that is exact."""
+        """Correlation coefficients (n, n); 0 for an exact constant."""
         sigma = np.sqrt(np.diag(self.matrix_mhz2))
         safe = np.where(sigma > 0, sigma, 1.0)
         matrix = self.matrix_mhz2 / np.outer(safe, safe)
@@ -96,7 +98,7 @@ class Covariance:
 
     @property
     def factor(self) -> Floats:
-        """F with C = F Fᵀ, (n, n), in MHz."""
+        """F (n, n) in MHz with C = F Fᵀ."""
         sigma = np.sqrt(np.diag(self.matrix_mhz2))
         safe = np.where(sigma > 0, sigma, 1.0)
         values, vectors = np.linalg.eigh(self.matrix_mhz2 / np.outer(safe, safe))
@@ -105,7 +107,7 @@ class Covariance:
 
 def _refuse_impossible(names: Sequence[str], matrix: Floats) -> None:
     if len(set(names)) != len(names):
-        raise ValueError(f"covariance of {', '.join(names)}: a name stands twice")
+        raise ValueError(f"covariance of {', '.join(names)}: a name is repeated")
     if matrix.shape != (len(names), len(names)):
         raise ValueError(
             f"covariance of {len(names)} constants: expected a square of that size, found shape {matrix.shape}"

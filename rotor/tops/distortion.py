@@ -1,14 +1,14 @@
 """Centrifugal distortion from a harmonic force field: Wilson's τ, and the quartic constants of both reductions.
 
-A molecule that turns is stretched until the force field holds it. With b(Q) = f I(Q)⁻¹ in MHz, f = h/8π², the energy
-Σ b_αβ J_α J_β + ½ Σ λ Q² has its minimum in Q below the rigid one by Σ T_αβγδ J_α J_β J_γ J_δ with
+A rotating molecule is stretched until the force field balances the centrifugal force. With b(Q) = f I(Q)⁻¹ in MHz, f = h/8π², the energy
+Σ b_αβ J_α J_β + ½ Σ λ Q² has a minimum in Q that lies below the rigid energy by Σ T_αβγδ J_α J_β J_γ J_δ with
 
     T_αβγδ = ¼ τ_αβγδ = -½ Σ_k (∂b_αβ/∂Q_k) (∂b_γδ/∂Q_k) / λ_k,    ∂b/∂Q = -b (∂I/∂Q) b / f
 
 (E. B. Wilson, J. Chem. Phys. 4, 526 (1936); D. Kivelson and E. B. Wilson, J. Chem. Phys. 20, 1575 (1952), eq. 5; M. R.
 Aliev and J. K. G. Watson, in Molecular Spectroscopy: Modern Research 3 (1985), § 1). Neglected: vibrational averaging and
-anharmonicity, which move quartic constants by some per cent (up to ten for hydrides), and the shifts of A, B, C by the
-order of operators, as large as the quartic constants themselves.
+anharmonicity, which change quartic constants by some per cent (up to ten for hydrides), and shifts of A, B, C from the
+order of operators, which are as large as the quartic constants.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from rotor.tops.top import Top
 from rotor.units import ELEMENTARY_CHARGE_C, PLANCK_J_S, ROTATIONAL_MHZ_U_ANGSTROM2
 
 MHZ_PER_EV = ELEMENTARY_CHARGE_C / PLANCK_J_S * 1e-6
-_NEAR_SYMMETRIC = 1e-4  # (Bx - By)/Bz below which the A-reduction divides by nothing
+_NEAR_SYMMETRIC = 1e-4  # (Bx - By)/Bz below which the A-reduction divides by nearly zero
 
 
 @dataclass(frozen=True)
 class Cylindrical:
-    """Σ T_αβ J_α² J_β² by operators of the z axis, MHz: c J⁴, c J²Jz², c Jz⁴, c J²u, c Jz²u, c (J₊⁴ + J₋⁴); u = Jx² - Jy²."""
+    """Σ T_αβ J_α² J_β² in operators of the z axis: coefficients in MHz of J⁴, J²Jz², Jz⁴, J²u, Jz²u, J₊⁴ + J₋⁴; u = Jx² - Jy²."""
 
     jj: float
     jz: float
@@ -44,7 +44,7 @@ class Cylindrical:
 def tau_mhz(field: ForceField) -> Floats:
     """Wilson's τ (3, 3, 3, 3) in MHz along the principal axes a, b, c.
 
-    For a linear molecule the components along a are 0: there is no J_a to stretch it.
+    For a linear molecule the components along a are 0, since J_a = 0.
     """
     top = Top.from_molecule(field.molecule)
     change = _constants_by_modes(field, top)
@@ -53,8 +53,8 @@ def tau_mhz(field: ForceField) -> Floats:
 
 
 def _constants_by_modes(field: ForceField, top: Top) -> Floats:
-    """∂b_αβ/∂Q_k (m, 3, 3) in MHz/(√u Å), principal axes; 0 along the axis of a linear molecule."""
-    assert top.frame is not None  # a top of a molecule has one
+    """∂b_αβ/∂Q_k (m, 3, 3) in MHz/(√u Å) along the principal axes; 0 along the axis of a linear molecule."""
+    assert top.frame is not None  # from_molecule sets it
     linear = top.kind == "linear"
     inverse = np.array([0.0 if linear and i == 0 else 1 / moment for i, moment in enumerate(top.frame.moments)])
     return np.asarray(-ROTATIONAL_MHZ_U_ANGSTROM2 * inverse[:, None] * inertia_by_modes(field, top) * inverse)
@@ -64,7 +64,7 @@ def quartic_tensor_mhz(field: ForceField) -> Floats:
     """Watson's T_αβ (3, 3) in MHz along a, b, c: H = Σ T_αβ J_α² J_β², T_αα = ¼ τ_αααα, T_αβ = ¼ (τ_ααββ + 2 τ_αβαβ).
 
     J. K. G. Watson, in Vibrational Spectra and Structure 6 (1977), eq. 22. Components such as τ_aaab of a molecule of low
-    symmetry have no bearing on the energies in this order.
+    symmetry do not affect the energies in this order.
     """
     tau = tau_mhz(field)
     squares = np.einsum("aabb->ab", tau) + 2 * np.einsum("abab->ab", tau)
@@ -73,9 +73,9 @@ def quartic_tensor_mhz(field: ForceField) -> Floats:
 
 
 def cylindrical(tensor: Floats, axes: tuple[int, int, int]) -> Cylindrical:
-    """The tensor (3, 3) by operators of the z axis; `axes` are the places of x, y, z in it.
+    """The tensor (3, 3) in operators of the z axis; `axes` are the indices of x, y, z in it.
 
-    With w = J² - Jz²: Jx² = ½ (w + u), Jy² = ½ (w - u), u² = ½ w² + ¼ (J₊⁴ + J₋⁴), but for the order of operators.
+    With w = J² - Jz²: Jx² = ½ (w + u), Jy² = ½ (w - u), u² = ½ w² + ¼ (J₊⁴ + J₋⁴), up to the order of operators.
     """
     t = tensor[np.ix_(axes, axes)]
     xx_yy, xy, ww = t[0, 0] + t[1, 1], t[0, 1], 3 * (t[0, 0] + t[1, 1]) / 8 + t[0, 1] / 4
@@ -90,7 +90,7 @@ def cylindrical(tensor: Floats, axes: tuple[int, int, int]) -> Cylindrical:
 
 
 def reduced(tensor: Floats, rigid_mhz: Floats, axes: tuple[int, int, int], reduction: str) -> Cylindrical:
-    """The tensor turned by exp(i s (JxJyJz + JzJyJx)) so that one of the six operators vanishes.
+    """The tensor transformed by exp(i s (JxJyJz + JzJyJx)) so that one of the six operators vanishes.
 
     A: no J₊⁴ + J₋⁴; S: no Jz² u.
 
@@ -101,7 +101,7 @@ def reduced(tensor: Floats, rigid_mhz: Floats, axes: tuple[int, int, int], reduc
     rigid_mhz : (3,) array
         A, B, C.
     axes : (int, int, int)
-        Places of x, y, z among a, b, c.
+        Indices of x, y, z among a, b, c.
     reduction : str
         "A" or "S".
 
@@ -113,12 +113,12 @@ def reduced(tensor: Floats, rigid_mhz: Floats, axes: tuple[int, int, int], reduc
     Raises
     ------
     ValueError
-        For the A-reduction of a top so nearly symmetric that it would divide by nearly zero.
+        For the A-reduction of a nearly symmetric top, which would divide by nearly zero.
 
     Notes
     -----
-    The turn adds s (By - Bx), s (Bz - By), s (Bx - Bz) to T_xy, T_yz, T_xz and leaves the levels alone (Watson 1977, §
-    3).
+    The transformation adds s (By - Bx), s (Bz - By), s (Bx - Bz) to T_xy, T_yz, T_xz and does not change the levels (Watson 1977,
+    § 3).
     """
     x, y, z = axes
     bx, by, bz = rigid_mhz[list(axes)]
@@ -131,10 +131,10 @@ def reduced(tensor: Floats, rigid_mhz: Floats, axes: tuple[int, int, int], reduc
         s = ((tensor[x, x] + tensor[y, y]) / 2 - tensor[x, y]) / (by - bx)
     else:
         s = (tensor[x, z] - tensor[y, z] - (tensor[x, x] - tensor[y, y]) / 2) / (2 * bz - bx - by)
-    turned = tensor.copy()
+    transformed = tensor.copy()
     for (i, j), change in {(x, y): by - bx, (y, z): bz - by, (x, z): bx - bz}.items():
-        turned[i, j] = turned[j, i] = tensor[i, j] + s * change
-    return cylindrical(turned, axes)
+        transformed[i, j] = transformed[j, i] = tensor[i, j] + s * change
+    return cylindrical(transformed, axes)
 
 
 def distortion_constants(field: ForceField, *, reduction: str = "S", representation: str | None = None) -> Constants:
@@ -143,19 +143,19 @@ def distortion_constants(field: ForceField, *, reduction: str = "S", representat
     Parameters
     ----------
     field : ForceField
-    reduction : "S" or "A", of an asymmetric top
-    representation : of an asymmetric top; Ir for κ <= 0 and IIIl for κ > 0 unless given
+    reduction : "S" or "A", for asymmetric tops
+    representation : for asymmetric tops; by default Ir for κ <= 0 and IIIl for κ > 0
 
     Returns
     -------
     Constants
-        Linear: D. Spherical: D, the mean over directions; the tensor that splits J levels is left out. Symmetric: DJ, DJK,
+        Linear: D. Spherical: D, the mean over directions, without the tensor that splits J levels. Symmetric: DJ, DJK,
         DK. Asymmetric: DJ, DJK, DK, d1, d2 or DeltaJ, DeltaJK, DeltaK, deltaJ, deltaK.
 
     Raises
     ------
     ValueError
-        A geometry that is no minimum, an A-reduction of a nearly symmetric top, an unknown reduction.
+        For a geometry that is not a minimum, the A-reduction of a nearly symmetric top, an unknown reduction.
 
     Examples
     --------
@@ -199,18 +199,18 @@ def _asymmetric(rigid: Constants, tensor: Floats, reduction: str, representation
 
 
 def semirigid_top(field: ForceField, *, reduction: str = "S", representation: str | None = None) -> Top:
-    """The top of a force field: its geometry, and the quartic distortion that the force field gives.
+    """The top of a force field: its geometry with the quartic distortion of the force field.
 
-    Notes say where the distortion is from and what it neglects, and the inertial defect of a planar molecule that vibrates.
+    Notes state the source and the neglect of the distortion, and the inertial defect of a planar vibrating molecule.
     """
     top = Top.from_molecule(field.molecule)
     constants = distortion_constants(field, reduction=reduction, representation=representation)
     note = (
-        f"quartic distortion from a harmonic force field ({field.source}): some per cent off, ten for hydrides; "
+        f"quartic distortion from a harmonic force field ({field.source}): error some per cent, ten for hydrides; "
         "no sextic constants"
     )
     notes = (*top.notes, note)
     if is_planar(top):
         defect = inertial_defect_u_angstrom2(field)
-        notes += (f"A, B, C are those of the rigid minimum; vibration makes an inertial defect of {defect:.4f} u Å²",)
+        notes += (f"A, B, C are those of the rigid minimum; vibration causes an inertial defect of {defect:.4f} u Å²",)
     return replace(top.with_constants(constants), notes=notes)

@@ -1,4 +1,4 @@
-"""A dipole for a top that has none: estimated from its geometry, and noted as an estimate."""
+"""Estimate of the dipole of a top from its geometry, noted as an estimate."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ if TYPE_CHECKING:
 
 
 def with_dipole_estimate(top: Top) -> Top:
-    """The top itself where its dipole is known or a spherical top needs none, else with an estimate and a note that says so.
+    """The top if its dipole is known or not needed (spherical tops); else the top with an estimated dipole and a note.
 
-    The estimate is that of `rotor.molecules.mmff_dipole`, without what symmetry forbids. Raises ValueError where there is
-    no geometry, or none that MMFF94 has charges for.
+    The estimate is that of `rotor.molecules.mmff_dipole`, without components that symmetry forbids. Raises ValueError without
+    a geometry, or if MMFF94 has no charges for it.
     """
     if top.dipole_abc_debye is not None or top.kind == "spherical":
         return top

@@ -1,4 +1,4 @@
-"""What a top is, as plain content: the keys under which every report, file and JSON of the package names it."""
+"""Facts of a top under the keys that all reports, files and JSON of the package use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def top_facts(top: Top) -> dict[str, Any]:
     """Name, constants, kind, moments, frame, dipole, polarizability, spin weights and sources of a top.
 
-    The keys are those of docs/command_line.md; what is not known is None.
+    The keys are those of docs/command_line.md; unknown values are None.
 
     >>> from rotor.tops.top import Top
     >>> facts = top_facts(Top.from_constants("A=10 B=6 C=4 MHz"))
@@ -61,7 +61,7 @@ def top_facts(top: Top) -> dict[str, Any]:
 
 
 def estimated_errors_mhz(top: Top) -> dict[str, float]:
-    """Estimated errors of A, B, C in MHz by name, where they were not measured: of a geometry, or of scaling to another isotopologue.
+    """Estimated errors (MHz) of A, B, C by name if not measured: from a geometry, or from scaling of another isotopologue.
 
     >>> from rotor.molecules.molecule import Molecule
     >>> from rotor.tops.top import Top
@@ -70,8 +70,8 @@ def estimated_errors_mhz(top: Top) -> dict[str, float]:
     {'B': 577}
     """
     constants, molecule = top.constants, top.molecule
-    of_geometry = molecule is not None and top.source == molecule.source
-    relative = molecule.uncertainty if of_geometry and molecule is not None else top.scaling_error
+    from_geometry = molecule is not None and top.source == molecule.source
+    relative = molecule.uncertainty if from_geometry and molecule is not None else top.scaling_error
     if not relative:
         return {}
     return {
@@ -79,29 +79,29 @@ def estimated_errors_mhz(top: Top) -> dict[str, float]:
     }
 
 
-_OF_CONSTANTS = (
+_FROM_CONSTANTS = (
     "kind", "constants_mhz", "uncertainties_mhz", "estimated_errors_mhz", "reduction", "rotational_constants_mhz",
     "rotational_constants_cm", "kappa", "moments_u_angstrom2", "planar_moments_u_angstrom2",
     "inertial_defect_u_angstrom2", "spin_weights", "constants", "dipole_abc_debye",
 )  # fmt: skip
-NO_CONSTANTS = "the parameters of the file have no names here; the levels are those of its own codes"
+NO_CONSTANTS = "the parameters of the file have no names here; levels follow from its parameter codes"
 
 
 def without_constants(facts: dict[str, Any]) -> dict[str, Any]:
-    """The facts of a top that stands for the symmetry of a file alone: null in place of constants and of what follows from them.
+    """The facts of a top that only carries the symmetry of a file: null for constants and quantities derived from them.
 
-    `constants_reason` says why.
+    `constants_reason` has the reason.
 
     >>> without_constants({"name": "x", "constants_mhz": {"B": 2.0}})["constants_mhz"] is None
     True
     """
-    return {key: None if key in _OF_CONSTANTS else value for key, value in facts.items()} | {
+    return {key: None if key in _FROM_CONSTANTS else value for key, value in facts.items()} | {
         "constants_reason": NO_CONSTANTS
     }
 
 
 def _states(top: Top) -> dict[str, Any] | None:
-    """Further states of a top: constants and couplings by name, names, weights and dipoles of states."""
+    """Further vibrational states: constants and couplings, names, weights and dipoles."""
     states = top.states
     if states is None:
         return None
@@ -116,7 +116,7 @@ def _states(top: Top) -> dict[str, Any] | None:
 
 
 def formula_of(top: Top) -> str | None:
-    """The formula of the molecule behind a top; None for constants alone."""
+    """The formula of the molecule of a top; None for constants alone."""
     return top.molecule.formula if top.molecule is not None else None
 
 

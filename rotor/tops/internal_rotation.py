@@ -43,7 +43,7 @@ BARE = (
     "rho",
     "delta",
     *(name for name in NUMBERED if name.startswith(("delta", "epsilon"))),
-)  # without a unit, radians
+)  # dimensionless, or angles in radians
 DEFAULT_FUNCTIONS = {
     1: 9,
     2: 25,
@@ -69,7 +69,7 @@ def species_of_tops(count: int) -> dict[str, tuple[int, ...]]:
 
 
 def is_torsional(name: str) -> bool:
-    """Whether a constant belongs to an internal rotor by its name: F, rho, a barrier, a named term, or one spelled with p, cos or sin.
+    """Whether a constant belongs to an internal rotor: F, rho, a barrier, a named term, or a term spelled with p, cos or sin.
 
     >>> [is_torsional(name) for name in ("V3", "J2p2", "Jz1Jpm1", "DeltaJ")]
     [True, True, False, False]
@@ -136,7 +136,7 @@ class InternalRotationConstants:
         object.__setattr__(self, "uncertainties", MappingProxyType(dict(self.uncertainties)))
 
     def _check_names(self) -> None:
-        """ValueError for names that are none, that another frame has, and that are missing."""
+        """Raise ValueError for unknown names, names of the other frame, and missing names."""
         for name in self.values:
             if re.fullmatch(r"(F0|delta|epsilon|V3|V6)_[4-9]", name):
                 raise ValueError(f"{name}: computed are molecules with up to three tops; leave the others locked")
@@ -162,7 +162,7 @@ class InternalRotationConstants:
 
     @property
     def tops(self) -> int:
-        """How many tops turn."""
+        """Number of internal rotors."""
         return max((NUMBERED | PAIRS).get(name, 1) for name in (*self.values, ""))
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -181,7 +181,7 @@ class InternalRotationConstants:
     def parse(cls, text: str) -> InternalRotationConstants:
         """Constants from a text such as "RAM F=7.57cm-1 rho=0.3286 V3=407.6cm-1 Dab=0.12cm-1 vt_max=1".
 
-        Raises ValueError for a frame that is not stated first, and for items that are not NAME=VALUE.
+        Raises ValueError if the text does not start with a frame, and for items that are not NAME=VALUE.
 
         >>> InternalRotationConstants.parse("PAM F0=158.6GHz delta=0.322 V3=11100GHz vt_max=0").vt_max
         0
@@ -204,9 +204,9 @@ class InternalRotationConstants:
 
     @property
     def weights(self) -> tuple[int, int]:
-        """Spin weights of A, and of E with both components, of three equal nuclei with n = 2I + 1 states each.
+        """Spin weights of A, and of E with both components, for three equal nuclei with n = 2I + 1 states each.
 
-        A has (n³ + 2n)/3 of the n³ spin functions, each component of E (n³ - n)/3: 4 and 4 of CH3, 11 and 16 of CD3.
+        A has (n³ + 2n)/3 of the n³ spin functions, each component of E (n³ - n)/3: 4 and 4 for CH3, 11 and 16 for CD3.
         """
         n = self.spin_states
         return (n**3 + 2 * n) // 3, 2 * (n**3 - n) // 3

@@ -1,4 +1,4 @@
-"""Which kind of top a body is: linear, spherical, prolate, oblate or asymmetric, by its moments and by its symmetry."""
+"""Kind of top (linear, spherical, prolate, oblate, asymmetric) from moments of inertia and from symmetry."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class KindOfTop:
-    """Which kind a geometry is, by which numbers: I_a/I_c, the relative differences of moments, and the tolerances."""
+    """The kind of a geometry, with the numbers that decide it: I_a/I_c, relative differences of moments, and tolerances."""
 
     kind: str
     linearity: float  # I_a / I_c
@@ -28,7 +28,7 @@ class KindOfTop:
 
     @property
     def margin(self) -> float:
-        """The factor by which the deciding number is away from its tolerance; near 1 the choice is doubtful."""
+        """The factor between the deciding number and its tolerance; near 1 the kind is doubtful."""
         deciding = {
             "linear": [self.linear_below / max(self.linearity, 1e-300)],
             "spherical": [self.equal_within / max(self.ab, self.bc, 1e-300)],
@@ -44,9 +44,9 @@ class KindOfTop:
 def kind_from_moments(
     moments: ArrayLike, *, linear_below: float = LINEAR_BELOW, equal_within: float = EQUAL_MOMENTS
 ) -> KindOfTop:
-    """Kind of top of principal moments I_a ≤ I_b ≤ I_c (any unit): linear, spherical, prolate, oblate, asymmetric.
+    """Kind of top from principal moments I_a ≤ I_b ≤ I_c (any unit).
 
-    Linear when I_a/I_c < `linear_below`; two moments are equal when they differ by less than `equal_within` of the larger.
+    Linear if I_a/I_c < `linear_below`; two moments are equal if they differ by less than `equal_within` of the larger.
 
     >>> kind_from_moments([1.0, 2.0, 2.0]).kind
     'prolate'
@@ -65,10 +65,10 @@ def kind_from_moments(
 
 
 def kind_with_symmetry(by_numbers: KindOfTop, symmetry: Symmetry) -> KindOfTop:
-    """The kind that the point group settles, else the one by numbers.
+    """The kind that the point group determines, else the kind from the moments.
 
-    A group T, O or I makes a spherical top, an axis C3 or higher, or S4, a symmetric one, C∞ a linear molecule. Lower
-    groups settle nothing: moments that agree there do so by accident.
+    A group T, O or I means a spherical top, an axis C3 or higher, or S4, a symmetric top, C∞ a linear molecule. Lower
+    groups determine nothing: equal moments are accidental there.
     """
     group = symmetry.rotation_group
     if symmetry.linear:
@@ -78,5 +78,5 @@ def kind_with_symmetry(by_numbers: KindOfTop, symmetry: Symmetry) -> KindOfTop:
     elif symmetry.point_group in ("D2d", "S4") or (group[1:].isdigit() and int(group[1:]) > 2):
         kind = "prolate" if by_numbers.bc < by_numbers.ab else "oblate"
     else:
-        return replace(by_numbers, reason=f"{symmetry.point_group} settles no kind; by the moments")
+        return replace(by_numbers, reason=f"{symmetry.point_group} determines no kind; by the moments")
     return replace(by_numbers, kind=kind, reason=f"by symmetry: {symmetry.point_group}")

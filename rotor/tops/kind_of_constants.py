@@ -1,4 +1,4 @@
-"""What a set of constants is by its names and sizes: kind of top, reduction, representation; and which names each kind has."""
+"""Kind of top, reduction and representation of a set of constants, from its names and values; names allowed for each kind."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ KNOWN = tuple(dict.fromkeys((*RIGID, *LINEAR, *SPHERICAL, *S_REDUCTION, *A_REDUC
 def ray_kappa(a: float, b: float, c: float) -> float:
     """Ray's asymmetry parameter κ = (2B - A - C)/(A - C): -1 prolate, +1 oblate; -1 for a linear top (A infinite).
 
-    Source: Ray, Z. Phys. 78 (1932) 74. Raises ValueError for a spherical top, where κ is 0/0.
+    Source: Ray, Z. Phys. 78 (1932) 74. Raises ValueError for a spherical top, where κ is undefined.
 
     >>> ray_kappa(3.0, 2.0, 1.0)
     0.0
@@ -33,7 +33,7 @@ def ray_kappa(a: float, b: float, c: float) -> float:
 
 
 def vocabulary(kind: str, reduction: str | None = None) -> tuple[str, ...]:
-    """The names that constants of a kind of top may have; both reductions of an asymmetric top if none is given.
+    """The names of constants for a kind of top; for an asymmetric top without a reduction, those of both reductions.
 
     >>> vocabulary("linear")
     ('B', 'D', 'H', 'L')
@@ -44,7 +44,7 @@ def vocabulary(kind: str, reduction: str | None = None) -> tuple[str, ...]:
 
 
 def kind_of(values: Mapping[str, float], kind: str | None) -> str:
-    """The kind given, where it fits the constants, else that of the rule of `Constants`; ValueError where neither is possible."""
+    """The given kind if the constants fit it, else the kind by the rule of `Constants`; ValueError if they do not fit."""
     rigid = "".join(name for name in RIGID if name in values)
     if kind is None:
         return _by_rule(rigid, values)
@@ -66,8 +66,8 @@ def kind_of(values: Mapping[str, float], kind: str | None) -> str:
             "oblate": "B and C, or A, B, C with A = B exactly",
             "asymmetric": "A, B and C",
         }[kind]
-        have = ", ".join(f"{name} = {values[name]!r}" for name in rigid) or "none of A, B, C"
-        raise ValueError(f"kind {kind!r} needs {needed}, but the constants have {have}")
+        present = ", ".join(f"{name} = {values[name]!r}" for name in rigid) or "none of A, B, C"
+        raise ValueError(f"kind {kind!r} needs {needed}, but the constants have {present}")
     return kind
 
 
@@ -89,7 +89,7 @@ def _by_rule(rigid: str, values: Mapping[str, float]) -> str:
 
 
 def reduction_of(kind: str, names: Mapping[str, float], reduction: str | None) -> str | None:
-    """The reduction given, or the one the names tell; None for a rigid asymmetric top and every other kind."""
+    """The given reduction, or the one that the names imply; None for rigid asymmetric tops and all other kinds."""
     if reduction not in (None, "A", "S"):
         raise ValueError(f"reduction {reduction!r}: Watson's reductions are 'A' and 'S'")
     if kind != "asymmetric":
@@ -108,14 +108,14 @@ def reduction_of(kind: str, names: Mapping[str, float], reduction: str | None) -
             f"reduction {reduction!r}, but {', '.join(belonging[implied])} belong to the {implied}-reduction"
         )
     if not reduction and not implied and any(name in _SHARED - {*RIGID} for name in names):
-        raise ValueError("octic and decic names alone fit both reductions; say reduction='A' or reduction='S'")
+        raise ValueError("octic and decic names fit both reductions; give reduction='A' or reduction='S'")
     return reduction or implied
 
 
 def representation_of(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:
-    """The axes given, or Ir for κ <= 0 and IIIl for κ > 0; None for every kind but asymmetric tops."""
+    """The given representation, or Ir for κ <= 0 and IIIl for κ > 0; None for all kinds but asymmetric tops."""
     if representation is not None:
-        axes_of(representation)  # refuses one that does not exist
+        axes_of(representation)  # raises for an unknown representation
     if kind != "asymmetric":
         if representation:
             raise ValueError(f"representation {representation!r} belongs to asymmetric tops; kind is {kind!r}")

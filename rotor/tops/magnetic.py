@@ -1,8 +1,8 @@
-"""What a magnetic field acts on in a molecule without electron spin: the rotational g tensor and the magnetisability.
+"""Magnetic tensors of a molecule without electron spin: the rotational g tensor and the magnetisability.
 
-Both are along the principal axes a, b, c. g is dimensionless, the moment of rotation being μ_N ½ Σ g_ij (Φ_Zi J_j + J_j Φ_Zi); the
-magnetisability χ is in 1e-6 erg/(G² mol), as tables have it, negative for diamagnetic molecules (W. H. Flygare, Chem. Rev. 74, 653
-(1974)). Both belong to one isotopologue: g goes roughly as 1/I, and with the centre of mass.
+Both are given along the principal axes a, b, c. g is dimensionless; the rotational moment is μ_N ½ Σ g_ij (Φ_Zi J_j + J_j Φ_Zi). The
+magnetisability χ is in 1e-6 erg/(G² mol), as in tables, negative for diamagnetic molecules (W. H. Flygare, Chem. Rev. 74, 653
+(1974)). Both belong to one isotopologue: g varies roughly as 1/I and with the centre of mass.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ ELEMENTS = ("aa", "bb", "cc", "ab", "ac", "bc")
 
 @dataclass(frozen=True)
 class MagneticTensors:
-    """g (3, 3) and the magnetisability (3, 3) in 1e-6 erg/(G² mol) or None, and where they are from.
+    """g (3, 3), the magnetisability (3, 3) in 1e-6 erg/(G² mol) or None, and their source.
 
-    g need not be symmetric. Raises ValueError for numbers that are not finite and a magnetisability that is not symmetric.
+    g need not be symmetric. Raises ValueError for non-finite numbers and an asymmetric magnetisability.
 
     >>> MagneticTensors(tensor_of((0.7, 0.3, 0.2))).g[0]
     (0.7, 0.0, 0.0)
@@ -58,9 +58,9 @@ def tensor_of(numbers: ArrayLike) -> Tensor:
 
 
 def tensor_for(kind: str, numbers: Sequence[float]) -> Tensor:
-    """A tensor of a top of a kind: all of it, along and across the axis of a symmetric top, or across that of a linear one.
+    """A tensor for a kind of top: 3 or 6 elements; along and across the axis of a symmetric top; or across that of a linear top.
 
-    The element along the axis of a linear top does nothing to g; here it is 0 where one number is given.
+    The element along the axis of a linear top has no effect; it is set to 0 if a single number is given.
 
     >>> tensor_for("linear", [-0.03])
     ((0.0, 0.0, 0.0), (0.0, -0.03, 0.0), (0.0, 0.0, -0.03))
@@ -78,5 +78,5 @@ def tensor_for(kind: str, numbers: Sequence[float]) -> Tensor:
         return tensor_of(numbers)
     raise ValueError(
         f"{len(numbers)} numbers for a top of the kind {kind}: expected aa,bb,cc or aa,bb,cc,ab,ac,bc; parallel,perpendicular "
-        "of a linear or symmetric top; or the one across the axis of a linear top"
+        "of a linear or symmetric top; or the element across the axis of a linear top"
     )

@@ -2,8 +2,8 @@
 
     {"A": "9.4 GHz", "B": 3100, "C": 2500, "chi_aa(14N)": -4.2, "E[1]": "5 GHz", ..., "G_c[0,1]": 450}
 
-A name with its spins in round brackets belongs to `SpinConstants`, one with states in square brackets alone to `StateConstants`, any other
-to `Constants`; numbers are MHz.
+A name with spins in round brackets belongs to `SpinConstants`, a name with only states in square brackets to `StateConstants`, others
+to `Constants`; numbers are in MHz.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from rotor.units import parse_quantity
 
 
 def constants_of_names(values: Mapping[str, float | str], spins: str | None = None) -> tuple[Constants, dict[str, Any]]:
-    """The constants of a mapping, and `spin_constants` and `states` where it has any, as fields of a top.
+    """The rotational constants of a mapping, and `spin_constants` and `states`, if present, as fields of a top.
 
-    spins: how large those are that are not called after isotopes, and which are coupled first, such as "S=1/2".
+    spins: sizes of spins not named after isotopes, and spins that are coupled first, such as "S=1/2".
 
-    >>> own, others = constants_of_names({"A": 9400, "B": 3100, "C": 2500, "chi_aa(14N)": "-4.2 MHz"})
-    >>> own["A"], dict(others["spin_constants"].values)
+    >>> rotational, others = constants_of_names({"A": 9400, "B": 3100, "C": 2500, "chi_aa(14N)": "-4.2 MHz"})
+    >>> rotational["A"], dict(others["spin_constants"].values)
     (9400.0, {'chi_aa(14N)': -4.2})
     """
     kinds: dict[str, dict[str, float]] = {"": {}, "(": {}, "[": {}}
@@ -39,7 +39,7 @@ def constants_of_names(values: Mapping[str, float | str], spins: str | None = No
 
 
 def fields_of_texts(fields: Mapping[str, Any], spins: str | None = None) -> dict[str, Any]:
-    """Fields of a top whose `spin_constants` and `states` may be texts, or mappings by name in MHz.
+    """Fields of a top, where `spin_constants` and `states` may be texts, or mappings by name in MHz.
 
     >>> fields_of_texts({"spin_constants": "chi_aa(14N)=-4.2 MHz"})["spin_constants"].of("14N")
     {'chi_aa': -4.2}

@@ -1,12 +1,12 @@
-"""Which operator every published name stands for, and names for terms that have none of their own.
+"""Operators behind the published names of constants, and names for terms without a published name.
 
-A term of the effective Hamiltonian of one vibrational state is J^2p Jz^2q (n = 0) or J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊, known
-by its powers (p, q, n). Watson's names stand for such terms with a sign: ΔJ for -J⁴. A term without a name is spelled
-out: `J4Jz2Jpm6` is J⁴ ½[Jz², J₊⁶ + J₋⁶]₊, every exponent being that of J.
+A term of the effective Hamiltonian of one vibrational state is J^2p Jz^2q (n = 0) or J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊, identified
+by its powers (p, q, n). Watson's names denote such terms with a sign, such as ΔJ for -J⁴. A term without a name is spelled
+out: `J4Jz2Jpm6` is J⁴ ½[Jz², J₊⁶ + J₋⁶]₊, with the exponents of the angular momentum.
 
 Names and signs: J. K. G. Watson, "Aspects of quartic and sextic centrifugal effects", in Vibrational Spectra and
 Structure 6 (1977), eq. 39 (A) and table 6 (S); octic names as in Watson, J. Mol. Spectrosc. 103 (1984) 350-363. The decic
-P J^2(5-q) Jz^2q are named as CDMS names them; without them the levels of water above J = 14 fold back.
+terms P J^2(5-q) Jz^2q have the names of CDMS; without them the levels of water above J = 14 fold back.
 """
 
 from __future__ import annotations
@@ -27,14 +27,18 @@ REPRESENTATIONS = {
 }  # principal axes at x, y, z
 
 KINDS = ("linear", "spherical", "prolate", "oblate", "asymmetric")
-FIGURE_AXIS = {"linear": "a", "prolate": "a", "oblate": "c"}  # the axis of a top that has one
-AXIAL_REPRESENTATION = {"prolate": "Ir", "spherical": "Ir", "oblate": "IIIr"}  # in which that axis is z
+FIGURE_AXIS = {"linear": "a", "prolate": "a", "oblate": "c"}  # figure axis of linear and symmetric tops
+AXIAL_REPRESENTATION = {
+    "prolate": "Ir",
+    "spherical": "Ir",
+    "oblate": "IIIr",
+}  # representation with the figure axis as z
 
 
 def axes_of(representation: str) -> str:
     """The principal axes at x, y, z of a representation.
 
-    Raises ValueError for one that does not exist.
+    Raises ValueError for an unknown representation.
 
     >>> axes_of("IIIl")
     'bac'
@@ -45,7 +49,7 @@ def axes_of(representation: str) -> str:
 
 
 def added(weighted: Iterable[tuple[Operators, float]]) -> Operators:
-    """The sum of operators times numbers.
+    """Sum of operators times numbers.
 
     >>> added([({(1, 0, 0): 0.5, (0, 1, 0): -0.5}, 2.0), ({(1, 0, 0): 1.0}, 3.0)])
     {(1, 0, 0): 4.0, (0, 1, 0): -1.0}
@@ -64,7 +68,7 @@ _DECIC = {"PJ": (5, 0), "PJJK": (4, 1), "PJK": (3, 2), "PKJ": (2, 3), "PKKJ": (1
 
 
 def _diagonal(quartic: str, sextic: str) -> dict[str, Operators]:
-    """The terms diagonal in K, named DJ ... or DeltaJ ..., HJ ... or PhiJ ..., LJ ..., PJ ..."""
+    """Terms diagonal in K: DJ ... or DeltaJ ..., HJ ... or PhiJ ..., LJ ..., PJ ..."""
     table: dict[str, Operators] = {quartic + name: {(*powers, 0): -1.0} for name, powers in _QUARTIC.items()}
     table |= {sextic + name: {(*powers, 0): 1.0} for name, powers in _SEXTIC.items()}
     return table | {name: {(*powers, 0): 1.0} for name, powers in (_OCTIC | _DECIC).items()}
@@ -100,7 +104,7 @@ _SPELLED = re.compile(r"(?=J)(?:J(?P<p>[1-9]\d*))?(?:Jz(?P<q>[1-9]\d*))?(?:Jpm(?
 
 
 def distortion_terms(kind: str, reduction: str | None) -> dict[str, Operators]:
-    """Every published name of distortion for a kind of top, and what it stands for; S where no reduction is given.
+    """The published names of distortion constants for a kind of top, with their operators; S if no reduction is given.
 
     >>> distortion_terms("asymmetric", "A")["deltaK"]
     {(0, 1, 1): -1.0}
@@ -111,7 +115,7 @@ def distortion_terms(kind: str, reduction: str | None) -> dict[str, Operators]:
 
 
 def spelled_term(p: int, q: int, n: int) -> str:
-    """The name that spells a term out.
+    """The spelled-out name of a term.
 
     >>> spelled_term(2, 1, 3), spelled_term(6, 0, 0)
     ('J4Jz2Jpm6', 'J12')
@@ -120,12 +124,12 @@ def spelled_term(p: int, q: int, n: int) -> str:
         if isinstance(power, bool) or not isinstance(power, int) or power < 0:
             raise ValueError(f"term ({p!r}, {q!r}, {n!r}): the powers p, q, n are whole numbers of 0 or more")
     if not p and not q and not n:
-        raise ValueError("term (0, 0, 0): a constant energy is no term of rotation")
+        raise ValueError("term (0, 0, 0): a constant energy is not a rotational term")
     return "".join(f"{letter}{2 * power}" for letter, power in (("J", p), ("Jz", q), ("Jpm", n)) if power)
 
 
 def powers_of_spelled(name: str) -> Powers | None:
-    """The powers (p, q, n) of a name that spells a term out, None for any other name.
+    """The powers (p, q, n) of a spelled-out name; None for other names.
 
     >>> powers_of_spelled("J4Jz2Jpm6"), powers_of_spelled("DJK")
     ((2, 1, 3), None)
@@ -141,7 +145,7 @@ def powers_of_spelled(name: str) -> Powers | None:
 
 
 def published_name(powers: Powers, kind: str, reduction: str | None) -> str:
-    """The published name of a term in a kind of top and reduction (either, if None), "" where it has none.
+    """The published name of a term for a kind of top and reduction (either, if None); "" if there is none.
 
     >>> published_name((2, 0, 0), "asymmetric", "A"), published_name((2, 0, 1), "linear", None)
     ('DeltaJ', '')

@@ -1,4 +1,4 @@
-"""What is said of constants, dipoles and geometries that hardly any molecule has: they are taken as given, with a note."""
+"""Notes on constants, dipoles and geometries that hardly any molecule has; they are accepted all the same."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
     from rotor.tops.top import Top
 
-LARGEST_DEFECT = 0.1  # of I_c; of the molecules of the library water has most, 0.028
-LARGEST_DIPOLE_DEBYE = 20.0  # the largest of the library is 4.5 D
-SHORTEST_BOND_TWICE = 1.3  # Å; H2 has 0.74 Å, 1.40 bohr: whatever is nearer is no molecule in bohr
-BOND_UP_TO = 1.3  # of the sum of the covalent radii of Cordero et al. 2008, as in ASE
+LARGEST_DEFECT = 0.1  # relative to I_c; the largest in the library is 0.028, of water
+LARGEST_DIPOLE_DEBYE = 20.0  # the largest in the library is 4.5 D
+SHORTEST_BOND_TWICE = 1.3  # Å; H2 has 0.74 Å = 1.40 bohr: smaller numbers are not coordinates in bohr
+BOND_UP_TO = 1.3  # longest bond, relative to the sum of covalent radii (Cordero et al. 2008, as in ASE)
 DEBYE_PER_ATOMIC_UNIT = 2.541746  # e a0, CODATA
 
 
 def implausible(top: Top) -> tuple[str, ...]:
-    """Notes on a top: I_c above I_a + I_b by more than vibration gives, a dipole that is too large, coordinates that look like bohr.
+    """Notes on a top: I_c above I_a + I_b by more than vibration explains, too large a dipole, coordinates that look like bohr.
 
-    A rigid body has I_c <= I_a + I_b, with equality where it is flat.
+    A rigid body has I_c <= I_a + I_b, with equality if it is flat.
 
     >>> from rotor.tops.top import Top
     >>> [text[:32] for text in implausible(Top.from_constants("A=9000 B=3000 C=1500"))]
@@ -39,7 +39,7 @@ def implausible(top: Top) -> tuple[str, ...]:
     size = math.hypot(*(top.dipole_abc_debye or (0.0,)))
     if size > LARGEST_DIPOLE_DEBYE:
         notes.append(
-            f"a dipole of {size:.4g} D is larger than that of a molecule: components are in debye (e a0 is {DEBYE_PER_ATOMIC_UNIT:.4g} D)"
+            f"a dipole of {size:.4g} D is too large for a molecule: components are in debye (e a0 is {DEBYE_PER_ATOMIC_UNIT:.4g} D)"
         )
     if top.molecule is not None and len(top.molecule.symbols) > 1:
         notes += _far_apart(top.molecule)
@@ -47,7 +47,7 @@ def implausible(top: Top) -> tuple[str, ...]:
 
 
 def _far_apart(molecule: Molecule) -> list[str]:
-    """A note where no two atoms are near enough for a bond, and all would have one if the coordinates were in bohr."""
+    """A note if no two atoms are close enough for a bond, but all would be if the coordinates were in bohr."""
     distances = np.linalg.norm(molecule.positions_angstrom[:, None] - molecule.positions_angstrom, axis=2)
     np.fill_diagonal(distances, np.inf)
     if distances.min() < SHORTEST_BOND_TWICE:
@@ -58,5 +58,5 @@ def _far_apart(molecule: Molecule) -> list[str]:
     longest = BOND_UP_TO * (radii[:, None] + radii)
     if (distances < longest).any() or not (units.BOHR_RADIUS_ANGSTROM * distances < longest).any(axis=1).all():
         return []
-    return [f"no two atoms are near enough for a bond, the nearest are {distances.min():.3g} Å apart: coordinates are read in ångström; "
+    return [f"no two atoms are close enough for a bond, the closest are {distances.min():.3g} Å apart: coordinates are read in ångström; "
             f"if they are in bohr, multiply them by {units.BOHR_RADIUS_ANGSTROM:.6f}"]  # fmt: skip

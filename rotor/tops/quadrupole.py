@@ -1,6 +1,6 @@
-"""Constants of nuclear quadrupole coupling of a top from the tensors of its molecule, along its principal axes.
+"""Nuclear quadrupole coupling constants of a top along its principal axes, from the tensors of its molecule.
 
-χ_abc = A χ Aᵀ       A: the principal axes in rows (W. Gordy and R. L. Cook, Microwave Molecular Spectra, 3rd ed., chapter IX)
+χ_abc = A χ Aᵀ       A: rows are the principal axes (W. Gordy and R. L. Cook, Microwave Molecular Spectra, 3rd ed., chapter IX)
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from rotor.geometry.inertia import PrincipalFrame
     from rotor.molecules.molecule import Molecule
 
-NOISE = 1e-3  # of the largest element, and in MHz: programs print four decimals, and symmetry is met that well
+NOISE = 1e-3  # relative to the largest element, and in MHz: programs print four decimals and meet symmetry that well
 
 
 def computed_couplings(molecule: Molecule, frame: PrincipalFrame) -> SpinConstants | None:
-    """χ of every nucleus with a spin of 1 or more, None where no tensor is known.
+    """χ of all nuclei with spin 1 or more; None without tensors.
 
-    What is below 1 kHz, or 1e-3 of the largest element, counts as 0 off the diagonal and in χ_bb - χ_cc.
+    Off-diagonal elements and χ_bb - χ_cc below 1 kHz, or below 1e-3 of the largest element, count as 0.
 
     >>> from rotor.geometry.inertia import point_masses, principal_frame
     >>> from rotor.molecules.molecule import Molecule
@@ -39,8 +39,8 @@ def computed_couplings(molecule: Molecule, frame: PrincipalFrame) -> SpinConstan
     twice, atoms = {}, {}
     for atom, chi in sorted(with_spin.items()):
         nucleus = molecule.nuclei[atom - 1]
-        alike = [other for other in sorted(with_spin) if molecule.nuclei[other - 1] == nucleus]
-        name = nucleus.label + (f"_{alike.index(atom) + 1}" if len(alike) > 1 else "")
+        equal_nuclei = [other for other in sorted(with_spin) if molecule.nuclei[other - 1] == nucleus]
+        name = nucleus.label + (f"_{equal_nuclei.index(atom) + 1}" if len(equal_nuclei) > 1 else "")
         twice[name], atoms[name] = round(2 * nucleus.spin), atom
         values |= {f"{symbol}({name})": value for symbol, value in _named(frame.axes @ chi @ frame.axes.T).items()}
     return SpinConstants(values, twice, f"computed: {molecule.quadrupole_source or molecule.source}", atoms=atoms)

@@ -1,6 +1,6 @@
-"""A top: inertia, principal axes, rotational constants, kind, dipole, polarizability, spin weights. The waist of the package.
+"""A top: inertia, principal axes, rotational constants, kind, dipole, polarizability, spin weights. The central object of the package.
 
-A molecule becomes a top here; the quantum and the classical half know tops only. Someone with constants alone starts at
+A molecule becomes a top here; the quantum and the classical half work with tops only. Constants without a geometry enter through
 `Top.from_constants`.
 """
 
@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
     from rotor.molecules.symmetry.point_group import Symmetry
 
-NOISE_ANGSTROM = 0.01  # displacements below it may be noise of a geometry: a symmetry that they spoil is named
-SYMMETRIC_WITHIN = 1e-3  # of the shortest distance between nuclei: displacements that symmetry may overlook
+NOISE_ANGSTROM = 0.01  # smaller displacements may be noise of a geometry: a note names the symmetry that they break
+SYMMETRIC_WITHIN = 1e-3  # tolerance of symmetry, relative to the shortest distance between nuclei
 NO_WEIGHTS = SpinWeights()
 
 
@@ -56,20 +56,19 @@ NO_WEIGHTS = SpinWeights()
 class Top:
     """A rigid or semi-rigid rotor.
 
-    constants: named constants in MHz. dipole_abc_debye: (μa, μb, μc) or None where it is not known.
-    polarizability_abc_angstrom3: the symmetric tensor (3, 3) along a, b, c as rows, in Å³, or None. spin_weights:
-    nuclear-spin weights. mass_u: for Doppler widths. frame: principal frame of a geometry, None without one.
-    kind_of_top: how the kind was decided. molecule, symmetry: of a geometry. source: where the constants are from.
-    independent_errors: whether the uncertainties of the constants may count as uncorrelated; not those of a fit whose
-    correlations are unknown. covariance: of the constants, where it is known. notes: limits of the data. spin_constants: of
-    nuclear and electron spins, None where none are known. states: further vibrational or tunnelling states; the spin weights are
-    then those with the states taken together, and each state may have its own. level_table: energies that count instead of those of
-    the constants where it has them; both belong to these constants alone (`with_constants` leaves them out). symmetry_checked:
-    False takes a dipole that spin weights forbid as it is, as SPCAT does. magnetic: what a magnetic field acts on.
-    internal_rotation: a methyl group that turns; constants, dipole and other tensors are then along the axes of its frame.
-    scaling_error: estimated relative error of constants that were scaled from those of another isotopologue.
+    constants: rotational constants in MHz. dipole_abc_debye: (μa, μb, μc), None if unknown.
+    polarizability_abc_angstrom3: symmetric tensor (3, 3) along a, b, c in Å³, or None. spin_weights: of nuclear spins.
+    mass_u: for Doppler widths. frame: principal frame of a geometry, None without one. kind_of_top: how the kind was decided.
+    molecule, symmetry: of a geometry. source: of the constants.
+    independent_errors: whether uncertainties of the constants count as uncorrelated; False for a fit with unknown correlations.
+    covariance: of the constants, if known. notes: limits of the data. spin_constants: of nuclear and electron spins, if known.
+    states: further vibrational or tunnelling states; the spin weights are then those of all states together, and each state may have
+    its own. level_table: energies that replace those of the constants. Covariance, states and level table belong to these constants
+    (`with_constants` drops them). symmetry_checked: False accepts a dipole that spin weights forbid, as SPCAT does.
+    magnetic: tensors on which a magnetic field acts. internal_rotation: of a methyl group; constants, dipole and other tensors then
+    refer to its frame. scaling_error: estimated relative error of constants scaled from another isotopologue.
 
-    Raises ValueError for a dipole or a polarizability that the symmetry of the nuclei, or of the spin weights, forbids.
+    Raises ValueError for a dipole or polarizability that the symmetry of the nuclei, or of the spin weights, forbids.
     """
 
     constants: Constants
@@ -125,9 +124,9 @@ class Top:
         formula = self.molecule.formula if self.molecule is not None else ""
         name = ", ".join(dict.fromkeys(filter(None, (self.name, formula))))
         dipole = self.dipole_abc_debye
-        known = "not known" if dipole is None else ", ".join(f"{mu + 0.0:.5g}" for mu in dipole) + " D"
+        dipole_text = "not known" if dipole is None else ", ".join(f"{mu + 0.0:.5g}" for mu in dipole) + " D"
         inner = repr(self.constants).removeprefix("Constants(").removesuffix(")")
-        return f"Top({f'{name}, ' if name else ''}{inner}; dipole {known})"
+        return f"Top({f'{name}, ' if name else ''}{inner}; dipole {dipole_text})"
 
     def _repr_html_(self) -> str:
         """The constants with their errors, for notebooks."""
@@ -143,7 +142,7 @@ class Top:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """What the top consists of and where that is from: constants, dipole, weights, notes."""
+        """Content and sources of the top: constants, dipole, weights, notes."""
         return {
             "name": self.name,
             "kind": self.kind,
@@ -173,16 +172,16 @@ class Top:
         Parameters
         ----------
         constants : Constants, mapping or str
-            A mapping has numbers in MHz or texts with a unit by name: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`, constants of
-            spins and of further states too: `{..., "chi_aa(14N)": -4.2, "E[1]": "5 GHz", ..., "G_c[0,1]": 450}`.
+            A mapping has numbers in MHz or texts with a unit: `{"A": "9.2 GHz", "B": 3000, "C": 2500}`, also for constants of
+            spins and further states: `{..., "chi_aa(14N)": -4.2, "E[1]": "5 GHz", ..., "G_c[0,1]": 450}`.
         dipole_abc_debye : (3,) array, optional
             Along the principal axes.
         spin_weights : SpinWeights or dict of str to int, optional
-            Nuclear-spin weights; 1 for all by default.
+            Nuclear-spin weights; by default 1 for all levels.
         spins : str, optional
-            How large spins are that are not called after isotopes, "S=1/2", and which are coupled first, "35Cl_1+35Cl_2".
+            Sizes of spins not named after isotopes, "S=1/2", and spins that are coupled first, "35Cl_1+35Cl_2".
         others : object
-            Any further field of `Top`; `spin_constants` and `states` as texts or mappings too.
+            Further fields of `Top`; `spin_constants` and `states` may be texts or mappings.
 
         Returns
         -------
@@ -192,14 +191,14 @@ class Top:
         Raises
         ------
         ValueError
-            For unknown names, units or an impossible set.
+            For unknown names or units, and for impossible constants.
         """
         if isinstance(constants, str):
             constants = Constants.parse(constants)
         if not isinstance(constants, Constants):
             constants, coupled = constants_of_names(constants, spins)
             if twice := ", ".join(coupled.keys() & others.keys()):
-                raise ValueError(f"{twice}: given by name among the constants and again; give each once")
+                raise ValueError(f"{twice}: given among the constants and again; give each once")
             others |= coupled
         if not isinstance(spin_weights, SpinWeights):
             spin_weights = SpinWeights.from_mapping(spin_weights) if spin_weights else SpinWeights()
@@ -214,16 +213,16 @@ class Top:
         equal_within: float = EQUAL_MOMENTS,
         symmetry_within: float = SYMMETRIC_WITHIN,
     ) -> Top:
-        """A rigid top from a geometry: principal axes, A, B, C, kind, spin weights, and its tensors turned along.
+        """A rigid top from a geometry: principal axes, A, B, C, kind, spin weights, and tensors along the principal axes.
 
-        The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), the moments where it cannot.
-        Nuclear-spin weights follow from it and from `molecule.electronic`, inversion doublets unresolved. What symmetry
-        forbids of a dipole or a polarizability is left out where it is noise (`rotor.tops.allowed`).
+        The symmetry of the nuclei decides the kind where it can (C3v is a symmetric top), else the moments.
+        Nuclear-spin weights follow from the symmetry and from `molecule.electronic`, without resolved inversion. Components of
+        dipole and polarizability that symmetry forbids are removed if they are noise (`rotor.tops.allowed`).
 
         Parameters
         ----------
         molecule : Molecule
-            Two atoms or more.
+            At least two atoms.
         linear_below : float, optional
             Ratio of the smallest to the largest moment below which the top is linear.
         equal_within : float, optional
@@ -243,7 +242,7 @@ class Top:
 
         Notes
         -----
-        Neglected: everything that vibration and centrifugal distortion do, about 0.3 to 1 % between an equilibrium
+        Neglected: effects of vibration and centrifugal distortion, about 0.3 to 1 % between an equilibrium
         geometry and measured constants.
 
         Examples
@@ -303,7 +302,7 @@ class Top:
 
     @property
     def rotational_constants_mhz(self) -> tuple[float, float, float]:
-        """A, B, C in MHz for every kind of top; A of a linear top is infinite."""
+        """A, B, C in MHz for any kind of top; A of a linear top is infinite."""
         return self.constants.rigid
 
     @property
@@ -314,7 +313,7 @@ class Top:
 
     @property
     def kappa(self) -> float | None:
-        """Ray's asymmetry parameter (2B - A - C)/(A - C), -1 prolate to +1 oblate; None where A = C or linear."""
+        """Ray's asymmetry parameter (2B - A - C)/(A - C) from -1 (prolate) to +1 (oblate); None if A = C or linear."""
         a, b, c = self.rotational_constants_mhz
         return (2 * b - a - c) / (a - c) if math.isfinite(a) and a > c else None
 
@@ -331,14 +330,14 @@ class Top:
         return c - a - b
 
     def with_symmetry_within(self, displacement_angstrom: float) -> Top:
-        """A top with the symmetry that its nuclei miss by at most this much: kind, spin weights and axes follow.
+        """The top with the symmetry that its nuclei miss by at most this displacement; kind, spin weights and axes follow.
 
-        A nucleus that is off by so much has images twice as far from each other. Raises ValueError for a top without geometry
-        or with constants of its own, and for a displacement of more than a tenth of the shortest distance between nuclei.
+        The images of a displaced nucleus are twice as far apart. Raises ValueError for a top without geometry
+        or with measured constants, and for a displacement above a tenth of the shortest distance between nuclei.
         """
         if self.molecule is None or self.kind_of_top is None or self.source != self.molecule.source:
             raise ValueError(
-                f"{self.name or 'this top'} has constants of its own; the tolerance is for geometries alone"
+                f"{self.name or 'this top'} has constants that do not follow from its geometry; the tolerance is only for geometries"
             )
         from rotor.molecules.symmetry.operations import shortest_distance
 
@@ -351,38 +350,38 @@ class Top:
         return Top.from_molecule(self.molecule, symmetry_within=2.1 * displacement_angstrom / shortest)
 
     def with_constants(self, constants: Constants, source: str = "") -> Top:
-        """This top with other constants, without its covariance, level energies and further states."""
+        """The top with other constants, without covariance, level energies, further states and internal rotation."""
         return replace(
             self, constants=constants, source=source or self.source, covariance=None, level_table=None, states=None,
             internal_rotation=None,
         )  # fmt: skip
 
     def with_dipole(self, dipole_abc_debye: ArrayLike, source: str) -> Top:
-        """This top with another dipole in principal axes; dipoles of its states that are the top's own change with it."""
+        """The top with another dipole along the principal axes (D); states that share the top's dipole change with it."""
         dipole = dipole_vector(dipole_abc_debye)
         states = self.states.with_dipole(self.dipole_abc_debye, dipole) if self.states and dipole else self.states
         return replace(self, dipole_abc_debye=dipole, dipole_source=source, states=states)
 
     def with_polarizability(self, polarizability_abc_angstrom3: ArrayLike, source: str) -> Top:
-        """This top with another polarizability (3, 3) in principal axes, Å³."""
+        """The top with another polarizability (3, 3) along the principal axes, in Å³."""
         tensor = symmetric_tensor(polarizability_abc_angstrom3)
         return replace(self, polarizability_abc_angstrom3=tensor, polarizability_source=source)
 
     def with_estimated_dipole(self, dipole_debye: ArrayLike, source: str) -> Top:
-        """This top with a dipole given in the frame of its geometry; components that symmetry forbids are left out."""
+        """The top with a dipole (D) in the frame of its geometry, without components that symmetry forbids."""
         if self.frame is None or self.symmetry is None:
-            raise ValueError(f"{self.name or 'this top'} has no geometry whose frame a dipole could be in")
+            raise ValueError(f"{self.name or 'this top'} has no geometry, so a dipole has no frame")
         allowed = invariant_vector(np.asarray(dipole_debye, dtype=float), self.symmetry)
         return replace(self, dipole_abc_debye=in_frame(self.frame, allowed), dipole_source=source)
 
     def with_weights(self, weights: dict[str, int], source: str) -> Top:
-        """This top with other spin weights, for all its states."""
+        """The top with other spin weights, for all its states."""
         states = replace(self.states, weights={}) if self.states else None
         return replace(self, spin_weights=SpinWeights.from_mapping(weights), weights_source=source, states=states)
 
 
 def _near_notes(symmetry: Symmetry) -> list[str]:
-    """Notes where nuclei miss a higher symmetry by so little that noise may be the reason."""
+    """Notes if nuclei miss a higher symmetry by so little that noise may be the reason."""
     near = symmetry.near
     if near is None or near.displacement_angstrom > NOISE_ANGSTROM:
         return []
@@ -393,18 +392,18 @@ def _near_notes(symmetry: Symmetry) -> list[str]:
 
 
 def _electrons(molecule: Molecule, weights: SpinWeights) -> str:
-    """What spin weights take the electrons for, as words after the point group; none where levels weigh alike anyway."""
+    """Assumption of the spin weights about the electrons, as words after the point group; empty if all weights are equal."""
     if weights.rule == "none":
         return ""
     if molecule.electronic == "odd":
         return ", electrons in a state that half turns change in sign"
     electrons = sum(nucleus.element_number for nucleus in molecule.nuclei) - molecule.charge
-    odd = "; theirs is an odd number here, so that the state may be another" if electrons % 2 else ""
-    return f", electrons taken for a closed shell{odd}"
+    odd = "; their number is odd, so that the state may differ" if electrons % 2 else ""
+    return f", electrons assumed to form a closed shell{odd}"
 
 
 def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
-    """The rigid constants that a kind of top has, from moments in u Å²; degenerate ones are averaged."""
+    """Rigid constants for a kind of top, from moments in u Å²; degenerate moments are averaged."""
     if kind not in KINDS:
         raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
     ia, ib, ic = (float(m) for m in np.asarray(moments))
@@ -421,7 +420,7 @@ def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
 
 
 def one_state(top: Top, what: str) -> Top:
-    """The top itself where it has one state; ValueError, with what cannot be computed, where it has more.
+    """The top if it has one vibrational state; ValueError, naming the calculation, if it has more.
 
     >>> from rotor.tops.top import Top
     >>> one_state(Top.from_constants("B=5 MHz"), "levels in a field").kind
@@ -431,16 +430,16 @@ def one_state(top: Top, what: str) -> Top:
     if top.states is not None:
         names = ", ".join(top.states.name_of(v) for v in range(top.states.count))
         raise ValueError(
-            f"{what} of {top.name or 'this top'}: computed for tops of one state, and this one has {top.states.count} ({names}); "
-            "give the constants of one of them alone"
+            f"{what} of {top.name or 'this top'}: computed for a single state, but this top has {top.states.count} ({names}); "
+            "give the constants of one state"
         )
     return top
 
 
 def without_internal_rotation(top: Top, what: str) -> Top:
-    """The top itself where nothing in it turns; ValueError, with what cannot be computed, where something does."""
+    """The top if it has no internal rotation; ValueError, naming the calculation, if it has."""
     if top.internal_rotation is not None:
         raise ValueError(
-            f"{what} of {top.name or 'this top'}: not computed with internal rotation; leave its constants out for those of a rigid top"
+            f"{what} of {top.name or 'this top'}: not computed with internal rotation; leave out its constants to compute a rigid top"
         )
     return top

@@ -1,6 +1,6 @@
 """Numbers as tables print them: name=value(uncertainty in the last digits) unit, read and written without loss.
 
-Decimal arithmetic throughout, so that a number written in any unit comes back as the same floating-point number.
+Decimal arithmetic throughout: a number written in any unit reads back as the same floating-point number.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ _PRECISION = 1100  # decimal places: enough for the sum of any two floats
 def parse_named(text: str) -> tuple[dict[str, float], dict[str, float]]:
     """Values and uncertainties in MHz, by name, from text such as "B=9.2(1)GHz D=3.8kHz" or "A=5 B=4 C=3 GHz".
 
-    An item keeps its own unit; a unit at the end, after a space, serves every item that carries none; without any,
-    numbers are MHz. Raises ValueError for anything that is no such item, a name given twice, or a unit written at
-    the last item while others have none, which could mean either.
+    An item may have a unit; a unit at the end, after a space, serves all items without one; without any unit, numbers are MHz.
+    Raises ValueError for unreadable items, a repeated name, or a unit attached to the last item while others have none,
+    which is ambiguous.
 
     >>> parse_named("B=9.2(1)GHz D=3.8kHz")
     ({'B': 9200.0, 'D': 0.0038}, {'B': 100.0})
@@ -36,7 +36,7 @@ def parse_named(text: str) -> tuple[dict[str, float], dict[str, float]]:
     if unitless and items[-1]["unit"] and not shared:
         raise ValueError(
             f"{text!r}: {items[-1]['unit']} stands at {items[-1]['name']} only; put a space before it to serve "
-            f"{', '.join(unitless)} too, or give each its own"
+            f"{', '.join(unitless)} too, or give each item a unit"
         )
 
     values: dict[str, float] = {}
@@ -48,13 +48,13 @@ def parse_named(text: str) -> tuple[dict[str, float], dict[str, float]]:
         number = Decimal(f"{item['number']}e{item['power'] or 0}")
         values[item["name"]] = _product(number, factor)
         if digits := item["early"] or item["late"]:
-            spread = Decimal((0, tuple(map(int, digits)), int(number.as_tuple().exponent)))
-            uncertainties[item["name"]] = _product(spread, factor)
+            error = Decimal((0, tuple(map(int, digits)), int(number.as_tuple().exponent)))
+            uncertainties[item["name"]] = _product(error, factor)
     return values, uncertainties
 
 
 def _items(text: str) -> list[re.Match[str]]:
-    """The items name=number(digits)unit of a text that has nothing else in it but spaces, commas and semicolons."""
+    """The items name=number(digits)unit of a text; anything else but spaces, commas and semicolons is an error."""
     text = text.replace("−", "-")
     items, rest, end = [], [], 0
     for item in _ITEM.finditer(text):
@@ -74,7 +74,7 @@ def _items(text: str) -> list[re.Match[str]]:
 
 
 def _factor(unit: str) -> Decimal:
-    """MHz per unit, as the decimal number that is meant."""
+    """MHz per unit, as an exact decimal number."""
     try:
         return Decimal(repr(parse_quantity(f"1 {unit}", "MHz")))
     except ValueError as error:
@@ -87,7 +87,7 @@ def _product(number: Decimal, factor: Decimal) -> float:
 
 
 def write_number(value: float, spread: float | None, unit: str) -> str:
-    """A frequency in MHz written in `unit` as 12.345(67), cut where both numbers read back as the same floats.
+    """A frequency in MHz written in `unit` as 12.345(67), with the fewest digits that read back as the same floats.
 
     >>> write_number(835840.288, 0.012, "GHz"), write_number(-8.96e-11, None, "MHz")
     ('835.840288(12)', '-8.96e-11')

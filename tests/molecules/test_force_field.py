@@ -250,7 +250,7 @@ def test_hessian_on_the_command_line(tmp_path, capsys):
         dict(expected.values), rel=1e-6
     )  # positions of nine digits
     assert "quartic distortion from a harmonic force field" in err
-    assert "vibration makes an inertial defect of 0.062" in err  # D2O; measured constants 0.067
+    assert "vibration causes an inertial defect of 0.062" in err  # D2O; measured constants 0.067
     assert run(["info", "water", "--hessian", "calculator"]) == 2
     assert run(["info", "--constants", "B=1", "--hessian", "h.txt"]) == 2
     assert run(["info", "water", "--hessian", str(tmp_path / "none.txt")]) == 2

@@ -340,7 +340,7 @@ def test_every_fitted_file_has_its_covariance():
         assert MOLECULES[name].covariance.names == tuple(MOLECULES[name].constants.uncertainties)
     top = rotor.read("SO2")
     known = rotor.api.line_list(top, jmax=30, range_mhz=(1e5, 1.2e5), q=1.0).error_mhz
-    alone = Covariance.of_uncertainties(top.constants)
+    alone = Covariance.from_uncertainties(top.constants)
     without = rotor.api.line_list(top, jmax=30, range_mhz=(1e5, 1.2e5), q=1.0, covariance=alone).error_mhz
     assert np.median(known) < 0.001  # the lines are measured to 1 to 100 kHz, the fit has 437 of them
     assert np.median(without) > 5 * np.median(known)

@@ -162,7 +162,7 @@ def test_errors_of_levels_survive_a_conversion():
     names = tuple(before.values)
     root = rng.normal(size=(8, 8)) + 2 * np.eye(8)
     root /= np.linalg.norm(root, axis=1)[:, None]
-    old = Covariance.of_correlations(names, [0.02, 0.01, 0.01, *[1e-5] * 5], root @ root.T)
+    old = Covariance.from_correlations(names, [0.02, 0.01, 0.01, *[1e-5] * 5], root @ root.T)
     done = to_representation(before, "IIIl", old)
     errors = []
     for constants, covariance in ((before, old), (done.constants, done.covariance)):

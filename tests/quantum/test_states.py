@@ -328,7 +328,7 @@ def test_fields_have_several_states_and_alignment_refuses_them(folder, call):
     assert code == 0
     assert "1 1 0 1" in out
     top = rotor.read("doublet.toml")
-    with pytest.raises(ValueError, match="alignment of doublet: computed for tops of one state"):
+    with pytest.raises(ValueError, match="alignment of doublet: computed for a single state"):
         thermal(top, 10.0, 1e-3)
 
 

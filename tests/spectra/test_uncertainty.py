@@ -30,7 +30,7 @@ def test_linear_molecule_in_closed_form():
     from_b, from_d = 2 * n * 6e-6, 4 * n**3 * 2e-8
     plain = line_list(top, jmax=30, min_lgint=None)
     assert np.allclose(plain.error_mhz, np.hypot(from_b, from_d), rtol=1e-10)
-    rho = Covariance.of_correlations(["B", "D"], [6e-6, 2e-8], [[1, 0.9], [0.9, 1]])
+    rho = Covariance.from_correlations(["B", "D"], [6e-6, 2e-8], [[1, 0.9], [0.9, 1]])
     correlated = line_list(top, jmax=30, min_lgint=None, covariance=rho)
     closed = np.sqrt(from_b**2 + from_d**2 - 1.8 * from_b * from_d)
     assert np.allclose(correlated.error_mhz, closed, rtol=1e-9)
@@ -43,7 +43,7 @@ def test_errors_are_the_spread_of_drawn_constants():
     sigma = np.array([0.02, 0.01, 0.015, 1e-4, 2e-5])
     root = rng.normal(size=(5, 5)) + 2 * np.eye(5)
     root /= np.linalg.norm(root, axis=1)[:, None]
-    covariance = Covariance.of_correlations(tuple(values), sigma, root @ root.T)
+    covariance = Covariance.from_correlations(tuple(values), sigma, root @ root.T)
     top = Top(Constants(**values))
     ours = level_errors(top, solve_levels(top, 8), covariance)
 
@@ -72,7 +72,7 @@ def test_err_column_of_the_reference_program(shared):
     names = [p.label.removeprefix("-").replace("Del", "Delta").replace("del", "delta") for p in file.parameters]
     signs = np.array([-1.0 if p.label.startswith("-") else 1.0 for p in file.parameters])
     correlations = correlations_in(file.rest, len(names)) * np.outer(signs, signs)
-    covariance = Covariance.of_correlations(names, [constants.uncertainties[n] for n in names], correlations)
+    covariance = Covariance.from_correlations(names, [constants.uncertainties[n] for n in names], correlations)
     with gzip.open(folder / "ared6_500_p0p1pct.cat.gz") as handle:
         theirs = read_cat(handle.read())
 
@@ -116,7 +116,7 @@ def test_selected_lines_keep_their_errors():
 @pytest.mark.parametrize(
     ("names", "matrix", "says"),
     [
-        (("B", "B"), np.eye(2), "stands twice"),
+        (("B", "B"), np.eye(2), "a name is repeated"),
         (("B", "D"), np.eye(3), "square"),
         (("B", "D"), [[1, 0.5], [0.2, 1]], "symmetric"),
         (("B", "D"), [[1, 2], [2, 1]], "negative variance"),
@@ -132,9 +132,9 @@ def test_what_is_no_covariance(names, matrix, says):
 
 def test_correlations_are_checked():
     with pytest.raises(ValueError, match="1 on its diagonal"):
-        Covariance.of_correlations(["B"], [0.1], [[0.01]])
+        Covariance.from_correlations(["B"], [0.1], [[0.01]])
     with pytest.raises(ValueError, match="expected"):
-        Covariance.of_correlations(["B", "D"], [0.1], np.eye(2))
+        Covariance.from_correlations(["B", "D"], [0.1], np.eye(2))
 
 
 def test_a_stranger_among_the_names_is_refused():

@@ -91,7 +91,7 @@ def test_replace_takes_terms():
         (RIGID | {"J4": 1.0}, "DeltaJ or DJ"),
         (RIGID | {"Jz2Jpm2": 1.0, "reduction": "A"}, "deltaK"),
         (RIGID | {"J2": 1.0}, "A, B, C"),
-        ({"B": 5.0, "Jz4": 1.0}, "powers of J alone"),
+        ({"B": 5.0, "Jz4": 1.0}, "powers of J only"),
         ({"B": 5.0, "A": 9.0, "Jpm8": 1.0}, "J and Jz"),
         (RIGID | {"J4": 1.0, "J_4": 1.0}, "given twice"),
         (RIGID | {"J5": 1.0}, "not a rotational constant"),
@@ -105,7 +105,7 @@ def test_terms_refused(values, says):
 def test_impossible_powers_are_refused():
     with pytest.raises(ValueError, match="whole numbers"):
         Constants(terms={(-1, 0, 3): 1.0}, **RIGID)
-    with pytest.raises(ValueError, match="no term of rotation"):
+    with pytest.raises(ValueError, match="not a rotational term"):
         Constants(terms={(0, 0, 0): 1.0}, **RIGID)
 
 

@@ -287,7 +287,7 @@ def covariance_of(
     for i, row in enumerate(rows):
         matrix[i, : i + 1] = row
     try:
-        return Covariance.of_correlations(names, [known[name] for name in names], whole_of_lower(matrix))
+        return Covariance.from_correlations(names, [known[name] for name in names], whole_of_lower(matrix))
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 

@@ -38,7 +38,7 @@ def level_errors(top: Top, levels: Levels, covariance: Covariance) -> Floats:
     >>> from rotor.quantum.solve import solve_levels
     >>> from rotor.tops.top import Top
     >>> top = Top(Constants(B=6000.0, uncertainties={"B": 0.1}))
-    >>> covariance = Covariance.of_uncertainties(top.constants)
+    >>> covariance = Covariance.from_uncertainties(top.constants)
     >>> level_errors(top, solve_levels(top, 2), covariance).round(9).tolist()
     [0.0, 0.2, 0.6]
     """
@@ -64,7 +64,7 @@ def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None
     if top.level_table is not None:
         return None
     if top.covariance is None:
-        covariance = Covariance.of_uncertainties(top.constants) if top.independent_errors else None
+        covariance = Covariance.from_uncertainties(top.constants) if top.independent_errors else None
     else:
         covariance = top.covariance.of(parameters)
     spins = top.spin_constants.uncertainties if top.spin_constants else {}

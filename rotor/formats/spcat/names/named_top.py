@@ -125,7 +125,7 @@ def _constants_of_state(v: int, file: ParameterFile, errors: bool) -> Constants:
     try:
         return constants_of(file, errors=errors)
     except AxisOrderError as reason:
-        raise ValueError(f"state {v}: {reason.given}; axes in another order than A >= B >= C {NO_NAME}") from None
+        raise ValueError(f"state {v}: {reason.constants}; axes in another order than A >= B >= C {NO_NAME}") from None
 
 
 def _refuse_unlike(constants: list[Constants]) -> None:
