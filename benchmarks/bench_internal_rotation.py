@@ -104,6 +104,16 @@ def two_tops(equal: bool) -> rotor.Top:
     return rotor.Top.from_constants(constants, dipole_abc_debye=(0.0, 1.3, 0.0), internal_rotation=internal)
 
 
+def three_tops() -> rotor.Top:
+    """Three different tops."""
+    tops = zip((158e3, 161e3, 159.5e3), (0.56, 2.5, 1.45), (250 * CM, 340 * CM, 300 * CM), strict=True)
+    numbered = [(f"F0_{i}", f0, f"delta_{i}", delta, f"V3_{i}", v3) for i, (f0, delta, v3) in enumerate(tops, 1)]
+    values = {name: value for row in numbered for name, value in zip(row[::2], row[1::2], strict=True)}
+    constants = rotor.Constants(A=4800.0, B=3300.0, C=2200.0, reduction="A", representation="Ir")
+    internal = InternalRotationConstants(values, "PAM", vt_max=0)
+    return rotor.Top.from_constants(constants, dipole_abc_debye=(0.3, 1.3, 0.0), internal_rotation=internal)
+
+
 def iteration_of_a_fit() -> Callable[[], object]:
     """One evaluation of 1000 lines of v_t = 0 and 1 with 19 constants."""
     names = ("j", "ka", "kc", "species", "vt")
@@ -234,6 +244,9 @@ def main() -> None:
         ),
         "levels and lines of equivalent tops, four species, J to 20": lambda: rotor.api.line_list(
             two_tops(True), jmax=20, q=1.0, min_lgint=None
+        ),
+        "levels and lines of three tops, 14 species, J to 10": lambda: rotor.api.line_list(
+            three_tops(), jmax=10, q=1.0, min_lgint=None
         ),
     }
     for name, work in works.items():

@@ -38,11 +38,15 @@ SIXTH = names(
     "phiJ phiJK phiK"
 )
 EIGHTH = names("p8 Jz1p7 Jz2p6 Jz3p5 Jz4p4 Jz5p3 Jz6p2 Jz7p1")
+MIXED = names(
+    "J2p6 Jpm2p6 Jz1Jpm1p6 J2Jz1p5 Jz1Jpm2p5 J4p4 J2Jz2p4 J2Jpm2p4 J2Jz1Jpm1p4 J2Jz3p3 J4Jz1p3 J2Jz1Jpm2p3"
+)  # of sixth and eighth order, rotation and torsion: low K of v_t = 1, E
 STEPS = (
     (6, SECOND + FOURTH),
     (6, SECOND + FOURTH + TORSION),
     *((jmax, SECOND + FOURTH + TORSION + SIXTH) for jmax in (8, 12, 16)),
     *((jmax, SECOND + FOURTH + TORSION + SIXTH + EIGHTH) for jmax in (18, 20)),
+    (20, SECOND + FOURTH + TORSION + SIXTH + EIGHTH + MIXED),
 )
 
 
@@ -60,6 +64,12 @@ def catalogue(path, jmax):
                     side.append((*label[:3], int(label[3] % 3 > 0), label[3] // 3))
                 numbers.append((float(row[:13]), float(row[13:21])))
     return upper, lower, *np.array(numbers).T
+
+
+def crosses(labels):
+    """Whether E levels of v_t = 1 have K ≥ 14: v_t = 2, K = 12 crosses them, and lines of v_t = 0 and 1 do not determine where."""
+    columns = np.array(labels)
+    return (columns[:, 3] == 1) & (columns[:, 4] == 1) & (columns[:, 1] >= 14)
 
 
 def test_constants_of_the_fit_give_lines_of_the_catalogue_with_its_labels():
@@ -92,14 +102,16 @@ def test_lines_of_two_torsional_states_have_their_labels_and_frequencies(shared)
     start = TopConstants(top)
     for jmax, free in STEPS:
         upper, lower, frequency, error = catalogue(path, jmax)
-        lines = assignments(NAMES, upper, lower, frequency, np.maximum(error, 0.005))
+        left_out = crosses(upper) | crosses(lower)  # of the fit; they count in the shares below
+        lines = assignments(NAMES, upper, lower, frequency, np.where(left_out, 1e4, np.maximum(error, 0.005)))
         start = start.replace(**{name: 0.0 for name in free if name not in start})
         fit = fit_lines(lines, start, parameters(start, free), FitOptions(most_iterations=25, poor_rms=100))
         start = fit.constants
     missed = np.abs(fit.difference_mhz)
     assert len(lines) == 8587
     assert (missed < 50.0).mean() > 0.999  # another label is off by GHz
-    assert (missed < 3 * error).mean() > 0.95  # as far as the catalogue itself states them
+    assert left_out.sum() == 46
+    assert (missed < 2 * error).mean() > 0.95  # as far as the catalogue itself states them
     for vt in (0, 1):
         here = lines.upper[:, 4] == vt
-        assert (missed < 3 * error)[here].mean() > (0.99, 0.94)[vt]
+        assert (missed < 3 * error)[here].mean() > (0.99, 0.95)[vt]

@@ -110,7 +110,11 @@ class ReducedElements:
     def _moment(self, magnet: Magnet, up: AnyBlock, low: AnyBlock) -> Floats | None:
         """Elements of the magnetic moment; None where they are zero."""
         if isinstance(up, MomentBlock):
-            raise ValueError("internal rotation in a magnetic field is not computed; leave its constants out")
+            raise ValueError(
+                "internal rotation in a magnetic field is not computed: the turning group adds a moment along its axis, proportional to "
+                "<p - rho·P>, which shifts E levels to first order and whose g value is not among the constants; leave its constants "
+                "out for the moment of the rotation alone"
+            )
         if up.axial_k != low.axial_k or abs(up.twice_total - low.twice_total) > 2:
             return None
         if isinstance(up, SolvedBlock):

@@ -132,3 +132,28 @@ def test_elements_between_torsional_states_move_levels_by_less_than_is_said(sigm
         energies = [np.linalg.eigvalsh(np.diag(b.energies_mhz) - strength * b.matrix(along)) for b in blocks]
         lowest.append(np.sort(np.concatenate(energies))[:15])
     assert np.abs(lowest[0] - lowest[1]).max() < 0.1
+
+
+FILE = """
+name = "top"
+[constants]
+A = 9800
+B = 4300
+C = 3200
+reduction = "A"
+representation = "Ir"
+[internal_rotation]
+frame = "PAM"
+F0 = 158000
+delta = 0.56
+V3 = "250 cm-1"
+vt_max = 0
+"""
+
+
+def test_a_magnetic_field_is_refused_with_the_reason(tmp_path, call):
+    path = tmp_path / "top.toml"
+    path.write_text(FILE)
+    code, _, error = call("zeeman", str(path), "--jmax", "4", "--field", "0:1T:3", "--g=-0.03,-0.02,-0.01")
+    assert code == 2
+    assert "adds a moment along its axis" in error
