@@ -1,4 +1,4 @@
-"""The compiled loop of the splitting: kicks and drifts of all columns of a block, and snapshots on the way."""
+"""The compiled loop of the splitting: kicks and drifts of all columns of a block, with snapshots."""
 
 import numpy as np
 from numba import njit
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 @njit(cache=True, error_model="numpy")
 def _copy(source: NDArray[np.complex128], target: NDArray[np.complex128]) -> None:
-    """Plain loops: an assignment of slices compiles the texts of its errors with it, for four seconds."""
+    """Copy by plain loops: compiling a slice assignment, with its error messages, takes four seconds more."""
     for i in range(source.shape[0]):
         for c in range(source.shape[1]):
             target[i, c] = source[i, c]
@@ -22,10 +22,10 @@ def kick_and_drift(
     marks: NDArray[np.bool_],
     snapshots: NDArray[np.complex128],
 ) -> None:
-    """`states` (n, m) in place: for every stage i the phases[i] (n,) of a kick and the drift drifts[which[i]].
+    """Propagate `states` (n, m) in place: each stage i is a kick with phases[i] (n,) and the drift drifts[which[i]].
 
-    After the stages with `marks` the states are copied into `snapshots`. One column goes through plain loops, which are faster
-    there than a call of BLAS; more go through zgemm.
+    After stages with `marks` the states are copied into `snapshots`. A single column uses plain loops, which are then faster than
+    BLAS; several columns use zgemm.
     """
     size, columns = states.shape
     moved = np.empty_like(states)

@@ -1,4 +1,4 @@
-"""What pulses act on, and how far they carry a top: polarizability or dipole, the J that is reached, the period of revivals."""
+"""The tensor that a pulse acts on (polarizability or dipole), the highest J that is reached, and the revival period."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _DIAGONAL = (np.arange(3), np.arange(3))
-ISOTROPIC = 1e-14  # of a polarizability: an anisotropy below it is round-off
+ISOTROPIC = 1e-14  # relative to the polarizability: a smaller anisotropy is round-off
 
 
 def acted_on(top: Top, acts_on: str) -> Floats:
-    """What a channel acts on: the polarizability without its mean (3, 3) in Å³, or the dipole (3,) in D.
+    """The property that a channel acts on: the traceless polarizability (3, 3) in Å³, or the dipole (3,) in D.
 
-    Raises ValueError where it is not known or does nothing.
+    Raises ValueError if it is unknown or has no effect.
     """
     name = top.name or "this top"
     if top.kind == "spherical":
@@ -60,29 +60,29 @@ def contractions_of(top: Top, windows: Sequence[Window]) -> tuple[tuple[Contract
 
 
 def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: float) -> int:
-    """The J that a gas reaches from J = `highest`, and a tail.
+    """Estimate of the highest J that a gas reaches from J = `highest`, with a margin for the tail.
 
-    J + min(P, √(J² + U0/B) - J) for each pulse, P = ∫U0 dt/ħ, U0 the depth of the well.
+    Each pulse adds min(P, √(J² + U0/B) - J), with P = ∫U0 dt/ħ and the well depth U0.
 
     Parameters
     ----------
     top : Top
-        With what the pulses act on.
+        With the property that the pulses act on.
     pulses : sequence of Pulse
-        One after another.
+        In order of time.
     highest : int
-        The highest J that is populated before the first pulse.
+        The highest populated J before the first pulse.
     tolerance : float
-        Of the populations, from which the tail follows.
+        Tolerance of the populations; determines the margin.
 
     Returns
     -------
     int
-        J max to begin with.
+        Initial J max.
 
     Notes
     -----
-    An estimate: the population of the highest J has to be looked at afterwards.
+    The population of the highest J must be checked after the propagation.
     """
     smallest = RAD_PER_PS_MHZ * min(x for x in top.rotational_constants_mhz if math.isfinite(x))
     reached = float(highest)
@@ -97,7 +97,7 @@ def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: flo
 
 
 def _spread(body: Floats) -> float:
-    """Largest difference of energies that orientation makes, for strength 1."""
+    """Largest change of the energy with orientation, for strength 1."""
     if body.ndim == 1:
         return 2 * float(np.linalg.norm(body))
     values = np.linalg.eigvalsh(body)
@@ -115,7 +115,7 @@ def _peak_and_area(pulse: Pulse) -> tuple[float, float]:
 
 
 def revival_period_ps(top: Top) -> float:
-    """1/(2Bc), after which a rigid linear or symmetric top is as it was (B the constant across its axis).
+    """The revival period 1/(2Bc) of a rigid linear or symmetric top (B: the constant across its axis).
 
     >>> from rotor.tops.top import Top
     >>> round(revival_period_ps(Top.from_constants("B=6081.492 MHz")), 3)  # OCS

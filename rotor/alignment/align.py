@@ -2,10 +2,10 @@
 
     trace = align(top, [GaussianPulse(1e13, 0.05)], np.linspace(-0.2, 164, 4001), temperature_k=10)
 
-How each stretch of time is treated follows from what acts in it: nothing, exact phases and a sum of harmonics; a kick, one phase
-in the eigenvectors of its operator; one operator, a splitting of order 4 or 6; several, a Magnus method. The number of steps and J max
-follow from the tolerance, which is that of the cosines: the block M = 0 is carried with steps and with half of them until both agree.
-The result says what it found: step error, population at the highest J, population left out, norm.
+The method for each interval of time depends on the fields: without fields, exact phases and a sum of harmonics; for a kick, a phase
+in the eigenvectors of its operator; for one operator, a splitting of order 4 or 6; for several, a Magnus method. The number of steps and
+J max follow from the tolerance of the cosines: the block M = 0 is propagated with steps of halved length until the cosines agree.
+The result reports step error, population at the highest J, omitted population, and norm.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ HIGHEST_J = 600
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AlignmentTrace(Table):
-    """Cosines against time, and how they were found.
+    """Cosines as functions of time, with the numerical parameters.
 
-    t_ps: (t,). cosines: by name (t,). ensemble: what the gas was like at first. levels, populations: of the free top after the last
-    pulse, one row for each level, over all M. jmax: of the basis. states: initial states (level, M) that were propagated. steps: of
-    each window. step_error: by halving the steps, in the cosines. edge_population: largest population of the two highest J.
-    norm_error: largest departure of the norm from 1. harmonics: of each cosine after the last pulse.
+    t_ps: (t,). cosines: by name (t,). ensemble: the initial gas. levels, populations: of the free top after the last pulse, a row for
+    each level, summed over M. jmax: of the basis. states: propagated initial states (level, M). steps: of each window. step_error: of
+    the cosines, from halved steps. edge_population: largest population of the two highest J. norm_error: largest deviation of the norm
+    from 1. harmonics: of each cosine after the last pulse.
     """
 
     top: Top
@@ -68,12 +68,12 @@ class AlignmentTrace(Table):
 
     @property
     def columns(self) -> dict[str, Floats]:
-        """t_ps and every cosine."""
+        """t_ps and all cosines."""
         return {"t_ps": self.t_ps, **self.cosines}
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Top, pulses, ensemble and what was found about accuracy."""
+        """Top, pulses, ensemble and accuracy."""
         top = self.top
         return {
             "constants_mhz": dict(top.constants.values),
@@ -97,12 +97,12 @@ class AlignmentTrace(Table):
 
     @cached_property
     def permanent(self) -> dict[str, float]:
-        """The mean over time of each cosine after the last pulse."""
+        """The permanent alignment: time average of each cosine after the last pulse."""
         return {name: harmonics_of_cosine.constant for name, harmonics_of_cosine in self.harmonics.items()}
 
     @property
     def moved(self) -> float:
-        """The largest departure of a cosine from that of an isotropic gas."""
+        """The largest deviation of a cosine from that of an isotropic gas."""
         apart = (
             float(np.max(np.abs(values - observe.observable(name, self.top).isotropic)))
             for name, values in self.cosines.items()
@@ -111,26 +111,26 @@ class AlignmentTrace(Table):
 
     @property
     def error_estimate(self) -> float:
-        """Error of the cosines from the steps, leakage, rounded phases and the states that the ensemble leaves out.
+        """Error of the cosines from steps, leakage, rounded phases and states omitted from the ensemble.
 
-        The difference to half the steps, twice, bounds their error from order 1 on; the steps have order 4 only where they are short
-        (two of 100 random cases exceeded 16/15 of the difference, by up to 42 %). What is left out counts as isotropic, while it moves no
-        further than the gas that is followed: the higher J are, the less a pulse turns them.
+        Twice the difference to a run with half as many steps bounds the step error for any order >= 1. The steps have order 4 only if they
+        are short (two of 100 random cases exceeded 16/15 of the difference, by up to 42 %). Omitted states are taken as isotropic; their
+        cosines deviate no more than those of the propagated gas, since a pulse aligns higher J less.
         """
         return truncation_apart(self) + self.edge_population
 
 
 class BasisTooSmallError(ValueError):
-    """The two highest J hold more of the population than the tolerance allows."""
+    """The population of the two highest J exceeds the tolerance."""
 
 
 def truncation_apart(trace: AlignmentTrace) -> float:
-    """The error of the cosines by steps, by populations left out and by rounded phases, without that of the truncated basis."""
+    """The error of the cosines from steps, omitted populations and rounded phases, without that of the truncated basis."""
     return trace.step_error * 2 + trace.ensemble.left_out * trace.moved + rounding_of_phases(trace)
 
 
 def rounding_of_phases(trace: AlignmentTrace) -> float:
-    """The error of the cosines by the phases of the highest level at the last time, in double precision."""
+    """The error of the cosines from rounded phases of the highest level at the last time."""
     farthest = RAD_PER_PS_MHZ * float(np.abs(trace.levels.energy_mhz).max()) * float(np.abs(trace.t_ps).max())
     return float(np.finfo(np.float64).eps) * farthest * trace.moved
 
@@ -156,24 +156,24 @@ def align(
     top : Top
         With `polarizability_abc_angstrom3` for light, `dipole_abc_debye` for fields that act on the dipole.
     pulses : sequence of Pulse
-        Any polarizations and directions; M stays good, and the work small, where all are symmetric about Z (linear along Z,
-        circular in the XY plane).
-    times_ps : (t,) rising
-        They may begin before the first pulse; the last pulse must have ended by the last of them.
+        Any polarizations and directions. If all are symmetric about Z (linear along Z, circular in the XY plane), M is conserved and
+        the calculation is faster.
+    times_ps : (t,) increasing
+        May begin before the first pulse; must extend beyond the end of the last pulse.
     temperature_k : float
-        Of the gas; 0 is its lowest level.
+        Temperature of the gas; 0: its lowest level.
     state, m : optional
-        One level instead, by quantum numbers such as {"j": 0}, and one of its M.
+        A single level instead, by quantum numbers such as {"j": 0}, and optionally a single M.
     observables : names
         cos2theta, costheta, cos2theta_2d, cos2_aZ, ...; see `rotor.alignment.observables.observable`.
     tolerance : float
-        Of the cosines: steps, J max and the populations left out follow from it.
+        Tolerance of the cosines; determines steps, J max and omitted populations.
     jmax : int, optional
-        Of the basis; by default what the tolerance needs.
+        Of the basis; default: as needed for the tolerance.
     executor : Executor, optional
-        Blocks (M and symmetry) are spread over it.
+        Runs the blocks (M and symmetry) in parallel.
     progress : callable, optional
-        Called with the number of blocks done and of all.
+        Called with the numbers of blocks done and in total.
 
     Returns
     -------
@@ -187,8 +187,8 @@ def align(
 
     Notes
     -----
-    Neglected: what light does beyond the polarizability (hyperpolarizability, ionisation), averaging over the optical cycle (below
-    1e-7 at 800 nm), centrifugal change of the tensors, nuclear hyperfine coupling, the profile of the focus.
+    Neglected: hyperpolarizability and ionisation, the error of averaging over the optical cycle (below 1e-7 at 800 nm), centrifugal
+    changes of the tensors, nuclear hyperfine coupling, the intensity profile of the focus.
     """
     pulses = (pulses,) if isinstance(pulses, Pulse) else tuple(pulses)
     times = _checked_times(times_ps, pulses)
@@ -263,23 +263,23 @@ def carried(
     executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> AlignmentTrace:
-    """All blocks, and the trace that they make together.
+    """Propagate all blocks and combine them to a trace.
 
     Parameters
     ----------
     problem : Problem
-        What is asked for.
+        Top, pulses, times, gas and observables.
     pilot : Pilot
-        Of it: the steps and the basis.
+        Steps and basis for this problem.
     executor : Executor, optional
-        Blocks are spread over it.
+        Runs the blocks in parallel.
     progress : callable, optional
-        Called with the number of blocks done and of all.
+        Called with the numbers of blocks done and in total.
 
     Returns
     -------
     AlignmentTrace
-        Whatever population is at the edge of the basis.
+        Returned for any population at the edge of the basis.
     """
     space, before = pilot.space, problem.begins_before
     if pilot.whole and pilot.task is not None and pilot.outcome is not None:
@@ -331,7 +331,7 @@ def _method(plan: Plan) -> str:
 def _signal(
     problem: Problem, energies: Floats, outcomes: list[Outcome], place: int, before: bool
 ) -> tuple[Floats, Harmonics]:
-    """One cosine at all times, and its harmonics after the last window."""
+    """A cosine at all times, and its harmonics after the last window."""
     remainder = problem.ensemble.left_out * problem.observables[place].isotropic
     out = np.full(len(problem.times), np.nan)
     stretches = range(-1 if before else 0, len(problem.windows))

@@ -1,8 +1,8 @@
-"""Functions of cosθ, θ between an axis of the molecule and Z, that are no tensors of finite rank: |cosθ| above all.
+"""Functions of cosθ (θ: angle between a molecular axis and Z) that are not tensors of finite rank, mainly |cosθ|.
 
-Over symmetric-top functions |J k M⟩ whose k is counted about that axis, f(cosθ) changes neither k nor M, and its elements are
-integrals over cosθ that Gauss-Legendre points do exactly. A block of an asymmetric top is turned into such functions first: with z of
-its representation the axis there is nothing to do, and for x and y
+In symmetric-top functions |J k M⟩ with k about that axis, f(cosθ) is diagonal in k and M, and Gauss-Legendre quadrature over cosθ
+gives its elements exactly. A block of an asymmetric top is first transformed to such functions. If the axis is z of the representation,
+no transformation is needed; for x and y
 
     f(Φ_Zx) = U† f(Φ_Zz) U,  U = exp(-i π/2 J_y);        f(Φ_Zy) = U† f(Φ_Zz) U,  U = exp(-i π/2 J_x)      (f even)
 
@@ -27,7 +27,7 @@ from rotor.quantum.tensors import frame_of, phase_exponent
 Complexes = NDArray[np.complex128]
 EvenFunction = Callable[[Floats], Floats]
 
-ROUND_OFF = 1e-9  # imaginary parts of elements, of the largest value of f
+ROUND_OFF = 1e-9  # largest imaginary part of an element, relative to the largest value of f
 
 
 def absolute_cosine(block: AxialBlock) -> Floats:
@@ -45,7 +45,7 @@ def absolute_cosine(block: AxialBlock) -> Floats:
 
 
 def _between_functions(j: Ints, k: int, m: int, function: EvenFunction) -> Floats:
-    """⟨J' k M|f(cosθ)|J k M⟩ of the J given, none below max(|k|, |M|): (n, n).
+    """⟨J' k M|f(cosθ)|J k M⟩ (n, n) for the given J, which must be at least max(|k|, |M|).
 
     Gauss-Legendre points on each half of -1 < cosθ < 1, where |cosθ| times two functions is a polynomial.
     """
@@ -85,7 +85,7 @@ def _symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
 def asymmetric_elements(block: SolvedFieldBlock, axis: int, function: EvenFunction = np.abs) -> Floats:
     """⟨a|f(cosθ)|b⟩ over a block (n, n) of an asymmetric top, θ between the axis a (0), b (1) or c (2) and Z, f even.
 
-    Raises ValueError where the block is not one of a field along Z that leaves real phases.
+    Raises ValueError unless the block belongs to a field along Z with real phases.
     """
     if not block.real:
         raise ValueError(f"M = {block.m}: functions of an axis are made over blocks with real phases")
@@ -112,7 +112,7 @@ def asymmetric_elements(block: SolvedFieldBlock, axis: int, function: EvenFuncti
 
 
 def _turned(basis: Any, axis: int, representation: str) -> Complexes:
-    """The Wang functions of a block as combinations of |J k⟩ with k about an axis, (2J+1, functions), k rising from -J."""
+    """The Wang functions of a block as combinations of |J k⟩ with k about an axis, (2J+1, functions), k from -J to J."""
     j = basis.j
     functions = np.zeros((2 * j + 1, basis.size), dtype=np.complex128)
     for column, k in enumerate(basis.k.tolist()):
@@ -126,7 +126,7 @@ def _turned(basis: Any, axis: int, representation: str) -> Complexes:
 
 @lru_cache(maxsize=512)
 def _quarter_turn(j: int, place: int) -> Complexes:
-    """exp(-i π/2 J_y) (place 0) or exp(-i π/2 J_x) (place 1) over |J k⟩, k rising; J_x - i J_y raises k in the molecule."""
+    """exp(-i π/2 J_y) (place 0) or exp(-i π/2 J_x) (place 1) in |J k⟩, k = -J to J; J_x - i J_y raises k in the molecular frame."""
     k = np.arange(-j, j)
     raising = np.diag(np.sqrt(j * (j + 1.0) - k * (k + 1.0)), -1).astype(np.complex128)
     component = (raising.T - raising) / 2j if place == 0 else (raising + raising.T) / 2

@@ -1,8 +1,8 @@
-"""The smallest J max of an alignment: the block that holds most of the gas, carried with fewer J by the same steps.
+"""The smallest J max of an alignment: the most populated block is propagated with fewer J and the same steps.
 
-With too few J population reaches the highest of them, and is turned back there. Two things say so: the population of the two highest J,
-and by how much the cosines differ from those of the larger basis. The larger of both is taken, of the block of lowest M with the largest
-population, where light couples most.
+In too small a basis, population is reflected at the highest J. The truncation error is the larger of the population of the two highest J
+and the change of the cosines relative to the larger basis. It is computed for the most populated block of lowest M, where the coupling by
+light is strongest.
 """
 
 from __future__ import annotations
@@ -25,25 +25,25 @@ if TYPE_CHECKING:
 
 
 def least_jmax(trace: AlignmentTrace, allowed: float) -> tuple[int, float]:
-    """The smallest J max whose truncation moves the cosines by less than `allowed`, and that truncation error.
+    """The smallest J max whose truncation changes the cosines by less than `allowed`, and this truncation error.
 
     Parameters
     ----------
     trace : AlignmentTrace
-        Of a basis that is large enough.
+        A run with a sufficiently large basis.
     allowed : float
-        Of the cosines.
+        Largest truncation error of the cosines.
 
     Returns
     -------
     int
-        J max, not above that of the trace.
+        J max, at most that of the trace.
     float
-        The estimate for it: the larger of the population of its two highest J and of the change of the cosines; 0 for that of the trace.
+        Its truncation error, see above; 0 for the J max of the trace.
 
     Notes
     -----
-    Of one block; `AlignmentTrace.edge_population` of a run with this J max says what all blocks have at the edge.
+    The estimate is for one block; `AlignmentTrace.edge_population` of a run with this J max covers all blocks.
     """
     problem = _problem_of(trace)
     pilot = pilot_of(problem, trace.jmax)
@@ -67,7 +67,7 @@ def least_jmax(trace: AlignmentTrace, allowed: float) -> tuple[int, float]:
 def trace_with(trace: AlignmentTrace, jmax: int) -> AlignmentTrace:
     """Cosines recomputed with any J max; `align` itself refuses a J max too small for its tolerance.
 
-    jmax: at least that of the populated levels.
+    jmax: at least the highest J of the populated levels.
     """
     from rotor.alignment.align import carried
 
@@ -85,10 +85,10 @@ def _problem_of(trace: AlignmentTrace) -> Problem:
 
 
 def _signals(problem: Problem, jmax: int, plan: Plan) -> tuple[list[Floats], float]:
-    """Every cosine of the largest block within and after the pulses, and the population at the edge, of what is in the block."""
+    """All cosines of the largest block during and after the pulses, and its population at the edge, relative to that of the block."""
     space = problem.space(jmax)
     task, _ = pilot_task(problem, space)
-    assert task is not None  # populated levels are below every J max that is tried
+    assert task is not None  # populated levels are below all trial values of J max
     outcome = run(replace(task, plan=plan))
     energies, share = RAD_PER_PS_MHZ * space.levels.energy_mhz, float(task.weights.sum())
     period = max(float(problem.times[-1]) - problem.windows[-1].stop_ps, 0.0)

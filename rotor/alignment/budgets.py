@@ -1,7 +1,7 @@
 """Error budget of cosines of an aligned gas (`rotor.requests.budget`).
 
-Truncation: the terms of `AlignmentTrace.error_estimate`. Model: a frequency that is off by δ turns a coherence by 2π δ t in the time t, so
-that a cosine is off by at most as much of its departure from the isotropic gas, and never by more than all of it.
+Truncation: the terms of `AlignmentTrace.error_estimate`. Model: a frequency error δ changes the phase of a coherence by 2π δ t after a
+time t. The relative error of a cosine's deviation from the isotropic value is at most this phase, and at most 1.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ def cosines_budget(trace: AlignmentTrace, limits: Sequence[Limit]) -> ErrorBudge
     ----------
     trace : AlignmentTrace
     limits : sequence of Limit
-        What the calculation leaves out of frequencies, at the highest J that is populated before the pulses.
+        Neglected contributions to frequencies, at the highest populated J before the pulses.
 
     Returns
     -------
     ErrorBudget
-        Of numbers between -1 and 1.
+        Absolute errors of the cosines.
     """
     rounding = rounding_of_phases(trace)
     parts = {
@@ -58,7 +58,7 @@ def _acting(trace: AlignmentTrace) -> str:
 
 
 def model_of_cosines(trace: AlignmentTrace, limits: Sequence[Limit]) -> ErrorTerm:
-    """What frequencies that are off make of the cosines at the last time after the first pulse."""
+    """Error of the cosines at the last time from errors of the frequencies."""
     term = model_term(limits)
     if term.value is None:
         return term

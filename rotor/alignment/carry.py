@@ -1,4 +1,4 @@
-"""One block of states carried through all windows of the pulses: its task and its outcome."""
+"""Propagation of a block of states through all windows of the pulses: its task and its outcome."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 Complexes = NDArray[np.complex128]
 
-EDGE = 2  # the highest values of J, whose population is the leakage
+EDGE = 2  # number of highest J whose population is the leakage
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What is asked for, the same for every block."""
+    """The inputs of a calculation, common to all blocks."""
 
     top: Top
     pulses: tuple[Pulse, ...]
@@ -42,24 +42,24 @@ class Problem:
     observables: tuple[Observable, ...]
     tolerance: float
     contractions: tuple[tuple[Contraction, ...], ...]
-    known: dict[str, Any] = field(default_factory=dict)  # populations of the levels last asked for
+    cached: dict[str, Any] = field(default_factory=dict)  # populations of the last set of levels
 
     def space(self, jmax: int) -> FieldSpace:
         """The states up to J max and their blocks."""
         return field_space(
             one_state(self.top, "alignment"),
             jmax,
-            [contraction for of_window in self.contractions for contraction in of_window],
+            [contraction for window_contractions in self.contractions for contraction in window_contractions],
         )
 
     def m_values(self, space: FieldSpace) -> Sequence[int]:
-        """|M| of the blocks to be carried; 0 stands for all where M is mixed."""
+        """|M| of the blocks to propagate; (0,) if fields mix M."""
         if not space.m_is_good:
             return (0,)
         return range(self.ensemble.jmax + 1) if self.ensemble.m is None else (self.ensemble.m,)
 
     def free_times(self, after: int) -> slice:
-        """Which times lie between window `after` (-1: before the first) and the next; the time of a kick is before it."""
+        """Which times lie between window `after` (-1: before the first) and the next; a kick acts just after its time."""
         first, last = 0, len(self.times)
         if after >= 0:
             side: Literal["left", "right"] = "right" if self.windows[after].is_kick else "left"
@@ -70,7 +70,7 @@ class Problem:
 
     @property
     def begins_before(self) -> bool:
-        """Whether some of the times lie before the first window."""
+        """Whether any time lies before the first window."""
         return bool(self.free_times(-1).stop)
 
     def times_in(self, window: Window) -> slice:
@@ -79,15 +79,15 @@ class Problem:
         return slice(first, max(first, int(np.searchsorted(self.times, window.stop_ps))))
 
     def populations(self, levels: FreeLevels) -> Floats:
-        """Population (n,) of one state of each level, computed once for all blocks."""
-        if self.known.get("levels") is not levels:
-            self.known.update(levels=levels, populations=self.ensemble.populations(levels))
-        return np.asarray(self.known["populations"])
+        """Population (n,) of a single state of each level, computed once for all blocks."""
+        if self.cached.get("levels") is not levels:
+            self.cached.update(levels=levels, populations=self.ensemble.populations(levels))
+        return np.asarray(self.cached["populations"])
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How each window is passed: kicks of a splitting, the grid of a Magnus method, or the area of a kick."""
+    """Integration of each window: kicks of a splitting, the grid of a Magnus method, or the area of a kick."""
 
     windows: tuple[Window, ...]
     passages: tuple[propagate.KickPlan | propagate.Grid | float, ...]
@@ -95,7 +95,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Task:
-    """One block: energies (n,) in rad/ps, operators by window, cosines, rows, initial columns with weights, edge states."""
+    """Inputs of a block: energies (n,) in rad/ps, operators by window, cosines, rows, initial columns with weights, edge states."""
 
     energies: Floats
     operators: tuple[tuple[NDArray[Any], ...], ...]
@@ -107,12 +107,12 @@ class Task:
     plan: Plan
     before: bool
     gradients: tuple[GradientOf | None, ...] | None = None
-    known: dict[Any, Any] = field(default_factory=dict)  # decomposed operators and patterns of cosines, once made
+    cached: dict[Any, Any] = field(default_factory=dict)  # decomposed operators and patterns of cosines
 
 
 @dataclass(frozen=True)
 class GradientOf:
-    """W = scale (x^rank - shift) of x = cosθ, and B in rad/ps across the figure axis: what B (dW/dθ)² follows from."""
+    """Parameters of B (dW/dθ)² for W = scale (x^rank - shift), x = cosθ; across : B across the figure axis, rad/ps."""
 
     rank: int
     scale: float
@@ -138,7 +138,7 @@ class Outcome:
 
 
 def run(task: Task) -> Outcome:
-    """Carry one block through all windows."""
+    """Propagate a block through all windows."""
     states = np.zeros((len(task.energies), len(task.columns)), dtype=np.complex128)
     states[task.columns, np.arange(len(task.columns))] = 1.0
     free, samples, edges = [], [], []
@@ -159,9 +159,9 @@ def run(task: Task) -> Outcome:
 
 
 def _all_coherences(task: Task, states: Complexes) -> tuple[Coherences, ...]:
-    if "patterns" not in task.known:
-        task.known["patterns"] = [observe.pattern(matrix, task.rows) for matrix in task.cosines]
-    return observe.coherences(states, task.weights, task.known["patterns"])
+    if "patterns" not in task.cached:
+        task.cached["patterns"] = [observe.pattern(matrix, task.rows) for matrix in task.cosines]
+    return observe.coherences(states, task.weights, task.cached["patterns"])
 
 
 def _through(
@@ -171,16 +171,16 @@ def _through(
     operators: tuple[NDArray[Any], ...],
     states: Complexes,
 ) -> tuple[Complexes, Floats, Floats]:
-    """States after a window, each one's largest population at the edge, and the cosines (cosines, samples) inside."""
+    """States after a window, the largest edge population of each, and the cosines (cosines, samples) inside it."""
     snapshots = _Snapshots(task)
     if isinstance(passage, propagate.Grid):
         states, leaked = propagate.magnus_through(
             window, passage, task.energies, operators, states, task.edge, snapshots
         )
         return states, leaked, snapshots.cosines
-    operator = task.known.get(id(operators[0]))
+    operator = task.cached.get(id(operators[0]))
     if operator is None:
-        operator = task.known[id(operators[0])] = _decomposed(task, window, operators[0])
+        operator = task.cached[id(operators[0])] = _decomposed(task, window, operators[0])
     if isinstance(passage, propagate.KickPlan):
         states, leaked = propagate.split_through(passage, task.energies, operator, states, task.edge, snapshots)
     else:
@@ -196,14 +196,14 @@ def _decomposed(task: Task, window: Window, matrix: NDArray[Any]) -> propagate.D
 
 
 class _Snapshots(list[Complexes]):
-    """Takes states at sampled times and turns them into cosines, so that they do not fill the memory."""
+    """Converts states at sampled times to cosines at once, to limit memory."""
 
     def __init__(self, task: Task) -> None:
         super().__init__()
         self._task, self._made = task, [np.zeros((len(task.cosines), 0))]
 
     def append(self, states: Complexes) -> None:
-        """Keep the cosines of states (times, n, m) and drop the states."""
+        """Store the cosines of states (times, n, m), not the states."""
         self._made.append(
             np.array([observe.expectation(states, self._task.weights, cosine) for cosine in self._task.cosines])
         )
@@ -215,14 +215,14 @@ class _Snapshots(list[Complexes]):
 
 
 def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Task | None:
-    """What has to be done for a block.
+    """The task of a block; None if nothing in it is populated.
 
     Parameters
     ----------
     problem : Problem
         Top, pulses, times, gas and observables.
     block : FieldBlock
-        States that the pulses leave apart from all others.
+        States that the pulses do not couple to other blocks.
     plan : Plan
         Steps of every window.
     before : bool
@@ -231,8 +231,7 @@ def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Ta
     Returns
     -------
     Task or None
-        Energies in rad/ps, matrices, and the populated columns with their weights; None where nothing in it is
-        populated.
+        Energies in rad/ps, matrices, and the populated columns with their weights.
     """
     population = problem.populations(block.levels)[block.rows] * block.copies
     if problem.ensemble.m is not None:
@@ -240,9 +239,10 @@ def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Ta
     columns = np.flatnonzero(population)
     if not len(columns):
         return None
-    made: dict[int, NDArray[Any]] = {}
+    matrices: dict[int, NDArray[Any]] = {}
     operators = tuple(
-        tuple(_made(block, contraction, made) for contraction in of_window) for of_window in problem.contractions
+        tuple(_cached_matrix(block, contraction, matrices) for contraction in window_contractions)
+        for window_contractions in problem.contractions
     )
     return Task(
         energies=RAD_PER_PS_MHZ * block.energies_mhz,
@@ -269,16 +269,16 @@ def _gradient(top: Top, contraction: Contraction) -> GradientOf:
     return GradientOf(contraction.rank, float(scale), RAD_PER_PS_MHZ * (a if top.kind == "oblate" else b))
 
 
-def _made(block: FieldBlock, contraction: Contraction, made: dict[int, NDArray[Any]]) -> NDArray[Any]:
-    """The matrix of a contraction, made once for all windows that share it."""
+def _cached_matrix(block: FieldBlock, contraction: Contraction, matrices: dict[int, NDArray[Any]]) -> NDArray[Any]:
+    """The matrix of a contraction, computed once for all windows that share it."""
     key = hash((contraction.body.tobytes(), contraction.space.tobytes()))
-    if key not in made:
-        made[key] = block.matrix(contraction)
-    return made[key]
+    if key not in matrices:
+        matrices[key] = block.matrix(contraction)
+    return matrices[key]
 
 
 def tasks_of(problem: Problem, space: FieldSpace, plan: Plan, before: bool) -> Iterator[Task]:
-    """What has to be done for all blocks with populated states.
+    """The tasks of all blocks with populated states.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def tasks_of(problem: Problem, space: FieldSpace, plan: Plan, before: bool) -> I
     Returns
     -------
     iterator of Task
-        One for each block, made when it is asked for.
+        One for each block, generated lazily.
     """
     for m in problem.m_values(space):
         for block in space.blocks(m):

@@ -1,8 +1,8 @@
-"""The classical gas of the same top under the same pulses: bodies drawn at the temperature, moved by the Euler core.
+"""A classical gas of the same top under the same pulses: bodies sampled at the temperature and propagated by Euler's equations.
 
-Units: ps, rad/ps for energies and ħ for angular momenta, so that I = ħ/(4π B) is 1/(2B) with B in rad/ps. While a pulse acts the
-bodies are stepped with its torque; between pulses their motion is exact. The classical gas has no revivals: it
-dephases once, as the quantum one does at first, and keeps the mean that the pulse left.
+Units: ps, rad/ps for energies and ħ for angular momenta, so that I = ħ/(4π B) is 1/(2B) with B in rad/ps. During a pulse the motion is
+integrated with its torque; between pulses it is exact. The classical gas has no revivals: it dephases once, like the quantum gas at
+first, and retains its mean alignment.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 STEPS_PER_WINDOW = 400
-PIECE = 5000  # bodies moved together
+PIECE = 5000  # bodies propagated together
 
 
 def classical_trace(
@@ -50,18 +50,18 @@ def classical_trace(
     Parameters
     ----------
     top : Top
-        With what the pulses act on.
+        With the property that the pulses act on.
     pulses : sequence of Pulse
-        As `rotor.alignment.align.align` takes them.
-    times_ps : (t,) rising
+        As for `rotor.alignment.align.align`.
+    times_ps : (t,) increasing
     temperature_k : float
-        Of the gas; 0 for bodies at rest.
+        Temperature of the gas; 0 for bodies at rest.
     molecules : int
-        How many bodies; the cosines scatter by about 0.3/√molecules.
+        Number of bodies; the cosines scatter by about 0.3/√molecules.
     observables : names
         costheta, cos2theta, cos2theta_2d, cos_aZ, cos2_aZ, ...
     rng : Generator
-        The one source of randomness.
+        Source of randomness.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def classical_trace(
     Raises
     ------
     ValueError
-        For what the quantum calculation refuses, and less than one molecule.
+        As in the quantum calculation, and for less than one molecule.
     """
     times = np.asarray(times_ps, dtype=np.float64)
     if molecules < 1:
@@ -116,7 +116,7 @@ def _summed(
     attitude: Floats,
     measures: Sequence[Measure],
 ) -> Floats:
-    """Sums of the measures over some bodies, (measures, t)."""
+    """Sums of the measures over a batch of bodies, (measures, t)."""
     out = np.zeros((len(measures), len(times)))
     now = min(float(times[0]), windows[0].start_ps)
     for window in windows:
@@ -124,7 +124,9 @@ def _summed(
         listed = np.append(times[here], window.start_ps) - now
         momentum, attitude = _freely(moments, momentum, attitude, listed, measures, out, here)
         momentum, attitude = _through(top, window, times, moments, momentum, attitude, measures, out)
-        momentum = np.where(moments > 0, momentum, 0.0)  # a linear top has none about its axis, but for round-off
+        momentum = np.where(
+            moments > 0, momentum, 0.0
+        )  # a linear top has no angular momentum about its axis, except for round-off
         now = window.stop_ps
     here = _between(times, now, np.inf)
     _freely(moments, momentum, attitude, times[here] - now, measures, out, here)
@@ -140,9 +142,9 @@ def _freely(
     out: Floats,
     places: Ints,
 ) -> tuple[Floats, Floats]:
-    """The bodies at the last of the times `later`; the measures at the first of them are written into `out` at `places`.
+    """Free motion to the last of the times `later`; writes the measures into `out` at `places`.
 
-    Both ways are exact: symmetric tops are turned from each time to the next, others follow from elliptic functions.
+    Both methods are exact: symmetric tops are rotated from each time to the next, others follow from elliptic functions.
     """
     axial = len(np.unique(moments)) < 3
     motion = None if axial else free_motion(moments, momentum, attitude)
@@ -172,7 +174,7 @@ def _through(
     measures: Sequence[Measure],
     out: Floats,
 ) -> tuple[Floats, Floats]:
-    """The bodies after a window; the measures at the times inside it are written into `out`."""
+    """The bodies after a window; writes the measures at times inside it into `out`."""
     if window.is_kick:
         kick = window.channels[0].pulses[0]
         area = kick.area if isinstance(kick, Kick) else 0.0

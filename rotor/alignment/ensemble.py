@@ -1,8 +1,8 @@
-"""Which states a gas is in before a pulse: all (level, M) at a temperature with their spin weights, or one chosen level.
+"""The initial states of a gas: all (level, M) at a temperature with their spin weights, or a single level.
 
-Levels are taken in order of the population of one state until what is left out is below a cut. What is left out is not scaled
-away: it stays isotropic (cos²θ = 1/3), so that a cut ε moves the cosines by ε times their own
-departure at the most (`AlignmentTrace.error_estimate`).
+Levels are included in order of population per state until the omitted population is below a cut. The others are not renormalised away
+but taken as isotropic (cos²θ = 1/3), so that a cut ε changes the cosines by at most ε times their deviation from the isotropic value
+(`AlignmentTrace.error_estimate`).
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ MOST_J = 400
 
 @dataclass(frozen=True)
 class Ensemble:
-    """What a gas is like at first.
+    """The initial ensemble.
 
-    temperature_k: 0 for one level alone. ground_mhz: lowest level that exists. q: Σ g (2J+1) exp(-E/kT). least: population of one
-    state below which it is left out. left_out: population of all those. jmax: the highest J that is populated. chosen: quantum
-    numbers of the one level, None for a gas; m: its M, None for all of them alike.
+    temperature_k: 0 for a single level. ground_mhz: lowest existing level. q: Σ g (2J+1) exp(-E/kT). least: population of a state
+    below which it is omitted. left_out: total omitted population. jmax: the highest populated J. chosen: quantum numbers of a single
+    level, None for a gas; m: its M, None for equal populations of all M.
     """
 
     temperature_k: float
@@ -44,7 +44,7 @@ class Ensemble:
     m: int | None = None
 
     def populations(self, levels: FreeLevels) -> Floats:
-        """Population of one state |level, M⟩ of each level (n,), zero for what is left out."""
+        """Population of a single state |level, M⟩ of each level (n,), 0 for omitted levels."""
         if self.chosen is not None:
             return self._chosen_state(levels)
         kelvin = (levels.energy_mhz - self.ground_mhz) / units.MHZ_PER_K
@@ -61,9 +61,9 @@ class Ensemble:
 
 
 def one_level(top: Top, state: Mapping[str, int], m: int | None = None) -> Ensemble:
-    """The ensemble of one level, named by its quantum numbers (j; j, k; j, ka, kc), with one |M| or all M alike.
+    """The ensemble of a single level, named by quantum numbers (j; j, k; j, ka, kc), with one |M| or equal populations of all M.
 
-    Raises ValueError for names that do not fit, a level that does not exist and an M above J.
+    Raises ValueError for wrong names, a level that does not exist, and an M above J.
     """
     from rotor.quantum.solve import solve_levels
 
@@ -80,17 +80,17 @@ def one_level(top: Top, state: Mapping[str, int], m: int | None = None) -> Ensem
 
 
 def ground_level(top: Top) -> Ensemble:
-    """The ensemble of the lowest level that exists, all its M alike: a gas at 0 K."""
+    """The ensemble of the lowest existing level with equal populations of all M: a gas at 0 K."""
     from rotor.quantum.solve import solve_levels
 
     levels = solve_levels(one_state(top, "alignment"), 4)
-    there = np.flatnonzero(levels.weight > 0)
-    row = int(there[np.argmin(levels.energy_mhz[there])])
+    existing = np.flatnonzero(levels.weight > 0)
+    row = int(existing[np.argmin(levels.energy_mhz[existing])])
     return one_level(top, {name: int(column[row]) for name, column in levels.quanta.items()})
 
 
 def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
-    """The ensemble at a temperature with populations left out below `cut` in all.
+    """The ensemble at a temperature, with a total omitted population below `cut`.
 
     Raises ValueError for a temperature not above 0 K and one that would populate J above 400.
     """
@@ -99,14 +99,14 @@ def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
             f"temperature {temperature_k} K: a finite temperature above 0 K is expected (0 means one level)"
         )
     levels = _levels_for(one_state(top, "alignment"), temperature_k, cut)
-    there = levels.weight > 0
-    ground = float(levels.energy_mhz[there].min())
+    exists = levels.weight > 0
+    ground = float(levels.energy_mhz[exists].min())
     factor = levels.weight * np.exp(-(levels.energy_mhz - ground) / (units.MHZ_PER_K * temperature_k))
-    factor[~there] = 0.0
+    factor[~exists] = 0.0
     whole = (2 * levels.j + 1) * factor
     order = np.argsort(-factor, kind="stable")
     share = np.cumsum(whole[order]) / whole.sum()
-    last = min(int(np.searchsorted(share, 1.0 - cut)), int(there.sum()) - 1)
+    last = min(int(np.searchsorted(share, 1.0 - cut)), int(exists.sum()) - 1)
     least = float(factor[order[last]] / whole.sum()) * (1 - 1e-9)
     populated = factor / whole.sum() >= least
     return Ensemble(
@@ -120,7 +120,7 @@ def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
 
 
 def _levels_for(top: Top, temperature_k: float, cut: float) -> FreeLevels:
-    """Levels up to the J whose population is far below the cut."""
+    """Levels up to a J whose population is far below the cut."""
     from rotor.quantum.solve import solve_levels
 
     least = min(x for x in top.rotational_constants_mhz if math.isfinite(x))

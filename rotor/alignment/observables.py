@@ -1,14 +1,14 @@
-"""What is measured of a wave packet: cosines, as matrices over a block, and as sums of harmonics while nothing acts.
+"""Observables of a wave packet: cosines as matrices over a block, and as sums of harmonics without fields.
 
-Between pulses every expectation value is a sum of lines,
+Between pulses an expectation value is a sum of lines,
 
     ⟨O⟩(t) = Σ_i ρ_ii O_ii + 2 Re Σ_{i<j} ρ_ij* O_ij exp(i (E_i - E_j) (t - t0)/ħ),
 
-with the coherences of all initial states of a gas added up once. The lines of all M fall on the same pairs of levels, so a trace costs
-the same for one state as for a gas. On even times the sum is a product of two small matrices.
+with the coherences of all initial states of a gas summed once. Lines of different M belong to the same pairs of levels, so a trace
+costs the same for a single state and for a gas. For equidistant times the sum is a product of two small matrices.
 
-cos²θ_2D, what a detector sees of the axis in a plane through Z, is cos²θ/(cos²θ + sin²θ sin²φ). It is no tensor of finite rank; its
-mean over φ, which is all that counts where the gas is symmetric about Z, is |cosθ| (`axis_functions`).
+cos²θ_2D = cos²θ/(cos²θ + sin²θ sin²φ) is the projection of the axis on a detector plane through Z. It is not a tensor of finite rank;
+its mean over φ, which suffices for a gas with symmetry about Z, is |cosθ| (`axis_functions`).
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ FEW_LINES = 64  # which are not worth being searched for pairs that are there mo
 
 @dataclass(frozen=True)
 class Observable:
-    """A cosine to be followed: the name of its column, the contraction, None for |cosθ| of `axis`, its value in an isotropic gas."""
+    """A cosine: name of its column, contraction (None for |cosθ| of `axis`), and value in an isotropic gas."""
 
     name: str
     contraction: Contraction | None
@@ -48,7 +48,7 @@ class Observable:
     axis: int = 0
 
     def matrix(self, block: FieldBlock) -> NDArray[Any]:
-        """Over the states of a block (n, n)."""
+        """The matrix (n, n) over the states of a block."""
         if self.contraction is not None:
             return block.matrix(self.contraction)
         if isinstance(block, AxialBlock):
@@ -59,9 +59,9 @@ class Observable:
 
 
 def figure_axis(top: Top) -> int:
-    """The axis whose angle with Z is θ: a (0), or c (2) of an oblate top; of an asymmetric top that of the largest polarizability.
+    """The axis whose angle with Z is θ: a (0), or c (2) for an oblate top; for an asymmetric top that of largest polarizability.
 
-    Without one it is that of the largest part of the dipole.
+    Without a polarizability, the axis of the largest dipole component.
     """
     if top.kind != "asymmetric":
         return 2 if top.kind == "oblate" else 0
@@ -117,7 +117,7 @@ class Harmonics:
 def harmonic_sum(amplitudes: Complexes, omegas: Floats, times: Floats) -> Floats:
     """Re Σ amplitude exp(i ω t) at times (t,).
 
-    Even times t0 + (p s + q) dt are split into p and q, so that only 2√t exponentials are made for each line.
+    Equidistant times t0 + (p s + q) dt are split into p and q, so that only 2√t exponentials per line are needed.
     """
     count = len(times)
     step = (times[-1] - times[0]) / (count - 1) if count > 8 else 0.0
@@ -158,7 +158,7 @@ class Coherences:
 
 
 class Pattern(NamedTuple):
-    """Where above its diagonal a matrix is not zero: places and rows of the levels (n,) each, the elements, and the diagonal."""
+    """Nonzero elements above the diagonal of a matrix: their places and rows of the levels (n,), values, and the diagonal."""
 
     i: Ints
     j: Ints
@@ -183,7 +183,7 @@ def pattern(matrix: Any, rows: Ints) -> Pattern:
 
 
 def coherences(states: Complexes, weights: Floats, patterns: Sequence[Pattern]) -> tuple[Coherences, ...]:
-    """Coherences of weighted states, columns (n, m) over the free states with weights (m,), for each observable."""
+    """Coherences for each observable of weighted states: columns (n, m) over the free states, weights (m,)."""
     weighted = states.conj() * weights
     few = len(states) * 8 > sum(len(pattern.i) for pattern in patterns)
     density = None if few else weighted @ states.T  # Σ w c_i* c_j
@@ -202,7 +202,7 @@ def coherences(states: Complexes, weights: Floats, patterns: Sequence[Pattern]) 
 
 
 def harmonics(pieces: Sequence[Coherences], energies: Floats, remainder: float) -> Harmonics:
-    """All blocks together: lines between the same levels added; energies (levels,) in rad/ps; remainder: of what is left out."""
+    """Sum over all blocks, with lines between the same levels added; energies (levels,) in rad/ps; remainder: of omitted states."""
     constant = remainder + sum(piece.constant for piece in pieces)
     if not pieces:
         return Harmonics(constant, np.zeros(0, dtype=np.complex128), np.zeros(0))

@@ -1,8 +1,8 @@
-"""One block of states carried through one window of a pulse, all its columns at once.
+"""Propagation of a block of states through a window of a pulse, all columns together.
 
-Where one operator W acts, V(t) = -u(t) W, H = H0 + V is split into drifts, diagonal over the free states, and kicks, diagonal
-over the eigenvectors of W in the block (a discrete variable representation of the angle). Time goes on with the drifts. The
-states live in the eigenvectors of W, where a drift is the matrix Q† exp(-i E a h) Q, made once for each a. Three splittings:
+If a single operator W acts, V(t) = -u(t) W, then H = H0 + V is split into drifts, diagonal in the free states, and kicks, diagonal
+in the eigenvectors of W in the block (a discrete variable representation of the angle). Time advances with the drifts. The states are
+represented in the eigenvectors of W, where a drift is the matrix Q† exp(-i E a h) Q, computed once for each a. Three splittings:
 
 - `nystrom 4`, `nystrom 6`: for a rigid body [V, [V, [V, H0]]] = 0, because H0 is of second order in the momenta, so that the
   Runge-Kutta-Nyström compositions SRKN6b (order 4, 6 drifts) and SRKN11b (order 6, 11 drifts) of S. Blanes and P. C. Moan serve
@@ -10,10 +10,10 @@ states live in the eigenvectors of W, where a drift is the matrix Q† exp(-i E 
 - `gradient`: for linear and symmetric tops ½ [V, [H0, V]] = B (dV/dθ)² is known at the eigenvectors too, and the splitting of
   order 4 with 2 drifts of S. A. Chin (Phys. Lett. A 226, 344 (1997)) is the cheapest for short pulses.
 
-Where several operators act at once (light and a THz field, crossed polarizations), or a block is too large to be diagonalised, each
+If several operators act at once (light and a THz field, crossed polarizations), or a block is too large to diagonalise, each
 step is the product of two exponentials of the commutator-free Magnus method of order 4 (S. Blanes and P. C. Moan, Appl. Numer.
-Math. 56, 1519 (2006)), each of them a Chebyshev series (H. Tal-Ezer and R. Kosloff, J. Chem. Phys. 81, 3967 (1984)). A kick is
-one diagonal phase. Tests measure the orders.
+Math. 56, 1519 (2006)), each evaluated as a Chebyshev series (H. Tal-Ezer and R. Kosloff, J. Chem. Phys. 81, 3967 (1984)). A kick is
+a diagonal phase. Tests measure the orders.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ _NYSTROM_6 = (
     (0.123229775946271, 0.290553797799558, -0.127049212625417, -0.246331761062075, 0.357208872795928),
     (0.0414649985182624, 0.198128671918067, -0.0400061921041533, 0.0752539843015807, -0.0115113874206879),
 )
-CHEBYSHEV_BELOW = 1e-14  # terms of the series below it are left out
+CHEBYSHEV_BELOW = 1e-14  # smaller terms of the series are neglected
 _INSIDE = 1e-9  # of a step
-CHECKS = 8  # how often, about, leakage is looked at inside a window
+CHECKS = 8  # approximate number of leakage checks inside a window
 SNAPSHOT_NUMBERS = 1 << 20  # complex numbers of snapshots held at once
 PRODUCTS_OF_A_CALL = 1 << 27  # complex products of one call of the compiled loop, 0.1 to 0.5 s
 
@@ -63,12 +63,12 @@ class Splitting:
 
     @cached_property
     def nodes(self) -> Floats:
-        """When each kick acts, in steps; those at the ends just inside, since the pulse may jump there."""
+        """Times of the kicks in steps; those at the ends are just inside, since the pulse may jump there."""
         return np.asarray(np.clip(np.concatenate([[0.0], np.cumsum(self.drifts)]), _INSIDE, 1 - _INSIDE))
 
     @cached_property
     def different_drifts(self) -> tuple[Floats, Ints]:
-        """Each duration of a drift once, and which of them each drift has."""
+        """The distinct durations of drifts, and the index of each drift among them."""
         shares, which = np.unique(self.drifts, return_inverse=True)
         return shares, which.ravel()
 
@@ -100,7 +100,7 @@ def splitting(name: str) -> Splitting:
 
 @dataclass(frozen=True)
 class Grid:
-    """Stretches of a window with equal steps, (n,) each; after those with `sampled` the observables are taken."""
+    """Intervals of a window with equal steps, (n,) each; the observables are evaluated after those with `sampled`."""
 
     starts: Floats
     steps: Floats
@@ -114,11 +114,11 @@ class Grid:
 
     @property
     def stages(self) -> int:
-        """What a run costs, in exponentials."""
+        """The cost of a run, in exponentials."""
         return 2 * self.steps_taken
 
     def refined(self, factor: int) -> Grid:
-        """These stretches with `factor` times as many steps."""
+        """These intervals with `factor` times as many steps."""
         return Grid(self.starts, self.steps / factor, self.counts * factor, self.sampled)
 
 
@@ -132,22 +132,22 @@ def grid_of(window: Window, longest_step_ps: float, times_ps: Floats) -> Grid:
     return Grid(edges[:-1], lengths / counts, counts, _among(edges[1:], inside))
 
 
-def _among(values: NDArray[Any], known: NDArray[Any]) -> NDArray[np.bool_]:
-    """Which values are among some that rise; `np.isin` for few of them takes longer than a step."""
-    if not len(known):
+def _among(values: NDArray[Any], sorted_values: NDArray[Any]) -> NDArray[np.bool_]:
+    """Which values are among `sorted_values`; for few values `np.isin` takes longer than a step."""
+    if not len(sorted_values):
         return np.zeros(len(values), dtype=bool)
-    place = np.minimum(np.searchsorted(known, values), len(known) - 1)
-    return np.asarray(known[place] == values)
+    place = np.minimum(np.searchsorted(sorted_values, values), len(sorted_values) - 1)
+    return np.asarray(sorted_values[place] == values)
 
 
 @dataclass(frozen=True)
 class KickPlan:
-    """How a window is passed by a splitting, the same for all blocks.
+    """Integration of a window by a splitting, common to all blocks.
 
-    durations: (kinds,) of every different drift. which: (stages,) the drift after each kick. areas: (stages + 1,) u(t) times the
-    duration of each kick; those where a step ends and the next begins are one. gradients: u(t)² times h³ and its share, None
-    where there is none. marks: (stages,) after which drift the states are looked at. sampled: (looks,) whether it is for the
-    observables. steps_taken: how many.
+    durations: (kinds,) distinct durations of drifts. which: (stages,) the drift after each kick. areas: (stages + 1,) u(t) times the
+    duration of each kick; the last kick of a step and the first of the next are merged. gradients: u(t)² times h³ and its share; None
+    without gradients. marks: (stages,) whether the states are examined after a drift. sampled: (marks,) whether for the observables.
+    steps_taken: number of steps.
     """
 
     durations: Floats
@@ -160,14 +160,14 @@ class KickPlan:
 
     @property
     def stages(self) -> int:
-        """What a run costs, in drifts."""
+        """The cost of a run, in drifts."""
         return len(self.which)
 
 
 def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
-    """The kicks and drifts of the one channel of a window.
+    """The kicks and drifts of a window with a single channel.
 
-    What is looked at are functions of the angle, which a kick does not change, so that states between drifts serve. Kicks at the
+    The observables are functions of the angle, which a kick does not change, so they can be evaluated between drifts. Kicks at the
     ends of a step are evaluated just inside it, since the pulse may jump there.
     """
     stages = len(rule.drifts)
@@ -200,14 +200,14 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
 
 
 def _different(values: Floats) -> tuple[Floats, Ints]:
-    """Each value once, rising, and which of them each is; `np.unique` for few of them takes longer than a step."""
+    """Distinct values in increasing order, and the index of each value; for few values `np.unique` takes longer than a step."""
     listed = values.tolist()
     place = {value: number for number, value in enumerate(sorted(set(listed)))}
     return np.array(list(place)), np.array([place[value] for value in listed])
 
 
 def _merged(table: Floats) -> Floats:
-    """Kicks of steps (steps, kicks) in a row, (stages + 1,), the last of each added to the first of the next."""
+    """Kicks of steps (steps, kicks) as one sequence (stages + 1,); the last kick of a step is added to the first of the next."""
     stages = table.shape[1] - 1
     out = np.append(table[:, :-1].ravel(), 0.0)
     out[stages::stages] += table[:, -1]
@@ -218,7 +218,7 @@ def _merged(table: Floats) -> Floats:
 class Decomposed:
     """Eigenvalues (n,) and eigenvectors (n, n) in columns of the operator W of a channel in a block.
 
-    gradient: where W is a function of one angle, B (dW/dθ)² at the eigenvalues (n,) in rad/ps times the unit of W²: ½ [W, [H0, W]].
+    gradient: if W is a function of one angle, ½ [W, [H0, W]] = B (dW/dθ)² at the eigenvalues (n,), in rad/ps times the unit of W².
     """
 
     values: Floats
@@ -237,7 +237,7 @@ class Decomposed:
 
 
 def decompose(matrix: Any) -> Decomposed:
-    """Eigenvalues and vectors of a dense or sparse Hermitian matrix; a matrix of one band goes to LAPACK's tridiagonal solver."""
+    """Eigenvalues and vectors of a dense or sparse Hermitian matrix; LAPACK's tridiagonal solver if it applies."""
     matrix = matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
     size = len(matrix)
     if size > 2 and not np.iscomplexobj(matrix) and _is_tridiagonal(matrix):
@@ -263,7 +263,7 @@ def split_through(
     edge: NDArray[np.bool_],
     snapshots: list[Complexes] | None = None,
 ) -> tuple[Complexes, Floats]:
-    """States (n, m) over the free states after a window with one channel, and each one's largest population at the edge.
+    """States (n, m) in the free basis after a window with one channel, and the largest edge population of each.
 
     Parameters
     ----------
@@ -276,7 +276,7 @@ def split_through(
     states : (n, m)
         At the start of the window.
     edge : (n,) of bool
-        The states whose population is leakage, looked at a dozen times.
+        The states whose population is leakage; checked about a dozen times.
     snapshots : list, optional
         The states at the sampled times, (times, n, m) in pieces, are appended.
 
@@ -308,7 +308,7 @@ def split_through(
 
 
 def _pieces(marks: NDArray[np.bool_], shape: tuple[int, ...]) -> list[slice]:
-    """Stages in pieces whose snapshots of states (n, m) fit into memory, and between which signals are obeyed."""
+    """Split the stages into pieces whose snapshots of states (n, m) fit into memory; between pieces, signals are handled."""
     size, columns = shape
     at_once = max(1, SNAPSHOT_NUMBERS // max(size * columns, 1))
     stages = max(1, PRODUCTS_OF_A_CALL // max(size * size * columns, 1))
@@ -344,7 +344,7 @@ def magnus_through(
     edge: NDArray[np.bool_],
     snapshots: list[Complexes] | None = None,
 ) -> tuple[Complexes, Floats]:
-    """States after a window with any channels, and each one's largest population at the edge; see `split_through`.
+    """States after a window with any channels, and the largest edge population of each; see `split_through`.
 
     Parameters
     ----------
@@ -388,14 +388,14 @@ def magnus_through(
 
 
 def _norm_bound(operator: Any) -> float:
-    """The largest sum of absolute values in a row: no eigenvalue is larger."""
+    """The largest row sum of absolute values, an upper bound of the eigenvalues."""
     return float(np.max(abs(operator).sum(axis=1)))
 
 
 def _chebyshev(
     diagonal: Floats, factors: Floats, operators: Sequence[Any], reach: list[float], states: Complexes
 ) -> Complexes:
-    """exp(-i (diagonal + Σ factor operator)) states by Σ (2 - δ_n0) (-i)^n J_n(R) T_n(H/R) after H is centred."""
+    """exp(-i (diagonal + Σ factor operator)) states by Σ (2 - δ_n0) (-i)^n J_n(R) T_n(H/R), with H shifted to its centre."""
     from scipy.special import jv
 
     centre = (diagonal.max() + diagonal.min()) / 2

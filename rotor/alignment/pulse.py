@@ -32,7 +32,7 @@ Complexes = np.typing.NDArray[np.complex128]
 Axis = tuple[complex, complex, complex]
 
 Z_AXIS: Axis = (0.0, 0.0, 1.0)
-HIGHEST_W_PER_CM2 = 1e17  # far beyond any intensity that a molecule survives
+HIGHEST_W_PER_CM2 = 1e17  # far beyond the ionisation of any molecule
 HIGHEST_KV_PER_CM = 1e6  # 10 V/Å: molecules are ionised below 1 V/Å; models of kicks may go beyond that
 # 2π I/(cħ) in rad/ps for 1 Å³ and 1 W/cm²; Å³ → m³ 1e-30, W/cm² → W/m² 1e4, 1/s → 1/ps 1e-12
 RAD_PER_PS_ANGSTROM3_W_PER_CM2 = (
@@ -40,14 +40,14 @@ RAD_PER_PS_ANGSTROM3_W_PER_CM2 = (
 )
 RAD_PER_PS_MHZ = 2 * math.pi * 1e-6
 GAUSSIAN_REACH = 3.5  # widths on either side of the middle; the intensity there is 2e-15 of the peak
-FIELD_REACH = 3.0  # of a field, not an intensity: exp(-4 ln2 · 9) = 1.5e-11
+FIELD_REACH = 3.0  # widths of a field envelope: exp(-4 ln2 · 9) = 1.5e-11
 
 
 _AXES = {"z": (0, 0, 1), "x": (1, 0, 0), "y": (0, 1, 0), "circular": (1, 1j, 0)}
 
 
 def read_axis(axis_text: Any) -> Axis:
-    """The unit vector of polarization that a word, or real and imaginary parts of its components, mean.
+    """The unit polarization vector from a word, or from real and imaginary parts of its components.
 
     >>> round(float(read_axis("circular")[0].real), 12) == round(2**-0.5, 12)
     True
@@ -71,7 +71,7 @@ def read_axis(axis_text: Any) -> Axis:
 
 
 def write_axis(axis: Axis) -> str | list[list[float]]:
-    """What `read_axis` makes the same vector of."""
+    """The inverse of `read_axis`."""
     return "z" if axis == Z_AXIS else [[complex(x).real, complex(x).imag] for x in axis]
 
 
@@ -82,14 +82,14 @@ def axis_field() -> Any:
 
 
 class Pulse(ABC):
-    """A pulse: when it acts, along what, and on which property of the molecule."""
+    """A pulse: its time window, polarization, and the molecular property on which it acts."""
 
     acts_on: ClassVar[str]  # "polarizability" or "dipole"
 
     @property
     @abstractmethod
     def window_ps(self) -> tuple[float, float]:
-        """When the pulse begins and ends; outside it is exactly zero. Equal for a kick."""
+        """Begin and end of the pulse, which is exactly zero outside; equal for a kick."""
 
     @property
     def breaks_ps(self) -> tuple[float, ...]:
@@ -107,7 +107,7 @@ class Pulse(ABC):
 
     @property
     def space_tensor(self) -> Floats:
-        """Re(e_F* e_G) (3, 3) of light, the unit vector (3,) of a field that acts on the dipole."""
+        """Re(e_F* e_G) (3, 3) for light; the unit vector (3,) for a field that acts on the dipole."""
         axis = np.array(self.axis)
         return axis.real if self.acts_on == "dipole" else np.outer(axis.conj(), axis).real
 
@@ -137,7 +137,7 @@ def elliptical(ratio: float) -> Axis:
 
 
 def checked_intensity(intensity: float) -> float:
-    """An intensity in W/cm² that a pulse can have; ValueError for a negative or infinite intensity and above 1e17 W/cm²."""
+    """Check an intensity in W/cm²; ValueError if it is negative, infinite or above 1e17 W/cm²."""
     if not (math.isfinite(intensity) and 0 <= intensity <= HIGHEST_W_PER_CM2):
         raise ValueError(
             f"intensity {intensity:g} W/cm²: a number from 0 to {HIGHEST_W_PER_CM2:g} W/cm² is expected; check the unit"
@@ -146,7 +146,7 @@ def checked_intensity(intensity: float) -> float:
 
 
 def checked_duration(duration_ps: float, what: str) -> float:
-    """A duration above zero in ps, or ValueError."""
+    """Check a duration in ps; ValueError unless it is above zero."""
     if not (math.isfinite(duration_ps) and duration_ps > 0):
         raise ValueError(f"{what} {duration_ps:g} ps: a finite time above 0 is expected")
     return float(duration_ps)
@@ -203,7 +203,7 @@ class GaussianPulse(Pulse):
 class SwitchedPulse(Pulse):
     """Rises as sin² in `rise_ps`, stays for `plateau_ps`, falls as cos² in `fall_ps`; 0 is a sudden switch.
 
-    `start_ps` is where it begins. A slow rise with a sudden fall leaves pendular states to dephase without a field.
+    `start_ps` is its begin. After a slow rise and a sudden fall, pendular states dephase without field.
     """
 
     acts_on: ClassVar[str] = "polarizability"
@@ -297,10 +297,10 @@ class TabulatedPulse(Pulse):
 
 @dataclass(frozen=True)
 class Kick(Pulse):
-    """A pulse so short that the molecule does not turn during it: exp(i P cos²θ), P = ∫ U0 dt/ħ for 1 Å³ of anisotropy.
+    """A pulse so short that the molecule does not rotate during it: exp(i P cos²θ), P = ∫ U0 dt/ħ for 1 Å³ of anisotropy.
 
-    fluence_j_per_cm2 = ∫ I dt. A Gaussian pulse of finite width differs from it in proportion to the width: for OCS with P = 4.3
-    the cosine is off by 3e-4 for 10 fs and 1.5e-3 for 50 fs.
+    fluence_j_per_cm2 = ∫ I dt. The error for a Gaussian pulse is proportional to its width: for OCS with P = 4.3
+    it is 3e-4 in the cosine for 10 fs and 1.5e-3 for 50 fs.
 
     >>> kick = Kick.of_strength(5.0, anisotropy_angstrom3=4.04)
     >>> round(float(kick.area * 4.04), 12)
@@ -323,7 +323,7 @@ class Kick(Pulse):
 
     @classmethod
     def of_strength(cls, p: float, anisotropy_angstrom3: float, time_ps: float = 0.0) -> Kick:
-        """The kick with P = `p` for a linear molecule of that anisotropy."""
+        """The kick with P = `p` for a linear molecule with this polarizability anisotropy."""
         return cls(p / (anisotropy_angstrom3 * RAD_PER_PS_ANGSTROM3_W_PER_CM2) * 1e-12, time_ps)
 
     @property
@@ -398,4 +398,4 @@ SHAPES: dict[str, type[Pulse]] = {
     "kick": Kick,
     "table": TabulatedPulse,
     "thz": DipolePulse,
-}  # by the word that names them in scenes
+}  # by their names in scenes

@@ -1,11 +1,11 @@
-"""States and operators of tops in fields as objects of QuTiP, for what it does best: open systems, other solvers, pictures of states.
+"""States and operators of tops in fields as QuTiP objects, for open systems, other solvers, and plots of states.
 
-`block_objects` gives one symmetry block (the small one that a pulse along Z needs), `linear_objects` all |J M⟩ of a linear top with the
-operators of isotropic collisions. Energies are in rad/ps, so that times of QuTiP's solvers are ps and ħ = 1.
+`block_objects` gives a symmetry block (sufficient for pulses along Z), `linear_objects` all |J M⟩ of a linear top with the
+operators of isotropic collisions. Energies are in rad/ps, so that times of QuTiP's solvers are in ps and ħ = 1.
 
-QuTiP's solvers choose their steps by the error they see. A list of times that begins long before a pulse lets them grow until they
-pass over the pulse without noticing it: cos²θ then stays 1/3, without a warning. `solve_windows` therefore integrates the windows of
-the pulses alone, with a longest step of a fraction of the window, and multiplies by the exact phases between them.
+QuTiP's solvers adapt their steps to the estimated error. If the times begin long before a pulse, the steps grow until they skip the
+pulse: cos²θ then stays 1/3, without a warning. `solve_windows` therefore integrates only the windows of the pulses, with steps limited
+to a fraction of the window, and applies exact phases between them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ from rotor.tops.top import one_state
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-LONGEST_STEP = 1 / 14  # of a window: half a width of a Gaussian pulse, whose window has seven
+LONGEST_STEP = (
+    1 / 14
+)  # longest step, as a fraction of a window: half a width of a Gaussian pulse, whose window has seven widths
 BEST_OPTIONS = {"method": "vern7", "rtol": 1e-10, "atol": 1e-12, "nsteps": 1_000_000, "progress_bar": ""}
 
 
@@ -63,7 +65,7 @@ class BlockObjects:
 
 
 def _operator(objects: BlockObjects, channel: Channel) -> Any:
-    return next(operator for known, operator in objects.interactions if _same(known, channel))
+    return next(operator for candidate, operator in objects.interactions if _same(candidate, channel))
 
 
 def _same(channel: Channel, other: Channel) -> bool:

@@ -1,4 +1,4 @@
-"""How many steps, and of which method, a tolerance needs: found on one block with runs whose steps are doubled."""
+"""Choice of method and number of steps for a tolerance, from runs of one block with repeatedly doubled steps."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick
 from rotor.quantum.fields.blocks import FieldSpace
 
 FIRST_STEPS = 4
-LARGEST_SPLIT = 700  # states of a block whose operator is still diagonalised
+LARGEST_SPLIT = 700  # most states of a block for diagonalisation of its operator
 MOST_STEPS = 200_000
 PILOT_COLUMNS = 64
 PILOT_TIMES = 256
-USUAL_STEPS = 15  # of the coarser of two runs; the finer one serves
+USUAL_STEPS = 15  # of the coarser of two runs; the finer one is used
 USUAL_TOLERANCE = 1e-9  # that twice as many steps of a short pulse give
 ASYMPTOTIC = 1e-4  # error of a cosine below which it falls as the order of the method says
 
 
 @dataclass(frozen=True)
 class Pilot:
-    """What the block M = 0 has shown: the plan, its steps, their error, and the population at the highest J."""
+    """Result of test runs of the block M = 0: the plan, its steps, their error, and the population at the highest J."""
 
     plan: Plan
     steps: tuple[int, ...]
@@ -39,7 +39,7 @@ class Pilot:
 
 
 def _grids(problem: Problem, steps: Sequence[int]) -> list[propagate.Grid | None]:
-    """About so many steps a window, None for a kick."""
+    """Grids with about this number of steps per window; None for a kick."""
     lengths = [(window.stop_ps - window.start_ps) / count for window, count in zip(problem.windows, steps, strict=True)]
     return [
         None if window.is_kick else propagate.grid_of(window, length, problem.times)
@@ -48,7 +48,7 @@ def _grids(problem: Problem, steps: Sequence[int]) -> list[propagate.Grid | None
 
 
 def _plan_of(problem: Problem, grids: Sequence[propagate.Grid | None], rule: str | None, factor: int = 1) -> Plan:
-    """Passages with `factor` times the steps of grids; a Magnus method where `rule` is None."""
+    """The plan with `factor` times the steps of the grids; a Magnus method if `rule` is None."""
     out: list[propagate.KickPlan | propagate.Grid | float] = []
     for window, coarse in zip(problem.windows, grids, strict=True):
         if coarse is None:
@@ -62,7 +62,7 @@ def _plan_of(problem: Problem, grids: Sequence[propagate.Grid | None], rule: str
 
 
 def pilot_of(problem: Problem, jmax: int) -> Pilot:
-    """Steps that are fine enough for the tolerance, found on the block M = 0 that holds most of the gas."""
+    """Steps that meet the tolerance, determined with the most populated block M = 0."""
     space = problem.space(jmax)
     task, whole = pilot_task(problem, space)
     if task is None or all(window.is_kick for window in problem.windows):
@@ -93,12 +93,12 @@ def _refined(
     below: Pilot | None = None,
     finer_order: int = 0,
 ) -> Pilot:
-    """About the fewest steps of a method whose error is below half the tolerance; `below` where that would cost more.
+    """Approximately the fewest steps of a method with an error below half the tolerance; `below` if that is cheaper.
 
-    The number of steps is doubled; the difference between a run and the next is taken as the error of the first. Of the number that
-    is enough and its half, between which the answer lies, the place is taken where log(error) on a straight line meets the goal.
-    finer_order: of a method whose finer run serves as the answer, its error taken as the difference over half of what the order gives;
-    nothing is left out of the gas then, so that the steps may have what leakage leaves of the tolerance.
+    The number of steps is doubled; the difference between successive runs is taken as the error of the coarser one. Between the
+    sufficient number and its half, log(error) is interpolated linearly to the goal. finer_order: order of a method whose finer run is
+    the result; its error is the difference divided by half of the factor that the order predicts. In that case no population is
+    omitted, so that the steps may use the part of the tolerance that leakage does not need.
     """
     goal, before, factor = (0.7 if finer_order else 0.5) * problem.tolerance, 0.0, 1
     windows = len(problem.windows)
@@ -142,7 +142,7 @@ def _cost(plan: Plan) -> int:
 
 
 def pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]:
-    """The populated block of lowest M with the largest population, with a few of its columns; and whether that is all there is."""
+    """The most populated block of lowest M with a few of its columns, and whether this is the whole problem."""
     m = problem.m_values(space)[0]
     plan = Plan(problem.windows, ())  # to be replaced
     before = problem.begins_before
@@ -162,7 +162,7 @@ def relative_edge(outcome: Outcome, task: Task) -> float:
 
 
 def _difference(problem: Problem, space: FieldSpace, task: Task, first: Outcome, second: Outcome) -> float:
-    """Largest difference of the cosines of two runs of one block, of the population in it."""
+    """Largest difference of the cosines between two runs of a block, relative to its population."""
     energies = RAD_PER_PS_MHZ * space.levels.energy_mhz
     period = max(float(problem.times[-1]) - problem.windows[-1].stop_ps, 0.0)
     times = np.linspace(0.0, period, PILOT_TIMES)

@@ -1,8 +1,8 @@
-"""Pulses put in order: windows of time in which something acts, kicks, and the free stretches between them.
+"""Pulses in order of time: windows with fields, kicks, and free intervals between them.
 
-Windows that overlap become one; a kick cuts the window in which it falls. Inside a window, pulses with one polarization act
-through one operator and add up. Nothing is integrated outside the windows: there the phases of free rotation are exact, and no
-solver can step over a pulse that it never sees.
+Overlapping windows are merged; a kick divides the window that contains it. Inside a window, pulses of the same polarization act
+through the same operator and add up. Outside the windows nothing is integrated: the phases of free rotation are exact there, so no
+solver can skip a pulse.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from rotor.alignment.pulse import Kick, Pulse
 from rotor.arrays import Floats
 
-SAME_AXIS = 1e-12  # of 1: how much polarization tensors may differ and still be the same
+SAME_AXIS = 1e-12  # largest difference of polarization tensors that are the same
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Window:
-    """From `start_ps` to `stop_ps` the channels act; breaks are times inside at which they are not smooth."""
+    """An interval from `start_ps` to `stop_ps` with active channels; breaks : times at which they are not smooth."""
 
     start_ps: float
     stop_ps: float
@@ -91,7 +91,7 @@ def timeline(pulses: Sequence[Pulse]) -> tuple[Window, ...]:
 
 
 def _cut(group: Sequence[Pulse], kicks: Sequence[float]) -> list[Window]:
-    """One window of pulses that overlap, cut at the kicks inside it."""
+    """The window of overlapping pulses, divided at the kicks inside it."""
     start, stop = min(pulse.window_ps[0] for pulse in group), max(pulse.window_ps[1] for pulse in group)
     edges = {time for pulse in group for time in (*pulse.window_ps, *pulse.breaks_ps)}
     times = [start, *sorted({time for time in kicks if start < time < stop}), stop]

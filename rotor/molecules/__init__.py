@@ -1,1 +1,1 @@
-"""Molecules as they come in: nuclei, geometry, and the files and programs that bring them."""
+"""Molecules: nuclei, geometry, and readers of files and of program output."""

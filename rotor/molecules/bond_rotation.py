@@ -1,12 +1,12 @@
-"""Rotation of one part of a molecule about a bond: which atoms turn, its symmetry, and its reduced moment of inertia.
+"""Internal rotation about a bond: the atoms that turn, the symmetry, and the reduced moment of inertia.
 
-With the angle α, the velocities v_i = n × (x_i - x_0) of the atoms of one part (0 for those of the other), less that of the centre of
-mass, and the angular velocity ω of the whole, the kinetic energy is ½ (ω, α') K (ω, α')ᵀ with the 4 x 4 matrix
+Let α be the torsional angle, ω the angular velocity of the molecule, and v_i = n × (x_i - x_0) the velocities of the atoms of one part
+(0 for the other part) relative to the centre of mass. The kinetic energy is ½ (ω, α') K (ω, α')ᵀ with the 4 x 4 matrix
 
     K = | I   c |     I the inertia tensor,   c = Σ m_i r_i × v_i,   I_α = Σ m_i v_i².
         | cᵀ I_α |
 
-Without angular momentum of the whole, ω = -I⁻¹ c α', and ½ I_r α'² is left with
+For zero total angular momentum, ω = -I⁻¹ c α', and the kinetic energy is ½ I_r α'² with
 
     I_r = I_α - cᵀ I⁻¹ c = det K / det I = 1 / (K⁻¹)_αα.
 
@@ -27,12 +27,10 @@ from rotor.arrays import Floats, Ints
 from rotor.molecules.bonds import bonded_atoms
 from rotor.molecules.molecule import Molecule
 
-ON_AXIS_ANGSTROM = 0.1  # atoms nearer to the line of the bond do not turn: the group is linear
-SYMMETRIC_ANGSTROM = (
-    0.25  # how far atoms of a group may be off an n-fold axis along the bond: hydrogens of a methyl group are by 0.05
-)
+ON_AXIS_ANGSTROM = 0.1  # Å: atoms closer to the line of the bond count as on it; a group of such atoms is linear
+SYMMETRIC_ANGSTROM = 0.25  # Å: tolerance of an n-fold axis along the bond; hydrogens of a methyl group deviate by 0.05
 MOST_FOLD = 6
-PLANAR = 0.4  # determinant of three unit vectors: 0 in a plane, 0.77 of a tetrahedron; amides that bend a little count as planar
+PLANAR = 0.4  # determinant of three unit vectors: 0 in a plane, 0.77 for a tetrahedron; slightly pyramidal amides count as planar
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +43,7 @@ class BondRotation:
     first, last : int
         The atoms of the bond, counted from 0.
     top, frame : (n,) array of int
-        Atoms on the side of `last` and of `first`, both of them among these.
+        Atoms on the side of `last` and of `first`, inclusive.
 
     Examples
     --------
@@ -93,14 +91,14 @@ class BondRotation:
         return float(1 / np.linalg.inv(self.kinetic_matrix(positions))[3, 3])
 
     def symmetry_number(self, isotopes: bool = True) -> int:
-        """How many positions in a turn are alike: least common multiple of the axes of both parts along the bond.
+        """Number of equivalent positions per turn: least common multiple of the axes of both parts along the bond.
 
-        isotopes: whether different isotopes are different; the potential does not know them, the kinetic energy does.
+        isotopes: whether isotopes are distinguished; the potential does not depend on them, the kinetic energy does.
         """
         return math.lcm(*(self._fold(atoms, isotopes) for atoms in (self.top, self.frame)))
 
     def _fold(self, atoms: Ints, isotopes: bool) -> int:
-        """Largest n for which a turn by 2π/n brings every atom of a part to a place of its like."""
+        """Largest n for which a rotation by 2π/n brings all atoms of a part onto like atoms."""
         x, axis = self.molecule.positions_angstrom, _axis(self.molecule.positions_angstrom, self.first, self.last)
         arms = x[atoms] - x[self.last]
         kinds = [(self.molecule.symbols[i], self.molecule.mass_numbers[i] if isotopes else 0) for i in atoms.tolist()]
@@ -115,9 +113,9 @@ class BondRotation:
         return 1
 
     def mirror_angle(self, isotopes: bool = True) -> float | None:
-        """An angle α_0 about which energy and moments are even: planes of symmetry of both parts along the bond coincide there.
+        """An angle α_0 about which energy and moments are even: there the symmetry planes of both parts coincide.
 
-        None where a part has no such plane. isotopes: as for `symmetry_number`.
+        None if a part has no plane of symmetry that contains the bond. isotopes: as for `symmetry_number`.
         """
         planes = [self._plane(atoms, isotopes) for atoms in (self.top, self.frame)]
         if planes[0] is None or planes[1] is None:
@@ -125,7 +123,7 @@ class BondRotation:
         return float((planes[1] - planes[0] + math.pi / 2) % math.pi - math.pi / 2)
 
     def _plane(self, atoms: Ints, isotopes: bool) -> float | None:
-        """φ about the bond of a plane whose reflection brings every atom of a part to a place of its like; None without one."""
+        """The angle φ of a symmetry plane of a part that contains the bond; None without one."""
         x, axis = self.molecule.positions_angstrom, _axis(self.molecule.positions_angstrom, self.first, self.last)
         across = _across(x, self, atoms.tolist(), unit=False)
         along = (x[atoms] - x[self.last]) @ axis
@@ -144,9 +142,9 @@ class BondRotation:
         return min(planes)[1] if planes else None
 
     def angle(self, positions: Floats) -> float:
-        """Mean angle by which the inner atoms of the top have turned against those of the frame, radian from -π to π.
+        """Mean angle of rotation of the inner atoms of the top relative to those of the frame, radian from -π to π.
 
-        One dihedral angle would count the tilt of a single bond as rotation; a mean over a methyl group does not.
+        A single dihedral angle would count the tilt of one bond as rotation; the mean over a methyl group does not.
         """
         turns = [
             self._mean_turn(positions, end, other) for end, other in ((self.last, self.first), (self.first, self.last))
@@ -162,7 +160,7 @@ class BondRotation:
         return complex(np.sum(_across(positions, self, atoms) * np.conj(_across(start, self, atoms))))
 
     def dihedral_atoms(self) -> tuple[int, int, int, int]:
-        """Four atoms (from 0) whose dihedral angle is that of the bond: the nearest atoms off the axis on either side."""
+        """Four atoms (from 0) that define the dihedral angle of the bond: the nearest atoms off the axis on both sides."""
         x = self.molecule.positions_angstrom
         ends = []
         for atoms, end in ((self.frame, self.first), (self.top, self.last)):
@@ -171,9 +169,9 @@ class BondRotation:
         return ends[0], self.first, self.last, ends[1]
 
     def opposite_atoms(self) -> tuple[int, int, int, int] | None:
-        """Four atoms of the other substituents, where both atoms of the bond have two in one plane with it (a peptide bond); else None.
+        """Four atoms of the other substituents if both ends of the bond are planar with two substituents (a peptide bond); else None.
 
-        With one dihedral angle fixed alone such a group would bend out of its plane instead of turning.
+        With only one dihedral angle fixed, such a group would bend out of its plane instead of turning.
         """
         x = self.molecule.positions_angstrom
         nearest = self.dihedral_atoms()
@@ -190,7 +188,7 @@ class BondRotation:
 
 
 def bond_rotation(molecule: Molecule, bond: str) -> BondRotation:
-    """The rotation about a bond, named by its atoms as counted from 1, such as "1-2".
+    """The rotation about a bond, named by its atoms (from 1), such as "1-2".
 
     Parameters
     ----------
@@ -205,7 +203,7 @@ def bond_rotation(molecule: Molecule, bond: str) -> BondRotation:
     Raises
     ------
     ValueError
-        For atoms that are not there or not bonded, a bond of a ring, an atom without others behind it, and a linear group.
+        For missing or unbonded atoms, a bond in a ring, a terminal atom, and a linear group.
     """
     first, last = _numbers(molecule, bond)
     neighbours = bonded_atoms(molecule)
@@ -247,7 +245,7 @@ def _named(molecule: Molecule, first: int, last: int) -> str:
 
 
 def _side(neighbours: list[Ints], start: int, without: int) -> set[int]:
-    """Atoms reached from `start` by bonds other than that to `without`."""
+    """Atoms connected to `start` without the bond to `without`."""
     reached, front = {start}, [start]
     while front:
         atom = front.pop()

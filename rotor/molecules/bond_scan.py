@@ -1,4 +1,4 @@
-"""A relaxed scan of the rotation about a bond: energies and geometries by an ASE calculator, or by MMFF94 of RDKit."""
+"""A relaxed scan of the rotation about a bond: energies and geometries from an ASE calculator or MMFF94 of RDKit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rotor.molecules.optimise import ase_atoms, calculator_by_name
 from rotor.units import AVOGADRO_PER_MOL, CM_PER_EV, ELEMENTARY_CHARGE_C
 
 MOST_FORCE_EV_PER_ANGSTROM = (
-    5e-4  # the energy is then converged to some 1e-6 eV, 0.01 cm⁻¹: it is of second order in what is left
+    5e-4  # eV/Å; the energy, of second order in the force, is then converged to about 1e-6 eV, 0.01 cm⁻¹
 )
 MOST_STEPS = 500
 EV_PER_KCAL_MOL = 4184.0 / AVOGADRO_PER_MOL / ELEMENTARY_CHARGE_C  # exact
@@ -32,7 +32,7 @@ class BondScan:
     angles : (n,) radian, mean angle of the group from that of the input, over one period (`BondRotation.angle`)
     energies_cm : (n,) cm⁻¹ above the lowest
     positions_angstrom : (n, atoms, 3)
-    closure_cm : energy after a whole period less that at its start; a path that does not close has left its valley
+    closure_cm : energy after a whole period minus that at its start; not 0 if the path has left its valley
     source : the calculator
     """
 
@@ -50,19 +50,19 @@ def relaxed_scan(
     points: int = POINTS,
     progress: Callable[[int, int], object] | None = None,
 ) -> BondScan:
-    """Energies over one period of the rotation, all else relaxed at each angle (BFGS with the dihedral angle fixed).
+    """Energies over a period of the rotation with all other coordinates relaxed (BFGS with fixed dihedral angle).
 
-    Between planar groups (a peptide bond) the dihedral angles of both sides are fixed: with one alone they bend instead of turning.
+    Between planar groups (a peptide bond) the dihedral angles on both sides are fixed: with only one, the groups bend instead of turning.
 
     Parameters
     ----------
     rotation : BondRotation
     calculator : ASE calculator or str, optional
-        Any with forces; a name for `calculator_by_name`; "mmff": MMFF94 of RDKit.
+        A calculator with forces, a name for `calculator_by_name`, or "mmff" for MMFF94 of RDKit.
     points : int, optional
-        Angles in a whole turn; those of one period are calculated, 2π divided by the symmetry number of the elements.
+        Angles per turn; only a period is calculated, 2π divided by the symmetry number without isotopes.
     progress : callable, optional
-        Called with points done and points in all.
+        Called with the numbers of points done and in total.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def relaxed_scan(
     Raises
     ------
     ValueError
-        Where the calculator is unknown or fails, and where a geometry does not converge, with its angle.
+        If the calculator is unknown or fails, or a geometry does not converge.
     """
     engine = _calculator(rotation.molecule, calculator)
     name = "MMFF94 (RDKit)" if calculator == MMFF else type(engine).__name__
@@ -98,7 +98,7 @@ def relaxed_scan(
 
 
 def _relaxed(rotation: BondRotation, positions: Floats, engine: Any, name: str, degrees: float) -> tuple[Floats, float]:
-    """Positions and energy (eV) at the minimum of all coordinates but the dihedral angle, or two of a bond between planar groups."""
+    """Positions and energy (eV) minimised with the dihedral angle fixed (two of them between planar groups)."""
     from ase import constraints
     from ase.optimize import BFGS
 
@@ -113,7 +113,9 @@ def _relaxed(rotation: BondRotation, positions: Floats, engine: Any, name: str, 
         search: Any = BFGS(atoms, logfile=None)
         converged = search.run(fmax=MOST_FORCE_EV_PER_ANGSTROM, steps=MOST_STEPS)
         energy = float(atoms.get_potential_energy())
-    except Exception as reason:  # calculators fail with any class; all mean that this molecule cannot be done with it
+    except (
+        Exception
+    ) as reason:  # calculators raise exceptions of any class; all mean that it cannot treat this molecule
         raise ValueError(
             f"{name} fails for {rotation.molecule.formula} at {degrees:g} degrees: {reason or type(reason).__name__}"
         ) from reason
@@ -126,7 +128,7 @@ def _relaxed(rotation: BondRotation, positions: Floats, engine: Any, name: str, 
 
 
 def _unwrapped(angle: float, near: float) -> float:
-    """The angle plus the multiple of 2π that brings it next to another."""
+    """The angle plus the multiple of 2π that brings it closest to `near`."""
     return angle + 2 * math.pi * round((near - angle) / (2 * math.pi))
 
 
@@ -139,7 +141,7 @@ def _calculator(molecule: Molecule, calculator: Any) -> Any:
 def mmff_calculator(molecule: Molecule) -> Any:
     """An ASE calculator with the energy and forces of MMFF94 (T. A. Halgren, J. Comput. Chem. 17 (1996) 490) by RDKit.
 
-    Raises ValueError where no bonds fit the geometry or MMFF94 has no parameters.
+    Raises ValueError if no bonds fit the geometry or MMFF94 has no parameters.
     """
     from ase.calculators import calculator as library
     from rdkit import Chem, rdBase
@@ -171,12 +173,12 @@ def mmff_calculator(molecule: Molecule) -> Any:
             super().calculate(atoms, properties, system_changes)
             for i, position in enumerate(atoms.get_positions().tolist()):  # the force field follows its conformer
                 conformer.SetAtomPosition(i, position)
-            field.Initialize()  # otherwise it goes on with the distances of its last call
+            field.Initialize()  # otherwise it reuses the distances of its last call
             gradient = np.array(field.CalcGrad()).reshape(-1, 3)
             self.results = {
                 "energy": field.CalcEnergy() * EV_PER_KCAL_MOL,
                 "forces": -gradient * EV_PER_KCAL_MOL,
             }
 
-    made: Any = Mmff94
-    return made()
+    calculator_class: Any = Mmff94
+    return calculator_class()

@@ -14,7 +14,7 @@ BONDED = 1.2  # of the sum of two covalent radii (B. Cordero et al., Dalton Tran
 
 
 def bonded_atoms(molecule: Molecule) -> list[Ints]:
-    """Atoms bonded to each atom, by distance: nearer than 1.2 times the sum of covalent radii."""
+    """Atoms bonded to each atom: closer than 1.2 times the sum of covalent radii."""
     x = molecule.positions_angstrom
     radii = np.array([RADII_ANGSTROM.get(symbol, OTHER_RADIUS) for symbol in molecule.symbols])
     neighbours: list[list[int]] = [[] for _ in x]
@@ -27,7 +27,7 @@ def bonded_atoms(molecule: Molecule) -> list[Ints]:
 
 
 def _pairs_within(x: Floats, reach: float) -> Ints:
-    """Pairs (m, 2) of points nearer than a reach, Å."""
+    """Pairs (m, 2) of points closer than `reach`, Å."""
     if len(x) > FEW_ATOMS:
         from scipy.spatial import cKDTree
 

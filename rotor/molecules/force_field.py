@@ -1,7 +1,7 @@
-"""A harmonic force field: the Hessian of a molecule at its minimum, its vibrations, where it comes from.
+"""A harmonic force field: the Hessian of a molecule at its minimum, and its vibrations.
 
-Near the minimum the potential is V = ½ xᵀ F x with the 3n displacements x. What the force field says of vibration stands
-here; what it says of rotation in `rotor.tops.distortion`.
+Near the minimum the potential is V = ½ xᵀ F x with the 3n displacements x. Centrifugal distortion from a force field is in
+`rotor.tops.distortion`.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ EV_PER_ANGSTROM2 = {  # one of each unit in eV/Å²
 _UNIT_NAMES = {"eV/A2": "eV/Å²", "hartree/bohr2": "hartree/bohr²", "mdyn/A": "mdyn/Å"}
 _WAVENUMBER = np.sqrt(ELEMENTARY_CHARGE_C * 1e20 / ATOMIC_MASS_KG) / (200 * np.pi * SPEED_OF_LIGHT_M_PER_S)
 
-LOPSIDED = 1e-3  # of the largest element, up to which a Hessian may differ from its transpose
-LEFT_OVER_CM = 100.0  # a translation or rotation stiffer than that belongs to another geometry
+LOPSIDED = 1e-3  # largest asymmetry of a Hessian, relative to its largest element
+LEFT_OVER_CM = 100.0  # a stiffer translation or rotation means that the Hessian belongs to another geometry
 
 
 @dataclass(frozen=True, eq=False)
 class Vibrations:
     """Harmonic vibrations.
 
-    wavenumbers_cm : (m,) rising, m = 3n - 6 or 3n - 5
+    wavenumbers_cm : (m,) increasing, m = 3n - 6 or 3n - 5
     modes : (3n, m) mass-weighted displacements, orthonormal, x_i √m_i
     stiffness_ev : (m,) eigenvalues λ of the mass-weighted Hessian, eV/(u Å²); V = ½ λ Q²
-    left_over_cm : the stiffest translation or rotation, which a Hessian at an exact minimum leaves at 0
+    left_over_cm : the stiffest translation or rotation; 0 for a Hessian at an exact minimum
     """
 
     wavenumbers_cm: Floats
@@ -59,10 +59,10 @@ class ForceField:
     """A molecule at its minimum and the Hessian there.
 
     hessian_ev_per_angstrom2 : (3n, 3n) array in the frame of the positions, rows and columns x1 y1 z1 x2 ...
-    source : where it is from
+    source : origin of the Hessian
 
-    Raises ValueError for a Hessian of another shape, with numbers that are not finite, or lopsided by more than 1e-3
-    of its largest element (up to that it is made symmetric).
+    Raises ValueError for a Hessian of another shape, with numbers that are not finite, or asymmetric by more than 1e-3
+    of its largest element (smaller asymmetries are averaged).
     """
 
     molecule: Molecule
@@ -86,15 +86,15 @@ class ForceField:
         object.__setattr__(self, "hessian_ev_per_angstrom2", hessian)
 
     def with_isotopes(self, changes: Mapping[int | str, str] | str) -> ForceField:
-        """This force field with other isotopes: in the approximation of Born and Oppenheimer it does not change."""
+        """This force field with other isotopes: it does not change in the Born-Oppenheimer approximation."""
         return replace(self, molecule=self.molecule.with_isotopes(changes))
 
     def vibrations(self) -> Vibrations:
         """Wavenumbers and modes, translations and rotations projected out.
 
         ω = √λ / 2πc with the eigenvalues λ of M^(-1/2) F M^(-1/2) (E. B. Wilson, J. C. Decius and P. C. Cross,
-        Molecular Vibrations (1955), § 2-2). Raises ValueError where a vibration has a negative λ (no minimum), or where
-        the projected motions are stiffer than 100 cm⁻¹ (the Hessian is that of another geometry, or there are forces).
+        Molecular Vibrations (1955), § 2-2). Raises ValueError if a vibration has a negative λ (no minimum), or if a projected
+        motion is stiffer than 100 cm⁻¹ (the Hessian belongs to another geometry, or there are forces).
         """
         roots = np.sqrt(np.repeat(self.molecule.masses_u, 3))
         weighted = self.hessian_ev_per_angstrom2 / np.outer(roots, roots)
@@ -133,7 +133,7 @@ def rigid_motions(molecule: Molecule) -> Floats:
 def force_field_from_calculator(
     molecule: Molecule, calculator: Any, *, step_angstrom: float = 0.005, most_force_ev_per_angstrom: float = 0.02
 ) -> ForceField:
-    """The force field of a molecule at its minimum by any ASE calculator: central differences of the forces.
+    """The force field of a molecule at its minimum from an ASE calculator, by central differences of the forces.
 
     F_ij = -[f_j(x_i + h) - f_j(x_i - h)] / 2h, 6n calls.
 
@@ -142,11 +142,11 @@ def force_field_from_calculator(
     molecule : Molecule
         At its minimum, n atoms.
     calculator : ase.calculators.calculator.Calculator
-        Gives the forces.
+        A calculator with forces.
     step_angstrom : float, optional
-        h.
+        The step h.
     most_force_ev_per_angstrom : float, optional
-        The largest component of a force that is taken for zero at the minimum.
+        The largest component of a force that counts as zero at the minimum.
 
     Returns
     -------
@@ -156,11 +156,11 @@ def force_field_from_calculator(
     Raises
     ------
     ValueError
-        Where the forces at the geometry exceed `most_force_ev_per_angstrom`: refine it first (`rotor.api.refine`).
+        If the forces at the geometry exceed `most_force_ev_per_angstrom`: refine it first (`rotor.api.refine`).
 
     Notes
     -----
-    Neglected: an error of the order h² times the fourth derivative.
+    The error of order h² times the fourth derivative is neglected.
     """
     from rotor.molecules.optimise import ase_atoms
 
@@ -189,11 +189,11 @@ def _forces(atoms: Any, start: Floats, coordinate: int, step: float) -> Floats:
 
 
 def read_hessian(path: str | os.PathLike[str], molecule: Molecule, *, unit: str = "hartree/bohr²") -> ForceField:
-    """The force field in a text file of numbers: all (3n)² of them by rows, or the lower triangle by rows.
+    """Read a force field from a text file: all (3n)² elements by rows, or the lower triangle by rows.
 
-    Lines that start with # are comments. unit : "hartree/bohr²", "eV/Å²" or "mdyn/Å". The molecule is that of the
-    calculation, in its frame. Raises ValueError, with the line, for what is no number (asterisks, D exponents), and for
-    a count of numbers that fits neither form.
+    Lines that start with # are comments. unit : "hartree/bohr²", "eV/Å²" or "mdyn/Å". The molecule must be that of the
+    calculation, in its frame. Raises ValueError, with the line, for invalid numbers (asterisks, D exponents), and for
+    a wrong number of elements.
     """
     unit = _UNIT_NAMES.get(unit, unit)
     if unit not in EV_PER_ANGSTROM2:
@@ -241,7 +241,7 @@ def force_field_from_internal(
     constants_mdyn_angstrom : (m, m) array
         Between stretches mdyn/Å, between angles mdyn Å, between both mdyn.
     source : str, optional
-        Where the constants come from.
+        Origin of the constants.
 
     Returns
     -------
@@ -251,7 +251,7 @@ def force_field_from_internal(
     Raises
     ------
     ValueError
-        For constants whose shape does not fit the coordinates.
+        For constants of the wrong shape.
 
     Notes
     -----

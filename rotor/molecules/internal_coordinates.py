@@ -1,8 +1,8 @@
 """Internal coordinates of a molecule, and Wilson's B matrix exact to round-off.
 
-A coordinate is a function of the positions that also takes complex ones, so that its derivative is the imaginary part of
-one step i h without any difference: f'(x) = Im f(x + i h) / h (W. Squire and G. Trapp, SIAM Rev. 40, 110 (1998)).
-Atoms are counted from 0, in functions of their own order as in E. B. Wilson, J. C. Decius and P. C. Cross, Molecular
+A coordinate is a function of the positions that also accepts complex ones, so that its derivative follows from a single
+imaginary step without cancellation: f'(x) = Im f(x + i h) / h (W. Squire and G. Trapp, SIAM Rev. 40, 110 (1998)).
+Atoms are counted from 0; the order of atoms in each function is that of E. B. Wilson, J. C. Decius and P. C. Cross, Molecular
 Vibrations (1955), § 4-1.
 """
 
@@ -78,7 +78,7 @@ def out_of_plane(end: int, apex: int, j: int, k: int) -> Coordinate:
 
 
 def torsion(i: int, j: int, k: int, m: int) -> Coordinate:
-    """The dihedral angle of i-j-k-m near its present value.
+    """The change of the dihedral angle i-j-k-m near its present value.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def torsion(i: int, j: int, k: int, m: int) -> Coordinate:
     Returns
     -------
     callable
-        Positions (n, 3) in Å to radian, right but for a constant.
+        Positions (n, 3) in Å to radian, up to a constant.
     """
 
     def angle(x: NDArray[Any]) -> Any:

@@ -1,8 +1,8 @@
-"""A dipole estimated from the partial charges of MMFF94, for a molecule whose dipole was not measured.
+"""Dipole estimated from the partial charges of MMFF94, for molecules without a measured dipole.
 
-μ = s Σ q_i (r_i - R), with R the centre of mass: it decides which kinds of lines a spectrum has (a, b or c type) and
-their rough strength, no more. The charges are made for liquids, where molecules polarise each other, and give dipoles
-a third too large for the gas; s = 0.74 brings 30 measured ones down to a median error of 0.2 D.
+μ = s Σ q_i (r_i - R), with R the centre of mass. The estimate only shows which types of lines (a, b, c) a spectrum has, and their
+approximate strengths. MMFF94 charges are made for liquids, where molecules polarise each other, and overestimate gas-phase dipoles by
+a third; s = 0.74 reduces the median error for 30 measured dipoles to 0.2 D.
 """
 
 from typing import Any
@@ -17,12 +17,12 @@ GAS_SCALE = (
     0.74  # least squares over 30 molecules (tests/molecules/test_dipoles.py): median error 0.2 D; without it 0.6 D
 )
 CHARGES_SOURCE = "estimate from MMFF94 partial charges"
-NO_DIPOLE_DEBYE = 1e-4  # smaller ones are round-off of a geometry that symmetry leaves without a dipole
-MOST_ATOMS = 200  # beyond this, finding the bonds of a bare geometry takes too long
+NO_DIPOLE_DEBYE = 1e-4  # smaller dipoles are round-off of a geometry whose symmetry forbids a dipole
+MOST_ATOMS = 200  # bond perception of larger geometries takes too long
 
 
 def estimate_dipole(molecule: Molecule) -> tuple[Floats | None, str]:
-    """The dipole that MMFF94 charges give a geometry, and what to say about it.
+    """The dipole of a geometry from MMFF94 charges, with a note on its accuracy.
 
     μ = s Σ q_i (r_i - R), s = 0.74 (1 for an ion, whose charges must add up). The bonds are found from the distances
     and the molecule's charge (RDKit's rdDetermineBonds), the charges q_i are those of T. A. Halgren, J. Comput. Chem.
@@ -36,9 +36,9 @@ def estimate_dipole(molecule: Molecule) -> tuple[Floats | None, str]:
     Returns
     -------
     dipole_debye : (3,) array or None
-        In the frame of the positions, D; None where bonds or charges cannot be found.
+        In the frame of the positions, D; None if bonds or charges cannot be determined.
     note : str
-        How far to trust it, or why there is none.
+        The accuracy of the dipole, or why there is none.
 
     Examples
     --------
@@ -62,7 +62,7 @@ def estimate_dipole(molecule: Molecule) -> tuple[Floats | None, str]:
 
 
 def bonded_rdkit(molecule: Molecule) -> Any:
-    """An RDKit molecule whose bonds follow from the distances and the charge (rdDetermineBonds); None where none fit."""
+    """An RDKit molecule with bonds from the distances and the charge (rdDetermineBonds); None if no bonds fit."""
     from rdkit import Chem, Geometry
     from rdkit.Chem import rdDetermineBonds
 
@@ -80,7 +80,7 @@ def bonded_rdkit(molecule: Molecule) -> Any:
 
 
 def mmff_dipole(mol: Any, molecule: Molecule) -> Floats | None:
-    """Dipole (3,) in D from the bonds of an RDKit molecule and the positions of ours; None without parameters."""
+    """Dipole (3,) in D from the bonds of the RDKit molecule and the positions of `molecule`; None without parameters."""
     from rdkit import Chem
     from rdkit.Chem import rdForceFieldHelpers
 
@@ -98,7 +98,7 @@ def mmff_dipole(mol: Any, molecule: Molecule) -> Floats | None:
 
 
 def charges_note(molecule: Molecule) -> str:
-    """How far to trust a dipole from MMFF94 charges."""
+    """A note on the accuracy of a dipole from MMFF94 charges."""
     if molecule.charge:
         return f"dipole of the ion about its centre of mass is an {CHARGES_SOURCE}: its error was not measured"
     return f"dipole is an {CHARGES_SOURCE}: half of 30 molecules were off by more than 0.2 D, the worst by 1.2 D"

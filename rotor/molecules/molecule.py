@@ -1,7 +1,6 @@
 """A molecule: symbols, isotopes, positions, and its dipole and polarizability in the same frame.
 
-Nothing here knows of rotation: a `Molecule` is what a file or a program says, checked once, and carried with
-where it came from and how far it can be trusted.
+A `Molecule` holds the checked data of a file or program, with their source and uncertainty. It has no rotational properties.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from rotor.units import DEBYE_PER_E_ANGSTROM, QUADRUPOLE_MHZ_PER_BARN_AU
 
 _UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
-ELECTRONIC = ("even", "odd")  # what half turns do to the electronic state
+ELECTRONIC = ("even", "odd")  # parity of the electronic state under half turns
 FEW_ATOMS = 100  # up to which all distances are as quick as a k-d tree
 CLOSEST_ANGSTROM = 0.1  # no two nuclei of a molecule come nearer; H2 has 0.74 Å
 
@@ -30,29 +29,29 @@ CLOSEST_ANGSTROM = 0.1  # no two nuclei of a molecule come nearer; H2 has 0.74 �
 class Molecule:
     """Nuclei at fixed positions, checked.
 
-    symbols : n element symbols; isotope names such as `"D"` or `"13C"` are taken apart into symbol and mass number
+    symbols : n element symbols; isotope names such as `"D"` or `"13C"` are split into symbol and mass number
     positions_angstrom : (n, 3) array, Å
-    mass_numbers : n mass numbers; left out, they are those of `symbols` or of the most abundant isotopes
+    mass_numbers : n mass numbers; default: those of `symbols`, or of the most abundant isotopes
     charge : in elementary charges
     multiplicity : 2S + 1 of the electrons. None: not known
     electron_spin_mhz : largest constant of the electron spin, such as |lambda| of a triplet. None: not known
-    electronic : "even" where half turns leave the electronic state alike, as in every closed shell; "odd" where those that
-        change places of like nuclei turn its sign, as in the Σg- of O2. Nuclear-spin weights need it
-    dipole_debye : (3,) array in the frame of the positions, D, pointing from negative to positive; that of an ion
-        refers to its centre of mass. None: not known
-    dipole_source : where the dipole is from
+    electronic : "even" if half turns leave the electronic state unchanged, as for closed shells; "odd" if half turns that exchange
+        like nuclei change its sign, as for Σg- of O2. Used for nuclear-spin weights
+    dipole_debye : (3,) array in the frame of the positions, D, pointing from negative to positive; for an ion relative
+        to its centre of mass. None: not known
+    dipole_source : origin of the dipole
     polarizability_angstrom3 : (3, 3) symmetric array in the same frame, polarizability volume in Å³. None: not known
-    polarizability_source : where the polarizability is from
-    quadrupole_mhz : (3, 3) traceless quadrupole couplings χ in MHz in the same frame, by the number of the atom, counted from 1
+    polarizability_source : origin of the polarizability
+    quadrupole_mhz : (3, 3) traceless quadrupole couplings χ in MHz in the same frame, by atom number, counted from 1
     field_gradients_au : (3, 3) traceless second derivatives of the electric potential at the nuclei, Eh/(e a0²), in the same frame, by
-        the number of the atom. They stay when isotopes change, so that a nucleus gets its coupling where the other one has none
-    quadrupole_source : where couplings and gradients are from
-    name, source : what it is called, where the geometry is from
-    uncertainty : typical relative error of the rotational constants that follow from the geometry. None: not known
-    notes : what a user must know
+        atom number. They do not change with isotopes, so that an isotope with a quadrupole moment gets its coupling
+    quadrupole_source : origin of couplings and gradients
+    name, source : name of the molecule, origin of the geometry
+    uncertainty : typical relative error of the rotational constants from the geometry. None: not known
+    notes : remarks for the user
 
-    Raises ValueError for no atoms, positions that are not n triples of finite numbers, a symbol or mass number that
-    is no isotope, two atoms nearer than 0.1 Å, an unknown electronic state, or a dipole or tensor of the wrong shape.
+    Raises ValueError for no atoms, positions that are not n triples of finite numbers, a symbol or mass number of no known
+    isotope, two atoms closer than 0.1 Å, an unknown electronic state, or a dipole or tensor of the wrong shape.
     Arrays are read-only copies.
 
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
@@ -119,7 +118,7 @@ class Molecule:
 
     @property
     def mass_u(self) -> float:
-        """Total mass in u; the electrons that an ion lacks or has more (5.5e-4 u each) are left out."""
+        """Total mass in u; missing or additional electrons of an ion (5.5e-4 u each) are neglected."""
         return float(self.masses_u.sum())
 
     @property
@@ -143,14 +142,14 @@ class Molecule:
         Parameters
         ----------
         changes : mapping or str
-            Isotope names by 1-based atom number or by element (then every atom of it): `{1: "2H"}`, `{"O": "18O"}`,
-            or as text `"1=2H,O=18O"`. Atom numbers win over elements.
+            Isotope names by 1-based atom number or by element for all its atoms: `{1: "2H"}`, `{"O": "18O"}`,
+            or as text `"1=2H,O=18O"`. Atom numbers have precedence.
 
         Returns
         -------
         Molecule
-            The dipole of an ion is moved on to the new centre of mass, μ' = μ - q (R' - R); that of a neutral
-            molecule and the geometry stay (the change of the r₀ structure, of the order of 0.001 Å, is neglected).
+            The dipole of an ion is transformed to the new centre of mass, μ' = μ - q (R' - R); that of a neutral
+            molecule and the geometry do not change (the change of the r₀ structure, about 0.001 Å, is neglected).
 
         Raises
         ------
@@ -175,7 +174,7 @@ class Molecule:
         return replace(changed, dipole_debye=self.dipole_debye - self.charge * DEBYE_PER_E_ANGSTROM * shift)
 
     def _atoms_named(self, key: int | str) -> list[int]:
-        """Indices of the atoms that an atom number or an element means."""
+        """Indices of the atoms with this number or element."""
         if isinstance(key, int):
             if not 1 <= key <= len(self.symbols):
                 raise ValueError(f"atom {key} to substitute: {self.formula} has atoms 1 to {len(self.symbols)}")
@@ -210,7 +209,7 @@ class Molecule:
 
 
 def _nuclei(symbols: Iterable[str], mass_numbers: Iterable[int]) -> tuple[Isotope, ...]:
-    """Isotopes of the atoms; messages have the 1-based number of the atom."""
+    """Isotopes of the atoms; messages give the 1-based atom number."""
     names = (symbols,) if isinstance(symbols, str) else tuple(symbols)
     numbers: tuple[int | None, ...] = tuple(mass_numbers) or (None,) * len(names)
     if not names:
@@ -227,7 +226,7 @@ def _nuclei(symbols: Iterable[str], mass_numbers: Iterable[int]) -> tuple[Isotop
 
 
 def _checked(values: ArrayLike, shape: tuple[int, ...], what: str) -> Floats:
-    """A read-only copy as floats, of that shape and finite."""
+    """A read-only copy as finite floats of this shape."""
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -243,7 +242,7 @@ def _checked(values: ArrayLike, shape: tuple[int, ...], what: str) -> Floats:
 
 
 def _checked_tensors(tensors: Mapping[int, Floats], atoms: int, key: str) -> dict[int, Floats]:
-    """Symmetric traceless tensors by the number of the atom, as read-only arrays."""
+    """Symmetric traceless tensors by atom number, as read-only arrays."""
     checked = {}
     for atom, value in tensors.items():
         if not 1 <= atom <= atoms:
@@ -257,7 +256,7 @@ def _checked_tensors(tensors: Mapping[int, Floats], atoms: int, key: str) -> dic
 
 
 def couplings_mhz(gradients_au: Mapping[int, Floats], nuclei: Sequence[Isotope]) -> dict[int, Floats]:
-    """χ = e Q q/h in MHz of the nuclei with a spin of 1 or more and a known Q, from field gradients q in Eh/(e a0²).
+    """χ = e Q q/h in MHz from field gradients q in Eh/(e a0²), for nuclei with a spin of at least 1 and a known Q.
 
     q is the second derivative of the potential, positive along the axis to a positive charge (W. Gordy and R. L. Cook, Microwave
     Molecular Spectra, 3rd ed., chapter IX).
@@ -275,7 +274,7 @@ def couplings_mhz(gradients_au: Mapping[int, Floats], nuclei: Sequence[Isotope])
 
 
 def _scaled_couplings(molecule: Molecule, nuclei: Sequence[Isotope]) -> dict[int, Floats]:
-    """χ Q'/Q for other isotopes, or that of the gradient, which stays. Nuclei without a known Q have none."""
+    """χ Q'/Q for other isotopes, or χ from the field gradient. Nuclei without a known Q have none."""
     couplings = couplings_mhz(molecule.field_gradients_au, nuclei)
     for atom, chi in molecule.quadrupole_mhz.items():
         old, new = molecule.nuclei[atom - 1], nuclei[atom - 1]
@@ -287,7 +286,7 @@ def _scaled_couplings(molecule: Molecule, nuclei: Sequence[Isotope]) -> dict[int
 
 
 def _refuse_multiplicity(multiplicity: int | None, electrons: int) -> None:
-    """ValueError for a multiplicity 2S + 1 that so many electrons cannot have."""
+    """Raise ValueError for a multiplicity 2S + 1 that is impossible with this number of electrons."""
     if multiplicity is None:
         return
     if isinstance(multiplicity, bool) or multiplicity != int(multiplicity) or multiplicity < 1:
@@ -305,7 +304,7 @@ def _refuse_lopsided(tensor: Floats | None) -> None:
 
 
 def _refuse_coincident(positions: Floats, nuclei: tuple[Isotope, ...]) -> None:
-    """ValueError for the first two atoms nearer than `CLOSEST_ANGSTROM`."""
+    """Raise ValueError for the first two atoms closer than `CLOSEST_ANGSTROM`."""
     if len(positions) < 2:
         return
     apart, nearest = nearest_others(positions)
@@ -320,12 +319,12 @@ def _refuse_coincident(positions: Floats, nuclei: tuple[Isotope, ...]) -> None:
 
 
 def nearest_others(positions: Floats) -> tuple[Floats, Ints]:
-    """Distance (n,) of each point from the nearest other one, and which that is; n ≥ 2."""
-    if len(positions) > FEW_ATOMS:  # n log n; few atoms do not load scipy
+    """Distance (n,) of each point from its nearest neighbour, and the index of this neighbour; n ≥ 2."""
+    if len(positions) > FEW_ATOMS:  # n log n; imported only for many atoms
         from scipy.spatial import cKDTree
 
         distances, indices = cKDTree(positions).query(positions, k=2)
-        is_itself = indices[:, 0] == np.arange(len(positions))  # two points in one place come in either order
+        is_itself = indices[:, 0] == np.arange(len(positions))  # coincident points may come in either order
         return distances[:, 1], np.where(is_itself, indices[:, 1], indices[:, 0])
     distances = np.linalg.norm(positions[:, None] - positions, axis=2)
     np.fill_diagonal(distances, np.inf)

@@ -1,7 +1,7 @@
-"""Isotopes: mass, natural abundance, spin and quadrupole moment of every nucleus, from data/isotopes.csv.
+"""Isotopes: mass, natural abundance, spin and quadrupole moment of all nuclei, from data/isotopes.csv.
 
-Masses are those of isotopes (AME2020), never averages over the natural mixture: an element named without a mass
-number means its most abundant isotope, or the longest-lived one where nature has none.
+Masses are those of isotopes (AME2020), not averages over the natural mixture. An element without a mass number means its most
+abundant isotope, or the longest-lived one of elements that do not occur in nature.
 """
 
 import difflib
@@ -21,16 +21,16 @@ _MASS_LAST = re.compile(r"([A-Za-z]{1,2})-?(\d+)")
 
 @dataclass(frozen=True)
 class Isotope:
-    """One nucleus, as the tables give it.
+    """Tabulated properties of a nucleus.
 
-    symbol : of the element, `"H"` for deuterium too (`label` distinguishes them)
+    symbol : of the element; `"H"` for deuterium too (`label` distinguishes them)
     element_number, mass_number : protons, nucleons
     mass_u : mass of the neutral atom in u (AME2020)
     abundance : fraction of the natural element, 0 to 1
     half_life_s : infinite for a stable nucleus
     spin : in units of h/2π
-    g_factor : magnetic moment over spin and nuclear magneton; None where the tables give none
-    quadrupole_barn : spectroscopic electric quadrupole moment, 1 barn = 1e-28 m²; None where unknown
+    g_factor : magnetic moment over spin and nuclear magneton; None if unknown
+    quadrupole_barn : spectroscopic electric quadrupole moment, 1 barn = 1e-28 m²; None if unknown
     """
 
     symbol: str
@@ -50,7 +50,7 @@ class Isotope:
 
 
 def data_folder() -> Path:
-    """The folder of data files: `rotor/data` of an installed package, else `data` beside `rotor` in the source tree."""
+    """The folder of data files: `rotor/data` in an installed package, `data` beside `rotor` in the source tree."""
     package = Path(__file__).resolve().parents[1]
     for folder in (package / "data", package.parent / "data"):
         if (folder / "isotopes.csv").is_file():
@@ -60,7 +60,7 @@ def data_folder() -> Path:
 
 @cache
 def _lines() -> dict[str, list[str]]:
-    """The lines of the table by symbol; numbers are made of those that are asked for."""
+    """The lines of the table by symbol; numbers are parsed on demand."""
     text = (data_folder() / "isotopes.csv").read_text(encoding="utf-8")
     by_symbol: dict[str, list[str]] = {}
     for line in [line for line in text.splitlines() if not line.startswith("#")][1:]:
@@ -70,7 +70,7 @@ def _lines() -> dict[str, list[str]]:
 
 @cache
 def _isotopes(element: str) -> dict[int, Isotope]:
-    """Every isotope of an element by mass number."""
+    """All isotopes of an element by mass number."""
     isotopes = {}
     for line in _lines()[element]:
         symbol, number, mass_number, *numbers, g_factor, quadrupole = line.split(",")
@@ -90,16 +90,16 @@ def _isotopes(element: str) -> dict[int, Isotope]:
 
 
 def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
-    """The isotope of that name; the most abundant one of the element where no mass number is given.
+    """The isotope of this name; without a mass number the most abundant isotope of the element.
 
-    An element that does not occur in nature means the isotope with the longest half-life known.
+    For an element that does not occur in nature, the isotope with the longest half-life.
 
     Parameters
     ----------
     symbol : str
         `"H"`, `"2H"`, `"D"`, `"T"`, `"13C"`, `"C13"`, `"C-13"`; case of the letters counts.
     mass_number : int, optional
-        Instead of one inside `symbol`.
+        Alternative to a mass number in `symbol`.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
     Raises
     ------
     ValueError
-        A name or mass number that the table does not have, with near matches; two mass numbers that differ.
+        A name or mass number outside the table (near matches are named); two different mass numbers.
 
     Examples
     --------
@@ -132,7 +132,7 @@ def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
 
 
 def _split(name: str) -> tuple[str, int | None]:
-    """Element and mass number of `"13C"`, `"C13"`, `"D"` or `"C"`; the element is one of the table."""
+    """Element and mass number of `"13C"`, `"C13"`, `"D"` or `"C"`; checks the element."""
     name = name.strip()
     if name in _OWN_NAMES:
         return _OWN_NAMES[name]
@@ -148,10 +148,10 @@ def _split(name: str) -> tuple[str, int | None]:
 
 
 def _near(element: str) -> str:
-    """A phrase that names the elements most like a wrong symbol; empty where none is."""
-    known = list(_lines())
-    near = [symbol for symbol in known if symbol.lower() == element.lower()]
-    near += [symbol for symbol in difflib.get_close_matches(element, known, n=3) if symbol not in near]
+    """A phrase with the elements most similar to a wrong symbol; may be empty."""
+    symbols = list(_lines())
+    near = [symbol for symbol in symbols if symbol.lower() == element.lower()]
+    near += [symbol for symbol in difflib.get_close_matches(element, symbols, n=3) if symbol not in near]
     return f" (near it: {', '.join(near)})" if near else ""
 
 
@@ -168,9 +168,9 @@ def element_symbol(number: int) -> str:
 
 
 def natural_isotopes(symbol: str) -> tuple[Isotope, ...]:
-    """The isotopes that nature has of an element, the most abundant first; none of technetium.
+    """The natural isotopes of an element, most abundant first; empty for technetium.
 
-    >>> [one.label for one in natural_isotopes("O")]
+    >>> [nucleus.label for nucleus in natural_isotopes("O")]
     ['16O', '18O', '17O']
     """
     element, _ = _split(symbol)
@@ -179,7 +179,7 @@ def natural_isotopes(symbol: str) -> tuple[Isotope, ...]:
 
 
 def isotope_of_mass(symbol: str, mass_u: float, within_u: float = 0.01) -> Isotope:
-    """The isotope of an element that has a given mass in u; ValueError where none is within `within_u`.
+    """The isotope of an element with this mass in u; ValueError if none is within `within_u`.
 
     >>> isotope_of_mass("Cl", 36.966).label
     '37Cl'

@@ -1,4 +1,4 @@
-"""A geometry made better by any ASE calculator: optimised until the forces are small, never silently short of it."""
+"""Optimisation of a geometry with an ASE calculator; a search that does not converge is an error."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from rotor.molecules.molecule import Molecule
 from rotor.table import counted
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
-MOST_FORCE_EV_PER_ANGSTROM = 1e-3  # on any atom, where an optimisation is done
+MOST_FORCE_EV_PER_ANGSTROM = 1e-3  # largest force on an atom of an optimised geometry
 MOST_STEPS = 500
 _INSTALLED_SEPARATELY = {"tblite": "tblite.ase", "xtb": "xtb.ase.calculator"}
 _CLASS_NAMES = {"tblite": "TBLite", "xtb": "XTB"}
-_SETTINGS = {"tblite": {"verbosity": 0}, "xtb": {}}  # tblite writes each cycle to standard output otherwise
+_SETTINGS = {"tblite": {"verbosity": 0}, "xtb": {}}  # by default tblite writes each cycle to standard output
 _NOT_FOR_MOLECULES = {
     "emt": "EMT is a potential for metals; its forces on C, N, O and H are for tests of programs, not for geometries",
     "lj": "one Lennard-Jones parameter for all atoms holds no molecule together; build the calculator in Python",
@@ -48,25 +48,24 @@ def refine(
     Parameters
     ----------
     molecule : Molecule
-        Where the search starts.
+        Start of the search.
     calculator : ASE calculator or str
-        Any with forces, or a name for `calculator_by_name`.
+        A calculator with forces, or a name for `calculator_by_name`.
     most_force_ev_per_angstrom : float
-        The search is done when no force on an atom is larger.
+        Convergence limit: largest force on an atom.
     most_steps : int
-        After as many it has failed.
+        Largest number of steps.
 
     Returns
     -------
     Molecule
-        With the new positions; the dipole is the calculator's where it has one, else not known, since that of the old
-        geometry has lost its frame. A note says how many steps it took and what force is left; the uncertainty of the
-        constants is not known.
+        With the new positions. The dipole is the calculator's, or unknown, since the frame has changed. A note gives the number of
+        steps and the remaining force; the uncertainty of the constants is unknown.
 
     Raises
     ------
     ValueError
-        Where the search does not converge, with the force that is left, and where the calculator fails.
+        If the search does not converge, or the calculator fails.
 
     Examples
     --------
@@ -87,7 +86,9 @@ def refine(
     try:
         converged = search.run(fmax=most_force_ev_per_angstrom, steps=most_steps)
         left = float(np.linalg.norm(atoms.get_forces(), axis=1).max())
-    except Exception as reason:  # calculators fail with any class; all mean that this molecule cannot be done with it
+    except (
+        Exception
+    ) as reason:  # calculators raise exceptions of any class; all mean that it cannot treat this molecule
         raise ValueError(f"{name} fails for {molecule.formula}: {reason or type(reason).__name__}") from reason
     if not converged:
         raise ValueError(
@@ -113,21 +114,21 @@ def _refined(molecule: Molecule, atoms: Any, name: str, note: str) -> Molecule:
 
 
 def calculator_by_name(name: str) -> Any:
-    """An ASE calculator with its own defaults, by the name that ASE knows, or `tblite`, `xtb` where installed.
+    """An ASE calculator with default settings, by its name in ASE, or `tblite`, `xtb` if installed.
 
-    Raises ValueError for a name unknown, a program not installed or not set up, and potentials that are not for
-    molecules (EMT and the like), with a word why.
+    Raises ValueError, with a reason, for an unknown name, a program that is not installed or set up, and potentials that are
+    not for molecules (such as EMT).
     """
     library: Any = import_module("ase.calculators.calculator")
     key, names = name.strip().lower(), library.names
     if key in _NOT_FOR_MOLECULES:
         raise ValueError(f"calculator {name!r}: {_NOT_FOR_MOLECULES[key]}")
     if key not in (*names, *_INSTALLED_SEPARATELY):
-        known = ", ".join(sorted({*names, *_INSTALLED_SEPARATELY} - {*_NOT_FOR_MOLECULES}))
-        raise ValueError(f"calculator {name!r} is unknown to ASE; known are {known}")
+        available = ", ".join(sorted({*names, *_INSTALLED_SEPARATELY} - {*_NOT_FOR_MOLECULES}))
+        raise ValueError(f"calculator {name!r} is unknown to ASE; known are {available}")
     try:
         return _separate(key) if key in _INSTALLED_SEPARATELY else library.get_calculator_class(key)()
-    except Exception as reason:  # an import, a configuration or a program that is missing: all mean that it is not here
+    except Exception as reason:  # a missing import, configuration or program: the calculator is not available
         raise ValueError(
             f"calculator {name!r} cannot be built here ({' '.join(str(reason).split()) or type(reason).__name__}); install "
             "and set it up, or build it in Python and give it to rotor.api.refine"

@@ -1,7 +1,7 @@
-"""Outputs that cclib 1.8 cannot read: CFOUR, for which it has no parser, and ORCA from version 6, whose dipole it fails at.
+"""Reader for outputs that cclib 1.8 cannot read: CFOUR (no parser) and ORCA from version 6 (its dipole fails).
 
-The few numbers that cclib reads from other programs are read, under its names. Real outputs that this
-was made from: `tests/oracles/outputs/README.md`. CFOUR's polarizability is not read: no real output with one was available; a note says so.
+The same numbers are read as by cclib from other programs, under its names. The formats were taken from the real outputs listed in
+`tests/oracles/outputs/README.md`. CFOUR's polarizability is not read, because no real output with one was available; a note says so.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ DEBYE_PER_AU = DEBYE_PER_E_ANGSTROM * BOHR_RADIUS_ANGSTROM
 
 @dataclass
 class Read:
-    """What an output says, with cclib's names and units: Å, D, atomic units of polarizability, u."""
+    """Data of an output, with cclib's names and units: Å, D, atomic units of polarizability, u."""
 
     atomnos: list[int]
     atomcoords: list[Floats]
@@ -32,14 +32,14 @@ class Read:
 
 
 def reads_itself(output: Output) -> bool:
-    """Whether this module reads an output in cclib's place."""
+    """Whether this module reads an output instead of cclib."""
     return output.program.name == "CFOUR" or (output.program.name == "ORCA" and _version(output) >= 6)
 
 
 def read_plain(output: Output) -> Read:
     """The last geometry, charge, dipole, polarizability and masses of an output.
 
-    Raises ValueError, with the line, for a table that does not hold what it should, and for an output without geometry.
+    Raises ValueError, with the line, for a malformed table, and for an output without geometry.
     """
     geometries = tables(output)
     if not geometries:
@@ -58,7 +58,7 @@ def read_plain(output: Output) -> Read:
 
 
 def unread(output: Output) -> tuple[str, ...]:
-    """Notes on what such an output holds and is not read."""
+    """Notes on data in such an output that are not read."""
     if output.program.name == "CFOUR" and any("polarizabilit" in line.lower() for line in output.lines):
         return (f"{output.where}: CFOUR's polarizability was not taken: how it is printed is not known here",)
     return ()
@@ -72,14 +72,14 @@ def _version(output: Output) -> int:
 
 
 def _charge(output: Output) -> int:
-    """`Total Charge  Charge  ....  0` of ORCA, `CHARGE  ICHRGE  0  ***` of CFOUR; 0 where neither stands."""
+    """The charge: `Total Charge  Charge  ....  0` of ORCA, `CHARGE  ICHRGE  0  ***` of CFOUR; default 0."""
     pattern = r"\s*(?:Total Charge\s+Charge\s+\.{4}|CHARGE\s+ICHRGE)\s+(-?\d+)"
     charges = [match for line in output.lines if (match := re.match(pattern, line))]
     return int(charges[-1][1]) if charges else 0
 
 
 def _dipole(output: Output) -> Floats | None:
-    """The last total dipole, a.u.; after a correlated method that is the correlated one."""
+    """The last total dipole, a.u.; for a correlated method the correlated one."""
     if output.program.name == "CFOUR":
         start = output.last(output.program.dipole)
         if start is None:
@@ -112,7 +112,7 @@ def _polarizability(output: Output) -> Floats | None:
 
 
 def _masses(output: Output, n: int) -> Floats:
-    """ORCA's masses, u, from its table in atomic units; none of CFOUR's, which are those of the abundant isotopes."""
+    """ORCA's masses, u, from its table in atomic units; none for CFOUR, which uses the most abundant isotopes."""
     start = output.last(("CARTESIAN COORDINATES (A.U.)",))
     if output.program.name != "ORCA" or start is None:
         return np.zeros(0)

@@ -1,4 +1,4 @@
-"""Electric field gradients at nuclei that ORCA prints with `%eprnmr nuclei = all N {fgrad}`, and the couplings that follow from them.
+"""Electric field gradients at nuclei, printed by ORCA with `%eprnmr nuclei = all N {fgrad}`, and quadrupole couplings from them.
 
      Nucleus   0N : A:ISTP=   14 I=  1.0 P= 38.5677 MHz/au**3             (ORCA 6: `Nucleus   0N : A  : Isotope=   14 ...`)
      Raw EFG matrix (all values in a.u.**-3):
@@ -7,9 +7,9 @@
                  0.6888      -0.1300      -0.3424
                  0.2845      -0.3424      -0.0186
 
-Atoms are counted from 0, and the axes are those of the coordinates. The sign is that of the second derivative of the potential: the
-part `V(Nuc)` is that of the other nuclei as positive charges, which a test computes from the geometry. ORCA's own Q (of 2H for a
-hydrogen, of 17O for an oxygen) is not used; χ = e Q q/h has the Q of data/isotopes.csv for the isotope of the molecule.
+Atoms are counted from 0, and the axes are those of the coordinates. The sign is that of the second derivative of the potential: a test
+computes the part `V(Nuc)` from the other nuclei as positive charges. ORCA's Q (of 2H for hydrogen, of 17O for oxygen) is not used;
+χ = e Q q/h has the Q of data/isotopes.csv for the isotope of the molecule.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _NUCLEUS = re.compile(r"\s*Nucleus\s+(\d+)([A-Z][a-z]?)\s*:\s*A\s*:")
 
 
 def with_field_gradients(molecule: Molecule, output: Output) -> Molecule:
-    """The molecule with the field gradients printed after its geometry, the last of each atom, and the couplings that follow from them."""
+    """The molecule with the last field gradients printed after its geometry, and the couplings from them."""
     if output.program.name != "ORCA" or (last := output.last((HEADING,))) is None:
         return molecule
     geometry = tables(output)[-1][0]
@@ -43,7 +43,7 @@ def with_field_gradients(molecule: Molecule, output: Output) -> Molecule:
 
 
 def _gradients(output: Output, start: int, molecule: Molecule) -> dict[int, Floats]:
-    """The matrices below a line, by the number of the atom."""
+    """The matrices below a line, by atom number."""
     gradients: dict[int, Floats] = {}
     atom: int | None = None
     for i in range(start, len(output.lines)):
@@ -57,7 +57,7 @@ def _gradients(output: Output, start: int, molecule: Molecule) -> dict[int, Floa
 
 
 def _atom(output: Output, i: int, molecule: Molecule, atom: int, symbol: str) -> int:
-    """The number of the atom, counted from 1, which must be of that element."""
+    """The atom number, counted from 1; checks the element."""
     if atom > len(molecule.symbols) or molecule.symbols[atom - 1] != symbol:
         raise output.refuse(i, f"atom {atom}, counted from 1, of the last geometry is expected to be {symbol}")
     return atom

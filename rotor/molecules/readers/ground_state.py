@@ -1,7 +1,7 @@
-"""Which printed dipole is that of the electronic ground state: programs print those of excited densities in the same form.
+"""Selection of the dipole of the electronic ground state: programs print dipoles of excited densities in the same form.
 
-Gaussian names the density in the head of its population analysis ("using the SCF density"; "CI" of CIS and TD-DFT, where
-excited states are listed), ORCA 6 the method under the head of the dipole, older ones name the method in the lines before it.
+Gaussian names the density in the heading of its population analysis ("using the SCF density"; "CI" for CIS and TD-DFT with a list of
+excited states). ORCA 6 names the method below the heading of the dipole, older versions in the lines before it.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ _LINES_BEFORE = 25  # in which an older ORCA names the method of the density
 
 
 def dipole_lines(output: Output) -> list[int]:
-    """Indices of the lines that open a printed dipole."""
+    """Indices of the first lines of printed dipoles."""
     return [i for i, line in enumerate(output.lines) if line.strip().startswith(output.program.dipole)]
 
 
 def is_excited(output: Output, start: int) -> bool:
-    """Whether the dipole that opens at a line is of an excited density."""
+    """Whether the dipole printed from line `start` is that of an excited density."""
     if output.program.name == "Gaussian":
         heads = [match[1] for line in output.lines[:start] if (match := _DENSITY.search(line))]
         density = heads[-1].upper() if heads else "SCF"
@@ -43,7 +43,7 @@ def is_excited(output: Output, start: int) -> bool:
 
 
 def printed_dipole(output: Output, start: int) -> Floats | None:
-    """The dipole (3,) in D that opens at a line of Gaussian, ORCA or Psi4, in the axes it is printed in; None where it is not found."""
+    """The dipole (3,) in D printed from line `start` by Gaussian, ORCA or Psi4, in its printed axes; None if not found."""
     if output.program.name == "Gaussian":
         numbers = re.findall(r"[XYZ]=\s*(-?\d+\.\d+)", output.lines[start + 1])
         return np.array([float(x) for x in numbers]) if len(numbers) == 3 else None

@@ -1,7 +1,7 @@
-"""What the outputs of quantum-chemistry programs look like, and what is refused in them before a number is read.
+"""Formats of the outputs of quantum-chemistry programs, and checks before a number is read.
 
-Each program is a row of `PROGRAMS`: its banner, its last words, what opens its tables and tensors. Whatever is used of
-an output is looked through first: asterisks, `D` exponents where there are none, a cut end.
+Each program is a row of `PROGRAMS`: banner, last words, headings of tables and tensors. The parts of an output that are used are
+checked first for asterisks, unexpected `D` exponents and a truncated end.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from rotor.units import BOHR_RADIUS_ANGSTROM, MHZ_PER_CM
 
 @dataclass(frozen=True)
 class Program:
-    """How one program's output reads: its name's line, its last line, and what opens its tables and tensors."""
+    """Format of a program's output: banner, last line, and headings of tables and tensors."""
 
     name: str
     banner: str
     ending: str
-    geometries: tuple[str, ...]  # what opens a table of coordinates; of several before a tensor the first one counts
+    geometries: tuple[str, ...]  # headings of coordinate tables; if several precede a tensor, the first counts
     rows_after: int  # lines between the opening one and the first atom
     columns: slice  # of the coordinates in a row
     dipole: tuple[str, ...]
@@ -65,7 +65,7 @@ PROGRAMS = (
 
 @dataclass(frozen=True)
 class Output:
-    """The lines of an output, of which program, and where it is from."""
+    """The lines of an output, its program, and its origin."""
 
     where: str
     lines: tuple[str, ...]
@@ -81,7 +81,7 @@ class Output:
 
 
 def program_of(text: str) -> Program | None:
-    """The program of those known here that an output names first, None for another.
+    """The supported program that an output names first; None for others.
 
     >>> program_of("Copyright (c) 1988-2016, Gaussian, Inc.  All Rights Reserved.").name
     'Gaussian'
@@ -91,7 +91,7 @@ def program_of(text: str) -> Program | None:
 
 
 def refuse_cut(output: Output) -> None:
-    """The program's last words must follow the last table and the last start of a job; without them the file is cut or the run failed."""
+    """Refuse an output without the program's last words after its last table and job: it is truncated or the run failed."""
     endings = [i for i, line in enumerate(output.lines) if output.program.ending in line]
     job_starts = (*output.program.geometries, "Link1:  Proceeding")  # the second words open Gaussian's next job
     starts = [
@@ -106,7 +106,7 @@ def refuse_cut(output: Output) -> None:
 
 
 def refuse_unreadable(output: Output) -> None:
-    """Asterisks and `D` exponents in the numbers that are going to be used."""
+    """Refuse asterisks and unexpected `D` exponents in the numbers that are used."""
     for i, may_have_d in _used_lines(output):
         line = output.lines[i]
         if "**" in line:
@@ -116,7 +116,7 @@ def refuse_unreadable(output: Output) -> None:
 
 
 def _used_lines(output: Output) -> Iterator[tuple[int, bool]]:
-    """Indices of the lines with coordinates, dipole, polarizability, and whether D exponents belong there."""
+    """Indices of the lines with coordinates, dipole, polarizability, and whether D exponents are expected there."""
     program = output.program
     for start, rows in tables(output):
         yield from ((start + program.rows_after + k, False) for k in range(len(rows)))
@@ -130,7 +130,7 @@ def _used_lines(output: Output) -> Iterator[tuple[int, bool]]:
 
 
 def _is_ornament(line: str) -> bool:
-    """`*** tstop() called`, `****ORCA TERMINATED NORMALLY****`: asterisks around words, no number that did not fit."""
+    """Whether asterisks surround words, as in `****ORCA TERMINATED NORMALLY****`, instead of replacing a number."""
     return bool(re.search(r"\*\*\s*[A-Za-z]{3}", line))
 
 
@@ -142,7 +142,7 @@ def tables(output: Output) -> list[tuple[int, list[list[str]]]]:
 
 
 def coordinates_angstrom(output: Output, start: int, rows: list[list[str]]) -> NDArray[np.float64]:
-    """The coordinates (n, 3) of a table, Å; those under a line that says bohr are turned into it."""
+    """The coordinates (n, 3) of a table, Å; converted if the heading says bohr."""
     scale = BOHR_RADIUS_ANGSTROM if "bohr" in output.lines[start].lower() else 1.0
     return scale * np.array([[float(word) for word in row[output.program.columns]] for row in rows])
 
@@ -157,6 +157,6 @@ def _rows(lines: tuple[str, ...]) -> Iterator[list[str]]:
 
 
 def without_constants(output: Output) -> str:
-    """The text without rotational constants: those of a linear molecule begin with asterisks, which stops cclib."""
+    """The text without rotational constants: cclib fails at the asterisks of a linear molecule."""
     pattern = re.compile(output.program.constants)
     return "\n".join(line for line in output.lines if not pattern.search(line)) + "\n"

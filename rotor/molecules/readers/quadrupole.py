@@ -1,4 +1,4 @@
-"""Quadrupole coupling of nuclei that Gaussian prints with `output=pickett`: χ_ij = e Q q_ij/h in MHz, with the isotope's Q.
+"""Quadrupole couplings printed by Gaussian with `output=pickett`: χ_ij = e Q q_ij/h in MHz, with the Q of the isotope.
 
      Nuclear quadrupole coupling constants [Chi] (MHz):
      3  N(14)
@@ -6,9 +6,10 @@
        ab=     0.0094   bb=     2.3852   cb=    -0.0000
        ac=    -0.0000   bc=    -0.0000   cc=    -4.9586
 
-Its letters are columns of the table "Principal axis orientation:", which need not be a, b, c in order of the moments (the example, from
-K. L. K. Lee's page "Gaussian Recipes for Rotational Spectroscopy", has cc along a). So the table is laid on the geometry, and the dipole
-printed below the couplings must be that of the molecule in the same axes; else they are left out, with a note.
+The letters denote columns of the table "Principal axis orientation:", which need not be a, b, c in order of the moments (the example,
+from K. L. K. Lee's page "Gaussian Recipes for Rotational Spectroscopy", has cc along a). The axes are therefore found by superposing
+that table on the geometry, and checked with the dipole printed below the couplings. If the check fails, the couplings are left out, with
+a note.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ TABLE, COUPLINGS, DIPOLE = (
 )
 ROWS_AFTER = 5  # lines from the head of the table to the first atom
 SAME_GEOMETRY_ANGSTROM = 1e-3  # rmsd
-SAME_DIPOLE_DEBYE = 5e-3  # printed at two places, to 1e-4 D in one
+SAME_DIPOLE_DEBYE = 5e-3  # printed twice, once rounded to 1e-4 D
 _NUCLEUS = re.compile(r"\s*(\d+)\s+([A-Z][a-z]?)\((\d+)\)\s*$")
 _NUMBER = re.compile(r"[a-c]{2}=\s*([-+]?\d+\.\d+)")
 
 
 def with_quadrupole(molecule: Molecule, output: Output) -> Molecule:
-    """The molecule with the quadrupole couplings of an output, in MHz and in the axes of the geometry; a note where they are not taken."""
+    """The molecule with the quadrupole couplings of an output (MHz, axes of the geometry), or with a note why they are left out."""
     start, table = output.last((COUPLINGS,)), output.last((TABLE,))
     if output.program.name != "Gaussian" or start is None:
         return molecule
@@ -58,7 +59,7 @@ def with_quadrupole(molecule: Molecule, output: Output) -> Molecule:
 
 
 def _axes(output: Output, table: int, molecule: Molecule) -> Superposition | None:
-    """What lays the table on the geometry."""
+    """The superposition of the table on the geometry."""
     rows = []
     for line in output.lines[table + ROWS_AFTER :]:
         words = line.split()
@@ -73,7 +74,7 @@ def _axes(output: Output, table: int, molecule: Molecule) -> Superposition | Non
 
 
 def _dipole_agrees(molecule: Molecule, output: Output, start: int, fit: Superposition) -> bool:
-    """Whether the dipole printed after the couplings is that of the molecule; where either is not known, nothing speaks against it."""
+    """Whether the dipole printed after the couplings agrees with that of the molecule; True if one of them is unknown."""
     after = [i for i in range(start, len(output.lines) - 1) if output.lines[i].strip() == DIPOLE]
     if not after or molecule.dipole_debye is None or molecule.charge:
         return True
@@ -83,7 +84,7 @@ def _dipole_agrees(molecule: Molecule, output: Output, start: int, fit: Superpos
 
 
 def _tensors(output: Output, start: int) -> list[tuple[int, tuple[str, int], Floats]]:
-    """Number of the atom, its element and mass number, and the tensor as printed."""
+    """Atom number, element, mass number and printed tensor of each nucleus."""
     tensors, i = [], start + 1
     while i + 3 < len(output.lines) and (head := _NUCLEUS.match(output.lines[i])):
         rows = [_NUMBER.findall(line) for line in output.lines[i + 1 : i + 4]]

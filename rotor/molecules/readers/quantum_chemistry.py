@@ -1,7 +1,7 @@
 """A molecule from the output of a quantum-chemistry program: geometry, dipole, polarizability, quadrupole couplings.
 
-cclib reads the numbers, or `plain_outputs` where it cannot; the text is looked through first (`programs`), each tensor is
-turned from the axes it was printed in to those of the geometry, and the printed rotational constants are a check.
+cclib reads the numbers, or `cfour_orca` if it cannot. The text is checked first (`programs`). Each tensor is rotated from its printed
+axes to those of the geometry, and the printed rotational constants serve as a check.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ from rotor.molecules.readers.quadrupole import with_quadrupole
 from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM, ROTATIONAL_MHZ_U_ANGSTROM2
 
 CONSTANTS_AGREE = 1e-4  # relative; printed constants have 6 to 8 digits, coordinates 6 decimals
-OTHER_GEOMETRY = 5e-3  # relative difference of constants from which on the geometry read is not the one of the output
-SAME_GEOMETRY_ANGSTROM = 1e-3  # rmsd: a tensor printed for a geometry further from the last one is not its tensor
+OTHER_GEOMETRY = 5e-3  # relative difference of constants above which the geometry is not that of the output
+SAME_GEOMETRY_ANGSTROM = 1e-3  # largest rmsd between the last geometry and that of a tensor
 SAME_DIPOLE_DEBYE = 2e-3  # Gaussian prints its dipole to 1e-4 D and, in a second place, in atomic units
 OTHER_ENDINGS = {  # last words of programs whose versions end otherwise than cclib expects
     "MOPAC": ("== MOPAC DONE ==", "JOB ENDED NORMALLY"),
@@ -52,22 +52,22 @@ def read_output(path: Path | str) -> Molecule:
     Parameters
     ----------
     path : Path or str
-        Output of Gaussian, ORCA, Psi4 or CFOUR; of the other programs that cclib distinguishes, the geometry alone.
+        Output of Gaussian, ORCA, Psi4 or CFOUR; for other programs that cclib supports, only the geometry is read.
 
     Returns
     -------
     Molecule
-        Positions in Å; dipole in D and static polarizability in Å³ where printed, turned with the rotation that
-        superposes the last geometry printed before the tensor on the one returned. Isotopes are those of the masses
-        printed, else the most abundant. `notes` says where A, B, C of the geometry and those printed differ by more
-        than 1e-4, and which tensor was left out and why. A dipole of an excited density is never taken.
+        Positions in Å; dipole in D and static polarizability in Å³ if printed, rotated by the superposition of the last geometry
+        printed before the tensor on the returned one. Isotopes follow from the printed masses; default: the most abundant.
+        `notes` report differences above 1e-4 between printed A, B, C and those of the geometry, and tensors that were left out.
+        A dipole of an excited density is never used.
 
     Raises
     ------
     ValueError
-        No cclib, which CFOUR and ORCA 6 do without; an output of no program that it knows; asterisks, a `D` exponent
-        where the program prints none, or a file that was cut, with the line; printed constants that are more than
-        0.5 % away from those of the geometry that was read.
+        If cclib is missing (not needed for CFOUR and ORCA 6); for an output of an unknown program; with the line, for asterisks, an
+        unexpected `D` exponent, or a truncated file; for printed constants that differ by more than 0.5 % from those of the
+        geometry.
 
     Notes
     -----
@@ -97,7 +97,7 @@ def _text(path: Path) -> str:
 
 
 def needs_no_cclib(path: Path) -> bool:
-    """Whether an output is of a program that is read here without cclib: CFOUR, ORCA from version 6."""
+    """Whether an output is read without cclib: CFOUR, ORCA from version 6."""
     text = _text(path)
     program = program_of(text)
     return program is not None and reads_itself(Output(str(path), tuple(text.splitlines()), program))
@@ -109,7 +109,7 @@ def has_cclib() -> bool:
 
 
 def is_output(path: Path) -> bool:
-    """Whether a file is an output that `read_output` knows: by its banner, or, with cclib, by what cclib finds."""
+    """Whether `read_output` can read a file, judged by its banner, or by cclib if installed."""
     text = _text(path)
     if program_of(text) is not None:
         return True
@@ -124,13 +124,13 @@ def is_output(path: Path) -> bool:
 
 
 def _parse(text: str, where: str) -> Any:
-    """What cclib reads."""
+    """Parse an output with cclib."""
     from cclib.io.ccio import ccopen
 
     try:
         parser = ccopen(io.StringIO(text), loglevel=logging.CRITICAL)
         data = None if parser is None else parser.parse()
-    except Exception as reason:  # cclib's parsers fail with any class; all mean that the file is not what it should be
+    except Exception as reason:  # cclib's parsers raise exceptions of any class; all mean that the file is invalid
         why = str(reason).strip().splitlines()[0] if str(reason).strip() else type(reason).__name__
         raise ValueError(f"{where}: cclib cannot read it ({why}); give an xyz file of the geometry") from reason
     if data is None:
@@ -143,7 +143,7 @@ def _parse(text: str, where: str) -> Any:
 
 
 def _set_last_table(data: Any, text: str) -> None:
-    """Give cclib's data the last table of Cartesian coordinates of MOPAC, which it reads from input in Cartesians alone."""
+    """Set the last Cartesian coordinates of MOPAC in cclib's data; cclib reads them only for Cartesian input."""
     from ase.data import atomic_numbers
 
     tables = re.split(r"CARTESIAN COORDINATES *\n(?:\s*NO\. .*)?\s*\n", text)[1:]
@@ -169,7 +169,7 @@ def _geometry(data: Any, where: str, program: str) -> Molecule:
 
 
 def _isotopes(data: Any, where: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
-    """Symbols, and the isotopes whose masses are printed; an average over isotopes means the most abundant one."""
+    """Symbols, and isotopes from the printed masses; an average over isotopes means the most abundant one."""
     from ase.data import atomic_masses, chemical_symbols
 
     numbers = [int(number) for number in data.atomnos]
@@ -188,14 +188,14 @@ def _isotopes(data: Any, where: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
 
 
 def _printed_masses(data: Any) -> Floats | None:
-    """Masses in u as printed; None unless every atom has one."""
+    """Printed masses in u; None unless all atoms have one."""
     masses = np.asarray(getattr(data, "atommasses", ()), dtype=np.float64)
     n = len(data.atomnos)
     return masses[-n:] if len(masses) and len(masses) % n == 0 else None
 
 
 def _read_other(text: str, where: str) -> Molecule:
-    """The geometry alone, of a program whose axes of tensors are not known here."""
+    """The geometry only, for a program whose tensor axes are unknown."""
     data = _parse(text, where)
     program = data.metadata.get("package", "a program")
     ended_well = any(words in text for words in OTHER_ENDINGS.get(program, ()))
@@ -217,7 +217,7 @@ def _read_other(text: str, where: str) -> Molecule:
 def _axes_at(
     output: Output, tensor: int, target: Floats, openings: tuple[str, ...] | None = None
 ) -> Superposition | None:
-    """What lays the geometry printed before line `tensor` on `target`; None where none is the same geometry."""
+    """The superposition of the geometry printed before line `tensor` on `target`; None if no printed geometry matches."""
     before = [(i, rows) for i, rows in tables(output) if i < tensor]
     for opening in openings or output.program.geometries:
         opened = [(i, rows) for i, rows in before if output.lines[i].strip().startswith(opening)]
@@ -232,12 +232,12 @@ def _axes_at(
 
 
 def _with_dipole(molecule: Molecule, data: Any, output: Output) -> Molecule:
-    """The dipole of the ground state, D: turned to the axes of the geometry, and of an ion moved to the centre of mass."""
+    """Add the ground-state dipole (D) in the axes of the geometry; for an ion about its centre of mass."""
     starts = dipole_lines(output)
     if not starts:
         return molecule
-    start, known = starts[-1], len(getattr(data, "moments", ())) > 1
-    vector = np.asarray(data.moments[1], dtype=np.float64) if known else printed_dipole(output, starts[-1])
+    start, has_moments = starts[-1], len(getattr(data, "moments", ())) > 1
+    vector = np.asarray(data.moments[1], dtype=np.float64) if has_moments else printed_dipole(output, starts[-1])
     if vector is None:
         return molecule
     printed = vector
@@ -266,7 +266,7 @@ def _with_dipole(molecule: Molecule, data: Any, output: Output) -> Molecule:
 
 
 def _moment_origin(data: Any, output: Output) -> Floats | None:
-    """The point that the dipole refers to, Å in the axes it is printed in; that of Gaussian and CFOUR is their origin."""
+    """The origin of the dipole (Å, printed axes); 0 for Gaussian and CFOUR."""
     if output.program.name in ("Gaussian", "CFOUR"):
         return np.zeros(3)
     for line in reversed(output.lines):
@@ -281,7 +281,7 @@ def _moment_origin(data: Any, output: Output) -> Floats | None:
 
 
 def _with_polarizability(molecule: Molecule, data: Any, output: Output) -> Molecule:
-    """The static polarizability, a.u. to Å³, turned to the axes of the geometry."""
+    """Add the static polarizability, converted from a.u. to Å³, in the axes of the geometry."""
     start = output.last(output.program.polarizability) if output.program.polarizability else None
     if start is None or not len(getattr(data, "polarizabilities", ())):
         return molecule
@@ -297,8 +297,8 @@ def _with_polarizability(molecule: Molecule, data: Any, output: Output) -> Molec
 def _polarizability_axes(molecule: Molecule, data: Any, output: Output, start: int) -> Superposition | None:
     """Axes of the polarizability; Gaussian's `Polarizability=` has those of the `Dipole =` printed above it.
 
-    Whether these are the standard or the input axes is settled by that dipole and the one of the population
-    analysis (standard axes): equal as printed, or equal after the turn. One that fits neither settles nothing.
+    They are the standard or the input axes. This dipole is compared with that of the population analysis (standard axes): equal as
+    printed, or equal after the rotation. If neither agrees, the axes are undecided.
     """
     fit = _axes_at(output, start, molecule.positions_angstrom)
     above = output.last(("Dipole        =",))
@@ -326,7 +326,7 @@ def _noted(molecule: Molecule, output: Output, start: int, tensor: str, why: str
 
 
 def _disagreement(molecule: Molecule, data: Any, output: Output) -> tuple[str, ...]:
-    """A note where the printed rotational constants are not those of the geometry; ValueError where they are of another."""
+    """A note if printed rotational constants differ slightly from those of the geometry; ValueError if they differ much."""
     printed, digits = _printed_constants(output)
     if not len(printed):
         return ()
@@ -350,7 +350,7 @@ def _disagreement(molecule: Molecule, data: Any, output: Output) -> tuple[str, .
 
 
 def _other_masses(molecule: Molecule, data: Any) -> list[Floats]:
-    """Masses that a program may have used: those printed, and averages over isotopes."""
+    """Masses that a program may have used: printed ones, and averages over isotopes."""
     from ase.data import atomic_masses
 
     printed = _printed_masses(data)
@@ -359,9 +359,9 @@ def _other_masses(molecule: Molecule, data: Any) -> list[Floats]:
 
 
 def _printed_constants(output: Output) -> tuple[Floats, float]:
-    """The last rotational constants printed, MHz, large to small, without the infinite or zero A of a linear molecule.
+    """The last printed rotational constants, MHz, in decreasing order, without the infinite or zero A of a linear molecule.
 
-    And what half of the last digit of the smallest is of it.
+    Also returns half a unit of the last digit of the smallest constant, relative to it.
     """
     pairs = zip(output.lines, (*output.lines[1:], ""), strict=True)
     texts = [match[1].strip() or below for line, below in pairs if (match := re.search(output.program.constants, line))]
@@ -383,7 +383,7 @@ def _constants_mhz(masses_u: Floats, positions_angstrom: Floats) -> Floats:
 
 
 def _apart(printed: Floats, calculated: Floats) -> float:
-    """Largest relative difference, of as many of the smaller constants as are printed.
+    """Largest relative difference between printed constants and the smallest calculated ones.
 
     >>> round(_apart(np.array([10.1, 8.0]), np.array([np.inf, 10.0, 8.0])), 9)
     0.01

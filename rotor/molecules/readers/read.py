@@ -1,4 +1,4 @@
-"""A molecule from whatever holds one: SMILES, xyz, sdf, a file that ASE reads, ASE and RDKit objects, a g2 name."""
+"""Read a molecule from SMILES, xyz, sdf, a file that ASE reads, ASE and RDKit objects, or a g2 name."""
 
 import difflib
 import sys
@@ -22,7 +22,7 @@ _OUTPUT_SUFFIXES = (".log", ".out", ".dat", ".c4", ".g09", ".g16")
 
 
 def read_molecule(source: Any, *, isotopes: dict[int | str, str] | str | None = None) -> Molecule:
-    """The molecule that a text, a path or an object means.
+    """The molecule of a text, path or object.
 
     Parameters
     ----------
@@ -35,12 +35,12 @@ def read_molecule(source: Any, *, isotopes: dict[int | str, str] | str | None = 
     Returns
     -------
     Molecule
-        With where the geometry is from and, in `notes`, what was assumed.
+        With the source of the geometry; `notes` list assumptions.
 
     Raises
     ------
     ValueError
-        What was read, where, which rule it breaks and what would do.
+        With the position and text of the mistake, the rule, and the remedy.
 
     Examples
     --------
@@ -103,7 +103,7 @@ def _read_file(path: Path) -> Molecule:
 
 
 def parse_molecule(text: str, where: str) -> Molecule:
-    """The molecule in xyz or sdf text, distinguished by the line `M  END` or the version on the fourth line."""
+    """The molecule in xyz or sdf text; sdf has the line `M  END` or the version on the fourth line."""
     head = text.splitlines()[:4]
     if "M  END" in text or (len(head) == 4 and head[3].rstrip().endswith(("V2000", "V3000"))):
         return parse_sdf(text, where)
@@ -111,7 +111,7 @@ def parse_molecule(text: str, where: str) -> Molecule:
 
 
 def _output_without_cclib(path: Path) -> Molecule:
-    """What ASE reads of a quantum-chemistry output, saying what cclib would have added or checked."""
+    """The data that ASE reads from a quantum-chemistry output, with a note on what cclib would add or check."""
     try:
         molecule = _read_with_ase(path)
     except ValueError as reason:
@@ -121,7 +121,7 @@ def _output_without_cclib(path: Path) -> Molecule:
 
 
 def _read_with_ase(path: Path) -> Molecule:
-    """The last structure of a file in one of ASE's formats (of an optimisation that is the optimised one)."""
+    """The last structure of a file in one of ASE's formats (the optimised one of an optimisation)."""
     from rotor.molecules.readers.ase_files import structures
 
     frames = structures(path)
@@ -138,9 +138,9 @@ def _read_with_ase(path: Path) -> Molecule:
 def from_ase(atoms: Any) -> Molecule:
     """A molecule from `ase.Atoms`.
 
-    Masses that were set name isotopes (within 0.01 u); ASE's own averages mean the most abundant ones. The dipole is
-    that of `info["dipole"]` or of a calculator's finished result (e Å), the charge that of `info["charge"]` or the sum
-    of initial charges. Tags and constraints mean nothing here; a periodic cell gives a note.
+    Masses set by the user select isotopes (within 0.01 u); ASE's average masses mean the most abundant ones. The dipole is
+    `info["dipole"]` or a calculator's finished result (e Å); the charge is `info["charge"]` or the sum of initial charges. Tags and
+    constraints are ignored; a periodic cell gives a note.
 
     >>> import ase
     >>> from_ase(ase.Atoms("HCl", [(0, 0, 0), (0, 0, 1.2746)], masses=[2.014, 34.969])).formula
@@ -163,7 +163,7 @@ def from_ase(atoms: Any) -> Molecule:
 
 
 def _ase_dipole(atoms: Any) -> Any:
-    """The dipole that comes with the atoms, in e Å; nothing is calculated for it."""
+    """The dipole stored with the atoms, in e Å; nothing is calculated."""
     if "dipole" in atoms.info:
         return atoms.info["dipole"]
     if atoms.calc is None or "dipole" not in getattr(atoms.calc, "results", {}):
@@ -172,7 +172,7 @@ def _ase_dipole(atoms: Any) -> Any:
 
 
 def _ase_mass_numbers(atoms: Any, symbols: tuple[str, ...]) -> tuple[int, ...]:
-    """Mass numbers that the masses of the atoms mean; ASE's own averages mean the most abundant isotopes."""
+    """Mass numbers from the masses of the atoms; ASE's average masses mean the most abundant isotopes."""
     from ase.data import atomic_masses
 
     if not atoms.has("masses"):
@@ -200,8 +200,8 @@ def g2_molecule(name: str) -> Molecule:
     """A molecule of ASE's g2 set: geometries from MP2(full)/6-31G*.
 
     Median error of the rotational constants 2 % (22 molecules of NIST CCCBDB).
-    L. A. Curtiss, K. Raghavachari, P. C. Redfern, J. A. Pople, J. Chem. Phys. 106, 1063 (1997). Raises ValueError for
-    another name, with near matches.
+    L. A. Curtiss, K. Raghavachari, P. C. Redfern, J. A. Pople, J. Chem. Phys. 106, 1063 (1997). Raises ValueError, with near
+    matches, for other names.
 
     >>> g2_molecule("CH3Cl").formula
     'CH3Cl'
@@ -210,7 +210,7 @@ def g2_molecule(name: str) -> Molecule:
 
     names = g2_names()
     if name not in names:
-        same = [known for known in names if known.lower() == name.lower()]
+        same = [candidate for candidate in names if candidate.lower() == name.lower()]
         near = list(dict.fromkeys([*same, *difflib.get_close_matches(name, names, n=5, cutoff=0.5)]))
         hint = f" (near it: {', '.join(near)})" if near else ""
         raise ValueError(

@@ -1,4 +1,4 @@
-"""Single molecules of an SDF file of many: `many.sdf#3` is the third."""
+"""Single molecules of an SDF file with several: `many.sdf#3` is the third."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _ENTRY = re.compile(r"(.+\.sdf?)#(\d+)", flags=re.IGNORECASE | re.DOTALL)
 
 
 def entry_of(word: str) -> tuple[Path, int] | None:
-    """The file and the number that a word such as many.sdf#3 means; None for any other word, and for a file of that very name.
+    """File and number of a word such as many.sdf#3; None for other words, and if a file has exactly this name.
 
     >>> entry_of("many.sdf#3"), entry_of("water")
     ((PosixPath('many.sdf'), 3), None)
@@ -22,12 +22,12 @@ def entry_of(word: str) -> tuple[Path, int] | None:
 
 
 def entry_names(path: Path) -> tuple[str, ...]:
-    """The titles of the molecules of a file, in its order; an empty text for one without."""
+    """The titles of the molecules of a file, in order; empty for a molecule without a title."""
     return tuple(name for name, _, _ in _entries(*_stamp(path)))
 
 
 def entry_bytes(path: Path, number: int) -> bytes:
-    """The text of one molecule, numbered from 1, as the file has it.
+    """The text of a molecule in the file, numbered from 1.
 
     Raises ValueError for a number beyond the entries of the file.
     """
@@ -49,7 +49,7 @@ def _stamp(path: Path) -> tuple[str, int, int]:
 
 @lru_cache(maxsize=8)
 def _entries(path: str, modified: int, size: int) -> list[tuple[str, int, int]]:
-    """Title, place and length of every molecule of a file; read anew when the file changes."""
+    """Title, position and length of all molecules of a file; cached until the file changes."""
     out: list[tuple[str, int, int]] = []
     start, place, title, blank = 0, 0, b"", True
     with open(path, "rb") as handle:

@@ -1,7 +1,7 @@
-"""Molecules by way of RDKit: a SMILES with a geometry from a force field, an RDKit molecule, mol and sdf text.
+"""Molecules through RDKit: SMILES with a geometry from a force field, RDKit molecules, mol and sdf text.
 
-A geometry from MMFF94 (T. A. Halgren, J. Comput. Chem. 17, 490 (1996)) is a guess, and says so: `uncertainty` is the
-median error of rotational constants seen with it, and the atoms for which it is known to fail are named.
+A geometry from MMFF94 (T. A. Halgren, J. Comput. Chem. 17, 490 (1996)) is approximate: `uncertainty` is the median error of its
+rotational constants, and notes name atoms for which the force field is known to fail.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ CONFORMERS = 10
 KJ_PER_KCAL = 4.184  # exact, the thermochemical calorie
 SAME_KJ_PER_MOL = 0.1  # two conformers nearer than that in energy are one,
 SAME_MOMENTS = 1e-3  # if their planar moments differ by no more than that, relative to the largest
-NEAR_KJ_PER_MOL = 10.0  # four times kT at 300 K: conformers that have a share in a spectrum
-MOST_ATOMS = 200  # hydrogens among them: a quarter of a minute; more take minutes and mostly fail
+NEAR_KJ_PER_MOL = 10.0  # 4 kT at 300 K: conformers that contribute to a spectrum
+MOST_ATOMS = 200  # including hydrogens: 15 s; larger molecules take minutes and mostly fail
 _SEED = 20240229  # any number; fixed, so that the same SMILES gives the same geometry
 _MOST_STEPS = 5000
 
 
 @dataclass(frozen=True)
 class Conformer:
-    """A geometry of a molecule, and its energy in kJ/mol above the lowest one found by the same force field."""
+    """A geometry of a molecule, and its energy in kJ/mol above the lowest conformer of the same force field."""
 
     molecule: Molecule
     energy_kj_per_mol: float
@@ -48,24 +48,24 @@ class Conformer:
 def from_smiles(text: str) -> Molecule:
     """A molecule from SMILES: the lowest of ten ETKDG conformers, optimised with MMFF94.
 
-    Isotopes are those of the labels (`"[2H]O[2H]"`, `"[13CH4]"`). The dipole is estimated from the force field's
-    charges. UFF takes over where MMFF94 has no parameters, with a note.
+    Isotopes are given by labels (`"[2H]O[2H]"`, `"[13CH4]"`). The dipole is estimated from the force field's charges. If MMFF94 has
+    no parameters, UFF is used, with a note.
 
     Parameters
     ----------
     text : str
-        SMILES of one molecule of two atoms or more (or a single atom), without the prefix `SMILES:`.
+        SMILES of a single molecule or atom, without the prefix `SMILES:`.
 
     Returns
     -------
     Molecule
-        `uncertainty` is the median relative error of rotational constants: 0.012 for MMFF94, 0.1 for UFF, and 0.2
-        where the force fields fail (hypervalent atoms, cumulated double bonds); `notes` say which.
+        `uncertainty` is the median relative error of rotational constants: 0.012 for MMFF94, 0.1 for UFF, and 0.2 for atoms at
+        which the force fields fail (hypervalent atoms, cumulated double bonds), which `notes` name.
 
     Raises
     ------
     ValueError
-        For text that is no SMILES, with RDKit's reason; several molecules; no force field; no geometry found.
+        For an invalid SMILES, with RDKit's reason; several molecules; no force field; no geometry found.
 
     Examples
     --------
@@ -84,18 +84,18 @@ def from_smiles(text: str) -> Molecule:
 
 
 def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
-    """The different conformers among `count` that ETKDG makes of a SMILES, each optimised, the lowest first.
+    """The distinct conformers of a SMILES among `count` optimised ETKDG geometries, lowest first.
 
-    Two are the same where their energies differ by less than 0.1 kJ/mol and their planar moments Σ m a², Σ m b², Σ m c² by
-    less than a part in a thousand of the largest; mirror images are the same, since they have one spectrum. Relative
-    energies of a force field are some kJ/mol off, and those of MMFF94 are of the bare molecule without zero-point energy.
+    Conformers are the same if their energies differ by less than 0.1 kJ/mol and their planar moments Σ m a², Σ m b², Σ m c² by less
+    than 1e-3 of the largest. Mirror images are the same, since they have the same spectrum. Relative energies of a force field have
+    errors of some kJ/mol and do not include zero-point energies.
 
     Parameters
     ----------
     text : str
         SMILES, as for `from_smiles`.
     count : int
-        How many geometries are tried, 1 or more; the more there are the likelier the lowest one is among them.
+        Number of trial geometries, at least 1; more make it likelier that the lowest conformer is found.
 
     Returns
     -------
@@ -104,11 +104,11 @@ def conformers(text: str, count: int = CONFORMERS) -> tuple[Conformer, ...]:
     Raises
     ------
     ValueError
-        As `from_smiles`, and for a count below 1.
+        As `from_smiles`; for a count below 1.
 
     Examples
     --------
-    >>> [round(one.energy_kj_per_mol, 1) for one in conformers("CCCC")]
+    >>> [round(conformer.energy_kj_per_mol, 1) for conformer in conformers("CCCC")]
     [0.0, 3.3]
     """
     if count < 1:
@@ -145,16 +145,16 @@ def _same_conformer(first: tuple[float, Floats], other: tuple[float, Floats]) ->
 
 
 def _planar_moments(masses_u: Floats, positions_angstrom: Floats) -> Floats:
-    """Σ m a², Σ m b², Σ m c² in u Å², falling."""
+    """Σ m a², Σ m b², Σ m c² in u Å², in decreasing order."""
     centred = positions_angstrom - masses_u @ positions_angstrom / masses_u.sum()
     weighted = np.sqrt(masses_u)[:, None] * centred
     return np.asarray(np.linalg.svd(weighted.T @ weighted, compute_uv=False))
 
 
 def from_rdkit(mol: Any, conformer: int = -1, name: str = "") -> Molecule:
-    """A molecule from an `rdkit.Chem.Mol` that has hydrogens and a conformer in 3D.
+    """A molecule from an `rdkit.Chem.Mol` with hydrogens and a 3D conformer.
 
-    Isotope labels and formal charges are preserved; the dipole is estimated from MMFF94 charges where there are any.
+    Isotope labels and formal charges are preserved; the dipole is estimated from MMFF94 charges if available.
     Raises ValueError without a conformer, with a flat drawing for one, or with hydrogens left implicit.
     """
     from rdkit import rdBase
@@ -177,8 +177,8 @@ def from_rdkit(mol: Any, conformer: int = -1, name: str = "") -> Molecule:
 def parse_sdf(text: str, where: str = "sdf text") -> Molecule:
     """The molecule in the text of a mol or sdf file; isotope labels are preserved.
 
-    Raises ValueError for text that RDKit does not read, with its reason, for several molecules, a flat drawing, or
-    hydrogens left out.
+    Raises ValueError for text that RDKit cannot read, with its reason, for several molecules, a flat drawing, or
+    missing hydrogens.
     """
     from rdkit import Chem, rdBase
 
@@ -202,7 +202,7 @@ def parse_sdf(text: str, where: str = "sdf text") -> Molecule:
 
 
 def _refuse_bad_coordinates(block: str, where: str) -> None:
-    """ValueError for a coordinate that is no number: RDKit reads a blank field, "0,58" and asterisks as zero."""
+    """Raise ValueError for invalid coordinates: RDKit reads a blank field, "0,58" and asterisks as zero."""
     for number, fields in _coordinate_fields(block.split("\n")):
         for field in fields:
             if not re.fullmatch(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", field):
@@ -213,7 +213,7 @@ def _refuse_bad_coordinates(block: str, where: str) -> None:
 
 
 def _coordinate_fields(lines: list[str]) -> Iterator[tuple[int, list[str]]]:
-    """Line number and texts of x, y, z of every atom of a V2000 or V3000 block."""
+    """Line number and texts of x, y, z of the atoms of a V2000 or V3000 block."""
     version = lines[3] if len(lines) > 3 else ""
     if "V2000" in version and version[:3].strip().isdecimal():
         for number, line in enumerate(lines[4 : 4 + int(version[:3])], start=5):
@@ -237,14 +237,14 @@ def _with_dipole(molecule: Molecule, dipole: Floats | None) -> Molecule:
 
 
 def _reason(messages: str) -> str:
-    """The first line of what RDKit logged, without its clock, its own name and the input."""
+    """The first line of RDKit's log, without time, name and input."""
     said = [line for line in re.split(r"\s*\[\d\d:\d\d:\d\d\]\s*|\n", messages) if line.strip(" *")]
     first = said[0] if said else "RDKit gives no reason"
     return re.sub(r"^SMILES Parse Error: |( while parsing| for input):.*$", "", first)
 
 
 def _parsed(text: str) -> Any:
-    """RDKit's molecule with its hydrogens, of one piece."""
+    """RDKit's molecule with hydrogens; refuses several fragments."""
     from rdkit import Chem, rdBase
 
     if not text.strip():
@@ -271,7 +271,7 @@ def _parsed(text: str) -> Any:
 
 
 def _optimised(mol: Any, text: str, count: int) -> tuple[list[float], str]:
-    """Embeds conformers in `mol` and optimises them: their energies in kcal/mol and the name of the force field."""
+    """Embed conformers in `mol` and optimise them; energies in kcal/mol and the name of the force field."""
     from rdkit import rdBase
     from rdkit.Chem import rdDistGeom, rdForceFieldHelpers
 
@@ -300,7 +300,7 @@ def _optimised(mol: Any, text: str, count: int) -> tuple[list[float], str]:
 
 
 def _trust(mol: Any, field: str) -> tuple[float | None, tuple[str, ...]]:
-    """Typical relative error of the rotational constants, and what to tell about it."""
+    """Typical relative error of the rotational constants, and notes on it."""
     if not field:
         return None, ()
     notes = ["MMFF94 lacks parameters for this molecule: UFF was used"] if field == "UFF" else []
@@ -328,7 +328,7 @@ def _is_doubtful(atom: Any) -> bool:
 
 
 def _stereo_note(mol: Any) -> tuple[str, ...]:
-    """A note where the SMILES leaves a choice between diastereomers (one open centre alone is a mirror image)."""
+    """A note if the SMILES does not distinguish diastereomers (a single open centre gives mirror images only)."""
     from rdkit import Chem
 
     kinds = Chem.StereoType
@@ -341,7 +341,7 @@ def _stereo_note(mol: Any) -> tuple[str, ...]:
 
 
 def _refuse_unfinished(mol: Any) -> None:
-    """ValueError for what gives no nuclei in space."""
+    """Raise ValueError for a molecule without atoms, 3D positions or hydrogens."""
     if not mol.GetNumAtoms():
         raise ValueError("a molecule without atoms: give one atom or more")
     if not mol.GetNumConformers():

@@ -1,7 +1,7 @@
-"""xyz and extended xyz text as a molecule: strict, with the line of every mistake.
+"""Strict reader for xyz and extended xyz text; errors give the line.
 
-Read right: any line ending, a byte-order mark, blank lines before and among the atoms, `D` exponents, a unicode minus,
-atomic numbers instead of symbols, isotopes written `D`, `T`, `2H`, `13C`. Refused: everything else.
+Accepted: any line ending, a byte-order mark, blank lines before and among the atoms, `D` exponents, a unicode minus, atomic numbers
+instead of symbols, isotopes written as `D`, `T`, `2H`, `13C`. Other deviations are refused.
 """
 
 import codecs
@@ -25,7 +25,7 @@ _ENCODINGS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (
 
 @dataclass(frozen=True)
 class _Columns:
-    """Which column of an atom's line holds what, counted from 0."""
+    """Columns of an atom's line, counted from 0."""
 
     label: int = 0
     position: int = 1
@@ -34,7 +34,7 @@ class _Columns:
 
 
 def decode(content: bytes, where: str) -> str:
-    """Text of a file: UTF-8, or what its byte-order mark says; ValueError for bytes that are no text."""
+    """Text of a file: UTF-8, or the encoding of its byte-order mark; ValueError for other bytes."""
     encoding = next((name for mark, name in _ENCODINGS if content.startswith(mark)), "utf-8")
     try:
         return content.decode(encoding)
@@ -49,22 +49,21 @@ def parse_xyz(text: str, where: str = "xyz text") -> Molecule:
     Parameters
     ----------
     text : str
-        Number of atoms; a comment; one line an atom: symbol, isotope or atomic number, then x y z in Å. A comment
-        with `Properties=` makes it extended xyz, whose `dipole` (e Å, as ASE writes it), `charge` and column `masses`
-        are read.
+        Number of atoms; a comment; a line per atom: symbol, isotope or atomic number, then x y z in Å. A comment with `Properties=`
+        makes it extended xyz, from which `dipole` (e Å, as written by ASE), `charge` and the column `masses` are read too.
     where : str
-        Name of the file, for messages.
+        File name for messages.
 
     Returns
     -------
     Molecule
-        Further columns are not read and a note says so; likewise a periodic cell.
+        Notes mention columns that were not read and a periodic cell.
 
     Raises
     ------
     ValueError
-        With file and line: a count that is none or does not fit, labels such as `C13` that may mean a number as well
-        as an isotope, asterisks of an overflowed field, a file that ends early, a second structure.
+        With file and line: for an invalid or wrong count, ambiguous labels such as `C13` (number or isotope), asterisks of an
+        overflowed field, a truncated file, a second structure.
 
     Examples
     --------
@@ -108,7 +107,7 @@ def _refuse_wrong_count(rows: list[tuple[int, list[str]]], count: int, n_lines: 
 
 
 def _refuse_cut_number(rows: list[tuple[int, list[str]]], columns: _Columns, where: str) -> None:
-    """A file without a last line end whose last number has fewer decimals than all others was cut inside it."""
+    """Refuse a file that was cut inside its last number: no final line end, and fewer decimals than all other numbers."""
     last = rows[-1][1]
     if len(last) != columns.position + 3:
         return
@@ -122,7 +121,7 @@ def _refuse_cut_number(rows: list[tuple[int, list[str]]], columns: _Columns, whe
 
 
 def _extended(comment: str, where: str) -> tuple[dict[str, Any], _Columns]:
-    """Key-value pairs and columns of an extended xyz comment; nothing and the plain columns for another comment."""
+    """Key-value pairs and columns of an extended xyz comment; for other comments no pairs and the plain columns."""
     if not re.search(r"\b(Properties|Lattice)=", comment):
         return {}, _Columns()
     from ase.io import extxyz
@@ -182,7 +181,7 @@ def _notes(rows: list[tuple[int, list[str]]], columns: _Columns, info: dict[str,
 
 
 def _nucleus(words: list[str], columns: _Columns, where: str) -> Isotope:
-    """The isotope that a label means, with the mass of its own column where there is one."""
+    """The isotope of a label, or of the mass column if present."""
     label = words[columns.label]
     if _NUMBERED.fullmatch(label):
         raise ValueError(

@@ -1,8 +1,8 @@
-"""Rotations and reflections that bring labelled points back onto like points, within a stated mismatch.
+"""Rotations and reflections that map labelled points onto like points within a tolerance.
 
-Two points i, j that do not lie on one line with the centre fix an operation of known handedness by where they go. So
-every operation sought is among those that carry (i, j) to a pair of like points at like distances; each candidate is
-matched against all points and then fitted to its own matching.
+The images of two points i, j that are not collinear with the centre determine a proper or improper operation. All operations are
+therefore among those that map (i, j) to a pair of like points at equal distances. Each candidate is matched against all points and
+then fitted to this matching.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 
-MATCH_WITHIN = 0.45  # of the shortest distance of like points: below one half, so that no two match the same one
+MATCH_WITHIN = (
+    0.45  # of the shortest distance of like points: below one half, so that two points cannot match the same image
+)
 MOST_CANDIDATES = 400_000  # pairs of images tried; a minute's work for ten thousand points
 FEW_POINTS = 60  # up to which all distances are as quick as a k-d tree
 MOST_OPERATIONS = 480  # a ring of 120 like atoms has as many
@@ -23,10 +25,10 @@ MOST_OPERATIONS = 480  # a ring of 120 like atoms has as many
 
 @dataclass(frozen=True, eq=False)
 class Operation:
-    """One operation about the centre: x → matrix @ x takes point i to the place of point `permutation[i]`.
+    """A symmetry operation about the centre: x → matrix @ x maps point i to point `permutation[i]`.
 
-    matrix : (3, 3) orthogonal. permutation : (n,) whole numbers. mismatch_angstrom : the largest distance between an
-    image and the point that it is matched to, Å.
+    matrix : (3, 3) orthogonal. permutation : (n,) integers. mismatch_angstrom : the largest distance between an
+    image and its matched point, Å.
     """
 
     matrix: Floats
@@ -40,7 +42,7 @@ class Operation:
 
     @property
     def axis(self) -> Floats:
-        """Unit vector (3,) of the rotation, or of the rotation part of an improper operation; z for none.
+        """Unit vector (3,) of the rotation, or of the rotation part of an improper operation; z for the identity or inversion.
 
         The direction is chosen so that its last nonzero component is positive.
         """
@@ -60,7 +62,7 @@ class Operation:
 
     @property
     def order(self) -> int:
-        """The least n with (rotation by `angle`)ⁿ = 1."""
+        """The smallest n with (rotation by `angle`)ⁿ = 1."""
         turns = self.angle / (2 * np.pi)
         orders = np.arange(1, MOST_OPERATIONS + 1)
         whole = np.abs(orders * turns - np.rint(orders * turns)) < 1e-5
@@ -74,7 +76,7 @@ def shortest_distance(points: Floats) -> float:
 
 
 def _neighbours(points: Floats) -> Any:
-    """What finds the nearest of the points (n, d): a k-d tree, or for few points all distances, which load no more."""
+    """A nearest-neighbour search for points (n, d): a k-d tree, or all distances for few points, which avoids loading scipy."""
     if len(points) <= FEW_POINTS:
         return _AllDistances(points)
 
@@ -84,13 +86,13 @@ def _neighbours(points: Floats) -> Any:
 
 
 class _AllDistances:
-    """Nearest points by all distances, with the face of scipy's k-d tree."""
+    """Nearest points from all distances, with the interface of scipy's k-d tree."""
 
     def __init__(self, points: Floats) -> None:
         self.points = points
 
     def query(self, places: Floats, k: int = 1) -> tuple[Floats, Ints]:
-        """Distances to the k nearest points, rising, and their indices."""
+        """Distances to the k nearest points, in increasing order, and their indices."""
         distances = np.linalg.norm(places[:, None, :] - self.points, axis=2)
         nearest = np.argsort(distances, axis=1, kind="stable")[:, :k]
         rising = np.take_along_axis(distances, nearest, axis=1)
@@ -98,10 +100,10 @@ class _AllDistances:
 
 
 def best_turn(points: Floats, images: Floats, proper: bool) -> Floats:
-    """The orthogonal matrix R (3, 3), det R = ±1, that makes Σ |image - R point|² least.
+    """The orthogonal matrix R (3, 3), det R = ±1, that minimises Σ |image - R point|².
 
-    W. Kabsch, Acta Crystallogr. A 32, 922 (1976), eq. 9; the last singular direction takes the sign of the determinant,
-    which leaves it free where all points lie in a plane.
+    W. Kabsch, Acta Crystallogr. A 32, 922 (1976), eq. 9. The sign of the last singular direction sets the determinant; for points in
+    a plane this direction is otherwise undetermined.
     """
     left, _, right = np.linalg.svd(points.T @ images)
     sign = np.sign(np.linalg.det(left) * np.linalg.det(right)) * (1 if proper else -1)
@@ -109,10 +111,10 @@ def best_turn(points: Floats, images: Floats, proper: bool) -> Floats:
 
 
 def find_operations(labels: Ints, points: Floats, reach: float) -> tuple[list[Operation], tuple[int, int]]:
-    """All operations about the origin whose mismatch is at most `reach` Å, and the two points that tell them apart.
+    """All operations about the origin with a mismatch of at most `reach` Å, and two points whose images distinguish them.
 
-    labels : (n,) whole numbers, alike for like points. points : (n, 3), Å, not all on one line with the origin.
-    Raises ValueError where there are more candidates or operations than `MOST_CANDIDATES` and `MOST_OPERATIONS`.
+    labels : (n,) integers, equal for like points. points : (n, 3), Å, not all on a line through the origin.
+    Raises ValueError for more candidates or operations than `MOST_CANDIDATES` and `MOST_OPERATIONS`.
     """
     base = _base_pair(labels, points, reach)
     turns = _candidates(labels, points, base, reach)
@@ -134,7 +136,7 @@ def find_operations(labels: Ints, points: Floats, reach: float) -> tuple[list[Op
 
 
 def fitted(points: Floats, permutation: Ints, proper: bool) -> Operation:
-    """The operation of that handedness that fits a matching of the points best."""
+    """The proper or improper operation that best fits a matching of the points."""
     images = points[permutation]
     turn = best_turn(points, images, proper)
     mismatch = float(np.linalg.norm(images - points @ turn.T, axis=1).max())
@@ -142,12 +144,12 @@ def fitted(points: Floats, permutation: Ints, proper: bool) -> Operation:
 
 
 def _images(labels: Ints, radii: Floats, point: int, reach: float) -> Ints:
-    """Points that point `one` can be carried to: like ones, as far from the centre."""
+    """Possible images of a point: like points at the same distance from the centre."""
     return np.flatnonzero((labels == labels[point]) & (np.abs(radii - radii[point]) <= reach))
 
 
 def _image_counts(labels: Ints, radii: Floats, reach: float) -> Ints:
-    """How many points each point can be carried to."""
+    """Number of possible images of each point."""
     counts = np.empty(len(labels), dtype=np.int64)
     for label in sorted(set(labels.tolist())):
         mine = np.flatnonzero(labels == label)
@@ -158,7 +160,7 @@ def _image_counts(labels: Ints, radii: Floats, reach: float) -> Ints:
 
 
 def _base_pair(labels: Ints, points: Floats, reach: float) -> tuple[int, int]:
-    """Two points with few images, far from the centre and well off one line with it."""
+    """Two points with few images, far from the centre and not collinear with it."""
     radii = np.linalg.norm(points, axis=1)
     counts = _image_counts(labels, radii, reach)
     far = radii.max()
@@ -168,7 +170,7 @@ def _base_pair(labels: Ints, points: Floats, reach: float) -> tuple[int, int]:
 
 
 def _candidates(labels: Ints, points: Floats, base: tuple[int, int], reach: float) -> Floats:
-    """Operations (m, 3, 3), proper and improper, that carry the base pair to a pair of images at like distance."""
+    """Operations (m, 3, 3), proper and improper, that map the base pair to a pair of images at equal distance."""
     radii = np.linalg.norm(points, axis=1)
     firsts, seconds = (_images(labels, radii, point, reach) for point in base)
     if len(firsts) * len(seconds) > 20 * MOST_CANDIDATES:
@@ -202,10 +204,10 @@ def _triads(first: Floats, second: Floats) -> Floats:
 
 
 class _Matcher:
-    """Which like point each point falls on under an operation.
+    """Matches the images of points under an operation to like points.
 
-    The k-d tree has the label for a fourth coordinate, wide enough apart that the nearest point is a like one. A match
-    counts within a little less than half of the shortest distance between like points, which makes it one to one.
+    The k-d tree has the label as fourth coordinate, spaced so that the nearest point is a like one. The tolerance is slightly less
+    than half of the shortest distance between like points, which makes matches unique.
     """
 
     def __init__(self, labels: Ints, points: Floats) -> None:
@@ -219,7 +221,7 @@ class _Matcher:
                 self.within[mine] = MATCH_WITHIN * shortest_distance(points[mine])
 
     def survivors(self, turns: Floats, base: tuple[int, int]) -> Floats:
-        """The candidates that bring a few points, the base pair and others spread over the order, onto like points."""
+        """The candidates that map a sample of points, including the base pair, onto like points."""
         n = len(self.points)
         for probe in dict.fromkeys([*base, *np.linspace(0, n - 1, min(n, 40)).astype(int).tolist()]):
             images = turns @ self.points[probe]
@@ -228,7 +230,7 @@ class _Matcher:
         return turns
 
     def permutation(self, turn: Floats) -> Ints | None:
-        """Where each point goes; None where one meets no like point."""
+        """The index of the image of each point; None if an image meets no like point."""
         distance, near = self.tree.query(np.column_stack([self.points @ turn.T, self.layers]))
         if (distance > self.within).any():
             return None
@@ -236,10 +238,10 @@ class _Matcher:
 
 
 def closed_group(operations: Iterable[Operation], base: tuple[int, int], reach: float) -> list[Operation]:
-    """The largest set of operations with mismatch up to some limit ≤ `reach` that is closed under multiplication.
+    """The largest set of operations, with mismatch up to a limit of at most `reach`, that is closed under multiplication.
 
-    Where a limit cuts through a group (one element just within, its product just without) the limit is lowered
-    until the set closes; the identity alone always does.
+    If a limit cuts through a group (an element just within, a product just beyond), it is lowered until the set is closed; the
+    identity alone always is.
     """
     remaining = sorted((o for o in operations if o.mismatch_angstrom <= reach), key=lambda o: o.mismatch_angstrom)
     while not _is_closed(remaining, base):
@@ -250,20 +252,20 @@ def closed_group(operations: Iterable[Operation], base: tuple[int, int], reach: 
 
 def _is_closed(operations: list[Operation], base: tuple[int, int]) -> bool:
     proper = [o.proper for o in operations]
-    known = {(*o.permutation[list(base)].tolist(), p) for o, p in zip(operations, proper, strict=True)}
+    base_images = {(*o.permutation[list(base)].tolist(), p) for o, p in zip(operations, proper, strict=True)}
     for second, turns in zip(operations, proper, strict=True):
         for first, also in zip(operations, proper, strict=True):
             images = second.permutation[first.permutation[list(base)]]
-            if (*images.tolist(), turns == also) not in known:
+            if (*images.tolist(), turns == also) not in base_images:
                 return False
     return True
 
 
 def symmetrised(points: Floats, operations: list[Operation]) -> tuple[Floats, list[Operation]]:
-    """The nearest points that the group leaves exactly alike, and its operations, exact, on them.
+    """The nearest points with exact symmetry, and the exact operations of the group.
 
-    Each point becomes the mean of what all operations bring back to it, and the matrices are fitted to the new points,
-    in turn until nothing moves.
+    Each point is replaced by the mean over all operations mapped back to it, and the matrices are fitted to the new points; both
+    steps are repeated until nothing moves.
     """
     proper = [o.proper for o in operations]
     for _ in range(100):

@@ -1,7 +1,7 @@
 """The symmetry of a molecule: point group, rotations and their permutations of nuclei, symmetry number.
 
-Found from the nuclei alone, isotopes included, within a tolerance that is stated with the result. A group that is only
-nearly there is named with the displacement that it would take; it is not used.
+It is determined from the nuclei, isotopes distinguished, within a tolerance that is part of the result. A higher approximate group is
+reported with the displacement that would make it exact, but not used.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from rotor.molecules.symmetry.schoenflies import point_group_name, rotation_axes
 
 TOLERANCE = 5e-3  # of the shortest distance between nuclei, unless the caller says otherwise
 NEAR = 0.2  # the same, up to which a group is called near
-NEAR_UP_TO = 300  # nuclei; in larger molecules a near group is not looked for
+NEAR_UP_TO = 300  # most nuclei for which near groups are searched
 
 
 @dataclass(frozen=True)
 class NearSymmetry:
-    """A higher group that is nearly there: its name and the largest displacement of a nucleus that it would take."""
+    """An approximate higher group: its name, and the largest displacement of a nucleus that would make it exact."""
 
     point_group: str
     displacement_angstrom: float
@@ -38,19 +38,18 @@ class NearSymmetry:
 
 @dataclass(frozen=True, eq=False)
 class Symmetry:
-    """What leaves a molecule alike.
+    """The symmetry operations of a molecule, with its point group.
 
     point_group, rotation_group : Schoenflies names, such as `"C3v"` and `"C3"`; `"Kh"` and `"K"` for an atom
-    rotations : the proper rotations, the identity first, with the permutation of the nuclei under each; of a linear
-        molecule the identity and, for D∞h, one half turn across the axis stand for all
-    improper : the other operations; of a linear molecule none are listed
-    axes_abc : (3, 3) rows: unit vectors of the principal axes a, b, c, right-handed, along axes of symmetry where
-        moments coincide
+    rotations : the proper rotations, identity first, with their permutations of the nuclei; for a linear molecule only the
+        identity and, for D∞h, one half turn across the axis
+    improper : the other operations; none are listed for a linear molecule
+    axes_abc : (3, 3) rows: unit vectors of the principal axes a, b, c, right-handed; along symmetry axes if moments are equal
     moments_u_angstrom2 : (3,) moments of inertia about them, I_a ≤ I_b ≤ I_c
-    equivalent : nuclei that operations carry into one another, by index from 0
-    tolerance : of the shortest distance, as given; tolerance_angstrom : the same in Å
-    deviation_angstrom : the largest distance of a nucleus from where exact symmetry would have it
-    near : the higher group within reach, or None. near_sought : False where the molecule is too large to look for one
+    equivalent : sets of equivalent nuclei, by index from 0
+    tolerance : relative to the shortest distance; tolerance_angstrom : in Å
+    deviation_angstrom : the largest distance of a nucleus from its exactly symmetric position
+    near : an approximate higher group, or None. near_sought : False if the molecule is too large for this search
     """
 
     point_group: str
@@ -73,7 +72,7 @@ class Symmetry:
 
     @property
     def symmetry_number(self) -> int:
-        """How many rotations bring the molecule onto itself; for a linear one 1 or 2."""
+        """The number of proper rotations in the group; 1 or 2 for a linear molecule."""
         return len(self.rotations)
 
     @property
@@ -82,7 +81,7 @@ class Symmetry:
         return rotation_axes(self.rotations)
 
     def describe(self) -> str:
-        """One sentence: group, symmetry number, tolerance, what is only near."""
+        """A sentence with group, symmetry number, tolerance, and approximate higher group."""
         parts = [f"{self.point_group}, symmetry number {self.symmetry_number}, within {self.tolerance_angstrom:.2g} Å"]
         if self.deviation_angstrom > 1e-6:
             parts.append(f"nuclei are up to {self.deviation_angstrom:.2g} Å off exact symmetry")
@@ -109,9 +108,9 @@ def find_symmetry(
 ) -> Symmetry:
     """Point group, rotations and permutations of labelled nuclei.
 
-    An operation about the centre of mass counts when it brings every nucleus to within `tolerance` times the shortest
-    distance between two nuclei of a like nucleus (same kind and mass); a molecule is linear when no nucleus is
-    further than that from a line. What counts forms a group: a limit that would cut through one is lowered.
+    An operation about the centre of mass is accepted if it maps each nucleus onto a like one (same kind and mass) within `tolerance`
+    times the shortest distance between nuclei. A molecule is linear if all nuclei are within this distance of a line. The accepted
+    operations form a group: a limit that would cut through a group is lowered.
 
     Parameters
     ----------
@@ -127,14 +126,14 @@ def find_symmetry(
     Raises
     ------
     ValueError
-        No nuclei, arrays that do not fit, numbers that are not finite, masses not above 0, nuclei nearer than 0.1 Å,
-        a tolerance out of range, or more operations than can be named.
+        No nuclei, arrays of different length, numbers that are not finite, masses not above 0, nuclei closer than 0.1 Å,
+        a tolerance out of range, or too many operations.
 
     Examples
     --------
     >>> square = [[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]]
-    >>> found = find_symmetry("FFFF", [19] * 4, square)
-    >>> found.point_group, found.rotation_group, found.symmetry_number, found.equivalent
+    >>> symmetry = find_symmetry("FFFF", [19] * 4, square)
+    >>> symmetry.point_group, symmetry.rotation_group, symmetry.symmetry_number, symmetry.equivalent
     ('D4h', 'D4', 8, ((0, 1, 2, 3),))
     """
     labels, masses, points = _checked(kinds, masses_u, positions_angstrom)
@@ -164,7 +163,7 @@ def find_symmetry(
 
 
 def _checked(kinds: Sequence[Hashable], masses_u: ArrayLike, positions: ArrayLike) -> tuple[Ints, Floats, Floats]:
-    """Labels as whole numbers, masses, and positions about the centre of mass."""
+    """Integer labels, masses, and positions relative to the centre of mass."""
     masses, points = np.asarray(masses_u, dtype=float), np.asarray(positions, dtype=float)
     n = len(kinds)
     if not n or masses.shape != (n,) or points.shape != (n, 3):
@@ -181,14 +180,14 @@ def _checked(kinds: Sequence[Hashable], masses_u: ArrayLike, positions: ArrayLik
 
 
 def _line_of(points: Floats) -> tuple[Floats, float]:
-    """The direction (3,) of the line through the centre nearest to the points, and the largest distance from it."""
+    """The direction (3,) of the best line through the centre, and the largest distance of a point from it."""
     direction = np.linalg.svd(points, full_matrices=False)[2][0]
     off = np.linalg.norm(points - np.outer(points @ direction, direction), axis=1)
     return direction, float(off.max())
 
 
 def _reversal(labels: Ints, points: Floats, line: Floats) -> tuple[Ints, float]:
-    """The permutation that turns a line end for end, and the largest mismatch; infinite where kinds do not match."""
+    """The permutation that reverses a linear molecule, and the largest mismatch; infinite if kinds do not match."""
     along = points @ line
     order = np.argsort(along)
     permutation = np.empty(len(order), dtype=np.int64)
@@ -205,7 +204,7 @@ def _linear_name(labels: Ints, points: Floats, line: Floats, reach: float) -> st
 def _linear_symmetry(
     labels: Ints, masses: Floats, points: Floats, line: Floats, tolerance: float, shortest: float
 ) -> Symmetry:
-    """C∞v or D∞h; one half turn across the axis stands for all."""
+    """C∞v or D∞h; one half turn across the axis represents all."""
     permutation, mismatch = _reversal(labels, points, line)
     axes = _completed([line])
     operations = [Operation(np.eye(3), np.arange(len(points)), 0.0)]
@@ -239,7 +238,7 @@ def _atom_symmetry(tolerance: float) -> Symmetry:
 
 
 def _near_symmetry(points: Floats, group: list[Operation], order: int) -> NearSymmetry | None:
-    """The wider group, if it has more operations than `order`."""
+    """The approximate group, if it has more operations than `order`."""
     if len(group) <= order:
         return None
     ideal, group = symmetrised(points, group)
@@ -282,7 +281,7 @@ def _sorted(group: list[Operation]) -> tuple[list[Operation], list[Operation]]:
 
 
 def _orbits(group: list[Operation]) -> tuple[tuple[int, ...], ...]:
-    """Sets of nuclei that the operations carry into one another, by their lowest index."""
+    """Sets of nuclei that are equivalent under the operations, by their lowest index."""
     images = np.sort(np.array([o.permutation for o in group]), axis=0)
     sets: dict[int, list[int]] = {}
     for atom, lowest in enumerate(images[0].tolist()):
@@ -291,9 +290,9 @@ def _orbits(group: list[Operation]) -> tuple[tuple[int, ...], ...]:
 
 
 def _principal_axes(masses: Floats, points: Floats, ideal: Floats, rotations: list[Operation]) -> tuple[Floats, Floats]:
-    """Principal axes as rows (3, 3), right-handed, of the exact geometry, and the moments of the given one about them.
+    """Right-handed principal axes (3, 3) of the exact geometry, as rows, and the moments of the given geometry about them.
 
-    Axes of rotation at right angles are principal axes; a twofold one settles the choice where moments coincide.
+    Perpendicular rotation axes are principal axes; a twofold axis fixes the choice if moments are equal.
     """
     settled: list[Floats] = []
     for _, axis in rotation_axes(rotations):
@@ -314,9 +313,9 @@ def _inertia(masses: Floats, points: Floats) -> Floats:
 
 
 def _completed(settled: list[Floats], tensor: Floats | None = None) -> Floats:
-    """Three axes at right angles as rows: those given, then the principal axes of the tensor across them."""
-    known = np.array(settled[:3]).reshape(-1, 3)
-    across = np.linalg.svd(known, full_matrices=True)[2][len(known) :]
+    """Three orthogonal axes as rows: the given ones, then principal axes of the tensor perpendicular to them."""
+    rows = np.array(settled[:3]).reshape(-1, 3)
+    across = np.linalg.svd(rows, full_matrices=True)[2][len(rows) :]
     if tensor is not None and len(across):
         across = np.linalg.eigh(across @ tensor @ across.T)[1].T @ across
-    return np.concatenate([known, across])
+    return np.concatenate([rows, across])

@@ -1,8 +1,7 @@
-"""The Schoenflies name of a finite point group, and of its rotations, from the operations themselves.
+"""The Schoenflies name of a finite point group, and of its rotation group, from its operations.
 
-The questions asked, in their order, are those of the textbook flow chart: is there more than one axis of order 3 or
-more; are there two-fold axes across the main one; which mirrors (P. R. Bunker and P. Jensen, Molecular Symmetry and
-Spectroscopy, 2nd ed., NRC Research Press 1998, chapter 3).
+The decisions follow the textbook flow chart: more than one axis of order 3 or higher; two-fold axes perpendicular to the main axis;
+mirror planes (P. R. Bunker and P. Jensen, Molecular Symmetry and Spectroscopy, 2nd ed., NRC Research Press 1998, chapter 3).
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ def rotation_axes(rotations: Sequence[Operation]) -> list[tuple[int, Floats]]:
 
 
 def rotation_group_name(rotations: Sequence[Operation]) -> str:
-    """C1, Cn, Dn, T, O or I from all rotations of a group, the identity among them."""
+    """C1, Cn, Dn, T, O or I from all rotations of a group, including the identity."""
     axes = rotation_axes(rotations)
     if sum(order > 2 for order, _ in axes) > 1:
         return _CUBIC[len(rotations)]
