@@ -157,7 +157,6 @@ class SolvedSpace(FieldSpace):
     def blocks(self, m: float) -> list[FieldBlock]:
         """Connected sets of sectors: in an electric field for ±M (M and -M apart where states are paired), in a magnetic one for M."""
         twice_m = round(2 * m)
-        nodes = [i for i, sector in enumerate(self.sectors) if sector.twice_f >= abs(twice_m)]
         edges = [
             (up, low, odd)
             for operator in self.operators
@@ -167,7 +166,9 @@ class SolvedSpace(FieldSpace):
         ]
         magnetic = any(isinstance(operator, Magnet) for operator in self.operators)
         out: list[FieldBlock] = []
-        for members, colours, real in coloured_components(nodes, edges):
+        for members, colours, real in coloured_components(len(self.sectors), edges):
+            if self.sectors[members[0]].twice_f < abs(twice_m):
+                continue
             paired = self.elements.paired[self.sectors[members[0]].block]
             signs = (1, -1) if paired and twice_m and not magnetic else (1,)
             copies = 2 if paired or (twice_m and not magnetic) else 1

@@ -170,7 +170,7 @@ def test_elliptical_light_leaves_sixteen_blocks():
 
 
 def test_colours_that_contradict_each_other_are_noticed():
-    assert coloured_components([0, 1, 2], [(0, 1, 1), (1, 2, 1), (0, 2, 1)])[0][2] is False
+    assert coloured_components(3, [(0, 1, 1), (1, 2, 1), (0, 2, 1)])[0][2] is False
 
 
 def test_nonsense_is_refused():

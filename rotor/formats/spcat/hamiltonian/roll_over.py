@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.connected import connected_parts
+from rotor.quantum.connected import part_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -86,9 +86,7 @@ def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats
     if diag == 0:
         apart = _rolled_over(groups, k, hamiltonian.diagonal())
         linked[apart, :] = linked[:, apart] = False
-    parts = np.empty(len(k), dtype=np.int64)
-    for number, members in enumerate(connected_parts(len(k), zip(*np.nonzero(linked), strict=True))):
-        parts[members] = number
+    parts = part_numbers(len(k), *np.nonzero(linked))
     return np.asarray(np.unique(np.column_stack([groups, parts]), axis=0, return_inverse=True)[1].reshape(-1))
 
 
