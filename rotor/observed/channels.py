@@ -65,7 +65,13 @@ def fit_rejecting(
     """
     sight, choices = sight or Sight(), choices or FitChoices()
     near = near_lines(spectrum, components, sight, widths)
-    used = near
+
+    def explained(parts: Sequence[Component]) -> NDArray[np.bool_]:
+        brightness = model(parts, spectrum.frequency_mhz, sight).brightness_k
+        sigma = np.hypot(spectrum.noise, choices.calibration * brightness)
+        return near & (spectrum.intensity - brightness < deviations * sigma)
+
+    used = explained(components)
     least = _LEAST * len(choices.free) * len(components)
     fit = None
     for _ in range(_ROUNDS):
@@ -75,9 +81,7 @@ def fit_rejecting(
             )
         begin = components if fit is None else fit.components
         fit = fit_source(spectrum.where(used), begin, sight, choices)
-        brightness = model(fit.components, spectrum.frequency_mhz, sight).brightness_k
-        sigma = np.hypot(spectrum.noise, choices.calibration * brightness)
-        again = near & (spectrum.intensity - brightness < deviations * sigma)
+        again = explained(fit.components)
         if (again == used).all():
             break
         used = again

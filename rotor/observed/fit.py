@@ -21,7 +21,7 @@ from rotor.arrays import Floats
 from rotor.observed.model import Component, Sight, model
 from rotor.observed.spectrum import KELVIN, ObservedSpectrum
 from rotor.observed.variables import DEFAULT_FREE, Variables, variables
-from rotor.statistics.least_squares import Iteration, Minimum, minimise
+from rotor.statistics.least_squares import Iteration, Minimum
 from rotor.statistics.regression import Regression, regression
 from rotor.table import Table, counted
 
@@ -248,7 +248,9 @@ def minimum_of(
             return residuals, jacobian
         return np.concatenate([residuals, (start - values) / widths]), np.concatenate([jacobian, rows])
 
-    return minimise(evaluate, start, most_iterations=choices.most_iterations, progress=progress, tolerance=1e-3)
+    return free.minimum(
+        evaluate, components, most_iterations=choices.most_iterations, progress=progress, tolerance=1e-3
+    )
 
 
 def prior_widths(components: Sequence[Component], free: Variables) -> Floats:

@@ -22,7 +22,6 @@ from rotor.observed.model import KM_PER_S, Component, Sight, component_depth
 from rotor.observed.species import SpeciesLines
 from rotor.observed.spectrum import ABSORBANCE, ObservedSpectrum
 from rotor.observed.variables import variables
-from rotor.statistics.least_squares import minimise
 from rotor.statistics.regression import regression
 
 _LN10 = math.log(10)
@@ -147,7 +146,7 @@ def fit_cell(spectrum: ObservedSpectrum, start: Sequence[Component]) -> CellFit:
         slopes = np.concatenate([depths[:, 1:], np.zeros_like(depths[:, :1])], axis=1)  # none of the size of a source
         return (spectrum.intensity - depths[:, 0].sum(axis=0)) / noise, free.jacobian(parts, slopes) / noise[:, None]
 
-    minimum = minimise(evaluate, free.values(start), tolerance=1e-3)
+    minimum = free.minimum(evaluate, start, tolerance=1e-3)
     best = free.applied(start, minimum.parameters)
     return CellFit(
         spectrum=spectrum,

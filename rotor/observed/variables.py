@@ -9,13 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.observed.model import PARAMETERS, Component
+from rotor.statistics.least_squares import Evaluate, Minimum, minimise
 
 LOGARITHMIC = ("column_per_cm2", "excitation_k", "fwhm_km_s", "size_arcsec")
+_ROUND_OFF = 1e-12  # of the exponential of a logarithm
 DEFAULT_FREE = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
 
 
@@ -72,6 +75,26 @@ class Variables:
             for component, change in zip(components, changes, strict=True)
         ]
 
+    def within(self, components: Sequence[Component], values: Floats) -> tuple[Floats, Ints]:
+        """Values (m,) with temperatures moved to where Q(T) of all their species is known, and at which end each is: -1, 1, else 0."""
+        low, high = np.array([_temperatures(variable, components) for variable in self.items]).reshape(-1, 2).T
+        inside = np.clip(values, low, np.maximum(low, high))
+        return inside, (inside >= high).astype(np.int64) - (inside <= low)
+
+    def minimum(self, evaluate: Evaluate, components: Sequence[Component], **choices: Any) -> Minimum:
+        """The least squares of a function of what the search moves, from components.
+
+        A temperature at an end of its Q(T) stays there while χ² falls outwards (its column is 0: not determined), and the others go on.
+        """
+
+        def projected(values: Floats) -> tuple[Floats, Floats]:
+            inside, end = self.within(components, values)
+            residuals, jacobian = evaluate(inside)
+            return residuals, np.where((jacobian.T @ residuals) * end > 0, 0.0, jacobian)
+
+        end = minimise(projected, self.values(components), **choices)
+        return replace(end, parameters=self.within(components, end.parameters)[0])
+
     def jacobian(self, components: Sequence[Component], slopes: Floats) -> Floats:
         """Derivatives (n, m) of the brightness by what the search moves, from the slopes (k, 5, n) of `model`."""
         out = np.zeros((slopes.shape[2], len(self)))
@@ -83,6 +106,14 @@ class Variables:
             if variable.name == "size_arcsec":  # a layer has one size; every member has the slope of the whole layer
                 out[:, column] /= _members(variable, components)
         return out
+
+
+def _temperatures(variable: Variable, components: Sequence[Component]) -> tuple[float, float]:
+    """First and last ln T at which Q(T) is known for all species of a variable, round-off inside; of others -inf and inf."""
+    if variable.name != "excitation_k":
+        return -math.inf, math.inf
+    lowest, highest = zip(*(components[k].species.partition.range_k for k in variable.components), strict=True)
+    return math.log(max(lowest)) + _ROUND_OFF, math.log(min(highest)) - _ROUND_OFF
 
 
 def _members(variable: Variable, components: Sequence[Component]) -> int:

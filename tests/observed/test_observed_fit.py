@@ -8,6 +8,7 @@ from observed_cases import artificial, injected, rigid
 
 from rotor.observed.fit import FitChoices, contributions, fit_source, limit_of
 from rotor.observed.model import Component, Sight, model
+from rotor.observed.partition import PartitionTable
 from rotor.observed.spectrum import observed_spectrum
 from rotor.observed.start import start_components, velocity_and_width
 
@@ -125,3 +126,33 @@ def test_mistakes_are_named() -> None:
         )
     with pytest.raises(ValueError, match="known are column_per_cm2"):
         fit_source(spectrum, [Component(rigid(), 1e14, 30.0)], choices=FitChoices(free=("colour",)))
+
+
+def test_a_temperature_at_the_end_of_its_partition_function_holds_up_no_other() -> None:
+    """The table of one of two species ends below its temperature: that one stays at the end, the other comes out as injected."""
+    cut = replace(
+        rigid(), partition=PartitionTable([2.0, 5.0, 10.0], [rigid().partition.at(t) for t in (2.0, 5.0, 10.0)])
+    )
+    end = cut.partition.range_k[1]
+    other = artificial("other", np.random.default_rng(5), 20e3 - 15, 20e3 + 15)
+    true = [Component(rigid(), 3e14, 90.0, 0.0, 3.0), Component(other, 1e14, 60.0, 0.0, 3.0)]
+    spectrum = injected(true, GRID, 0.02, np.random.default_rng(4))
+    start = [Component(cut, 1e14, end, 0.4, 2.5), Component(other, 5e13, 40.0, 0.4, 2.5)]
+    fit = fit_source(spectrum, start)
+    assert fit.minimum.converged
+    held = fit.parameters_of(0)["excitation_k"]
+    assert held["value"] == pytest.approx(end, rel=1e-9)
+    assert not held["determined"]
+    assert fit.components[0].velocity_km_s == pytest.approx(0.0, abs=0.1)
+    assert fit.components[0].column_per_cm2 > 1.1e14  # the start was far below
+
+
+def test_a_temperature_comes_back_from_the_end_of_its_partition_function() -> None:
+    """Started at the end, or outside of it as far as a first step goes: the fit of the middle of the table."""
+    species = rigid()
+    end = species.partition.range_k[1]
+    spectrum = injected([Component(species, 3e14, 300.0, 0.0, 3.0)], GRID, 0.002, np.random.default_rng(6))
+    fit = fit_source(spectrum, [Component(species, 2e15, end, 0.1, 3.0)])
+    assert fit.minimum.converged
+    row = fit.parameters_of(0)["excitation_k"]
+    assert abs(row["value"] - 300.0) < 4 * row["error"]
