@@ -155,6 +155,8 @@ def legend_below(figure: Any, axes: Any, **options: Any) -> None:
     """A legend below the only panel of a figure; inside the axes of a user, whose figure may have others."""
     layout = figure.get_layout_engine() if hasattr(figure, "get_layout_engine") else None
     if len(figure.axes) == 1 and layout is not None:
+        if "ncols" in options:  # as many as fit the width
+            options["ncols"] = max(1, round(options["ncols"] * figure.get_figwidth() / SIZE_INCHES[0]))
         figure.legend(loc="outside lower right", **options)
     else:
         axes.legend(**options)
@@ -210,7 +212,35 @@ def save_described(figure: Any, path: str | os.PathLike[str], title: str, descri
         metadata = {"Creator": program, "Title": plain, "Description": description, "Date": None}
     dots = (_USERS.get() or {}).get("savefig.dpi", "figure")
     with styled():
+        wrap_titles(figure)
+        wrap_titles(figure)
         figure.savefig(path, dpi=figure.dpi if dots == "figure" else dots, metadata=metadata)
+
+
+def wrap_titles(figure: Any) -> None:
+    """Break titles at the right edge of a figure, and shrink words that are wider; where two titles of a panel meet, stack them."""
+    width = 0.76 * figure.bbox.width  # the rest is for the labels of the vertical axis
+    suptitle = getattr(figure, "_suptitle", None)
+    titles = [] if suptitle is None else [suptitle]
+    for axes in figure.axes:
+        left, right = axes._left_title, axes._right_title
+        if right.get_text() and left.get_text() and _widest(left) + _widest(right) > width:
+            left.set_text(f"{left.get_text()}\n{right.get_text()}")
+            right.set_text("")
+        titles += [axes.title, left, right]
+    for title in titles:
+        title.set_wrap(True)
+        if (word := _widest(title, " ")) > width:
+            title.set_fontsize(title.get_fontsize() * width / word)
+
+
+def _widest(text: Any, separator: str = "\n") -> float:
+    """The widest part of a text between separators and line ends, in pixels."""
+    from matplotlib.text import Text
+
+    parts = text.get_text().replace(separator, "\n").split("\n")
+    figure, font = text.figure, text.get_fontproperties()
+    return max(float(Text(0, 0, part, fontproperties=font, figure=figure).get_window_extent().width) for part in parts)
 
 
 def joined(*facts: Mapping[str, Any] | None) -> str:

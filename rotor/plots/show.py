@@ -17,7 +17,7 @@ from rotor.classical.tumble import PERIODS, TumbleAnswer
 from rotor.fluids.request import FluidAnswer
 from rotor.formats.spcat.compare import Comparison
 from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.plots.picture import save, users_style
+from rotor.plots.picture import save, users_style, wrap_titles
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.stark_request import StarkAnswer
 from rotor.quantum.fields.zeeman_request import ZeemanAnswer
@@ -99,6 +99,8 @@ def plot(
         options["axes"] = ax
     with users_style(style):
         figure = _figure(thing, **options)
+        if ax is None:
+            wrap_titles(figure)
         if path is not None:
             save(figure, path, type(thing).__name__, {})
     return figure

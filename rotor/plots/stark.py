@@ -16,6 +16,7 @@ from rotor.quantum.fields.field_map import FieldMap
 from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 
+NARROW_INCHES = 5.0
 SIZE_INCHES = (7.2, 6.4)
 LEAST_DRAWN = 1e-4  # of the strongest line
 MOST_LABELS = 40  # on an axis of energies: the height of a name is a fortieth of it
@@ -110,7 +111,10 @@ def _energies(axes: Any, field_map: FieldMap, view: View) -> None:
     _labels(axes, (float(fields[0]), float(fields[-1])), ends)
     axes.set_ylabel("Energy (cm⁻¹)")
     if seen != {-1}:
-        axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
+        if axes.figure.get_figwidth() < NARROW_INCHES:  # the title needs the width beside it
+            axes.figure.legend(fontsize=8, loc="outside upper right", ncols=len(seen))
+        else:
+            axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
 
 
 def _curves(field_map: FieldMap, view: View) -> list[Ints]:

@@ -13,7 +13,7 @@ from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_top, require_whole
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.budgets import levels_budget
+from rotor.quantum.estimates.budgets import energy_errors, levels_budget
 from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.quantum.hamiltonian_input import effects_field
@@ -77,12 +77,13 @@ class LevelsRequest:
 class SelectedLevels(Table):
     """Energy levels in order of their rows, energies in three units from the lowest level that exists.
 
-    levels: all that were solved. rows: (n,) those asked for. ground_mhz: energy of the lowest level that exists, from the
-    Hamiltonian's zero.
+    levels: all that were solved. rows: (n,) those asked for. top: whose constants, or table, have the errors of energies; None: no
+    errors. ground_mhz: energy of the lowest level that exists, from the Hamiltonian's zero.
     """
 
     levels: Levels
     rows: Ints
+    top: Top | None = None
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -112,6 +113,12 @@ class SelectedLevels(Table):
         """E/k in K above the lowest level that exists."""
         return self.energy_mhz / units.MHZ_PER_K
 
+    @cached_property
+    def error_mhz(self) -> Floats | None:
+        """One standard deviation of every energy, None where no errors are known; see `energy_errors`."""
+        errors = None if self.top is None else energy_errors(self.top, self.levels)
+        return None if errors is None else errors[self.rows]
+
     @property
     def labels(self) -> list[str]:
         """The quantum numbers of each level as text."""
@@ -119,8 +126,9 @@ class SelectedLevels(Table):
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Quantum numbers, energies in three units, spin weight and degeneracy, by name."""
-        numbers = {"energy_mhz": self.energy_mhz, "energy_cm": self.energy_cm, "energy_k": self.energy_k}
+        """Quantum numbers, energies in three units, spin weight and degeneracy, by name; `error_mhz` where errors are known."""
+        error = {} if self.error_mhz is None else {"error_mhz": self.error_mhz}
+        numbers = {"energy_mhz": self.energy_mhz} | error | {"energy_cm": self.energy_cm, "energy_k": self.energy_k}
         counts = {name: getattr(self.levels, name)[self.rows] for name in ("weight", "degeneracy")}
         return {name: column[self.rows] for name, column in self.levels.quanta.items()} | numbers | counts
 
@@ -143,8 +151,12 @@ class LevelsAnswer(TextOf):
     def errors(self) -> ErrorBudget:
         """How far the energies can be trusted."""
         request, levels = self.request, self.table.levels
-        limits = every_limit(request.top, max(request.jmax, 1), levels.effects)
-        return levels_budget(request.top, levels, self.table.rows, limits)
+        errors_mhz = self.table.error_mhz
+        tabulated = (
+            request.top.level_table is not None and errors_mhz is not None and bool(np.isfinite(errors_mhz).all())
+        )
+        limits = every_limit(request.top, max(request.jmax, 1), levels.effects, tabulated=tabulated)
+        return levels_budget(request.top, levels, errors_mhz, limits)
 
     def facts(self) -> dict[str, Any]:
         """Everything about the answer but its table, by the keys of docs/verbs."""
@@ -182,7 +194,7 @@ def answer_levels(request: LevelsRequest, executor: Executor | None = None) -> L
         selected &= (k >= (request.kmin or 0)) & (k <= (request.jmax if request.kmax is None else request.kmax))
     if request.max_energy_mhz is not None:
         selected &= levels.energy_mhz - levels.ground_mhz <= request.max_energy_mhz
-    return LevelsAnswer(request, SelectedLevels(levels, np.flatnonzero(selected)))
+    return LevelsAnswer(request, SelectedLevels(levels, np.flatnonzero(selected), request.top))
 
 
 def _projection(levels: Levels, top: Top) -> Ints:

@@ -63,6 +63,16 @@ def tabulated_line_errors(
     return table.line_errors(rows[upper], rows[lower])
 
 
+def tabulated_level_errors(top: Top, levels: Levels) -> Floats | None:
+    """One standard deviation (levels,) in MHz of energies from the top's table, nan for levels that it has not; None without a table."""
+    table = top.level_table
+    if table is None or not _is_own(top, levels.effects):
+        return None
+    quanta = _labels_of_table(levels)
+    rows = table.rows_of({name: quanta[name] for name in table.quanta})
+    return np.where(rows >= 0, table.error_mhz[rows], np.nan)
+
+
 def _labels_of_table(levels: Levels) -> dict[str, Ints]:
     """Quanta of levels by the names of a table, k of a symmetric top in Wang functions and j of one with spins among them."""
     quanta = dict(levels.quanta)

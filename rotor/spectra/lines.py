@@ -108,15 +108,15 @@ class Lines(TransitionTable):
         beyond = (
             f"{counted(self.untrusted, 'line')} of levels beyond the reach of the distortion constants {verb} left out"
         )
-        limits = () if self._tabulated else warnings_of(self.top, self.levels)
+        limits = () if self.tabulated else warnings_of(self.top, self.levels)
         limits += (beyond,) if self.untrusted else ()
         return limits + ((partly,) if uncertain and exact else ())
 
     @property
-    def _tabulated(self) -> bool:
-        """Whether all lines join levels of the top's table, so that the distortion series does not matter."""
-        in_table = in_level_table(self.top, self.levels)
-        return in_table is not None and bool(in_table[self.upper].all() and in_table[self.lower].all())
+    def tabulated(self) -> bool:
+        """Whether every line is between levels of the top's table, so that the distortion series does not matter."""
+        known = in_level_table(self.top, self.levels)
+        return known is not None and bool(known[self.upper].all() and known[self.lower].all())
 
     @cached_property
     def spread(self) -> Floats | None:

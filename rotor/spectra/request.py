@@ -295,7 +295,9 @@ class SpectrumAnswer(TextOf):
         """Error budget of the frequencies."""
         lines = self.lines
         named = lines.levels.of_named_constants
-        limits = every_limit(lines.top, self.typical_j, lines.levels.effects) if named else ()
+        limits = (
+            every_limit(lines.top, self.typical_j, lines.levels.effects, tabulated=lines.tabulated) if named else ()
+        )
         return frequencies_budget(lines.levels, limits, lines.intensity_nm2_mhz, lines.error_mhz, lines.errors_from)
 
     def facts(self) -> dict[str, Any]:

@@ -43,9 +43,38 @@ def test_the_contract(call):
     info = json.loads(call("info", "water", "--json", "-")[1])
     assert set(content) == KEYS | set(info) - {"partition_function"}
     assert set(content["levels"][0]) == {
-        "j", "ka", "kc", "energy_mhz", "energy_cm", "energy_k", "weight", "degeneracy",
+        "j", "ka", "kc", "energy_mhz", "error_mhz", "energy_cm", "energy_k", "weight", "degeneracy",
     }  # fmt: skip
     assert content["jmax"] == 10
+
+
+def test_energies_have_the_errors_of_constants(call, folder):
+    """σ(E) = J(J+1) σ(B) of a linear rigid top, and nothing for the lowest level; no column without errors."""
+    assert call("levels", "--constants", "B=6000.0(2) MHz", "--jmax", "3", "--csv", "a.csv")[0] == 0
+    rows = list(csv.DictReader(Path("a.csv").read_text().splitlines()))
+    assert [float(row["error_mhz"]) for row in rows] == pytest.approx([0.0, 0.4, 1.2, 2.4])
+    assert call("levels", "--constants", "B=6000.0 MHz", "--jmax", "3", "--csv", "b.csv")[0] == 0
+    assert "error_mhz" not in Path("b.csv").read_text()
+
+
+def test_energies_count_from_the_lowest_level_that_exists():
+    """J = 1 with eo and oe alone: B + C is the lowest, and A + B is A - C above it."""
+    weights = {"ee": 0, "oo": 0, "eo": 1, "oe": 1}
+    top = rotor.Top.from_constants("A=9000.0(3) B=6000.0(2) C=4000.0(1) MHz", spin_weights=weights)
+    table = answer_levels(LevelsRequest(top, jmax=1)).table
+    errors = dict(zip(table.energy_mhz.round(6).tolist(), table.error_mhz.round(9).tolist(), strict=True))
+    assert errors[0.0] == 0.0
+    assert errors[5000.0] == pytest.approx(np.hypot(0.3, 0.1))
+
+
+def test_tabulated_energies_have_the_errors_of_the_table_and_no_series():
+    """Water to J = 5 is in its table: nothing is said of the next order of distortion, for levels and for lines."""
+    answer = rotor.levels("water", jmax=5)
+    table = rotor.read("water").level_table
+    rows = table.rows_of(answer.table.levels.quanta)[answer.table.rows]
+    assert answer.table.error_mhz.tolist() == table.error_mhz[rows].tolist()
+    for each in (answer, rotor.spectrum("water", jmax=5), rotor.levels("water", jmax=60)):
+        assert ("centrifugal distortion of order" in each.errors.line()) == (each.request.jmax == 60)
 
 
 @pytest.mark.parametrize(("unit", "energy"), [("MHz", "12.0000"), ("cm-1", "0.000400"), ("K", "0.000576")])
@@ -211,3 +240,11 @@ def test_ammonia_counts_from_the_lowest_level_that_exists_and_says_which(call):
     by_label = {tuple(row[:3]): int(row[4]) for row in rows}
     assert by_label[("1", "0", "0")] == 4  # 0even of 0-
     assert by_label[("0", "1", "1")] == 2  # K and -K
+
+
+def test_files_written_are_listed_after_the_report(call, folder):
+    """For people alone: the JSON on standard output stays JSON."""
+    _, out, _ = call("levels", "OCS", "--csv", "a.csv", "--plot", "a.png", "--save-scene", "a.toml", "--json", "a.json")
+    assert out.splitlines()[-1].split(maxsplit=1) == ["files", "a.csv, a.png, a.toml, a.json"]
+    assert "files" not in call("levels", "OCS")[1].split()
+    assert json.loads(call("levels", "OCS", "--csv", "a.csv", "--json", "-")[1])["files"] == ["a.csv"]

@@ -64,3 +64,25 @@ def test_a_style_needs_a_picture(call):
     code, _, err = call("fit", "nothing.csv", "--start", "OCS", "--free", "B", "--style", "ggplot")
     assert code == 2
     assert "--style: expected with --plot" in err
+
+
+LONG = "formamide in a cell of 300 K, lines of three isotopologues as measured by the group in Lille, second run"
+
+
+@pytest.mark.parametrize(
+    "title", [LONG, "/data/a_name_of_a_file_without_any_blank_that_is_wider_than_the_column_of_a_page.csv"]
+)
+@pytest.mark.parametrize("options", [{}, {"fwhm_mhz": 1.0, "range_mhz": (20000, 90000)}])
+def test_titles_fit_a_column_of_a_page(folder, title, options):
+    """8.5 cm: long titles break, long words shrink, and two titles of a panel do not meet."""
+    (folder / "journal.mplstyle").write_text(COLUMN)
+    figure = rotor.spectrum("formamide", jmax=5, **options).plot("a.png", style="journal.mplstyle", title=title)
+    axes = figure.axes[0]
+    boxes = [text.get_window_extent() for text in (axes._left_title, axes._right_title) if text.get_text()]
+    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 + 1 and box.y1 <= figure.bbox.y1 + 1 for box in boxes)
+    assert len(boxes) == 1 or not boxes[0].overlaps(boxes[1])
+
+
+def test_a_short_title_stays_as_it_is(folder):
+    figure = rotor.spectrum("OCS", jmax=5).plot("a.png", title="OCS")
+    assert (figure.axes[0].get_title(loc="left"), figure.axes[0]._left_title.get_size()) == ("OCS", 10.0)

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.quantum.estimates.beyond import Limit
-from rotor.quantum.estimates.uncertainty import known_covariance, level_errors, source_of_errors
+from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, source_of_errors
 from rotor.quantum.hyperfine_method import used_method
+from rotor.quantum.tabulated import tabulated_level_errors
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 
 if TYPE_CHECKING:
-    from rotor.arrays import Floats, Ints
+    from rotor.arrays import Floats
     from rotor.quantum.levels import Levels
     from rotor.tops.top import Top
 
@@ -73,17 +74,44 @@ def parameter_names(top: Top, levels: Levels) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for effect in levels.effects for name in effect.parameters(top)))
 
 
-def levels_budget(top: Top, levels: Levels, rows: Ints, limits: Sequence[Limit]) -> ErrorBudget:
-    """Error budget of the energies of these rows of levels; limits: neglected effects, at the highest J."""
-    parameters = parameter_names(top, levels)
-    covariance = known_covariance(top, parameters)
-    errors = None if covariance is None else level_errors(top, levels, covariance)[rows]
+def energy_errors(top: Top, levels: Levels) -> Floats | None:
+    """One standard deviation of every energy above the lowest level that exists, by the errors of the constants or of a level table.
+
+    Returns
+    -------
+    (levels,) array or None
+        In MHz; nan for a level that is missing in the table. None where no errors are known.
+
+    Notes
+    -----
+    σ² = d C dᵀ with d = ∂E/∂c - ∂E₀/∂c, E₀ the lowest level (`rotor.quantum.estimates.uncertainty`). Neglected: what the Hamiltonian
+    leaves out; constants without an uncertainty count as exact. Errors of a table count from J = 0, whichever level is the lowest.
+    """
+    covariance = known_covariance(top, parameter_names(top, levels))
+    if covariance is None:
+        return tabulated_level_errors(top, levels)
+    spread = level_spread(top, levels, covariance)
+    existing = np.flatnonzero(levels.weight > 0)
+    lowest = existing[np.argmin(levels.energy_mhz[existing])] if len(existing) else 0
+    return np.asarray(np.linalg.norm(spread - spread[lowest], axis=1))
+
+
+def levels_budget(top: Top, levels: Levels, errors_mhz: Floats | None, limits: Sequence[Limit]) -> ErrorBudget:
+    """The errors of energies.
+
+    errors_mhz: of the levels shown, from `energy_errors`. limits: what the calculation leaves out, at the highest J.
+    """
+    known = None if errors_mhz is None else errors_mhz[np.isfinite(errors_mhz)]
+    if known is not None and len(known) and top.level_table is not None:
+        data = ErrorTerm(float(known.max()), "the table of energies")
+    else:
+        data = data_term(known, source_of_errors(top, parameter_names(top, levels), None))
     return ErrorBudget(
         of="energies",
         unit="MHz",
         rounding=rounding_term(levels.energy_mhz),
         truncation=truncation_term(levels),
         model=model_term(limits),
-        data=data_term(errors, source_of_errors(top, parameters, None)),
+        data=data,
         statistics=NO_SAMPLES,
     )

@@ -95,14 +95,16 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     return largest_first(limits)
 
 
-def every_limit(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:
-    """`model_limits` with the effects that follow from the constants, however small (`rotor.quantum.estimates.beyond`).
+def every_limit(top: Top, j: int, effects: Sequence[QuantumEffect], *, tabulated: bool = False) -> list[Limit]:
+    """`model_limits` with what the constants themselves say, however small it is (`rotor.quantum.estimates.beyond`).
 
-    Known spin couplings replace estimated ones.
+    Known couplings of spins take the place of estimated ones. tabulated: all energies are from the table of the top, so that the
+    distortion series does not matter.
     """
-    couplings, further = known_couplings(top, j, effects), next_order(top, j, effects)
-    known_names = {limit.name for limit in couplings}
-    limits = [*couplings, *(limit for limit in model_limits(top, j, effects) if limit.name not in known_names)]
+    couplings = known_couplings(top, j, effects)
+    further = None if tabulated else next_order(top, j, effects)
+    known = {limit.name for limit in couplings}
+    limits = [*couplings, *(limit for limit in model_limits(top, j, effects) if limit.name not in known)]
     return largest_first(limits if further is None else [*limits, further])
 
 
