@@ -10,6 +10,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.assignment.peaks import PeakList
+from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import BLUE, GREY, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import line_text
@@ -17,6 +18,9 @@ from rotor.spectra.lines import Lines
 
 MOST_ROWS = 60
 WINDOW_MHZ = 5.0  # on either side of a line
+MOST_NAMES = 24
+LEAST_NAMED = 1e-2  # of the strongest line in view
+BESIDE = 500  # a peak stands at a line within this part of the width of the picture
 LEAST_SHOWN = 1e-3  # of the strongest line in the band
 
 
@@ -56,8 +60,25 @@ def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view
         axes.set_title(title, loc="left")
         axes.legend(frameon=False, fontsize=7, loc="upper left")
         axes.set_xlim(*peaks.band_mhz)
+        axes.set_ylim(-1.05 * float(heights.max(initial=0.0)), SPACE * float(peaks.intensity.max()))
         show_part(axes, view)
+        drawn = np.stack([peaks.frequency_mhz, peaks.intensity], axis=1)
+        name_peaks(axes, _named_lines(axes, lines, heights, peaks), drawn, MOST_NAMES)
         return figure
+
+
+def _named_lines(axes: Any, lines: Lines, heights: Floats, peaks: PeakList) -> list[Peak]:
+    """The strongest lines in view with their transitions, above the peaks that stand at them."""
+    first, last = sorted(axes.get_xlim())
+    inside = (lines.frequency_mhz >= first) & (lines.frequency_mhz <= last)
+    rows = np.flatnonzero(inside & (heights > LEAST_NAMED * heights[inside].max(initial=0.0)))
+    named = []
+    for row in rows[np.argsort(-heights[rows], kind="stable")][: 4 * MOST_NAMES].tolist():
+        at = float(lines.frequency_mhz[row])
+        near = np.abs(peaks.frequency_mhz - at) < (last - first) / BESIDE
+        text = line_text(lines.levels.quanta, int(lines.upper[row]), int(lines.lower[row]), lines.levels.halves)
+        named.append(Peak(at, float(peaks.intensity[near].max(initial=0.0)), text, BLUE))
+    return named
 
 
 def series_order(lines: Lines, rows: Ints) -> Ints:

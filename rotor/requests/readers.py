@@ -123,6 +123,8 @@ class Quantity(Reader):
         """The number in `unit`."""
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             raise ValueError(f"{raw!r}: expected a number{' with a unit' if self.unit else ''}")
+        if isinstance(raw, str) and ":" in raw:
+            raise ValueError(f"{raw!r}: expected a single value, not a range; the sweep of a scene goes over several")
         value = parse_quantity(raw, "fraction" if self.is_fraction else self.unit)
         self.check(value, raw)
         return value

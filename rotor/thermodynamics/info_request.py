@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,7 +19,7 @@ from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.table import Table
 from rotor.thermodynamics.partition_table import partition_table
 from rotor.tops.constants_budget import constants_budget
-from rotor.tops.facts import top_facts
+from rotor.tops.facts import estimated_errors_mhz, top_facts
 from rotor.tops.top import Top
 
 TEMPERATURES_K = (
@@ -64,19 +65,44 @@ class InfoRequest:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PartitionRows(Table):
-    """Rows of Q(T): temperature, sum, classical limit, highest J of the sum, error."""
+    """Rows of Q(T): temperature, sum, classical limit, highest J of the sum, error; in each row also A, B, C and their errors.
+
+    So a table of many molecules has the constants of each. top: whose constants they are.
+    """
 
     records: tuple[Mapping[str, Any], ...]
+    top: Top
 
     @cached_property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """temperature_k, q, classical, jmax, relative_error; NaN or -1 for a missing value."""
+        """temperature_k, q, classical, relative_error, jmax, a_mhz, ..., c_error_mhz; NaN or -1 for a missing value."""
         names = ("temperature_k", "q", "classical", "relative_error")
         numbers = {name: np.array([record[name] for record in self.records], dtype=np.float64) for name in names}
         return {
             **numbers,
             "jmax": np.array([-1 if record["jmax"] is None else record["jmax"] for record in self.records]),
+            **{name: np.full(len(self.records), value) for name, value in abc_columns(self.top).items()},
         }
+
+
+def abc_columns(top: Top) -> dict[str, float]:
+    """A, B, C and their errors, measured or estimated; rounded to the digits of an estimated error; NaN for what is not known.
+
+    >>> columns = abc_columns(Top.from_constants("A=9000.0(3) B=6000.0 C=4000.0 MHz"))
+    >>> columns["a_mhz"], columns["a_error_mhz"], columns["b_error_mhz"]
+    (9000.0, 0.3, nan)
+    """
+    estimated = estimated_errors_mhz(top)
+    errors = {**estimated, **top.constants.uncertainties}
+    columns = {}
+    for name, value in zip("ABC", top.rotational_constants_mhz, strict=True):
+        unknown = not math.isfinite(value)
+        same = "B" if name == "C" and "C" not in errors and "C" not in top.constants.values else name
+        error = math.nan if unknown else errors.get(same, math.nan)
+        digits = 1 - math.floor(math.log10(estimated[same])) if same in estimated and not unknown else 15
+        columns[f"{name.lower()}_mhz"] = math.nan if unknown else round(value, digits)
+        columns[f"{name.lower()}_error_mhz"] = error
+    return {name: columns[name] for name in sorted(columns, key=lambda name: ("error" in name, name))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +117,7 @@ class InfoAnswer:
     @property
     def table(self) -> PartitionRows:
         """Q(T)."""
-        return PartitionRows(self.partition)
+        return PartitionRows(self.partition, self.request.top)
 
     @property
     def errors(self) -> ErrorBudget:

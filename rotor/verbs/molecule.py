@@ -262,6 +262,11 @@ def _from_source(reading: Reading) -> Top:
     source = reading.path(inputs.source) if isinstance(inputs.source, str) else inputs.source
     if source == "-" and reading.style == "key":
         raise ValueError(f"{reading.named('source')}: '-': a scene cannot read standard input; give a file")
+    if isinstance(source, str) and source.lower().endswith(".csv") and is_file(source):
+        raise ValueError(
+            f"{source}: a CSV file is a list of molecules, not a single one: write it into a scene, "
+            f"molecule = \"{Path(source).name}\", and start that with 'rotor run'; 'rotor new info' prints a scene"
+        )
     top: object = _named_in_scenes(reading, lambda: read(source, isotopes=",".join(inputs.isotopes) or None))
     if not isinstance(top, Top):
         raise ValueError(f"{source}: holds a {type(top).__name__.lower()}, not a molecule or constants")

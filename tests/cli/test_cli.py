@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import io
 import json
 import math
@@ -580,3 +581,21 @@ def test_a_forgotten_unit_is_named(call):
 def test_a_smiles_without_its_prefix_is_recognized(call):
     code, _, err = call("spectrum", "C=O")
     assert (code, err) == (2, "error: 'C=O' is no file and no name of a molecule; did you mean 'SMILES:C=O'?\n")
+
+
+def test_tables_of_facts_have_the_constants(call, folder):
+    """Of a list of guessed geometries too, rounded to two uncertain digits of their errors."""
+    (folder / "list.csv").write_text("name,smiles\nformaldehyde,C=O\n", encoding="utf-8")
+    (folder / "many.toml").write_text(
+        'schema = 1\nkind = "info"\nmolecule = "list.csv"\nconditions.temperature = "100 K"\noutputs.csv = "q.csv"\n'
+    )
+    code, out, err = call("run", "many.toml")
+    assert code == 0, err
+    row = next(csv.DictReader((folder / "q.csv").read_text().splitlines()))
+    a, error = float(row["a_mhz"]), float(row["a_error_mhz"])
+    assert 0.003 < error / a < 0.1
+    assert a == round(a, 1 - math.floor(math.log10(error)))
+    assert f" {a:.8g} " in out
+    assert call("info", "OCS", "--csv", "one.csv")[0] == 0
+    row = next(csv.DictReader((folder / "one.csv").read_text().splitlines()))
+    assert (row["a_mhz"], float(row["b_mhz"])) == ("", rotor.read("OCS").constants["B"])

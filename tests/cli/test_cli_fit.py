@@ -437,3 +437,11 @@ def test_the_family_of_samples_gives_the_published_structure(call, folder):
     assert code == 0, err
     values = {value["name"]: value["value"] for value in json.loads(out)["rs"]["values"]}
     assert values == pytest.approx({"CO": 1.16054, "CS": 1.55967}, abs=1e-5)  # digits as published
+
+
+def test_a_fit_from_constants_is_not_named_after_its_lines(call, folder):
+    write_lines(folder / "co.csv")
+    code, out, err = call("fit", "co.csv", "--constants", "B=57636 D=0.18 H=0 MHz", "--free", "B,D,H", "--out", "f")
+    assert code == 0, err
+    assert out.startswith("linear top: CONVERGED")
+    assert rotor.read("f.toml").name == "linear top"

@@ -111,3 +111,20 @@ def test_command_with_pictures(call: Call, folder: Path) -> None:
     code, _, error = call(*arguments, "--range", "8000:18000", "--over", "far.csv")
     assert code != 0
     assert "no line lies in its band" in error
+
+
+def test_strongest_lines_are_named_above_their_peaks() -> None:
+    from rotor.plots.over import over_figure
+    from rotor.plots.view import View
+    from rotor.quantum.quanta import line_text
+
+    lines, peaks = known_lines(temperature_k=2.0, dipole=(0.0, 1.0, 0.6)), spectrum()
+    heights = fit_intensities(lines, peaks).heights(lines)
+    axes = over_figure(lines, heights, peaks, "", View()).axes[0]
+    names = {text.get_text(): text.xy for text in axes.texts}
+    at = {
+        line_text(lines.levels.quanta, int(lines.upper[row]), int(lines.lower[row])): lines.frequency_mhz[row]
+        for row in np.flatnonzero(heights > 0.01 * heights.max()).tolist()
+    }
+    assert len(names) >= 8
+    assert all(x == at[name] and y > 0 for name, (x, y) in names.items())

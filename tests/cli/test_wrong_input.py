@@ -124,3 +124,19 @@ def test_examples_of_help_fit_a_terminal(call):
     assert first.endswith('MHz" \\')
     assert second == "      --dipole-abc 0,1.8546,0 --jmax 20"
     assert max(map(len, call("stark", "--help")[1].splitlines())) <= 80  # columns of a terminal
+
+
+def test_a_range_where_a_single_value_is_needed(call):
+    code, _, err = call("spectrum", "water", "--temperature", "8:18K")
+    assert (code, err) == (
+        2, "error: --temperature: '8:18K': expected a single value, not a range; the sweep of a scene goes over several\n",
+    )  # fmt: skip
+
+
+def test_a_list_where_a_single_molecule_is_needed(call, folder):
+    (folder / "list.csv").write_text("name,smiles\na,C=O\n", encoding="utf-8")
+    code, _, err = call("info", "list.csv")
+    assert code == 2
+    assert err.startswith("error: list.csv: a CSV file is a list of molecules")
+    assert 'molecule = "list.csv"' in err
+    assert "rotor run" in err

@@ -124,8 +124,8 @@ def _assign(answer: Any) -> Numbers:
 
 def _info(answer: Any) -> Numbers:
     """Rotational constants, mass and Ray's parameter."""
-    facts = answer.facts()
-    constants = dict(zip(("a_mhz", "b_mhz", "c_mhz"), facts["rotational_constants_mhz"], strict=True))
+    facts, columns = answer.facts(), answer.table.columns
+    constants = {name: columns[name][0] for name in ("a_mhz", "b_mhz", "c_mhz")}
     return constants | {name: facts[name] for name in ("mass_u", "kappa")}
 
 
