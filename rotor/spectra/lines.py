@@ -114,9 +114,9 @@ class Lines(TransitionTable):
 
     @property
     def tabulated(self) -> bool:
-        """Whether every line is between levels of the top's table, so that the distortion series does not matter."""
-        known = in_level_table(self.top, self.levels)
-        return known is not None and bool(known[self.upper].all() and known[self.lower].all())
+        """Whether all lines join levels of the top's table, so that the distortion series does not matter."""
+        in_table = in_level_table(self.top, self.levels)
+        return in_table is not None and bool(in_table[self.upper].all() and in_table[self.lower].all())
 
     @cached_property
     def spread(self) -> Floats | None:

@@ -96,9 +96,9 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
 
 
 def every_limit(top: Top, j: int, effects: Sequence[QuantumEffect], *, tabulated: bool = False) -> list[Limit]:
-    """`model_limits` with what the constants themselves say, however small it is (`rotor.quantum.estimates.beyond`).
+    """`model_limits` with the effects that follow from the constants, however small (`rotor.quantum.estimates.beyond`).
 
-    Known couplings of spins take the place of estimated ones. tabulated: all energies are from the table of the top, so that the
+    Known spin couplings replace estimated ones. tabulated: all energies are from the table of the top, so that the
     distortion series does not matter.
     """
     couplings = known_couplings(top, j, effects)
