@@ -139,7 +139,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,mu_q"), "--free: 'mu_q' is not a rotational constant"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,mu_q"), "mu_a, mu_b, mu_c (lines in a field)"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,D_J,D"), "--free: D_J and D are one constant"),
-        (("co.csv", "--constants", "B=57000 MHz", "--free", "B,D_K"), "--free: D_K is no constant of kind 'linear'"),
+        (("co.csv", "--constants", "B=57000 MHz", "--free", "B,D_K"), "--free: D_K is not a constant of kind 'linear'"),
         (
             ("co.csv", "--constants", "B=57000 mu_a=1 MHz", "--free", "B"),
             "'mu_a' is not a rotational constant known here: the dipole",
