@@ -1,6 +1,6 @@
 """One Euler core: each shared piece is broken in a copy of the package, and exactly the motions that use it change.
 
-The table of docs/classical.md ("Which motion uses what") is the claim. The copies run with numba switched off, so that the plain
+The table of docs/validation/classical_core.md ("Which motion uses what") is the claim. The copies run with numba switched off, so that the plain
 source is what runs; that the compiled form gives the same numbers, and breaks with the same source, is tested beside it.
 """
 
@@ -14,7 +14,7 @@ import sys
 import pytest
 from places import PROJECT
 
-PAGE = PROJECT / "docs" / "classical.md"
+PAGE = PROJECT / "docs" / "validation" / "classical_core.md"
 
 # (file, what stands there, what is put in its place): each text stands there once
 BREAKS = {

@@ -188,7 +188,7 @@ def methods():
 
 
 def probes(scenes):
-    """A function for each motion, by the name that docs/classical.md gives it."""
+    """A function for each motion, by the name that docs/validation/classical_core.md gives it."""
     value = {
         "free motion, `rotor tumble`": tumble,
         "many free bodies, `propagate`": batch,

@@ -127,7 +127,7 @@ def test_cold_methane_of_nasa():
 
 
 def test_the_page():
-    """docs/thermo.md says what docs/make_thermo.py finds now."""
+    """docs/validation/thermo.md says what docs/make_thermo.py finds now."""
     assert MAKE.page() == MAKE.PAGE.read_text(encoding="utf-8")
 
 

@@ -13,7 +13,7 @@ the torsional part depends only on K of P_z,
 
 The lowest state |K, σ⟩ is computed for each K, and ⟨K'|H_rot|K⟩ is multiplied by the overlap ⟨K', σ|K, σ⟩. Neglected are excited torsional
 states, which change A - E splittings of methyl formate by less than 1e-4 of their size, the dependence of A, B, C on α, and other groups.
-docs/limitations.md compares with measured lines.
+docs/validation/estimates.md compares with measured lines.
 """
 
 from __future__ import annotations

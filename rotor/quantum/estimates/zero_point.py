@@ -13,7 +13,7 @@ as if the bond were longer by δr. ω follows from the bond length (AIP Advances
 F = 1.2 and 2.2 are the medians over every second of 45 diatomic molecules; the other half gives 1.2 and 2.2 again, with no molecule beyond
 a factor of 2 (tests/molecules/test_zero_point.py). In a polyatomic molecule each bond is lengthened by its δr at fixed angles, with the
 smallest displacements of atoms (in a ring, by least squares). Bending, which makes A of water larger in the ground state, and Coriolis
-terms are neglected: the quadratic mean over the axes is reliable, signs and single axes are not. docs/limitations.md compares with
+terms are neglected: the quadratic mean over the axes is reliable, signs and single axes are not. docs/validation/estimates.md compares with
 measured constants.
 """
 
