@@ -1,6 +1,6 @@
 """One Euler core: each shared piece is broken in a copy of the package, and exactly the motions that use it change.
 
-The table of docs/validation/classical_core.md ("Which motion uses what") is the claim. The copies run with numba switched off, so that the plain
+The table of docs/validation/classical_core.md is the claim. The copies run with numba switched off, so that the plain
 source is what runs; that the compiled form gives the same numbers, and breaks with the same source, is tested beside it.
 """
 
