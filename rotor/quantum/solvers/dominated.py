@@ -1,12 +1,12 @@
 """Eigenstates that lie mostly in a few functions, of a matrix that couples these to many others at a distance.
 
-Davidson's method for a block of states: from the chosen functions, the space grows by
+Davidson's method for a block of states: from the chosen functions, the space grows by approximate solutions of (E - H) w = r outside them,
 
-    w = w₁ + (E - D)⁻¹ (r - (E - H) w₁),      w₁ = (E - D)⁻¹ r,      r = (H - E) x,
+    w₀ = (E - D)⁻¹ r,      w ← w + (E - D)⁻¹ (r - (E - H) w), twice,      r = (H - E) x,
 
 D being the diagonal of H, r the residues of the Ritz states x with the largest shares in the chosen functions, until what second order says
-of the rest, Σ r_i²/|E - D_i|, is below a tolerance for each state. w₁ is the usual correction; the second step knows how H couples the
-functions outside, and costs one product with the sparse matrix where it spares two enlargements of the space in five. A function at the
+of the rest, Σ r_i²/|E - D_i|, is below a tolerance for each state. w₀ is the usual correction; the further steps know how H couples the
+functions outside, and cost one product with the sparse matrix each where they spare about half of the enlargements. A function at the
 energy of a state enters by its small denominator.
 """
 
@@ -18,7 +18,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 
-TOLERANCE_MHZ = 1e-7  # of an energy
+TOLERANCE_MHZ = 5e-8  # of an energy
+REPEATS = 2  # of the correction
 STEPS = 10  # enlargements before all states are solved instead
 SMALLEST_GAP = 1e-3  # MHz, in place of smaller denominators
 SMALL = 150  # size up to which all states are solved as fast
@@ -78,8 +79,9 @@ def dominated_states(lower: Any, chosen: Ints) -> tuple[Floats, Floats] | None:
         if not wrong.any():
             return energies, vectors
         rest, step, gaps = rest[:, wrong], step[:, wrong], gaps[:, wrong]
-        step += (rest - step * energies[wrong] + whole @ step) / gaps
-        step[chosen] = 0.0
+        for _ in range(REPEATS):
+            step += (rest - step * energies[wrong] + whole @ step) / gaps
+            step[chosen] = 0.0  # r is 0 there, and E - D small
         more = _orthonormal(step, beyond)
         applied = whole @ more
         beside = np.vstack([applied[chosen], beyond.T @ applied])
