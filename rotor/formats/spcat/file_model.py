@@ -21,7 +21,7 @@ from rotor.formats.spcat.hamiltonian.file_effect import (
     CodedLine,
     FileEffect,
     coded_lines,
-    real_ones,
+    real_lines,
     reasons_of_states,
 )
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
@@ -237,7 +237,7 @@ def _acting(
 ) -> tuple[list[CodedLine], list[str]]:
     """The lines that symmetry allows and that are real where operators along some axes are odd, and why others are left out."""
     lines, forbidden = allowed(coded_lines(file, len(states), doubled), states, doubled, file.options[0].nvib < 0)
-    lines, imaginary = real_ones(lines, odd, members_of_pairs(doubled))
+    lines, imaginary = real_lines(lines, odd, members_of_pairs(doubled))
     return lines, forbidden + imaginary
 
 
@@ -397,14 +397,14 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
         and states[0].linear
         and not oblate  # there its axis is not z
         and all(q == n == 0 for _, q, n in plain)
-        and not any(line.operator.of_j for line in lines)
+        and not any(line.operator.by_j for line in lines)
     ):
         return "linear"
     rotors = [line.operator.rotor for line in lines if line.operator.rotor is not None]
     axis = "c" if oblate else "a"
     good = all(n == 0 for _, _, n in plain) and all(is_axial(rotor, axis) for rotor in rotors)
     whole = alone and states[0].kmin == 0 and states[0].kmax > 0 and states[0].plus == states[0].minus
-    if symmetric and whole and good and states[0].equivalent < 3 and not any(line.operator.of_j for line in lines):
+    if symmetric and whole and good and states[0].equivalent < 3 and not any(line.operator.by_j for line in lines):
         return "oblate" if oblate else "prolate"
     return "asymmetric"
 

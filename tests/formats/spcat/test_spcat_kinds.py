@@ -156,7 +156,7 @@ def test_operators_of_n_are_hermitian_and_obey_time_reversal():
     for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):
         for typ in (*range(12, 18), *range(20, 28), *range(40, 48), *range(60, 68)):
             coded = operator_of(split_code(typ * 10000), axes)
-            matrix = coded.of_j(6, representation).matrix
+            matrix = coded.by_j(6, representation).matrix
             sign = -1 if coded.odd else 1
             np.testing.assert_allclose(matrix, sign * matrix.conj().T, atol=1e-9)  # i times a Hermitian operator
             k = np.arange(-6, 7)
@@ -173,9 +173,9 @@ def test_low_orders_are_cartesian_products():
         of = components(5, representation)
         for typ, axis in ((20, "a"), (40, "b"), (60, "c")):
             others = [of[x] for x in "abc" if x != axis]
-            pair = operator_of(split_code((typ + 1) * 10000), axes).of_j(5, representation)
+            pair = operator_of(split_code((typ + 1) * 10000), axes).by_j(5, representation)
             np.testing.assert_allclose(pair.matrix, anticommutator(*others).matrix, atol=1e-12)  # sums of two products
-            alone = operator_of(split_code(typ * 10000), axes).of_j(5, representation)
+            alone = operator_of(split_code(typ * 10000), axes).by_j(5, representation)
             factor = 1j if representation == "Ir" else -1j
             np.testing.assert_allclose(alone.matrix, factor * of[axis].matrix, atol=1e-14)  # round-off
 

@@ -1,1 +1,1 @@
-"""SPFIT's files as input of a fit, and what is written of one."""
+"""SPFIT's files as input and output of a fit."""

@@ -1,8 +1,7 @@
-"""SPFIT's input, .par and .lin, as a fit: assigned lines, constants, free parameters as its codes say, and its options.
+"""SPFIT's input (.par and .lin) as a fit: assigned lines, constants, free parameters and options.
 
-A parameter of the file is what its code multiplies: A - B where SPFIT's user wrote 1000, -D_J for 200. The constants follow
-linearly, so that the fit reports the same numbers as the field's program does. Every field of line 2 is honoured, or refused
-by its name.
+A parameter of the file is the coefficient of its code: A - B for 1000, -D_J for 200. The constants follow linearly, so that the fit reports
+the same numbers as SPFIT. Each field of line 2 is either applied or refused by name.
 """
 
 from __future__ import annotations
@@ -31,17 +30,16 @@ from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
 from rotor.tops.constants import AxisOrderError, Constants
 
-_LOOKED_AT = 20  # highest N at which the diagonal is looked at
-_NO_ERRTST = 1e6  # what SPFIT takes for an ERRTST of 0 or less
+_LOOKED_AT = 20  # highest N at which the diagonal is tested
+_NO_ERRTST = 1e6  # SPFIT's value for an ERRTST of 0 or less
 
 
 @dataclass(frozen=True, eq=False)
 class SpfitInput:
-    """What a pair of .par and .lin files asks for.
+    """The fit that a pair of .par and .lin files defines.
 
-    constants : of a file with one state and no spins, else None, and `model` has the levels
-    columns : of each parameter of the file the free one that it follows, -1 for one that is held; ratios : times what
-    notes : what is done otherwise than the field's program does it
+    constants: for a file with one state and no spins; else None, and `model` has the levels. columns: for each parameter of the file, the
+    free parameter that it follows, -1 if held. ratios: the ratio to that parameter. notes: deviations from SPFIT.
     """
 
     file: ParameterFile
@@ -56,9 +54,9 @@ class SpfitInput:
 
 
 def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = None) -> SpfitInput:
-    """The fit that a .par file asks for, with the .lin file of the same name unless another is given.
+    """The fit of a .par file, with the .lin file of the same name by default.
 
-    Raises ValueError, with file, line or the name of the option, for what cannot be read or is not supported.
+    Raises ValueError, with file, line or option, for input that cannot be read or is not supported.
     """
     if not Path(par).exists():
         raise ValueError(f"{par}: no such file")
@@ -99,9 +97,9 @@ def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
 
 
 def _named_constants(file: ParameterFile) -> tuple[Constants, Floats] | None:
-    """The constants of a file by name and M of `constants_and_matrix`; None where the codes themselves are fitted.
+    """The constants of a file by name and M of `constants_and_matrix`; None if the codes themselves are fitted.
 
-    That is so for spins, states and further operators, for axes in another order than A >= B >= C, and where the sign of SPIND asks for the
+    Codes are fitted for spins, states and further operators, for axes not in the order A >= B >= C, and if the sign of SPIND requests the
     quantum numbers of the other kind of top.
     """
     if not is_plain(file, None):
@@ -115,7 +113,7 @@ def _named_constants(file: ParameterFile) -> tuple[Constants, Floats] | None:
 
 
 def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> SpfitInput:
-    """The same from files that have been read."""
+    """The fit from a .par file and lines that have been read."""
     _refuse_options(file.header)
     held, ties = _roles(file.parameters)
     _refuse_twice(file.parameters, held)
@@ -155,12 +153,12 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         kmax=kmax,
         leave_out_missing=True,
     )
-    notes += _notes(file, options, model is None, assigned) + ([] if model is None else _of_codes(file))
+    notes += _notes(file, options, model is None, assigned) + ([] if model is None else _notes_on_codes(file))
     return SpfitInput(file, assigned, constants, parameters, options, columns, ratios, tuple(notes), model)
 
 
-def _of_codes(file: ParameterFile) -> list[str]:
-    """Notes of parameters that act on no level, and of free ones that a search from 0 does not move."""
+def _notes_on_codes(file: ParameterFile) -> list[str]:
+    """Notes on parameters that act on no level, and on free ones that a fit does not move from 0."""
     from rotor.formats.spcat.file_model import left_out
     from rotor.formats.spcat.fits.at_zero import stay_at_zero
     from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
@@ -170,11 +168,11 @@ def _of_codes(file: ParameterFile) -> list[str]:
     diag, spind = file.options[0].diag, file.options[0].spind
     by_energy = [f"DIAG = {diag}: with spins a fit names levels of a Wang block by energy, as DIAG = 0 does"]
     named = by_energy if diag in BY_DIAG and abs(spind) > 1 else []
-    return left_out(file) + ([at_zero] if stay else []) + named + _of_falling_diagonals(file)
+    return left_out(file) + ([at_zero] if stay else []) + named + _notes_on_falling_diagonals(file)
 
 
-def _of_falling_diagonals(file: ParameterFile) -> list[str]:
-    """A note of levels with spins whose names by energy are not those by K."""
+def _notes_on_falling_diagonals(file: ParameterFile) -> list[str]:
+    """Note on levels with spins whose labels by energy differ from those by K."""
     from rotor.formats.spcat.fits.fit_states import groups_for_fit
 
     falls = [n for group in groups_for_fit(file) if group.spins and (n := group.falls_from(_LOOKED_AT)) is not None]
@@ -187,11 +185,12 @@ def _of_falling_diagonals(file: ParameterFile) -> list[str]:
 
 
 def _largest_error(header: Header) -> float:
-    """ERRTST; 1e6 where it is 0 or less, as SPFIT takes it."""
+    """ERRTST; 1e6 if it is 0 or less, as in SPFIT."""
     return header.errtst if header.errtst > 0 else _NO_ERRTST
 
 
 def _refuse_options(header: Header) -> None:
+    """Raise ValueError for options of line 2 that are not supported."""
     if not 0 <= header.nxpar <= header.npar:
         raise ValueError(
             f"NXPAR = {header.nxpar}: so many parameters at the end of the list are left out for lines with F below 0; from 0 to "
@@ -202,7 +201,7 @@ def _refuse_options(header: Header) -> None:
 
 
 def _roles(parameters: Sequence[Parameter]) -> tuple[list[bool], list[bool]]:
-    """Which parameters are held (an a-priori error below 1e-30, or below 0), and which keep their ratio to the one before."""
+    """Whether parameters are held (a-priori error below 1e-30, or below 0), and whether they have a fixed ratio to the one before."""
     if parameters and parameters[0].constrained:
         raise ValueError(f"parameter -{parameters[0].code}: the first one has none before it to keep a ratio to")
     ties = [p.constrained for p in parameters]
@@ -211,7 +210,7 @@ def _roles(parameters: Sequence[Parameter]) -> tuple[list[bool], list[bool]]:
 
 
 def _refuse_twice(parameters: Sequence[Parameter], held: Sequence[bool]) -> None:
-    """ValueError for two free parameters of one code and no a-priori error: nothing tells them apart."""
+    """Raise ValueError for two free parameters with equal code and no a-priori error, which lines cannot distinguish."""
     free = [
         p.code
         for p, fixed in zip(parameters, held, strict=True)
@@ -227,6 +226,7 @@ def _refuse_twice(parameters: Sequence[Parameter], held: Sequence[bool]) -> None
 def _columns(
     parameters: Sequence[Parameter], held: Sequence[bool], ties: Sequence[bool]
 ) -> tuple[tuple[int, ...], tuple[float, ...], list[int]]:
+    """Columns and ratios of `SpfitInput`, and the places of free parameters."""
     columns, ratios, free = list[int](), list[float](), list[int]()
     leader = -1
     for i, parameter in enumerate(parameters):
@@ -243,12 +243,13 @@ def _columns(
 
 
 def _prior(parameter: Parameter) -> float:
+    """A-priori error of a parameter."""
     error = parameter.error if parameter.error else np.inf
     return error if error < FREE_ABOVE else np.inf
 
 
 def _distinct(parameters: Sequence[Parameter]) -> tuple[str, ...]:
-    """The labels, with the code behind those that stand twice, and a number where the code does too."""
+    """Distinct labels: repeated ones with their code, and with a number if the code is repeated too."""
     labels = [p.label or str(p.code) for p in parameters]
     names = [f"{x} ({p.code})" if labels.count(x) > 1 else x for x, p in zip(labels, parameters, strict=True)]
     return tuple(
@@ -257,11 +258,12 @@ def _distinct(parameters: Sequence[Parameter]) -> tuple[str, ...]:
 
 
 def _kmax(file: ParameterFile, constants: Constants) -> int | None:
+    """The largest K of the basis."""
     return file.options[0].knmax if constants.kind == "asymmetric" else None
 
 
 def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str) -> tuple[Assignments, list[str]]:
-    """Lines up to NLINE, wavenumbers over CAL, blends as the file marks them."""
+    """Lines up to NLINE as assignments, wavenumbers divided by CAL, with the blends of the file."""
     lines = with_defaults(lines, names)
     notes = [note_of_defaults(lines)] if lines.defaulted else []
     blends = lines.blends()
@@ -289,16 +291,16 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
 
 
 def _widths(lines: LineList, blends: Ints, used: np.ndarray, header: Header) -> dict[int, float]:
-    """The widths of blends: the error of the line of the same frequency behind them."""
-    found = {}
+    """Widths of blends: the error of the line of equal frequency that follows them."""
+    widths = {}
     for i in np.flatnonzero(used & (blends < 0)).tolist():
         scale = header.cal if lines.error[i] < 0 else 1.0
-        found[int(blends[:i][blends[:i] >= 0][-1])] = float(lines.error_mhz[i] / scale)
-    return found
+        widths[int(blends[:i][blends[:i] >= 0][-1])] = float(lines.error_mhz[i] / scale)
+    return widths
 
 
 def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> None:
-    """ValueError for a line with fewer or more quantum numbers than the top has."""
+    """Raise ValueError for a line with fewer or more quantum numbers than the top has."""
     counts = (lines.quanta != BLANK).sum(axis=1) // 2
     for i in np.flatnonzero(used).tolist():
         count = int(counts[i])
@@ -310,6 +312,7 @@ def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> No
 
 
 def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignments) -> list[str]:
+    """Notes on deviations from SPFIT."""
     notes = note_of_npar(file)
     below = [p.label or str(p.code) for p in file.parameters if not p.constrained and (p.error or 0.0) < 0]
     if below:
@@ -338,44 +341,43 @@ def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignm
 
 
 def error_factor(fit: Fit, header: Header) -> float:
-    """What SPFIT multiplies parameter errors by: FRAC, or, where it is below 0, -FRAC times √(χ²/degrees of freedom), one at least."""
+    """SPFIT's factor of parameter errors: FRAC, or for negative FRAC -FRAC times √(χ²/degrees of freedom), where the root is at least 1."""
     if header.frac >= 0:
         return header.frac
     return float(-header.frac * np.sqrt(fit.residuals @ fit.residuals / max(fit.degrees_of_freedom, 1)))
 
 
-def fitted_file(asked: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFile:
-    """The .par file after the fit (a-priori errors as they were), or the .var file (estimated errors and V of C = D V Vᵀ D).
+def fitted_file(fit_input: SpfitInput, fit: Fit, *, variances: bool) -> ParameterFile:
+    """The .par file after the fit (with a-priori errors), or the .var file (with estimated errors and V of C = D V Vᵀ D).
 
-    In the .var file what the lines do not determine is held.
+    In the .var file parameters that the lines do not determine are held.
     """
-    errors = fit.errors * error_factor(fit, asked.file.header)
-    made = []
-    for parameter, column, ratio in zip(asked.file.parameters, asked.columns, asked.ratios, strict=True):
+    errors = fit.errors * error_factor(fit, fit_input.file.header)
+    fitted = []
+    for parameter, column, ratio in zip(fit_input.file.parameters, fit_input.columns, fit_input.ratios, strict=True):
         value = parameter.value if column < 0 else float(fit.values[column]) * ratio
         error = parameter.error
         if variances and column >= 0:
             error = float(errors[column]) * abs(ratio) if np.isfinite(fit.errors[column]) else FIXED
-        made.append(replace(parameter, value=value, error=error))
-    leaders = [c for p, c in zip(asked.file.parameters, asked.columns, strict=True) if not p.constrained]
+        fitted.append(replace(parameter, value=value, error=error))
+    leaders = [c for p, c in zip(fit_input.file.parameters, fit_input.columns, strict=True) if not p.constrained]
     rest = correlation_text(fit, leaders) if variances else ""
-    header = replace(asked.file.header, npar=len(made))
-    return replace(asked.file, header=header, parameters=tuple(made), rest=rest)
+    header = replace(fit_input.file.header, npar=len(fitted))
+    return replace(fit_input.file, header=header, parameters=tuple(fitted), rest=rest)
 
 
 def correlation_text(fit: Fit, columns: Sequence[int]) -> str:
-    """What stands at the end of a .var file: the correlations C = V Vᵀ, V upper triangular, column by column, eight in a line.
+    """Text of the correlations at the end of a .var file: C = V Vᵀ, V upper triangular, column by column, eight numbers in a line.
 
-    columns : of every parameter without a minus sign its place among those of the fit, -1 of one that is held, which has none with others:
-    SPCAT reads so many, and takes none where fewer stand there. The sign of a column has no bearing on C.
-    """
+    columns: for each parameter without a minus sign its place among those of the fit, -1 if held (no correlations). SPCAT reads this number
+    of rows, and ignores the correlations if there are fewer. The sign of a column of V does not affect C."""
     correlations = np.nan_to_num(fit.statistics.correlations)
     np.fill_diagonal(correlations, 1.0)
     return packed_correlations(correlations, columns)
 
 
 def packed_correlations(correlations: Floats, columns: Sequence[int]) -> str:
-    """Correlations (n, n) as `correlation_text` has them."""
+    """Text of correlations (n, n), see `correlation_text`."""
     places = np.array(columns)
     free = np.flatnonzero(places >= 0)
     whole = np.eye(len(places))
@@ -387,7 +389,7 @@ def packed_correlations(correlations: Floats, columns: Sequence[int]) -> str:
 
 
 def _lower_factor(correlations: Floats) -> Floats:
-    """L with L Lᵀ = C; round-off below zero is lifted."""
+    """L with L Lᵀ = C; negative round-off is set to zero."""
     lift = 0.0
     for _ in range(20):
         try:

@@ -1,8 +1,8 @@
-"""Levels of SPFIT's files with spins or several states, for parameters that change: the model behind such a fit.
+"""Levels of SPFIT's files with spins or several states as functions of the parameters, for fits.
 
-Every parameter line of the file is one constant, by the name that `file_effect` gives it. States that are connected are solved
-together, F by F, and only those F in which a line has a level. A level is found by the quantum numbers that the file prints for it.
-Levels of lines whose hyperfine structure is not resolved have F below 0; see `unresolved`.
+Each parameter line of the file is a constant, named as in `file_effect`. Connected states are solved together, for those F in which a line
+has a level. Levels are identified by the quantum numbers that the file lists. Levels of lines without resolved hyperfine structure have F
+below 0; see `unresolved`.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ _NO_REQUEST = IntensityFile("", Request(), ())
 
 
 def groups_for_fit(file: ParameterFile) -> list[Group]:
-    """The groups of connected states with every parameter line in that may leave 0 in a fit; K limited as SPFIT does."""
+    """Groups of connected states, with all parameter lines that a fit may move from 0; K is limited as in SPFIT."""
     left = left_at_zero(file)
     nonzero = tuple(p if i in left else replace(p, value=p.value or AT_ZERO_MHZ) for i, p in enumerate(file.parameters))
     return groups_of(replace(file, parameters=nonzero), _NO_REQUEST)
 
 
 def names_of_quanta(form: Format) -> tuple[str, ...]:
-    """Names of the columns of quantum numbers in a .lin file: n, (k | ka, kc), (v), and those of spins.
+    """Names of the columns of quantum numbers in a .lin file: n, (k | ka, kc), (v), and sums with spins.
 
     >>> names_of_quanta(Format(3, True, 1)), names_of_quanta(Format(1, False, 2))
     (('n', 'ka', 'kc', 'v', 'f'), ('n', 'f1', 'f'))
@@ -66,7 +66,7 @@ def names_of_quanta(form: Format) -> tuple[str, ...]:
 
 
 class _Solved(NamedTuple):
-    """A group with the labels that lie in it: their places among all, the parameters that it has, and its blocks."""
+    """A group with its labels (places among all), its parameters (columns) and its blocks."""
 
     rows: Ints
     columns: Ints
@@ -75,9 +75,9 @@ class _Solved(NamedTuple):
 
 @dataclass(frozen=True)
 class FileLevels(LevelModel):
-    """Energies of the labelled levels of a file; names: its parameter lines as code#place.
+    """Energies of the labelled levels of a file; names: parameter lines as code#place.
 
-    reduced : levels with F below 0. excluded : the parameters that are taken off them
+    reduced: levels with F below 0. excluded: parameters whose contribution to them is subtracted.
     """
 
     names: tuple[str, ...]
@@ -88,9 +88,9 @@ class FileLevels(LevelModel):
 
     @classmethod
     def of(cls, file: ParameterFile, labels: Ints) -> FileLevels:
-        """The model for labels as the file prints them.
+        """The model for labels as the file lists them.
 
-        Raises ValueError for labels that no level has, with the first of them, and for what does not compute.
+        Raises ValueError for labels without a level, with the first of them, and for unsupported parameters.
         """
         groups = groups_for_fit(file)
         form = format_of(file, groups)
@@ -101,11 +101,11 @@ class FileLevels(LevelModel):
         return cls(line_names(file), len(labels), tuple(parts), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
-        """See `LevelModel`."""
+        """Energies and derivatives, see `LevelModel`."""
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
         for part in self.solved:
-            found, derived = part.blocks.levels(values_mhz[part.columns])
-            energies[part.rows] = found
+            part_energies, derived = part.blocks.levels(values_mhz[part.columns])
+            energies[part.rows] = part_energies
             slopes[part.rows[:, None], part.columns] = derived
         if len(self.reduced):
             rows, columns = self.reduced[:, None], self.excluded
@@ -114,21 +114,21 @@ class FileLevels(LevelModel):
         return energies, slopes
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """1: levels are called by what they mostly are, whatever the constants are."""
+        """1 for all levels: labels follow the dominant function at any constants."""
         return np.ones(self.count)
 
 
 def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels: Ints, reduced: Ints) -> list[_Solved]:
-    """The labels in the levels of the groups; those of `reduced` have F below 0."""
+    """Assign the labels to the levels of the groups; `reduced` labels have F below 0."""
     positive = labels.copy()
     positive[reduced, -1] = -spelled_out(labels[reduced], form) if len(reduced) else 0
     names, values = line_names(file), np.array([p.value for p in file.parameters])
     while True:
         parts = [part for group in groups for part in _with_labels(group, form, positive, names, values)]
-        there = np.zeros(len(labels), dtype=bool)
+        assigned = np.zeros(len(labels), dtype=bool)
         for part in parts:
-            there[part.rows] = True
-        lost = np.flatnonzero(~there)
+            assigned[part.rows] = True
+        lost = np.flatnonzero(~assigned)
         if not len(lost):
             return parts
         none = lost[~np.isin(lost, reduced) | (positive[lost, -1] >= HIGHEST_SEARCHED)]
@@ -141,22 +141,22 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
 
 
 def _together(parts: Sequence[_Solved], count: int) -> list[_Solved]:
-    """The parts of all groups that are solved block by block as one, so that blocks of one size are worked on together."""
-    some = [(part.blocks, part.rows, part.columns) for part in parts if isinstance(part.blocks, LabelledBlocks)]
+    """Join the parts of all groups that are solved block by block, so that blocks of equal size are solved together."""
+    joinable = [(part.blocks, part.rows, part.columns) for part in parts if isinstance(part.blocks, LabelledBlocks)]
     others = [part for part in parts if not isinstance(part.blocks, LabelledBlocks)]
-    if not some:
+    if not joinable:
         return others
-    rows = np.concatenate([rows for _, rows, _ in some])
-    starts = np.cumsum([0, *(len(rows) for _, rows, _ in some)])
+    rows = np.concatenate([rows for _, rows, _ in joinable])
+    starts = np.cumsum([0, *(len(rows) for _, rows, _ in joinable)])
     moved = [
         (blocks, np.arange(start, stop), columns)
-        for (blocks, _, columns), start, stop in zip(some, starts, starts[1:], strict=False)
+        for (blocks, _, columns), start, stop in zip(joinable, starts, starts[1:], strict=False)
     ]
     return [_Solved(rows, np.arange(count), joined(moved, len(rows))), *others]
 
 
 def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
-    """The levels of the doubled F, or J, that are listed, in blocks; those without spins by the names that DIAG gives."""
+    """The levels of the listed doubled F (or J), in blocks; without spins with the labels of DIAG."""
     if group.spins:
         return levels_of_f(group.top, (group.effect,), angular, None, None)
     j = [value // 2 for value in angular]
@@ -168,8 +168,8 @@ def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
 
 
 def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
-    """The labels that lie in the group, found in its levels by the quantum numbers that the file prints; some F at a time."""
-    here = _of_group(group, form, labels)
+    """Assign labels to the levels of a group by their quantum numbers, a few F at a time."""
+    here = _places_of_group(group, form, labels)
     if not len(here):
         return []
     total = labels[here, -1] if form.spins else labels[here, 0]
@@ -177,44 +177,44 @@ def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str],
         first = " ".join(map(str, labels[here[int(np.argmax(total < 0))]].tolist()))
         raise MissingLevelsError(f"there is no level {first}: F or J is below 0", here[total < 0])
     if _direct(group, form):
-        return _of_states(group, form, labels, here, names, values)
+        return _assign_without_spins(group, form, labels, here, names, values)
     twice = 2 * total - sum(group.spins) % 2
-    find = _of_spins if group.spins else _of_blocks
+    find = _assign_with_spins if group.spins else _assign_in_blocks
     return find(group, form, labels, here, twice, names, values)
 
 
 def _direct(group: Group, form: Format) -> bool:
-    """Whether the labels are J, Ka, Kc and the state, without spins and K that have no sign."""
+    """Whether the labels are J, Ka, Kc and the state, without spins and without unsigned K."""
     plain = not (group.spins or form.spins or group.effect.pairs) and form.rotation == 3 and group.top.kind != "linear"
     return plain and not any(state.is_e(np.arange(state.fold + 1)).any() for state in group.states)
 
 
-def _of_states(
+def _assign_without_spins(
     group: Group, form: Format, labels: Ints, here: Ints, names: Sequence[str], values: Floats
 ) -> list[_Solved]:
-    """The labels at the places `here` of states without spins."""
+    """Blocks of the labels at the places `here`, for states without spins."""
     place = {state.number: v for v, state in enumerate(group.states)}
     v = [place[number] for number in labels[here, 3].tolist()] if form.states else np.zeros(len(here), dtype=np.int64)
-    own = tuple(group.effect.parameters(group.top))
+    parameters = tuple(group.effect.parameters(group.top))
     columns, start = _columns_of(group, names, values)
-    asked = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
+    requested = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
     naming = naming_by(group.diag, group.oblate, group.diagonal(int(labels[here, 0].max())))
-    blocks = labelled_states(group.top, (group.effect,), own, asked, start, naming)
-    found = np.sort(blocks.found)
-    if not len(found):
+    blocks = labelled_states(group.top, (group.effect,), parameters, requested, start, naming)
+    present = np.sort(blocks.found)
+    if not len(present):
         return []
     order = np.full(len(here), -1)
-    order[found] = np.arange(len(found))
-    every = np.arange(len(columns))
-    return [_Solved(here[found], columns, joined([(blocks, order, every)], len(found)))]
+    order[present] = np.arange(len(present))
+    all_columns = np.arange(len(columns))
+    return [_Solved(here[present], columns, joined([(blocks, order, all_columns)], len(present)))]
 
 
-def _of_spins(
+def _assign_with_spins(
     group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
 ) -> list[_Solved]:
-    """The labels at the places `here`, of so many doubled F, of states with spins."""
+    """Blocks of the labels at the places `here` with these doubled F, for states with spins."""
     columns, start = _columns_of(group, names, values)
-    own = tuple(group.effect.parameters(group.top))
+    parameters = tuple(group.effect.parameters(group.top))
 
     def rows_of(levels: Levels, chosen: Ints) -> Ints:
         if group.effect.pairs:
@@ -222,12 +222,12 @@ def _of_spins(
         return _rows_of(group, levels, form, labels[here[chosen]])
 
     functions = partial(_functions_of, group) if group.effect.pairs else None
-    found = assigned_with_spins(group.top, (group.effect,), own, start, twice, rows_of, functions)
-    return [_Solved(here[one.rows], columns, one.blocks) for one in found]
+    assigned = assigned_with_spins(group.top, (group.effect,), parameters, start, twice, rows_of, functions)
+    return [_Solved(here[part.rows], columns, part.blocks) for part in assigned]
 
 
 def _rows_of(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
-    """The row of each label among the levels, -1 where there is none."""
+    """The row of each label among the levels, -1 if it has none."""
     rows_by_label: dict[tuple[int, ...], int] = {}
     for negative in (True, False):
         for row, label in enumerate(map(tuple, quanta_of(group, levels, form, negative).tolist())):
@@ -236,31 +236,31 @@ def _rows_of(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
 
 
 def _columns_of(group: Group, names: Sequence[str], values: Floats) -> tuple[Ints, Floats]:
-    """Which parameters a group has, and their values."""
+    """Columns of the parameters of a group, and their values."""
     columns = np.array([names.index(name) for name in group.effect.parameters(group.top)])
     return columns, np.where(values == 0, AT_ZERO_MHZ, values)[columns]
 
 
-def _of_blocks(
+def _assign_in_blocks(
     group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
 ) -> list[_Solved]:
-    """The labels at the places `here`, of so many doubled J, of states without spins."""
+    """Blocks of the labels at the places `here` with these doubled J, for states without spins."""
     levels = levels_in_blocks(group, distinct(twice).tolist())
     rows = _rows_of(group, levels, form, labels[here])
-    found = rows >= 0
-    if not found.any():
+    has_level = rows >= 0
+    if not has_level.any():
         return []
-    own = tuple(group.effect.parameters(group.top))
+    parameters = tuple(group.effect.parameters(group.top))
     columns, start = _columns_of(group, names, values)
     functions = _functions_of(group, levels) if group.effect.pairs else None
     named = functions is None and "kc" in levels.quanta
     naming = naming_by(group.diag, group.oblate, group.diagonal(levels.jmax)) if named else None
-    blocks = unit_levels(group.top, levels, rows[found], own, start, functions, naming)
-    return [_Solved(here[found], columns, blocks)]
+    blocks = unit_levels(group.top, levels, rows[has_level], parameters, start, functions, naming)
+    return [_Solved(here[has_level], columns, blocks)]
 
 
 def _functions_of(group: Group, levels: Levels) -> Functions:
-    """The functions by which levels of l-doubled states are called."""
+    """The functions that label levels of l-doubled states."""
     pairs, representation = group.effect.pairs, str(levels.representation)
 
     def functions(block: SolvedBlock | SpinBlock) -> tuple[Floats, Ints]:
@@ -271,8 +271,8 @@ def _functions_of(group: Group, levels: Levels) -> Functions:
     return functions
 
 
-def _of_group(group: Group, form: Format, labels: Ints) -> Ints:
-    """Positions of the labels whose state is one of the group's."""
+def _places_of_group(group: Group, form: Format, labels: Ints) -> Ints:
+    """Places of the labels whose state belongs to the group."""
     if not form.states:
         return np.arange(len(labels))
     numbers = [state.number for state in group.states]
@@ -280,7 +280,7 @@ def _of_group(group: Group, form: Format, labels: Ints) -> Ints:
 
 
 def _row(rows: dict[tuple[int, ...], int], label: tuple[int, ...], form: Format) -> int:
-    """The row of a label, else of the one with the other sign of K, -1 where there is none."""
+    """The row of a label, else of the label with the opposite sign of K, -1 if there is none."""
     if label in rows or form.rotation != 2:
         return rows.get(label, -1)
     turned = (label[0], -label[1], *label[2:])

@@ -1,4 +1,4 @@
-"""The parameters of SPFIT's files after a fit, for a publication and for the report: every one, by name, code and states."""
+"""Tables of the parameters of SPFIT's files after a fit, for a publication and for the report: name, code and states."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from rotor.formats.spcat.hamiltonian.codes import (
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 
 _RIGID = (Named("A", 10000, 1), Named("B", 20000, 1), Named("C", 30000, 1))
-_WITHOUT_STATES = 100_000  # codes without spins and series, states left out
+_WITHOUT_STATES = 100_000  # codes without spins, series and states are smaller
 
 
-def publication_rows(asked: SpfitInput, fit: Fit) -> list[Row]:
-    """Every parameter: published constants of rotation and distortion under their names and signs, others by their labels."""
-    file, rows = asked.file, list[Row]()
-    known = {item.code: item for item in _names(file)}
+def publication_rows(fit_input: SpfitInput, fit: Fit) -> list[Row]:
+    """Rows of all parameters: published constants with their names and signs, others with their labels."""
+    file, rows = fit_input.file, list[Row]()
+    published = {item.code: item for item in _names(file)}
     for place, parameter in enumerate(file.parameters):
         digits = split_code(parameter.code, len(file.options))
-        named = known.get(_rotational(digits))
+        named = published.get(_rotational(digits))
         name = named.name if named else parameter.label or str(parameter.code)
         sign = named.sign if named else 1
-        value, error, follows = _numbers(asked, fit, place)
+        value, error, follows = _numbers(fit_input, fit, place)
         rows.append(Row(name, sign * value, error, follows, _states(digits, len(file.options))))
     return rows
 
 
-def parameter_section(asked: SpfitInput, fit: Fit) -> list[str]:
-    """A line for each parameter of the file: code, label, value(error), and what it does where it is not free."""
+def parameter_section(fit_input: SpfitInput, fit: Fit) -> list[str]:
+    """A line for each parameter of the file: code, label, value(error), and whether it is held or follows another."""
     out = []
-    for place, parameter in enumerate(asked.file.parameters):
-        value, error, follows = _numbers(asked, fit, place)
+    for place, parameter in enumerate(fit_input.file.parameters):
+        value, error, follows = _numbers(fit_input, fit, place)
         role = "held" if error is None else f"follows {follows}" if follows else ""
         code = f"{'-' if parameter.constrained else ''}{parameter.code}"
         text = value_text(value, error) if error else f"{value:.15g}"
@@ -49,29 +49,30 @@ def parameter_section(asked: SpfitInput, fit: Fit) -> list[str]:
     return out
 
 
-def _numbers(asked: SpfitInput, fit: Fit, place: int) -> tuple[float, float | None, str]:
-    """Value and error (None: held) of a parameter, and the label or code of the one whose ratio it keeps."""
-    parameter, column, ratio = asked.file.parameters[place], asked.columns[place], asked.ratios[place]
+def _numbers(fit_input: SpfitInput, fit: Fit, place: int) -> tuple[float, float | None, str]:
+    """Value and error (None: held) of a parameter, and the label or code of the parameter to which it has a fixed ratio."""
+    parameter, column, ratio = fit_input.file.parameters[place], fit_input.columns[place], fit_input.ratios[place]
     if column < 0:
         return parameter.value, None, ""
-    leader = _leader(asked.file.parameters, place)
+    leader = _leader(fit_input.file.parameters, place)
     follows = "" if not parameter.constrained else leader.label or str(leader.code)
     return float(fit.values[column]) * ratio, float(fit.errors[column]) * abs(ratio), follows
 
 
 def _leader(parameters: Sequence[Parameter], place: int) -> Parameter:
+    """The parameter to which a parameter has a fixed ratio."""
     return next(p for p in reversed(parameters[: place + 1]) if not p.constrained)
 
 
 def _rotational(digits: Digits) -> int:
-    """The code without its states; -1 of terms with spins, series or between states."""
+    """The code without its states; -1 for terms with spins, series or between states."""
     if digits.v1 != digits.v2 or any((digits.ex, digits.ff, digits.i2, digits.i1, digits.ns)):
         return -1
     return 10000 * digits.typ + 1000 * digits.ksq + 100 * digits.nsq
 
 
 def _names(file: ParameterFile) -> tuple[Named, ...]:
-    """The published names of a file's codes; none where its terms are of more than one reduction, or of none."""
+    """The published names of the codes of a file; empty if its terms fit no single reduction."""
     codes = {_rotational(split_code(p.code, len(file.options))) for p in file.parameters}
     if all(is_linear(options) for options in file.options):
         return (Named("B", 100, 1), *LINEAR)

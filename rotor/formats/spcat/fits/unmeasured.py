@@ -1,4 +1,4 @@
-"""Lines that a .par file could have beside the measured ones: of the same kinds, frequencies and N, for advice on what to measure."""
+"""Lines of a .par file that are not measured but similar to measured ones in kind, frequency and N, as candidates for measurement."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from rotor.formats.spcat.fits.fit_states import groups_for_fit, levels_in_blocks
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.spins.levels import unmixed_levels
 
-_WIDER = 0.01  # of the lowest and highest frequency: how far beyond them a line may lie
-_MOST_NUMBERS = 2**62  # that an integer holds
+_WIDER = 0.01  # relative distance by which a line may lie outside the measured frequencies
+_MOST_NUMBERS = 2**62  # most labels that an integer can number
 
 
 def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, Ints]:
-    """Labels (n, k) of both states of the lines whose quantum numbers change as those of a measured line do.
+    """Labels (n, k) of both states of the lines with the same changes of quantum numbers as a measured line.
 
     The states are the same as the measured line's (v), N is at most the highest measured, the frequency within the measured range,
     where spins do not count. Raises ValueError where a file has so many quantum numbers that labels cannot be counted.
@@ -27,16 +27,16 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
     Parameters
     ----------
     file : ParameterFile
-        Near the fitted one.
+        Parameters near the fitted ones.
     measured : Assignments
-        Those with F below 0 and energies from zero are left out.
+        Measured lines; F below 0 and energies are ignored.
     """
     groups = groups_for_fit(file)
     form = format_of(file, groups)
     highest = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
-    found = [_labels_of(group, form, highest) for group in groups]
-    labels, first = np.unique(np.concatenate([one[0] for one in found]), axis=0, return_index=True)
-    energies = np.concatenate([one[1] for one in found])[first]
+    tables = [_labels_of(group, form, highest) for group in groups]
+    labels, first = np.unique(np.concatenate([table[0] for table in tables]), axis=0, return_index=True)
+    energies = np.concatenate([table[1] for table in tables])[first]
 
     plain = ~measured.from_zero & (
         measured.upper.min(axis=1) >= 0 if form.rotation != 2 else measured.upper[:, -1] >= 0
@@ -46,7 +46,7 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
     state = seen.lower[:, v] if form.states else np.zeros(len(seen), dtype=np.int64)
     changes = np.unique(np.column_stack([state, seen.upper - seen.lower]), axis=0)
     number = _Numbering(np.concatenate([labels, seen.upper, seen.lower]), changes[:, 1:])
-    known = set(zip(number.of(seen.upper).tolist(), number.of(seen.lower).tolist(), strict=True))
+    measured_pairs = set(zip(number.of(seen.upper).tolist(), number.of(seen.lower).tolist(), strict=True))
     rows = number.of(labels)
     order = np.argsort(rows)
     low_mhz = float(seen.frequency_mhz.min()) * (1 - _WIDER)
@@ -60,14 +60,14 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
         frequency = energies[upper] - energies[lower]
         chosen = (rows[upper] == goal) & (frequency > low_mhz) & (frequency < high_mhz)
         new = [(i, k) for i, k in zip(upper[chosen].tolist(), lower[chosen].tolist(), strict=True)
-               if (int(rows[i]), int(rows[k])) not in known]  # fmt: skip
+               if (int(rows[i]), int(rows[k])) not in measured_pairs]  # fmt: skip
         pairs += new
     table = np.array(pairs, dtype=np.int64).reshape(-1, 2)
     return labels[table[:, 0]], labels[table[:, 1]]
 
 
 def _labels_of(group: Group, form: Format, highest: int) -> tuple[Ints, Floats]:
-    """Labels (n, k) with N up to the highest, and where the levels lie without what the spins do, MHz."""
+    """Labels (n, k) with N up to the highest, and energies of the levels without spins, MHz."""
     if group.spins:
         total = sum(group.spins)
         if group.states[0].equivalent == 3:
@@ -84,7 +84,7 @@ def _labels_of(group: Group, form: Format, highest: int) -> tuple[Ints, Floats]:
 
 
 class _Numbering:
-    """One whole number for each label, so that labels are found by a search."""
+    """An integer for each label, so that labels can be searched."""
 
     def __init__(self, labels: Ints, changes: Ints) -> None:
         self._least = labels.min(axis=0) + np.minimum(changes.min(axis=0, initial=0), 0)

@@ -1,10 +1,10 @@
-"""SPFIT's lines whose hyperfine structure is not resolved: F below 0, and the NXPAR parameters at the end that do not count for them.
+"""SPFIT's lines without resolved hyperfine structure: F below 0, and the last NXPAR parameters, which do not affect them.
 
-The energy of such a level is that of the level |F| less what the last NXPAR parameters add to it to first order,
-E - Σ p ∂E/∂p, and these parameters have no derivative (`dnuadd` in H. M. Pickett's program, whose source this was read from).
+The energy of such a level is that of the level |F| without the first-order contribution of the last NXPAR parameters, E - Σ p ∂E/∂p, and
+its derivative by these parameters is 0 (`dnuadd` in the source of H. M. Pickett's program).
 
-F = -1 means minus the sum of angular momenta before F, or N (`linein`); where |F| is below 10 and has no such level, the next F
-up to 9 are looked through (`getblk`).
+F = -1 stands for minus the sum of angular momenta before F, or N (`linein`); if |F| is below 10 and has no such level, the next F up to 9
+are tried (`getblk`).
 """
 
 from __future__ import annotations
@@ -16,35 +16,35 @@ from rotor.formats.spcat.file_quanta import Format
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import MissingLevelsError
 
-HIGHEST_SEARCHED = 9  # F up to which a level with F below 0 is looked for where |F| has none
+HIGHEST_SEARCHED = 9  # highest F that is tried for a level with F below 0 if |F| has none
 
 
 def excluded_parameters(file: ParameterFile) -> Ints:
-    """Those of the last NXPAR parameter lines that follow no parameter before them."""
+    """Places of the last NXPAR parameter lines that follow no parameter before them."""
     first = len(file.parameters) - file.header.nxpar
     leaders = np.maximum.accumulate([0 if p.constrained else place for place, p in enumerate(file.parameters)])
     return np.flatnonzero(leaders >= first)
 
 
 def spelled_out(labels: Ints, form: Format) -> Ints:
-    """F of labels with F below 0, where -1 stands for the sum of angular momenta before it."""
+    """F of labels with F below 0, with -1 replaced by minus the sum of angular momenta before it."""
     before = -labels[:, -2 if form.spins > 1 and not form.aggregate else 0]
     return np.where((labels[:, -1] == -1) & (before < 0), before, labels[:, -1])
 
 
 def refuse_far_f(labels: Ints, reduced: Ints, form: Format, names: tuple[str, ...], twice_spins: int) -> None:
-    """Refuse labels with F below 0 whose |F| no coupling of N with the spins gives.
+    """Refuse labels with F below 0 whose |F| cannot result from N and the spins.
 
     Parameters
     ----------
     labels : (n, quanta) array
         Quantum numbers by level, N first.
     reduced : (m,) array
-        Places of those with F below 0.
+        Places of labels with F below 0.
     form : Format
-        Of the quantum numbers of the file.
+        Format of the quantum numbers of the file.
     names : tuple of str
-        Of the columns.
+        Names of the columns.
     twice_spins : int
         Twice the sum of all spins.
 
@@ -53,8 +53,8 @@ def refuse_far_f(labels: Ints, reduced: Ints, form: Format, names: tuple[str, ..
     MissingLevelsError
         With the first such label, and the places of all.
     """
-    some = labels[reduced]
-    far = reduced[np.abs(-spelled_out(some, form) - some[:, 0]) > (twice_spins + 1) // 2]
+    reduced_labels = labels[reduced]
+    far = reduced[np.abs(-spelled_out(reduced_labels, form) - reduced_labels[:, 0]) > (twice_spins + 1) // 2]
     if len(far):
         first = " ".join(map(str, labels[far[0]].tolist()))
         text = f"there is no level {first} ({', '.join(names)}): F and N differ by more than the spins"

@@ -1,1 +1,1 @@
-"""What the lines of SPFIT's files mean as operators: codes, states, series, l-doubled states, symmetry, names of levels."""
+"""Parameter codes of SPFIT as operators: series, l-doubled states, symmetry, labels of levels."""

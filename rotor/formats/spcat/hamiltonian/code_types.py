@@ -1,10 +1,10 @@
-"""What the TYP of a code says of its operator, the one table for all that reads codes: rank, axis, change of K, name between two states.
+"""Meaning of TYP in a parameter code: rank, axis, change of K, and name of the operator between two states.
 
 | TYP | rank L | axis |
 |---|---|---|
-| 3 + n | 2n | none: all half turns about a, b, c leave it as it is |
+| 3 + n | 2n | none: invariant under all half turns about a, b, c |
 | 11 + n | 2n + 1 | none |
-| 20 + n, 40 + n, 60 + n | n + 1 | a, b, c, whose half turn alone leaves it as it is |
+| 20 + n, 40 + n, 60 + n | n + 1 | a, b, c: invariant under the half turn about this axis only |
 
 (H. M. Pickett, documentation of SPFIT and SPCAT.) Tensors of odd rank change sign under time reversal.
 """
@@ -15,7 +15,7 @@ from math import sqrt
 
 ODD = {20: "a", 40: "b", 60: "c"}  # change sign under time reversal
 CROSS = {21: "bc", 41: "ac", 61: "ab"}
-TYPES_BETWEEN = {  # of what connects two states without a spin, by name
+TYPES_BETWEEN = {  # interactions of two states without spins, by name
     "G_a": 20,
     "G_b": 40,
     "G_c": 60,
@@ -37,7 +37,7 @@ TURNS = {
 
 
 def order_of(typ: int) -> int:
-    """L, the rank of the tensor of TYP 3 + n (2n), 11 + n (2n + 1), and of 20 + n, 40 + n, 60 + n (n + 1).
+    """Rank L of the tensor of TYP 3 + n (2n), 11 + n (2n + 1), and of 20 + n, 40 + n, 60 + n (n + 1).
 
     >>> order_of(5), order_of(12), order_of(21), order_of(62)
     (4, 3, 2, 3)
@@ -53,7 +53,7 @@ def is_odd_type(typ: int) -> bool:
 
 
 def axis_of(typ: int) -> str:
-    """a, b or c, whose half turn alone leaves an operator with this TYP as it is; "" where all do.
+    """The axis a, b or c of the only half turn that leaves the operator of a TYP invariant; "" if all half turns do.
 
     >>> [axis_of(typ) for typ in (0, 4, 21, 40, 62, 80)]
     ['', '', 'a', 'b', 'c', '']
@@ -62,12 +62,12 @@ def axis_of(typ: int) -> str:
 
 
 def factor_below(typ: int) -> float:
-    """Of {Z, N₊^(L-1)} with its conjugate: ¼ √(2L), for TYP 12 to 19 twice that."""
+    """Factor of {Z, N₊^(L-1)} with its conjugate: ¼ √(2L), twice that for TYP 12 to 19."""
     return sqrt(2 * order_of(typ)) * (0.5 if typ < 20 else 0.25)
 
 
 def shape_of(typ: int, z: str) -> tuple[int, bool]:
-    """K of the tensor of TYP 12 to 79, and whether it is E + E† (else (E - E†)/i): by its species, see `operators._tensor_of_n`."""
+    """K of the tensor of TYP 12 to 79, and whether it is E + E† or (E - E†)/i, by its species (`operators._tensor_of_n`)."""
     x, y = ("c", "b") if z == "a" else ("a", "b")
     order = order_of(typ)
     along = {"": "", x: "x", y: "y", z: "z"}[axis_of(typ)]
@@ -76,7 +76,7 @@ def shape_of(typ: int, z: str) -> tuple[int, bool]:
 
 
 def delta_k(typ: int, oblate: bool) -> int:
-    """The change of K of an operator, the part of Nb², Nc² with ΔK = 2 apart.
+    """The change of K of an operator; the part of Nb² and Nc² with ΔK = 2 does not count.
 
     >>> [delta_k(typ, False) for typ in (1, 4, 5, 20, 21, 40, 41, 42, 61)]
     [0, 2, 4, 0, 2, 1, 1, 3, 1]

@@ -1,4 +1,4 @@
-"""The codes of SPFIT's parameters, both ways: digits to operators, and named constants to codes and signs.
+"""Codes of SPFIT's parameters: from digits to operators, and from named constants to codes and signs.
 
 A code is read in decimal digits, EX FF I2 I1 NS TYP KSQ NSQ V2 V1 (H. M. Pickett, documentation of SPFIT and SPCAT;
 J. Mol. Spectrosc. 148, 371 (1991)). The parameter c of a code without spins and series multiplies
@@ -7,9 +7,9 @@ J. Mol. Spectrosc. 148, 371 (1991)). The parameter c of a code without spins and
     TYP = 1, 2, 3   Na², Nb², Nc²
     TYP = 3 + n     ½{Nz^2q, N₊^2n + N₋^2n} N^2p
 
-so that the codes of Watson's constants are 10000 (n > 0: 3 + n) + 1000 q + 100 p, and their signs those of his
-Hamiltonian: -ΔJ, -DJ, -δJ, -δK, all others plus. The basis is Iʳ (z, x, y = a, b, c), or IIIˡ (z, x, y = c, b, a)
-where NVIB is negative; a constant keeps its sign as published in that representation.
+so that the codes of Watson's constants are 10000 (n > 0: 3 + n) + 1000 q + 100 p, with the signs of his Hamiltonian: -ΔJ, -DJ, -δJ, -δK,
+all others plus. The basis is Iʳ (z, x, y = a, b, c), or IIIˡ (z, x, y = c, b, a) if NVIB is negative; a constant has the sign published
+for that representation.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ AXES = {basis: axes_of(basis) for basis in ("Ir", "IIIl")}  # x, y, z of the two
 
 
 def basis_axes(oblate: bool) -> str:
-    """The axes at x, y, z of a file: those of IIIl where NVIB is negative, else of Ir."""
+    """The axes x, y, z of a file: those of IIIl if NVIB is negative, else of Ir."""
     return AXES["IIIl" if oblate else "Ir"]
 
 
@@ -61,12 +61,12 @@ class Named(NamedTuple):
 
 
 def state_digits(states: int) -> int:
-    """Digits of V1 and of V2 in a code: one up to 9 states, two up to 99, else three."""
+    """Number of digits of V1 and of V2 in a code: one up to 9 states, two up to 99, else three."""
     return 1 if states <= 9 else 2 if states <= 99 else 3
 
 
 def split_code(code: int, states: int = 1) -> Digits:
-    """The fields of a code in a file with so many vibrational states.
+    """The fields of a code in a file with this number of vibrational states.
 
     >>> split_code(110010099)
     Digits(ex=0, ff=0, i2=1, i1=1, ns=0, typ=1, ksq=0, nsq=0, v2=9, v1=9)
@@ -83,7 +83,7 @@ def split_code(code: int, states: int = 1) -> Digits:
 
 
 def join_code(digits: Digits, states: int = 1) -> int:
-    """The code that `split_code` takes apart."""
+    """The code with these fields, the inverse of `split_code`."""
     widths = (1, 2, 1, 1, 1, 2, 1, 1, state_digits(states), state_digits(states))
     code = 0
     for value, width, name in zip(digits, widths, Digits._fields, strict=True):
@@ -104,12 +104,12 @@ def code_of_term(p: int, q: int, n: int) -> int:
 
 def _named(terms: Iterable[tuple[str, Operators]]) -> tuple[Named, ...]:
     """Names, codes and signs of constants that multiply one term each."""
-    found = ((name, *next(iter(operators.items()))) for name, operators in terms)
-    return tuple(Named(name, code_of_term(*powers), int(sign)) for name, powers, sign in found)
+    signed_terms = ((name, *next(iter(operators.items()))) for name, operators in terms)
+    return tuple(Named(name, code_of_term(*powers), int(sign)) for name, powers, sign in signed_terms)
 
 
 def _by_order(term: tuple[str, Operators]) -> tuple[int, int]:
-    """Quartic, sextic, ... terms one after another, those diagonal in K first."""
+    """Sorting key of terms: by order (quartic, sextic, ...), terms diagonal in K first."""
     powers = next(iter(term[1]))
     return sum(powers), powers[2]
 
@@ -121,7 +121,7 @@ A_REDUCTION = _named(sorted(published.A_REDUCTION.items(), key=_by_order))
 
 
 def _whole_code(parameter: Parameter) -> int:
-    """The code for the lowest state, after everything that is not computed yet is refused."""
+    """The code for the lowest state; ValueError for a parameter that is not supported."""
     d = split_code(parameter.code)
     label = f" /{parameter.label}" if parameter.label else ""
     reasons = {
@@ -132,14 +132,15 @@ def _whole_code(parameter: Parameter) -> int:
         "another vibrational state": (d.v1, d.v2) not in ((0, 0), (9, 9)),
         "a vibrational energy": not any(d[:8]),
     }
-    for what, found in reasons.items():
-        if found:
+    for what, applies in reasons.items():
+        if applies:
             why = "has no name here; predict from the file itself" if what.endswith("series") else NOT_YET
             raise ValueError(f"parameter {parameter.code}{label}: {what} {why}")
     return join_code(d._replace(v1=0, v2=0))
 
 
 def _single_state(options: tuple[Options, ...]) -> Options:
+    """The option line of a file with one state."""
     first = options[0]
     if abs(first.nvib) != 1 or len(options) > 1:
         raise ValueError(f"NVIB = {first.nvib}, {len(options)} option lines: more than one vibrational state {NOT_YET}")
@@ -153,12 +154,11 @@ def _single_state(options: tuple[Options, ...]) -> Options:
 def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
     """The named constants of a .par or .var file with one vibrational state and no spin.
 
-    Values of one code are added, as the field's program does. The reduction follows from the operators; where they
-    fit both, by the letter of the option line. With `errors` the errors of a .var file become uncertainties, of
-    those constants that are one parameter and were not held (an error below 1e-30 holds one).
+    Values of equal codes are added, as SPFIT does. The reduction follows from the operators, or from the letter of the option line if they
+    fit both. With `errors` the errors of a .var file become uncertainties of those constants that are one parameter and were not held (an
+    error below 1e-30 holds a parameter).
 
-    Raises ValueError, naming the parameter, for operators that have no name here or that are not computed yet.
-    """
+    Raises ValueError, with the parameter, for operators that have no name here or are not supported."""
     options = _single_state(file.options)
     values, spreads = _summed(file.parameters)
     rigid = {code: values.pop(code) for code in _RIGID if code in values}
@@ -170,12 +170,12 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
     named |= {names[code].name: names[code].sign * value for code, value in values.items()}
 
     codes = {item.name: item.code for item in names.values()} | {name: c for c, name in _RIGID_NAMES[kind].items()}
-    known = {name: spreads.get(codes[name]) for name in named if name in codes} if errors else {}
+    uncertainties = {name: spreads.get(codes[name]) for name in named if name in codes} if errors else {}
     return Constants(
         kind=kind,
         reduction=reduction,
         representation=_representation(options) if kind == "asymmetric" else None,
-        uncertainties={name: spread for name, spread in known.items() if spread and spread > HELD_BELOW},
+        uncertainties={name: spread for name, spread in uncertainties.items() if spread and spread > HELD_BELOW},
         **named,
     )
 
@@ -191,22 +191,22 @@ def constants_and_matrix(file: ParameterFile) -> tuple[Constants, NDArray[np.flo
     """
     constants = constants_of(file)
     options, names = file.options[0], list(constants.values)
-    of_code: dict[int, dict[str, float]] = {}
+    factors_by_code: dict[int, dict[str, float]] = {}
     for code in {_whole_code(parameter) for parameter in file.parameters}:
         if code in _RIGID:
-            of_code[code] = _rigid_constants(options, {code: 1.0}, constants.kind)
+            factors_by_code[code] = _rigid_constants(options, {code: 1.0}, constants.kind)
         else:
             named = _names_of([code], constants.kind, constants.reduction)[code]
-            of_code[code] = {named.name: float(named.sign)}
+            factors_by_code[code] = {named.name: float(named.sign)}
     matrix = np.zeros((len(names), len(file.parameters)))
     for column, parameter in enumerate(file.parameters):
-        for name, factor in of_code[_whole_code(parameter)].items():
+        for name, factor in factors_by_code[_whole_code(parameter)].items():
             matrix[names.index(constants.own_name(name)), column] += factor
     return constants, matrix
 
 
 def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int, float | None]]:
-    """Values by code, those of one code added, and errors of those that are one parameter."""
+    """Values by code, with equal codes added, and errors of codes that are one parameter."""
     values: dict[int, float] = {}
     spreads: dict[int, float | None] = {}
     for parameter in parameters:
@@ -217,7 +217,7 @@ def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int
 
 
 def _names_of(codes: Iterable[int], kind: str, reduction: str | None) -> dict[int, Named]:
-    """What the codes of distortion are called: by published names, else spelled out, such as J8Jpm2 for 40400."""
+    """Names of distortion codes: published ones, else spelled operators such as J8Jpm2 for 40400."""
     names = {item.code: item for item in _vocabulary(kind, reduction)}
     for code in codes:
         if code not in names:
@@ -226,6 +226,7 @@ def _names_of(codes: Iterable[int], kind: str, reduction: str | None) -> dict[in
 
 
 def _spelled_code(code: int, kind: str, reduction: str | None) -> str:
+    """The spelled operator of a code."""
     d = split_code(code)
     n = d.typ - 3 if d.typ > 3 else 0
     if (d.typ and not n) or (n and kind != "asymmetric") or (d.ksq and kind in ("linear", "spherical")):
@@ -245,16 +246,17 @@ _RIGID_NAMES: dict[str, dict[int, str]] = {
 
 
 def _representation(options: Options) -> str:
+    """Ir or IIIl."""
     return "Ir" if options.nvib > 0 else "IIIl"
 
 
 def is_linear(options: Options) -> bool:
-    """Whether an option line asks for a linear molecule."""
+    """Whether an option line states a linear molecule."""
     return options.knmin == options.knmax == 0
 
 
 def _kind(options: Options, rigid: Mapping[int, float], distortion: Mapping[int, float]) -> str:
-    """Kind of top; where all terms are diagonal in K, the constants decide, whichever basis the file names."""
+    """Kind of top; if all terms are diagonal in K the constants decide, not the basis of the file."""
     if is_linear(options):
         return "linear"
     if any(code >= 10000 for code in (*rigid, *distortion)):
@@ -283,7 +285,7 @@ def _rigid_constants(options: Options, rigid: Mapping[int, float], kind: str) ->
 
 
 def _reduction(options: Options, distortion: Mapping[int, float]) -> str | None:
-    """A where K² stands with an off-diagonal term, S where K changes by more than two, else the file's letter."""
+    """A if K² multiplies an off-diagonal term, S if K changes by more than two, else the letter of the file."""
     in_a = [code for code in distortion if 40000 <= code < 50000 and code % 10000 >= 1000]
     in_s = [code for code in distortion if code >= 50000]
     if in_a and in_s:
@@ -296,15 +298,16 @@ def _reduction(options: Options, distortion: Mapping[int, float]) -> str | None:
 
 
 def _vocabulary(kind: str, reduction: str | None) -> tuple[Named, ...]:
+    """Constants of a kind of top and a reduction, with codes and signs."""
     if kind == "asymmetric":
         return {"A": A_REDUCTION, "S": S_REDUCTION, None: ()}[reduction]
     return SYMMETRIC if kind in ("prolate", "oblate") else LINEAR
 
 
 def parameters_of(constants: Constants) -> tuple[Parameter, ...]:
-    """The parameter lines of named constants; errors are their uncertainties, 1e-37 (fixed) where there are none.
+    """The parameter lines of named constants, with their uncertainties as errors, or 1e-37 (fixed) without an uncertainty.
 
-    Raises ValueError for a representation that the files do not have: Iʳ and IIIˡ are the two.
+    Raises ValueError for representations other than Iʳ and IIIˡ.
 
     >>> [(p.code, p.value, p.label) for p in parameters_of(Constants(B=6081.5, D=0.0013))]
     [(100, 6081.5, 'B'), (200, -0.0013, '-D')]
@@ -350,17 +353,17 @@ def _distortion_parameters(constants: Constants) -> tuple[Parameter, ...]:
 
 
 def _code_of_spelled(name: str) -> int:
-    """The code of a term that is spelled out as an operator, such as `J4Jz2Jpm2`."""
+    """The code of a spelled operator such as `J4Jz2Jpm2`."""
     powers = powers_of_spelled(name)
     if powers is None:
         raise ValueError(f"{name}: SPFIT's files have no code for it; leave it out")
     return code_of_term(*powers)
 
 
-FIXED = 1e-37  # the error of a parameter that is not fitted
-HELD_BELOW = 1e-30  # an error so small says that a parameter was not fitted
+FIXED = 1e-37  # error of a parameter that is not fitted
+HELD_BELOW = 1e-30  # a smaller error marks a parameter as not fitted
 
 
 def is_held(parameter: Parameter) -> bool:
-    """Whether the error of a parameter says that it is not fitted."""
+    """Whether the error of a parameter marks it as not fitted."""
     return parameter.error is not None and parameter.error < HELD_BELOW

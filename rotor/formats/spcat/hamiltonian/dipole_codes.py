@@ -1,4 +1,4 @@
-"""Dipoles of an .int file by their codes: FC TYP I1 V2 V1 SYM, plain components by pairs of states and moments of other kinds."""
+"""Dipoles of an .int file by their codes, FC TYP I1 V2 V1 SYM: plain components by pairs of states, and other moments."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class DipoleCode(NamedTuple):
 
 
 def split_dipole(code: int, states: int) -> DipoleCode:
-    """The fields of a code in a file with so many states.
+    """The fields of a code in a file with this number of states.
 
     >>> split_dipole(50001, 1), split_dipole(113, 2)
     (DipoleCode(typ=5, spin=0, states=(0, 0), axis=1), DipoleCode(typ=0, spin=0, states=(1, 1), axis=3))
@@ -45,8 +45,8 @@ def split_dipole(code: int, states: int) -> DipoleCode:
 
 
 def dipoles_of(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tuple[Dipole, DipoleCode]]]:
-    """(μa, μb, μc) in D by pairs of states, lower first, lines of one code added; and the lines of other kinds."""
-    found: dict[tuple[int, int], list[float]] = {}
+    """(μa, μb, μc) in D by pairs of states (lower first) with equal codes added, and the lines of other moments."""
+    plain: dict[tuple[int, int], list[float]] = {}
     others = []
     for dipole in dipoles:
         code = split_dipole(dipole.code, states)
@@ -55,12 +55,12 @@ def dipoles_of(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tu
         if code.typ or code.spin or code.axis not in (1, 2, 3):
             others.append((dipole, code))
         else:
-            found.setdefault(code.states, [0.0, 0.0, 0.0])[code.axis - 1] += dipole.value
-    return {pair: (mu[0], mu[1], mu[2]) for pair, mu in found.items()}, others
+            plain.setdefault(code.states, [0.0, 0.0, 0.0])[code.axis - 1] += dipole.value
+    return {pair: (mu[0], mu[1], mu[2]) for pair, mu in plain.items()}, others
 
 
 FOURIER = (7, 8)
-EVEN_ORDER = (1, 2, 5, 8)  # TYP of electric moments that are of even order in angular momenta: {φ, N}, [N², φ], i sine
+EVEN_ORDER = (1, 2, 5, 8)  # TYP of electric moments of even order in angular momenta: {φ, N}, [N², φ], i sine
 _POWERS = {3: "J", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP with powers of N² of TYP 0
 _WRITTEN = (0, 1, 2, 3, 4, 6, 9, 10, 11, 12)
 
@@ -74,7 +74,7 @@ def moment_of(
     as_spcat: bool = False,
     series: Series | None = None,
 ) -> Moment:
-    """A moment that makes lines of another kind than a plain component of the dipole does.
+    """The moment of a dipole line that is not a plain component of the dipole.
 
     | TYP, I1, SYM | moment |
     |---|---|
@@ -91,27 +91,27 @@ def moment_of(
     dipole : Dipole
         The line of the .int file, its value in D or Bohr magnetons.
     code : DipoleCode
-        Its code in parts.
+        Fields of its code.
     states : (int, int)
-        As numbered in its group, the higher of the file first.
+        Numbers of the states in their group, the higher number of the file first.
     spins : int
-        How many spins SPIND names.
+        Number of spins in SPIND.
     oblate : bool, optional
         Whether z is the c axis.
     as_spcat : bool, optional
-        Whether a moment is what the program computes for it where that differs: N, spins with TYP 1 and 2.
+        Whether to reproduce SPCAT where it differs from its documentation: N, spins with TYP 1 and 2.
     series : Series, optional
-        The constants of Fourier series of the file.
+        Constants of the Fourier series of the file.
 
     Returns
     -------
     Moment
-        In debye.
+        The moment in debye.
 
     Raises
     ------
     ValueError
-        With what it stands for, for any other code.
+        For any other code, with its meaning.
     """
     if not as_spcat and states[0] == states[1] and _is_turned(code):
         raise ValueError(f"dipole {dipole.code}: {_TURNED}")
@@ -125,7 +125,7 @@ def moment_of(
         )
     value = dipole.value * (1.0 if code.axis else DEBYE_PER_BOHR_MAGNETON)
     if code.spin:
-        return _of_spin(dipole, code, states, value, oblate, as_spcat)
+        return _spin_moment(dipole, code, states, value, oblate, as_spcat)
     if as_spcat and not code.axis and code.typ in (10, 11):  # without elements there
         value = 0.0
     if as_spcat and code.typ == 12 and code.axis == (3 if oblate else 1) and states[0] == states[1]:
@@ -142,7 +142,7 @@ def moment_of(
 
 
 def has_error_of_program(code: DipoleCode, oblate: bool) -> bool:
-    """Whether SPCAT computes another moment than is documented: `moment_of` with `as_spcat` is not that without it."""
+    """Whether SPCAT deviates from its documentation, so that `as_spcat` changes the result of `moment_of`."""
     magnetic, alone = code.axis == 0, code.states[0] == code.states[1]
     if alone and _is_turned(code):
         return True
@@ -159,20 +159,22 @@ _TURNED = "time reversal would change the sign of this moment in one state, so t
 
 
 def _is_turned(code: DipoleCode) -> bool:
-    """Whether a moment is anti-Hermitian, so that it has no place within one state: i{φ, N}, i sine, i{Nz, }, [N², ] of second order."""
+    """Whether a moment is anti-Hermitian and thus impossible within one state: i{φ, N}, i sine, i{Nz, }, [N², ] of second order."""
     return code.typ in (8, 11) or (code.typ in (1, 2) and code.axis > 0) or (code.typ == 12 and code.axis == 0)
 
 
 def _along(axis: int) -> tuple[float, float, float]:
+    """Unit vector along an axis 1, 2 or 3."""
     return (float(axis == 1), float(axis == 2), float(axis == 3))
 
 
-def _of_spin(
+def _spin_moment(
     dipole: Dipole, code: DipoleCode, states: tuple[int, int], value: float, oblate: bool, as_spcat: bool
 ) -> Moment:
+    """The magnetic moment of a spin."""
     spin = f"I{code.spin}"
     if code.axis == 0 and code.typ in (0, 3, 4, 6, 9):
-        words = words_of(0 if code.typ in _POWERS else code.typ, 0, oblate, of_spin=True)
+        words = words_of(0 if code.typ in _POWERS else code.typ, 0, oblate, with_spin=True)
         return Moment(value, states, powers=_POWERS.get(code.typ, ""), spin=spin, written=Written(words, False))
     if code.typ == 0 and code.axis == (3 if oblate else 1):
         return Moment(value, states[::-1], _along(code.axis), spin=spin)
@@ -180,7 +182,7 @@ def _of_spin(
         if code.axis == 0 and as_spcat:
             if code.typ == 1:
                 return Moment(value, states, powers="3K-J", spin=spin)
-            return Moment(value, states, spin=spin, written=Written(words_of(6, 0, oblate, of_spin=True), False))
+            return Moment(value, states, spin=spin, written=Written(words_of(6, 0, oblate, with_spin=True), False))
         tensor = tensor_of(code.typ, code.axis, oblate)
         return Moment(value, states[::-1], tensor=tensor, spin=spin, with_i=code.axis > 0)
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
@@ -189,7 +191,7 @@ def _of_spin(
 def _fourier_of(
     dipole: Dipole, code: DipoleCode, states: tuple[int, int], series: Series, oblate: bool, as_spcat: bool
 ) -> Moment:
-    """TYP 0 times a function of K; states: as numbered in the group, the higher of the file first."""
+    """TYP 0 times a function of K; states: numbers in the group, the higher number of the file first."""
     sine, n = code.typ == 8, code.spin
     if code.axis > 3:
         raise ValueError(
@@ -204,11 +206,12 @@ def _fourier_of(
     words = words_of(0, code.axis, oblate, as_spcat=as_spcat)
     if sine:
         words = tuple(word._replace(factor=imaginary(oblate) * word.factor) for word in words)
-    of_k = factor_of_k(n, sine, series, code.states)
-    return Moment(value, states[::-1], written=Written(words, bool(code.axis), of_k=of_k))
+    function_of_k = factor_of_k(n, sine, series, code.states)
+    return Moment(value, states[::-1], written=Written(words, bool(code.axis), of_k=function_of_k))
 
 
 def _meaning(code: DipoleCode) -> str:
+    """Meaning of a code, for messages."""
     kinds = {1: "a moment of second order", 2: "a moment of second order", 6: "a moment of third order"}
     what = kinds.get(code.typ, f"a moment of TYP {code.typ}")
     if code.axis == 0 and code.typ in (0, 4, *_POWERS):

@@ -1,6 +1,6 @@
-"""The Hamiltonian of a .par or .var file as one effect: every parameter line under its code, states and spins as the file has them.
+"""The Hamiltonian of a .par or .var file as one effect, with parameter lines by code and the states and spins of the file.
 
-`codes.constants_of` turns files with one state and no spin into named constants; this is for all others.
+For files with one state and no spin see `codes.constants_of`, which gives named constants.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ Vector = tuple[float, float, float]
 
 
 class CodedLine(NamedTuple):
-    """One parameter line: its name, value, operator, and the two states, lower first; None for every state.
+    """One parameter line: name, value, operator, and the two states, lower first (None: all states).
 
-    reversed_: the code has V2 > V1. typ: TYP of the code. exchange: of an operator with one of two equivalent spins the part that acts,
-    1 the one that is even under their exchange, -1 the odd one, 0 both.
+    reversed_: whether the code has V2 > V1. typ: TYP of the code. exchange: part of an operator with one of two equivalent spins that acts:
+    1 the part that is even under their exchange, -1 the odd part, 0 both.
     """
 
     name: str
@@ -68,15 +68,15 @@ class CodedLine(NamedTuple):
         return self.name.partition("#")[0]
 
     def left_out(self, why: str) -> str:
-        """The note of a line that does not act, as in SPCAT."""
+        """Note on a line that is left out, as SPCAT does."""
         return f"parameter {self.code} is left out, as SPCAT does: {why}"
 
 
 def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) -> list[CodedLine]:
-    """The parameter lines of a file with so many states, one for each state where its series has constants of each.
+    """The parameter lines of a file; a series with constants of each state gives one line for each.
 
-    A parameter of value zero does nothing and is not looked at, nor is one of a state and 9 (99, 999), which SPFIT
-    takes for a place holder, nor one of a state that does not exist (`reasons_of_states`); a constant of a series is none.
+    Parameters of value zero are skipped, as are those between a state and 9 (99, 999), which are place holders in SPFIT, those of states
+    that do not exist (`reasons_of_states`), and constants of series.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     states : int
         Number of states, |NVIB|.
     pairs : sequence of Pair, optional
-        Those that are l-doubled, within which an odd operator acts with the sign of l.
+        l-doubled pairs, in which an odd operator acts with the sign of l.
 
     Returns
     -------
@@ -95,13 +95,13 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     Raises
     ------
     ValueError
-        Naming the line, for what does not compute: an unknown operator, a violation of time reversal.
+        With the line, for an unknown operator or one that violates time reversal.
     """
     options, wild = file.options[0], 10 ** state_digits(states) - 1
     if not 0 <= options.xopt < 80:
         raise ValueError(f"XOPT = {options.xopt}: expected PHASE + 10 NEWLZ + 20 NOFC + 40 G12, 0 to 79")
     series = series_of(file, states, pairs)
-    found: list[CodedLine] = []
+    result: list[CodedLine] = []
     for place, parameter in enumerate(file.parameters, 1):
         digits = split_code(parameter.code, states)
         low, high = sorted((digits.v1, digits.v2))
@@ -109,17 +109,17 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
             continue
         label = f" /{parameter.label}" if parameter.label else ""
         try:
-            own = None if low == wild else (low, high)
-            coded = _lines_of(digits, own, states, series, options)
+            pair_of_states = None if low == wild else (low, high)
+            coded = _lines_of(digits, pair_of_states, states, series, options)
             lines = [_within_pairs(line, digits, pairs, options) for line in coded]
         except ValueError as error:
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
-        found += [line._replace(name=f"{parameter.code}#{place}", value=parameter.value) for line in lines]
-    return found
+        result += [line._replace(name=f"{parameter.code}#{place}", value=parameter.value) for line in lines]
+    return result
 
 
 def reasons_of_states(file: ParameterFile, states: int) -> list[str]:
-    """A sentence for every parameter of a state that does not exist, which SPCAT passes over."""
+    """A sentence for each parameter of a state that does not exist, which SPCAT ignores."""
     wild, reasons = 10 ** state_digits(states) - 1, list[str]()
     for parameter in file.parameters:
         digits = split_code(parameter.code, states)
@@ -133,20 +133,20 @@ def reasons_of_states(file: ParameterFile, states: int) -> list[str]:
 def _lines_of(
     digits: Digits, states: tuple[int, int] | None, count: int, series: Series, options: Options
 ) -> list[CodedLine]:
-    """The lines of a code: of a series in every state one for each state, with the constants of each."""
+    """The lines of a code; a series in all states gives one line for each state, with its constants."""
     oblate = options.nvib < 0
     typ, axes = symmetry_type(digits, oblate), basis_axes(oblate)
-    every: list[tuple[int, int] | None] = [states]
+    targets: list[tuple[int, int] | None] = [states]
     if states is None and is_series(digits):
-        every = [(v, v) for v in range(count)]
+        targets = [(v, v) for v in range(count)]
     back = digits.v2 > digits.v1
-    return [CodedLine("", 0.0, coded_operator(digits, axes, series, own), own, back, typ) for own in every]
+    return [CodedLine("", 0.0, coded_operator(digits, axes, series, target), target, back, typ) for target in targets]
 
 
 def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], options: Options) -> CodedLine:
-    """The line as it acts on l-doubled states: with NEWLZ the operators that are named by the state with K l ≤ 0 have the sign of l.
+    """The line as it acts on l-doubled states: with NEWLZ, operators of the state with K l ≤ 0 have the sign of l.
 
-    Raises ValueError for what time reversal forbids, and for series that do not compute there.
+    Raises ValueError for operators that violate time reversal, and for unsupported series.
     """
     firsts = {pair.second: pair.first for pair in pairs}
     members = frozenset(v for pair in pairs for v in pair)
@@ -167,63 +167,62 @@ def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], option
 
 def _half_difference(line: CodedLine, digits: Digits, first: int, options: Options) -> CodedLine:
     """TYP 80 to 89 of the state with K l ≤ 0, with NEWLZ: half the difference of the energies of one K with K l > 0 and K l < 0."""
-    of_k = energy_of_k(10 * (digits.typ - 80) + digits.ksq, digits.nsq, 1j if options.nvib > 0 else -1j)
-    return line._replace(operator=CodedOperator(of_j=of_k, odd=True), states=(first, first))
+    operator = energy_of_k(10 * (digits.typ - 80) + digits.ksq, digits.nsq, 1j if options.nvib > 0 else -1j)
+    return line._replace(operator=CodedOperator(by_j=operator, odd=True), states=(first, first))
 
 
-def real_ones(
+def real_lines(
     lines: Sequence[CodedLine], odd: frozenset[str], doubled: frozenset[int]
 ) -> tuple[list[CodedLine], list[str]]:
-    """The lines without those within one state that are imaginary in the phases of a file, and why these are left out.
+    """The lines that are real in the phases of a file, and reasons why imaginary ones within one state are left out.
 
     Parameters
     ----------
     lines : sequence of CodedLine
-        Parameters that compute.
+        Supported parameters.
     odd : frozenset of str
         The axes along which operators within one state are odd, see `phases`.
     doubled : frozenset of int
-        l-doubled states, whose odd operators act with the sign of l.
+        l-doubled states, in which odd operators act with the sign of l.
 
     Returns
     -------
     lines : list of CodedLine
-        Those that act.
+        Lines that act.
     reasons : list of str
-        A sentence for each that is left out.
+        A sentence for each line that is left out.
 
     Raises
     ------
     ValueError
-        For an odd operator that every half turn leaves as it is, which is imaginary in all phases.
+        For an odd operator that is invariant under all half turns, which is imaginary in any phases.
     """
-    found, reasons = list[CodedLine](), list[str]()
+    acting, reasons = list[CodedLine](), list[str]()
     for line in lines:
         axis, between = axis_of(line.typ), bool(line.states and line.states[0] != line.states[1])
-        own = not between and not (line.states and line.states[0] in doubled)
-        if own and not axis and line.operator.odd:
+        within_plain_state = not between and not (line.states and line.states[0] in doubled)
+        if within_plain_state and not axis and line.operator.odd:
             raise ValueError(
                 f"parameter {line.code}: time reversal changes the sign of the operator and no half turn does, so that it can connect "
                 "different states only"
             )
-        if not own or not axis or line.operator.odd == (axis in odd):
-            found.append(line)
+        if not within_plain_state or not axis or line.operator.odd == (axis in odd):
+            acting.append(line)
             continue
         kind, others = ("even", "odd") if axis in odd else ("odd", "even")
         why = f"it is {kind} under time reversal; within one state those along {axis} are {others} ones here"
         reasons.append(line.left_out(f"{why} (by their number, or by PHASE of XOPT)"))
-    return found, list(dict.fromkeys(reasons))
+    return acting, list(dict.fromkeys(reasons))
 
 
 @dataclass(frozen=True, eq=False)
 class FileEffect(QuantumEffect):
-    """What the parameter lines of a file add up to for some of its states, which are numbered here from 0.
+    """The parameter lines of a file for a group of its states, which are numbered here from 0.
 
-    lines: with the file's numbers of states. numbers: the states taken, in their order here. coupled: the spins by place. moments:
-    dipoles in debye by pairs of numbers here. limits: least and largest K of states, by number here. others: moments of other kinds.
-    ixx: which sums of angular momenta are conserved, bit by bit from N on. pairs: l-doubled states, by number here. axes: those at x, y, z.
-    turned: the axis g of `phases` whose half turn goes with time reversal, where an operator within one state is odd under it.
-    apart: by pairs of states the species that have elements, where weights forbid others.
+    lines: with state numbers of the file. numbers: number in the file of each state. coupled: the spins by place. moments: dipoles in debye
+    by pairs of states. limits: smallest and largest K by state. others: moments of other kinds. ixx: bits for conserved sums of angular
+    momenta, from N on. pairs: l-doubled states. axes: the axes x, y, z. turned: the axis g of `phases` whose half turn accompanies time
+    reversal, if an operator within one state is odd under it. apart: species with elements by pairs of states, where weights forbid others.
     """
 
     name: ClassVar[str] = ""
@@ -242,8 +241,8 @@ class FileEffect(QuantumEffect):
     apart: dict[tuple[int, int], SpeciesPairs] = field(default_factory=dict)
 
     @cached_property
-    def _own(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
-        """The lines that concern these states, with the numbers here; None for every state."""
+    def _group_lines(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
+        """The lines of these states, with the numbers of the group (None: all states)."""
         here = {v: place for place, v in enumerate(self.numbers)}
         second = {pair.second for pair in self.pairs}
         out: list[tuple[CodedLine, tuple[int, int] | None]] = []
@@ -257,44 +256,47 @@ class FileEffect(QuantumEffect):
         return tuple(out)
 
     def parameters(self, top: Top) -> dict[str, float]:
-        """The values in MHz by code and number of the line."""
-        return {line.name: line.value for line, _ in self._own}
+        """Values in MHz by code and number of the line."""
+        return {line.name: line.value for line, _ in self._group_lines}
 
     def operators(self, top: Top) -> dict[str, Operators]:
         """The operators of the first state."""
         return self._plain(0)
 
     def _plain(self, v: int) -> dict[str, Operators]:
-        named = next((pair.first for pair in self.pairs if pair.second == v), v)  # the state that parameters name
+        """Operators of a state that have powers (p, q, n), by parameter."""
+        named = next(
+            (pair.first for pair in self.pairs if pair.second == v), v
+        )  # parameters refer to the first state of a pair
         return {
             line.name: line.operator.plain
-            for line, states in self._own
+            for line, states in self._group_lines
             if line.operator.plain is not None and states in (None, (named, named))
         }
 
     def states(self, top: Top) -> tuple[State, ...]:
-        """The other states."""
+        """The states beyond the first."""
         return tuple(State(v, self._plain(v)) for v in range(1, len(self.numbers)))
 
     def couplings(self, top: Top) -> tuple[Coupling, ...]:
-        """What connects states, and operators of one state that no powers (p, q, n) describe."""
-        found = []
-        for line, states in self._own:
+        """Interactions of states, and operators of one state that have no powers (p, q, n)."""
+        couplings = []
+        for line, states in self._group_lines:
             operator = line.operator
             if operator.rotor is not None:
                 continue
             if self.pairs and states and not set(states).isdisjoint(v for pair in self.pairs for v in pair):
-                found += self._with_pairs(line, states)
-            elif operator.of_j is not None:
+                couplings += self._with_pairs(line, states)
+            elif operator.by_j is not None:
                 pairs = [states] if states else [(v, v) for v in range(len(self.numbers))]
-                of = operator.of_j
+                of = operator.by_j
                 if self._is_turned(line):
                     of = half_turned(of, self.turned, operator.odd)
-                found += [Coupling(line.name, *pair, of) for pair in pairs]
+                couplings += [Coupling(line.name, *pair, of) for pair in pairs]
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
-                found.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
-        return tuple(self._restricted(coupling) for coupling in found)
+                couplings.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
+        return tuple(self._restricted(coupling) for coupling in couplings)
 
     def _restricted(self, coupling: Coupling) -> Coupling:
         """A coupling without elements between levels of unequal weights."""
@@ -315,14 +317,15 @@ class FileEffect(QuantumEffect):
         return "IIIl" if self.axes[2] == "c" else "Ir"
 
     def _is_turned(self, line: CodedLine) -> bool:
-        """Whether half a turn about the axis of the phases changes the sign of a line's operator."""
+        """Whether a half turn about the axis of the phases changes the sign of the operator of a line."""
         return bool(self.turned) and axis_of(line.typ) not in ("", self.turned)
 
     def _with_pairs(self, line: CodedLine, states: tuple[int, int]) -> list[Coupling]:
+        """Couplings of a line with l-doubled states."""
         operator = line.operator
         if operator.plain is not None and states[0] == states[1]:
-            return []  # among the operators of both components
-        of = operator.of_j or plain_of_j(operator.plain or {})
+            return []  # listed with the operators of both components
+        of = operator.by_j or plain_of_j(operator.plain or {})
         if operator.odd and states[0] == states[1] and self.axes[2] == "c":
             of = _turned_round(of)  # -i stands between states of an oblate basis, not within a pair
         try:
@@ -335,9 +338,9 @@ class FileEffect(QuantumEffect):
         return self.coupled
 
     def spin_terms(self, top: Top) -> tuple[SpinTerm, ...]:
-        """Every line with a spin."""
-        found = []
-        for line, states in self._own:
+        """The lines with spins."""
+        terms = []
+        for line, states in self._group_lines:
             o = line.operator
             if o.rotor is not None:
                 names = tuple(self.coupled[place - 1].name for place in o.spins)
@@ -350,11 +353,11 @@ class FileEffect(QuantumEffect):
                     ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
                 term = SpinTerm(line.name, names, rotor, factor, o.n2, o.nz2, o.ns, bra, ket)
                 for part in self._by_exchange(term, line.exchange):
-                    found += self._at_pairs(line, states, part)
-        return tuple(self._restricted_term(term) for term in found)
+                    terms += self._at_pairs(line, states, part)
+        return tuple(self._restricted_term(term) for term in terms)
 
     def _restricted_term(self, term: SpinTerm) -> SpinTerm:
-        """The same of a term with spins."""
+        """A spin term without elements between levels of unequal weights."""
         pairs, rotor = self.apart.get((term.bra, term.ket)), term.rotor
         if pairs is None or not isinstance(rotor, ByElements | Cosines | CosinesWithN | HalfTurned):
             return term
@@ -366,7 +369,7 @@ class FileEffect(QuantumEffect):
             for low in blocks
             if (up.species, low.species) not in pairs
         )
-        forbidden = any(found is not None and found.any() for found in beyond)
+        forbidden = any(elements is not None and elements.any() for elements in beyond)
         return replace(term, rotor=BetweenSpecies(rotor, pairs)) if forbidden else term
 
     def _by_exchange(self, term: SpinTerm, exchange: int) -> list[SpinTerm]:
@@ -382,6 +385,7 @@ class FileEffect(QuantumEffect):
         return [replace(term, factor=term.factor / 2), replace(term, spins=turned, factor=exchange * term.factor / 2)]
 
     def _at_pairs(self, line: CodedLine, states: tuple[int, int] | None, term: SpinTerm) -> list[SpinTerm]:
+        """Terms of a line with a spin and l-doubled states."""
         if not states or set(states).isdisjoint(v for pair in self.pairs for v in pair):
             return [term]
         if isinstance(term.rotor, ByElements):
@@ -398,24 +402,24 @@ class FileEffect(QuantumEffect):
         return dict(self.moments)
 
     def other_moments(self, top: Top) -> tuple[Moment, ...]:
-        """The moments of other kinds of the .int file."""
+        """Further moments of the .int file."""
         return self.others
 
     def conserved_sums(self, top: Top) -> frozenset[str]:
-        """The sums that IXX holds for conserved."""
+        """The sums of angular momenta that IXX treats as conserved."""
         sums = ("n", *Scheme(self.coupled).names)
         return frozenset(name for bit, name in enumerate(sums) if self.ixx >> bit & 1)
 
     def k_limits(self, top: Top) -> dict[int, tuple[int, int]]:
-        """KNMIN and KNMAX where they leave K out."""
+        """KNMIN and KNMAX of states where they exclude K."""
         return dict(self.limits)
 
     def size_mhz(self, top: Top, j: int) -> float:
-        """Not estimated: a file's Hamiltonian is one piece."""
+        """0: the size of the Hamiltonian of a file is not estimated."""
         return 0.0
 
 
-_LOOKED_AT = 5  # J at which all elements of the operators of files are there
+_LOOKED_AT = 5  # J at which all elements of a file's operators exist
 
 
 def _turned_round(of: OperatorOfJ) -> OperatorOfJ:

@@ -1,9 +1,9 @@
-"""Degenerate states of symmetric tops, l = ±L, as two real vibrational states x, y: operators of a file, and names of levels.
+"""Degenerate states l = ±L of symmetric tops as two real vibrational states x, y: operators of a file, and labels of levels.
 
     |l = ±⟩ = (|x⟩ ± i|y⟩)/√2
 
-A file names the pair by EWT1: the first state holds the functions with K l > 0, [|K⟩|+⟩ ± |-K⟩|-⟩]/√2, the second those with
-K l ≤ 0. Its operators O are meant over |k⟩|l⟩ (H. M. Pickett, documentation of SPFIT and SPCAT, "l-doubled states"):
+A file declares the pair by EWT1: the first state has the functions with K l > 0, [|K⟩|+⟩ ± |-K⟩|-⟩]/√2, the second those with K l ≤ 0.
+Operators O refer to |k⟩|l⟩ (H. M. Pickett, documentation of SPFIT and SPCAT, "l-doubled states"):
 
 | V1, V2 | elements | over x and y |
 |---|---|---|
@@ -13,8 +13,8 @@ K l ≤ 0. Its operators O are meant over |k⟩|l⟩ (H. M. Pickett, documentati
 | another state and the first | Δl = ±L, likewise | O/√2, ±(i/√2)(O↑ - O↓) |
 | two first states | O, both l alike | O, O |
 
-O↑ and O↓ are the parts that raise and lower k. Parameters of the second state twice are passed over, as in the program. What depends
-on the phase between x and y, the parity of a split pair, is not verified against the program.
+O↑ and O↓ are the parts that raise and lower k. Parameters of the second state twice are ignored, as in SPFIT. The parity of a split pair,
+which depends on the phase between x and y, is not verified against the program.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from rotor.quantum.wang.j_operators import JOperator, between_blocks, j_z
 
 
 class Pair(NamedTuple):
-    """Two states by their numbers: that with K l > 0, which x stands for, and that with K l ≤ 0, y."""
+    """Numbers of an l-doubled pair: the state with K l > 0 (x here), and the state with K l ≤ 0 (y)."""
 
     first: int
     second: int
@@ -45,7 +45,7 @@ class Pair(NamedTuple):
 
 def pairs_of(states: Sequence[StateOptions]) -> list[Pair]:
     """The l-doubled pairs among the states of a file; ValueError for a state without its partner."""
-    found, at = [], 0
+    pairs, at = [], 0
     while at < len(states):
         state = states[at]
         if not state.l_code:
@@ -63,13 +63,13 @@ def pairs_of(states: Sequence[StateOptions]) -> list[Pair]:
                 "not computed yet"
             )
         first, second = (state, partner) if state.l_code <= partner.l_code else (partner, state)
-        found.append(Pair(first.number, second.number))
+        pairs.append(Pair(first.number, second.number))
         at += 2
-    return found
+    return pairs
 
 
 class RealPart(NamedTuple):
-    """What a parameter stands for between two real states: the factor of O, or of i(O↑ - O↓) where `turned`."""
+    """A parameter between two real states: the factor of O, or of i(O↑ - O↓) if `turned`."""
 
     bra: int
     ket: int
@@ -80,30 +80,30 @@ class RealPart(NamedTuple):
 def over_real_states(
     states: tuple[int, int], odd: bool, reversed_: bool, pairs: Sequence[Pair], what: str = "operator"
 ) -> list[RealPart]:
-    """What a parameter stands for over real states, where one of its states at least is l-doubled.
+    """Parts of a parameter over real states, if at least one of its states is l-doubled (table of this module).
 
     Parameters
     ----------
     states : (int, int)
-        Lower number first.
+        Numbers, the lower one first.
     odd : bool
         Whether the operator changes sign under time reversal.
     reversed_ : bool
-        V2 > V1 in the code, Δk Δl < 0.
+        Whether V2 > V1 in the code, Δk Δl < 0.
     pairs : sequence of Pair
         The l-doubled states of the file.
     what : str, optional
-        What the operator is called in errors; a "spin operator" that is odd is not computed between different states.
+        Kind of operator for messages; an odd "spin operator" between different states is not supported.
 
     Returns
     -------
     list of RealPart
-        As the table at the head of the module.
+        Real states, factors and kinds of operator.
 
     Raises
     ------
     ValueError
-        For what symmetry or this package does not allow.
+        For operators that symmetry forbids or this package does not support.
     """
     low, high = states
     firsts, seconds = {pair.first: pair for pair in pairs}, {pair.second: pair for pair in pairs}
@@ -120,22 +120,24 @@ def over_real_states(
     if low in firsts and high in firsts:
         if odd:
             raise ValueError("an odd operator between two l-doubled states is read but not computed yet")
-        return [_ordered(one, other, 1.0) for one, other in zip(firsts[low], firsts[high], strict=True)]
+        return [_ordered(first, second, 1.0) for first, second in zip(firsts[low], firsts[high], strict=True)]
     if low in seconds or high in seconds:
         article = "an" if what == "operator" else "a"
         raise ValueError(
             f"{article} {what} of the state with K l ≤ 0 is read but not computed yet; name the one with K l > 0"
         )
-    pair, other = (firsts[low], high) if low in firsts else (firsts[high], low)
+    pair, second = (firsts[low], high) if low in firsts else (firsts[high], low)
     share = 1 / sqrt(2.0)
-    return [_ordered(other, pair.first, share), _ordered(other, pair.second, sign * share, True)]
+    return [_ordered(second, pair.first, share), _ordered(second, pair.second, sign * share, True)]
 
 
-def _ordered(one: int, other: int, factor: float, turned: bool = False) -> RealPart:
-    return RealPart(min(one, other), max(one, other), factor, turned)
+def _ordered(first: int, second: int, factor: float, turned: bool = False) -> RealPart:
+    """A real part with the lower number first."""
+    return RealPart(min(first, second), max(first, second), factor, turned)
 
 
 def _within(odd: bool, pair: Pair | None) -> list[RealPart]:
+    """Parts of an operator within one state or pair."""
     if pair is None:  # of the second state: passed over
         return []
     x, y = sorted(pair)
@@ -145,6 +147,7 @@ def _within(odd: bool, pair: Pair | None) -> list[RealPart]:
 
 
 def _scaled(of: OperatorOfJ, factor: complex) -> OperatorOfJ:
+    """factor · O."""
     return lambda j, representation: factor * of(j, representation)
 
 
@@ -161,7 +164,7 @@ def _turned(of: OperatorOfJ, factor: complex) -> OperatorOfJ:
 def couplings_with_pairs(
     name: str, of: OperatorOfJ, odd: bool, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair]
 ) -> list[Coupling]:
-    """The couplings of `over_real_states` for an operator in |J k⟩, which has the factor i where it is odd."""
+    """The couplings of `over_real_states` for an operator over |J k⟩, with a factor i if it is odd."""
     return [
         Coupling(name, bra, ket, _turned(of, 1j * factor) if turned else _scaled(of, factor))
         for bra, ket, factor, turned in over_real_states(states, odd, reversed_, pairs)
@@ -172,16 +175,16 @@ def couplings_with_pairs(
 
 
 def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Levels:
-    """The same levels with v of a pair by the sign of K l, and Ka, Kc of the function |K, l⟩ ± |-K, -l⟩ with the largest share."""
-    found = [_names_of_block(block, pairs, representation) for block in levels.blocks]
-    return renamed(levels, *zip(*found, strict=True))
+    """Relabel levels: v of a pair by the sign of K l, Ka and Kc of the function |K, l⟩ ± |-K, -l⟩ with the largest weight."""
+    labels_and_weights = [_names_of_block(block, pairs, representation) for block in levels.blocks]
+    return renamed(levels, *zip(*labels_and_weights, strict=True))
 
 
 def functions_of_l(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
-    """The functions (n, n), in rows, by which the states of a block are called, and their names v, Ka, Kc (n, 3).
+    """The functions (n, n), in rows, that label the states of a block, and their labels v, Ka, Kc (n, 3).
 
-    Those of states that are not l-doubled are the basis; of a pair they are |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0. Half a turn
-    across the axis changes the sign of y, so that of the two functions with K = 0 that of y has the other species, Ka + Kc = N + 1.
+    States that are not l-doubled have basis functions, a pair has |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0. A half turn across the
+    axis changes the sign of y; of the two functions with K = 0, the one of y therefore has the other species, Ka + Kc = N + 1.
     """
     return functions_of_parts(block.parts, len(block.vectors), pairs, representation)
 
@@ -189,7 +192,7 @@ def functions_of_l(block: SolvedBlock, pairs: Sequence[Pair], representation: st
 def functions_of_parts(
     places: Sequence[tuple[int, Basis, int]], size: int, pairs: Sequence[Pair], representation: str
 ) -> tuple[Floats, Ints]:
-    """The same as `functions_of_l`, of any part of a basis.
+    """Functions and labels as from `functions_of_l`, for any parts of a basis.
 
     Parameters
     ----------
@@ -215,17 +218,17 @@ def functions_of_parts(
     parts = [Part(v, _wang(basis), start) for v, basis, start in places]
     for part in parts:
         for place, (k, ka, kc) in enumerate(zip(part.basis.k.tolist(), *_by_k(part, representation), strict=True)):
-            own = np.zeros(size)
-            own[part.start + place] = 1.0
+            unit_vector = np.zeros(size)
+            unit_vector[part.start + place] = 1.0
             if part.v not in members:
-                functions.append(own)
+                functions.append(unit_vector)
                 names.append((part.v, ka, kc))
             elif part.v in second:
-                for v, function in _of_l(own, k, part, parts, second[part.v], representation):
+                for v, function in _functions_with_l(unit_vector, k, part, parts, second[part.v], representation):
                     functions.append(function)
                     names.append((v, ka, kc))
             elif k == 0:
-                functions.append(own)
+                functions.append(unit_vector)
                 names.append((part.v, ka + 1, kc) if representation == "IIIl" else (part.v, ka, kc + 1))
     if len(functions) < size:
         raise ValueError(_UNCOUPLED)
@@ -236,38 +239,40 @@ _UNCOUPLED = "l-doubled states without a coupling of their components; give -2A�
 
 
 def _wang(basis: Basis) -> WangBlock:
+    """The Wang block of a basis."""
     if isinstance(basis, AxialState):
         raise ValueError(_UNCOUPLED)
     return basis
 
 
 def _names_of_block(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
+    """Labels and weights of the states of a block."""
     functions, names = functions_of_l(block, pairs, representation)
     shares = (functions @ block.vectors) ** 2
-    of_state = assigned(shares, np.ones(len(functions), dtype=np.int64))
-    return names[of_state], shares[of_state, np.arange(len(of_state))]
+    function_of_state = assigned(shares, np.ones(len(functions), dtype=np.int64))
+    return names[function_of_state], shares[function_of_state, np.arange(len(function_of_state))]
 
 
 def _by_k(part: Part, representation: str) -> tuple[list[int], list[int]]:
-    """Ka and Kc in the order of the functions, whose K rises."""
+    """Ka and Kc of the functions, whose K rises."""
     ka, kc = names_of(part.basis, representation)
     along = kc if representation == "IIIl" else ka
     order = np.argsort(along, kind="stable")
     return ka[order].tolist(), kc[order].tolist()
 
 
-def _of_l(
-    own: Floats, k: int, part: Part, parts: Sequence[Part], second: int, representation: str
+def _functions_with_l(
+    unit_vector: Floats, k: int, part: Part, parts: Sequence[Part], second: int, representation: str
 ) -> list[tuple[int, Floats]]:
-    """(x ± y)/√2 with K l > 0 and with K l < 0, by the sign of ⟨Nz l⟩; x alone at K = 0."""
+    """(x ± y)/√2 with K l > 0 and with K l < 0, by the sign of ⟨Nz l⟩; x only at K = 0."""
     if k == 0:
-        return [(second, own)]
+        return [(second, unit_vector)]
     operator = -1j * j_z(part.basis.j)  # ⟨x|Nz l|y⟩
     for partner in parts:
         if partner.v == second and partner.basis.sign == -part.basis.sign and k in partner.basis.k.tolist():
             at = partner.basis.k.tolist().index(k)
             element = between_blocks(part.basis, partner.basis, operator).real[part.basis.k.tolist().index(k), at]
-            other = np.zeros_like(own)
+            other = np.zeros_like(unit_vector)
             other[partner.start + at] = np.sign(element)
-            return [(part.v, (own + other) / sqrt(2.0)), (second, (own - other) / sqrt(2.0))]
+            return [(part.v, (unit_vector + other) / sqrt(2.0)), (second, (unit_vector - other) / sqrt(2.0))]
     raise ValueError(_UNCOUPLED)

@@ -1,20 +1,20 @@
-"""Names of levels by the ways that DIAG of an option line chooses (H. M. Pickett, documentation of SPFIT and SPCAT, "DIAG").
+"""Labels of levels by the rules that DIAG of an option line selects (H. M. Pickett, documentation of SPFIT and SPCAT, "DIAG").
 
-| DIAG | states go to | and there in order of |
+| DIAG | states are assigned to | and inside it ordered by |
 |---|---|---|
-| 0 | the Wang block of one state v and one coupling pattern, by the largest shares | energy, as K rises |
-| 1 | one function each, by the largest shares | |
+| 0 | the Wang block of one state v and one coupling pattern, by the largest weights | energy, as K rises |
+| 1 | one function each, by the largest weights | |
 | 2 | as 0 | energy, as the diagonal elements rise |
 | 3 | all functions of one v and pattern | energy, as K rises; of one K the function with Ka + Kc = N + 1 first |
 | 4 | as 3 | ⟨K²⟩, those of one K by energy |
 | 5 | as 3 | energy, as the diagonal elements rise |
 
-Levels with spins have the names of 0 already, and those of 3 where no two Wang blocks of one v and pattern are connected; those of one
-Wang block too; of states that are coupled they are given here (elsewhere in this package such levels are named by their overlaps with
-the levels of each state). In an oblate basis energy falls as K rises.
+Levels with spins already have the labels of DIAG 0, and of 3 where no two Wang blocks of one v and pattern are connected; so do levels of a
+single Wang block. Levels of coupled states are labelled here (elsewhere in this package by overlaps with the levels of each state). In an
+oblate basis energy falls as K rises.
 
-Of equal diagonal elements (the two functions of one K ≥ 3, often) the program takes that of its earlier Wang block: of K even that with
-Ka + Kc = N for N even and N + 1 for N odd, of K odd the other way round.
+If diagonal elements are equal (often those of the two functions of one K ≥ 3) the program takes the function of its earlier Wang block: for
+even K the one with Ka + Kc = N if N is even and N + 1 if N is odd, for odd K the opposite.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.parts import assigned
 from rotor.quantum.wang.basis import WangBlock, names_of
 
-BY_DIAG = (1, 2, 4, 5)  # those that need another naming than that of levels
-_OF_WANG = (0, 2)  # whose groups are Wang blocks
+BY_DIAG = (1, 2, 4, 5)  # values of DIAG whose labels differ from the default ones
+_OF_WANG = (0, 2)  # values of DIAG that group by Wang blocks
 _BY_DIAGONAL = (2, 5)
-_ANEW = (2, 4, 5)  # whose order of names depends on the constants
-_CLEAR = 0.5  # a share above it is the largest
-_EQUAL = 1e-11  # of the largest energy: the two functions of one K have one diagonal element but for round-off
+_ANEW = (2, 4, 5)  # values of DIAG whose order of labels depends on the constants
+_CLEAR = 0.5  # a larger weight is the largest of its state
+_EQUAL = 1e-11  # diagonal elements of the two functions of one K agree within this fraction of the largest energy
 
 
 class Functions(NamedTuple):
-    """The functions of a block: names v, Ka, Kc, pattern (n, columns), K, group, Wang block (n,), amplitudes (n, states).
+    """The functions of a block: labels v, Ka, Kc, pattern (n, columns); K, group, Wang block (n,); amplitudes (n, states).
 
-    n: rotation N. A Wang block of K even or odd is known by Ka + Kc - N, 0 or 1.
+    n: rotation N. Ka + Kc - N, 0 or 1, identifies a Wang block of even or odd K.
     """
 
     names: Ints
@@ -62,14 +62,14 @@ class Functions(NamedTuple):
 
 
 def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diagonal.RISES) -> Levels:
-    """The same levels of an asymmetric top with the names that DIAG gives; those that have them already as they are."""
+    """Levels of an asymmetric top with the labels of DIAG; unchanged if they have these labels already."""
     rises = diagonal is Diagonal.RISES
     anew = not rises or diag in BY_DIAG
     if "kc" not in levels.quanta or not (anew or any(_needs_names(block, diag) for block in levels.blocks)):
         return levels
     tables, shares = [], []
     for block in levels.blocks:
-        clear = _of_clear_parts(block, oblate, str(levels.representation)) if diag == 0 and rises else None
+        clear = _clear_labels(block, oblate, str(levels.representation)) if diag == 0 and rises else None
         if diag == 3 and rises and isinstance(block, SpinBlock) and not _connects_wang_blocks(block):
             clear = block.labels, block.mixing
         if clear is not None:
@@ -85,7 +85,7 @@ def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diago
 
 
 def renamed(levels: Levels, tables: Sequence[Ints], shares: Sequence[Floats]) -> Levels:
-    """The same levels with names v, Ka, Kc and, with spins, the doubled pattern N, ..., F, and shares of what names them, by block."""
+    """Levels with new labels v, Ka, Kc (with spins also the doubled pattern N, ..., F) and weights, listed by block."""
     table = np.concatenate(tables)
     quanta = {**levels.quanta, "ka": table[:, 1], "kc": table[:, 2]}
     if "v" in quanta:
@@ -98,7 +98,7 @@ def renamed(levels: Levels, tables: Sequence[Ints], shares: Sequence[Floats]) ->
 
 
 def naming_by(diag: int, oblate: bool, diagonal: Diagonal = Diagonal.RISES) -> Naming:
-    """The same names of states without spins, for constants that change."""
+    """Rule that labels states without spins while constants change."""
     return partial(_named_functions, diag, oblate, diagonal)
 
 
@@ -119,52 +119,52 @@ def _named_functions(
 
 
 def _needs_names(block: object, diag: int) -> bool:
-    """Whether a block without spins holds several Wang blocks, or one with spins several of one v and pattern and DIAG is 3."""
+    """Whether a block contains several Wang blocks (with spins: of one v and pattern, and DIAG is 3)."""
     if isinstance(block, SpinBlock):
         return diag == 3 and _connects_wang_blocks(block)
     return isinstance(block, SolvedBlock) and len(block.parts) > 1
 
 
 def _connects_wang_blocks(block: SpinBlock) -> bool:
-    """Whether several Wang blocks of one v and pattern are in a block with spins; no block where only some functions exist."""
+    """Whether a block with spins contains several Wang blocks of one v and pattern; False if only some functions exist."""
     if block.allowed is not None:
         return False
     held = [
-        (own.v, number)
+        (wang_part.v, number)
         for part in block.parts
-        for own in part.rotor.parts
+        for wang_part in part.rotor.parts
         for number in range(part.patterns.start, part.patterns.stop)
     ]
     return len(set(held)) < len(held)
 
 
-def _of_clear_parts(block: object, oblate: bool, representation: str) -> tuple[Ints, Floats] | None:
-    """Names v, Ka, Kc by DIAG 0 and shares where every state has more than half of it in one Wang block; None elsewhere."""
+def _clear_labels(block: object, oblate: bool, representation: str) -> tuple[Ints, Floats] | None:
+    """Labels v, Ka, Kc of DIAG 0 and weights, if each state has more than half of its weight in one Wang block; else None."""
     if not isinstance(block, SolvedBlock) or block.alone:
         return None
-    of_parts = np.add.reduceat(block.vectors**2, [part.start for part in block.parts], axis=0)
-    of_state, shares = of_parts.argmax(axis=0), of_parts.max(axis=0)
+    weights_of_parts = np.add.reduceat(block.vectors**2, [part.start for part in block.parts], axis=0)
+    part_of_state, shares = weights_of_parts.argmax(axis=0), weights_of_parts.max(axis=0)
     sizes = [part.basis.size for part in block.parts]
-    if shares.min() <= _CLEAR or (np.bincount(of_state, minlength=len(sizes)) != sizes).any():
+    if shares.min() <= _CLEAR or (np.bincount(part_of_state, minlength=len(sizes)) != sizes).any():
         return None
     names = np.empty((len(shares), 3), dtype=np.int64)
     for place, part in enumerate(block.parts):
         ka, kc = names_of(part.basis, representation)
         order = np.argsort(kc if representation == "IIIl" else ka)
-        rows = np.flatnonzero(of_state == place)  # by energy
+        rows = np.flatnonzero(part_of_state == place)  # by energy
         names[rows[::-1] if oblate else rows] = np.column_stack([np.full_like(ka, part.v), ka, kc])[order]
     return names, shares
 
 
 def _shares_of_groups(functions: Functions, at: Ints, diag: int) -> Floats:
-    """The share of each state in the group that it is named after."""
-    of_function = np.arange(len(at)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
-    inside = of_function[:, None] == of_function[at][None, :]
+    """The weight of each state in the group that labels it."""
+    group_of_function = np.arange(len(at)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
+    inside = group_of_function[:, None] == group_of_function[at][None, :]
     return np.asarray((functions.amplitudes**2 * inside).sum(axis=0))
 
 
 def places(functions: Functions, energies: Floats, diag: int, diagonal: Diagonal = Diagonal.RISES) -> Ints:
-    """The function that names each state, (states,); see `named_by`."""
+    """The function that labels each state, (states,); see `named_by`."""
     shares = functions.amplitudes**2
     if diag == 1:
         return assigned(shares, np.ones(len(shares), dtype=np.int64))
@@ -174,24 +174,24 @@ def places(functions: Functions, energies: Floats, diag: int, diagonal: Diagonal
     if diagonal is not Diagonal.RISES:
         groups = connected_groups(groups, functions.k, functions.amplitudes, energies, diag)
     count = int(groups.max()) + 1
-    of_group = np.stack([shares[groups == g].sum(axis=0) for g in range(count)])
-    of_state = assigned(of_group, np.bincount(groups, minlength=count))
+    group_weights = np.stack([shares[groups == g].sum(axis=0) for g in range(count)])
+    group_of_state = assigned(group_weights, np.bincount(groups, minlength=count))
     ranks = _ranks(shares @ energies) if diag in _BY_DIAGONAL else None
-    found = np.empty(len(energies), dtype=np.int64)
+    functions_of_states = np.empty(len(energies), dtype=np.int64)
     for g in range(count):
-        members, states = np.flatnonzero(groups == g), np.flatnonzero(of_state == g)
+        members, states = np.flatnonzero(groups == g), np.flatnonzero(group_of_state == g)
         if diag == 4:
-            found[states] = _by_k2(functions, members, states, shares, energies)
+            functions_of_states[states] = _by_k2(functions, members, states, shares, energies)
         else:
             rising = _in_order_of_k(functions, members) if ranks is None else _by_diagonal(functions, members, ranks)
-            found[states[np.argsort(energies[states], kind="stable")]] = rising
-    return found
+            functions_of_states[states[np.argsort(energies[states], kind="stable")]] = rising
+    return functions_of_states
 
 
 def _by_diagonal(functions: Functions, members: Ints, ranks: Floats) -> Ints:
-    """The functions of a group as their diagonal elements rise, of equal ones as a selection sort that exchanges leaves them.
+    """The functions of a group by rising diagonal element; a selection sort by exchanges, as in SPCAT, orders equal ones.
 
-    It begins with the Wang block of Ka + Kc - N = 0 where N + K is even, 1 where it is odd.
+    The sort begins with the Wang block of Ka + Kc - N = 0 if N + K is even, of 1 if it is odd.
     """
     wang = (functions.n + functions.k + functions.above)[members] % 2
     order = members[np.lexsort((functions.k[members], wang))]
@@ -203,7 +203,7 @@ def _by_diagonal(functions: Functions, members: Ints, ranks: Floats) -> Ints:
 
 
 def _ranks(diagonal: Floats) -> Floats:
-    """A number for each function that rises with its diagonal element, one for those that round-off alone tells apart."""
+    """Rank of each function by diagonal element; elements equal within round-off share a rank."""
     order = np.argsort(diagonal, kind="stable")
     steps = np.diff(diagonal[order]) > _EQUAL * np.abs(diagonal).max(initial=0.0)
     ranks = np.empty(len(diagonal))
@@ -212,52 +212,56 @@ def _ranks(diagonal: Floats) -> Floats:
 
 
 def _in_order_of_k(functions: Functions, members: Ints) -> Ints:
-    """The functions of a group as K rises, of one K that with Ka + Kc = N + 1 first."""
+    """The functions of a group by rising K; for one K the function with Ka + Kc = N + 1 first."""
     return np.asarray(members[np.lexsort((-functions.above[members], functions.k[members]))])
 
 
 def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, energies: Floats) -> Ints:
-    """⟨K²⟩ of the part of each state in the group, over its size; states of one K by energy."""
-    own = shares[np.ix_(members, states)]
-    k2 = (functions.k[members].astype(float) ** 2) @ own / own.sum(axis=0)
+    """Functions for states ordered by ⟨K²⟩ of their part in the group; states of one K by energy."""
+    weights = shares[np.ix_(members, states)]
+    k2 = (functions.k[members].astype(float) ** 2) @ weights / weights.sum(axis=0)
     by_k2, by_tau = np.argsort(k2, kind="stable"), _in_order_of_k(functions, members)
-    ks, found = functions.k[by_tau], np.empty(len(states), dtype=np.int64)
+    ks, functions_of_states = functions.k[by_tau], np.empty(len(states), dtype=np.int64)
     for k in np.unique(ks):
         run = np.flatnonzero(ks == k)
         here = by_k2[run]
-        found[here[np.argsort(energies[states[here]], kind="stable")]] = by_tau[run]
-    return found
+        functions_of_states[here[np.argsort(energies[states[here]], kind="stable")]] = by_tau[run]
+    return functions_of_states
 
 
 def functions_of(block: SolvedBlock | SpinBlock, representation: str) -> Functions:
-    """The functions |N K ±⟩ of a solved block, with every coupling pattern, in order of parts, patterns and K."""
+    """The functions |N K ±⟩ of a solved block, with all coupling patterns, by part, pattern and K."""
     if isinstance(block, SpinBlock):
-        return _of_spin_block(block, representation)
+        return _functions_with_spins(block, representation)
     return _joined([(part.v, part.basis, None, block.vectors[part.place]) for part in block.parts], representation)
 
 
-def _of_spin_block(block: SpinBlock, representation: str) -> Functions:
+def _functions_with_spins(block: SpinBlock, representation: str) -> Functions:
+    """The functions of a block with spins."""
     pieces = []
     for part in block.parts:
         rows = block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1)
-        for own in part.rotor.parts:
-            assert isinstance(own.basis, WangBlock)
-            inside = np.einsum("kr,prn->pkn", part.rotor.vectors[own.place], rows)
+        for wang_part in part.rotor.parts:
+            assert isinstance(wang_part.basis, WangBlock)
+            inside = np.einsum("kr,prn->pkn", part.rotor.vectors[wang_part.place], rows)
             patterns = block.patterns[part.patterns]
-            pieces += [(own.v, own.basis, pattern, each) for pattern, each in zip(patterns, inside, strict=True)]
+            pieces += [
+                (wang_part.v, wang_part.basis, pattern, each) for pattern, each in zip(patterns, inside, strict=True)
+            ]
     return _joined(pieces, representation)
 
 
 def _joined(pieces: Sequence[tuple[int, WangBlock, Ints | None, Floats]], representation: str) -> Functions:
-    names, ks, groups, wangs, ns, known = [], [], [], [], [], dict[tuple[int, ...], int]()
+    """Functions of all parts."""
+    names, ks, groups, wangs, ns, group_numbers = [], [], [], [], [], dict[tuple[int, ...], int]()
     for place, (v, basis, pattern, _) in enumerate(pieces):
         ka, kc = names_of(basis, representation)
         order = np.argsort(kc if representation == "IIIl" else ka, kind="stable")
-        own = [] if pattern is None else [np.full(basis.size, value) for value in pattern]
-        names.append(np.column_stack([np.full(basis.size, v), ka[order], kc[order], *own]))
+        pattern_columns = [] if pattern is None else [np.full(basis.size, value) for value in pattern]
+        names.append(np.column_stack([np.full(basis.size, v), ka[order], kc[order], *pattern_columns]))
         ks.append(np.sort(basis.k))
         key = (v, *(() if pattern is None else tuple(pattern.tolist())))
-        groups.append(np.full(basis.size, known.setdefault(key, len(known))))
+        groups.append(np.full(basis.size, group_numbers.setdefault(key, len(group_numbers))))
         wangs.append(np.full(basis.size, place))
         ns.append(np.full(basis.size, basis.j))
     amplitudes = np.concatenate([vectors for *_, vectors in pieces])

@@ -1,7 +1,7 @@
-"""Moments of a file in the phases of its functions: what has the factor i between two states, and what stands for C2g times itself.
+"""Moments of a file in the phases of its functions: moments with a factor i between two states, and moments times C2g.
 
-The rule of `phases` counts the electric moments within states; it is the same for every electric moment between two states, whatever its
-TYP. The factor i is a sign that changes with the order of the states, in functions in which the Hamiltonian is real.
+The rule of `phases` counts electric moments within states; it applies to all electric moments between two states, independent of TYP. In
+functions with a real Hamiltonian the factor i is a sign that changes with the order of the states.
 """
 
 from __future__ import annotations
@@ -18,17 +18,18 @@ from rotor.quantum.moments import Moment, Vector
 def by_order(
     moments: dict[tuple[int, int], Vector], beside: tuple[Moment, ...], reverse: Sequence[bool]
 ) -> tuple[dict[tuple[int, int], Vector], tuple[Moment, ...]]:
-    """The moments with the factor i of every electric one between two states, and -i of those beside that are reversed."""
+    """The moments with a factor i for electric ones between two states, and -i for reversed ones among `beside`."""
     if not beside:
         back = {(w, v): (-a, -b, -c) for (v, w), (a, b, c) in moments.items() if v != w}
         return moments | back, ()
-    own = {states: along for states, along in moments.items() if states[0] == states[1]}
+    within_states = {states: along for states, along in moments.items() if states[0] == states[1]}
     between = [Moment(1.0, states, along) for states, along in moments.items() if states[0] != states[1]]
     signed = [(moment, False) for moment in between] + list(zip(beside, reverse, strict=True))
-    return own, tuple(_with_i(moment, back) for moment, back in signed)
+    return within_states, tuple(_with_i(moment, back) for moment, back in signed)
 
 
 def _with_i(moment: Moment, reverse: bool) -> Moment:
+    """A moment with the factor i, or -i if reversed."""
     if not moment.electric or moment.states[0] == moment.states[1]:
         return moment
     return moment._replace(value_debye=-moment.value_debye if reverse else moment.value_debye, by_order=True)
@@ -45,27 +46,27 @@ def turned_moments(
     moments : dict of (int, int) to (float, float, float)
         Plain dipoles by pairs of states.
     beside : tuple of Moment
-        Those of other kinds.
+        Other moments.
     turned : str
-        The axis whose half turn goes with time reversal, "" where there is none.
+        The axis whose half turn accompanies time reversal; "" if there is none.
     phases : Phases
-        Which components have the factor i.
+        Phases that decide which components have the factor i.
 
     Returns
     -------
     plain : dict of (int, int) to (float, float, float)
-        Those that are as they were.
+        Unchanged plain dipoles.
     others : tuple of Moment
-        The others.
+        All other moments.
     """
     if any(moment.written or moment.with_i or (moment.along_abc and moment.spin) for moment in beside):
         raise ValueError(
             "moments of second and third order, of a sine and of a spin with operators that are odd under time reversal within one "
             f"state, or PHASE, {PLURAL_NOT_YET}; leave one of them out"
         )
-    every = [*(Moment(1.0, states, along) for states, along in moments.items()), *beside]
+    all_moments = [*(Moment(1.0, states, along) for states, along in moments.items()), *beside]
     plain, others = dict[tuple[int, int], Vector](), list[Moment]()
-    for moment in every:
+    for moment in all_moments:
         if moment.along_abc is None:
             others.append(moment)
             continue
@@ -73,7 +74,7 @@ def turned_moments(
             along = (value * (axis == 1), value * (axis == 2), value * (axis == 3))
             ordered = moment.states[0] != moment.states[1] and phases.has_i(axis)
             across = "" if "abc"[axis - 1] == turned else turned
-            if value and not across and not ordered and moment in every[: len(moments)]:
+            if value and not across and not ordered and moment in all_moments[: len(moments)]:
                 plain[moment.states] = tuple(np.add(along, plain.get(moment.states, (0.0, 0.0, 0.0))).tolist())
             elif value:
                 others.append(moment._replace(along_abc=along, turned=across, by_order=ordered))

@@ -1,4 +1,4 @@
-"""Moments of .int files as sums of products of direction cosines φ and components of N: what each TYP stands for.
+"""Moments of .int files by TYP, as sums of products of direction cosines φ and components of N.
 
 x, y, z are b, c, a in a prolate and b, a, c in an oblate basis, where i stands for -i, {A, B} = AB + BA
 (H. M. Pickett, documentation of SPFIT and SPCAT, "Format of the .int file", table of dipole types):
@@ -34,55 +34,56 @@ def imaginary(oblate: bool) -> complex:
     return -1j if oblate else 1j
 
 
-def words_of(typ: int, sym: int, oblate: bool, of_spin: bool = False, as_spcat: bool = False) -> Words:
+def words_of(typ: int, sym: int, oblate: bool, with_spin: bool = False, as_spcat: bool = False) -> Words:
     """The words of a TYP without its powers of N².
 
     Parameters
     ----------
     typ : int
-        TYP 0, 1, 2, 4, 6, 11 or 12; of 11 the operator that is commuted.
+        TYP 0, 1, 2, 4, 6, 11 or 12; for 11 the operator in the commutator.
     sym : int
         SYM: 0 for magnetic moments, 1 to 3 for a, b, c.
     oblate : bool
         Whether z is the c axis.
-    of_spin : bool, optional
-        Whether a spin stands beside the words, so that they hold no cosine.
+    with_spin : bool, optional
+        Whether a spin multiplies the words, which then contain no cosine.
     as_spcat : bool, optional
-        Whether N is what the program computes for it, ½(2 φ_z N_z - φ_x N_x - φ_y N_y), but for TYP 6.
+        Whether N is ½(2 φ_z N_z - φ_x N_x - φ_y N_y), as SPCAT computes it, except for TYP 6.
 
     Returns
     -------
     tuple of Word
-        In debye or magnetons for a value of 1.
+        Words in debye or magnetons, for a value of 1.
     """
     x, y, z = axes_of_moments(oblate)
     if typ == 4:
-        return _half_with(z + z, words_of(0, sym, oblate, of_spin, as_spcat))
+        return _half_with(z + z, words_of(0, sym, oblate, with_spin, as_spcat))
     if typ == 6:
-        return _third_order(sym, (x, y, z), of_spin)
+        return _third_order(sym, (x, y, z), with_spin)
     if typ == 12:
         return _times(-imaginary(oblate), _half_with(z, words_of(2, sym, oblate)))
-    if typ in (1, 2, 11) or (as_spcat and not sym and not of_spin):
+    if typ in (1, 2, 11) or (as_spcat and not sym and not with_spin):
         typ = typ or 1
         return _second_order(typ, sym, (x, y, z), imaginary(oblate))
-    return _plain(sym, of_spin)
+    return _plain(sym, with_spin)
 
 
 def tensor_of(typ: int, sym: int, oblate: bool) -> Matrix:
-    """c of Σ_ij c_ij φ_i S_j for TYP 1 and 2: of SYM 1 to 3 without the factor i, with its sign in an oblate basis."""
+    """c of Σ_ij c_ij φ_i S_j for TYP 1 and 2; for SYM 1 to 3 without the factor i, with its sign in an oblate basis."""
     x, y, z = axes_of_moments(oblate)
-    c = dict.fromkeys((one + two for one in "abc" for two in "abc"), 0.0)
+    c = dict.fromkeys((i + j for i in "abc" for j in "abc"), 0.0)
     if sym:
-        one, two = (axis for axis in "abc" if axis != "abc"[sym - 1])
-        c[one + two] = c[two + one] = -1.0 if oblate else 1.0
+        i, j = (axis for axis in "abc" if axis != "abc"[sym - 1])
+        c[i + j] = c[j + i] = -1.0 if oblate else 1.0
     else:
         c |= {2 * z: 1.0, 2 * x: -0.5, 2 * y: -0.5} if typ == 1 else {2 * y: 1.0, 2 * x: -1.0}
-    rows = [tuple(c[one + two] for two in "abc") for one in "abc"]
+    rows = [tuple(c[i + j] for j in "abc") for i in "abc"]
     return (rows[0], rows[1], rows[2])  # type: ignore[return-value]
 
 
-def _plain(sym: int, of_spin: bool) -> Words:
-    if of_spin:
+def _plain(sym: int, with_spin: bool) -> Words:
+    """Words of TYP 0."""
+    if with_spin:
         return (Word(1.0, "", "", ""),)
     if sym:
         return (Word(1.0, "", "abc"[sym - 1], ""),)
@@ -90,18 +91,20 @@ def _plain(sym: int, of_spin: bool) -> Words:
 
 
 def _second_order(typ: int, sym: int, xyz: tuple[str, str, str], i: complex) -> Words:
+    """Words of TYP 1 and 2."""
     x, y, z = xyz
     if sym:
-        one, two = (axis for axis in xyz if axis != "abc"[sym - 1])
-        return _times(0.5 * i, _anti(one, two) + _anti(two, one))
+        first, second = (axis for axis in xyz if axis != "abc"[sym - 1])
+        return _times(0.5 * i, _anti(first, second) + _anti(second, first))
     along = {z: 1.0, x: -0.5, y: -0.5} if typ == 1 else {y: 1.0, x: -1.0}
     return tuple(word for axis, c in along.items() for word in _times(c / 2, _anti(axis, axis)))
 
 
-def _third_order(sym: int, xyz: tuple[str, str, str], of_spin: bool) -> Words:
+def _third_order(sym: int, xyz: tuple[str, str, str], with_spin: bool) -> Words:
+    """Words of TYP 6."""
     x, y, z = xyz
     if not sym:
-        plain = _plain(0, of_spin)
+        plain = _plain(0, with_spin)
         return _after(plain, y + y, 1.0) + _after(plain, x + x, -1.0)
     along = "abc"[sym - 1]
     squares = _times(1.0, _anti(along, y + y)) + _times(-1.0, _anti(along, x + x))
@@ -117,16 +120,18 @@ def _anti(cosine: str, letters: str) -> Words:
     return (Word(1.0, "", cosine, letters), Word(1.0, letters[::-1], cosine, ""))
 
 
-def _twice(cosine: str, one: str, two: str, factor: float) -> Words:
+def _twice(cosine: str, first: str, second: str, factor: float) -> Words:
     """c {φ, {N_i, N_j}}."""
-    return _times(factor, _anti(cosine, one + two) + _anti(cosine, two + one))
+    return _times(factor, _anti(cosine, first + second) + _anti(cosine, second + first))
 
 
 def _times(factor: complex, words: Iterable[Word]) -> Words:
+    """Words times a factor."""
     return tuple(word._replace(factor=factor * word.factor) for word in words)
 
 
 def _after(words: Words, letters: str, factor: float) -> Words:
+    """Words multiplied from the right by components of N."""
     return tuple(word._replace(factor=factor * word.factor, right=word.right + letters) for word in words)
 
 

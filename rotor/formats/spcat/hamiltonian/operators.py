@@ -1,4 +1,4 @@
-"""What each parameter code of SPFIT means as an operator of this package: the one table of codes that compute.
+"""Operators of SPFIT's parameter codes: the table of supported codes.
 
 | field | meaning here |
 |---|---|
@@ -48,12 +48,12 @@ REFUSED = {
 class CodedOperator:
     """The operator of a code, without its states.
 
-    plain: by powers (p, q, n), of a term without spins. of_j: of one without spins that has no such powers. rotor, spins: of a spin
-    term, the places of the spins counted from 1. odd: time reversal changes its sign.
+    plain: powers (p, q, n) of a term without spins. by_j: operator by J of a term without spins and without such powers. rotor, spins: of a
+    spin term, with places of the spins from 1. odd: whether time reversal changes its sign.
     """
 
     plain: Operators | None = None
-    of_j: OperatorOfJ | None = None
+    by_j: OperatorOfJ | None = None
     rotor: Rotor | None = None
     spins: tuple[int, ...] = ()
     odd: bool = False
@@ -63,9 +63,9 @@ class CodedOperator:
 
 
 def operator_of(digits: Digits, axes: str) -> CodedOperator:
-    """The operator of a code; axes: those at x, y, z (bca or bac).
+    """The operator of a code; axes: the axes x, y, z (bca or bac).
 
-    Raises ValueError with the meaning of a code that does not compute.
+    Raises ValueError, with the meaning of the code, if it is not supported.
     """
     _refuse(digits)
     spins = tuple(place for place in (digits.i1, digits.i2) if place)
@@ -73,41 +73,42 @@ def operator_of(digits: Digits, axes: str) -> CodedOperator:
     if ns > 4:  # N_z S_z of the first spin: with TYP 0 the product of both projections on z
         spins, typ, ns = (1,), "abc".index(axes[2]) + 1, ns - 5
     if spins and 80 <= typ < 90:
-        of_each = _with_spins(digits._replace(typ=0, ksq=0), spins, axes)
-        own = 10 * (typ - 80) + digits.ksq
-        assert of_each.rotor is not None
-        one = multiplied(
-            of_each.rotor, lambda m, n, above, below: 1.0 * ((abs(above) == own) & (above == below)), 1.0, False
+        product = _with_spins(digits._replace(typ=0, ksq=0), spins, axes)
+        k_of_code = 10 * (typ - 80) + digits.ksq
+        assert product.rotor is not None
+        restricted = multiplied(
+            product.rotor, lambda m, n, above, below: 1.0 * ((abs(above) == k_of_code) & (above == below)), 1.0, False
         )
-        return replace(of_each, rotor=one)
+        return replace(product, rotor=restricted)
     if spins or ns:
         return _with_spins(digits._replace(typ=typ, ns=ns), spins, axes)
     if 80 <= typ < 90:
-        return CodedOperator(of_j=energy_of_k(10 * (typ - 80) + digits.ksq, digits.nsq))
+        return CodedOperator(by_j=energy_of_k(10 * (typ - 80) + digits.ksq, digits.nsq))
     if 12 <= typ < 80:
-        return CodedOperator(of_j=_of_j(digits, axes), odd=is_odd_type(typ))
+        return CodedOperator(by_j=_operator_by_j(digits, axes), odd=is_odd_type(typ))
     return CodedOperator(plain=_plain(digits, axes))
 
 
-def energy_of_k(own: int, n2: int, factor: complex = 0.0) -> OperatorOfJ:
-    """N^2p of the functions with |K| = 10 (TYP - 80) + KSQ alone; with a factor, ± i, that times the sign of K."""
+def energy_of_k(k_of_code: int, n2: int, factor: complex = 0.0) -> OperatorOfJ:
+    """N^2p for functions with |K| = 10 (TYP - 80) + KSQ only; a factor ± i multiplies the sign of K."""
 
     def operator(j: int, representation: str) -> JOperator:
         k = np.arange(-j, j + 1)
-        of_k = (np.abs(k) == own) * (factor * np.sign(k) if factor else 1.0)
-        return JOperator(j, {0: (j * (j + 1.0)) ** n2 * of_k.astype(np.complex128)})
+        diagonal = (np.abs(k) == k_of_code) * (factor * np.sign(k) if factor else 1.0)
+        return JOperator(j, {0: (j * (j + 1.0)) ** n2 * diagonal.astype(np.complex128)})
 
     return operator
 
 
 def _refuse(d: Digits) -> None:
-    found = {
+    """Raise ValueError for codes that are not supported."""
+    reasons = {
         "commutator": d.i1 == 0 and d.i2 > 0,
         "own": 80 <= d.typ < 90 and bool(d.ns),
         "series": bool(d.ff or d.ex) or d.typ >= 90,
         "szsz": d.ns > 4 and (d.typ != 0 or d.i1 > 0 or d.i2 > 0),
     }
-    for reason, applies in found.items():
+    for reason, applies in reasons.items():
         if applies:
             raise ValueError(f"{REFUSED[reason]} is read but not computed yet")
 
@@ -125,8 +126,8 @@ def _plain(d: Digits, axes: str) -> Operators:
     return {(p + 1, q, 0): 0.5, (p, q + 1, 0): -0.5, (p, q, 1): 0.25 if place == 0 else -0.25}
 
 
-def _of_j(d: Digits, axes: str) -> OperatorOfJ:
-    """With half anticommutators of the powers, and the factor i, in an oblate basis -i, of what is odd under time reversal."""
+def _operator_by_j(d: Digits, axes: str) -> OperatorOfJ:
+    """Operators by J with half anticommutators of the powers, and the factor i (-i in an oblate basis) if odd under time reversal."""
     powers = ParameterName("", d.nsq, d.ksq)
     factor = (1j if axes[2] == "a" else -1j) if is_odd_type(d.typ) else 1.0
 
@@ -138,7 +139,7 @@ def _of_j(d: Digits, axes: str) -> OperatorOfJ:
 
 @lru_cache(maxsize=1024)
 def _tensor_of_j(typ: int, j: int, representation: str, z: str) -> JOperator:
-    """`_tensor_of_n` of one J, for the many parameters of one TYP."""
+    """`_tensor_of_n` of one J, cached for the parameters of one TYP."""
     return _tensor_of_n(typ, components(j, representation), z)
 
 
@@ -150,8 +151,8 @@ def _tensor_of_n(typ: int, of: Mapping[str, JOperator], z: str) -> JOperator:
         K = L:      ½ (E + E†), or (E - E†)/2i
         K = L - 1:  ¼ √(2L) {Z, E + E†}, or {Z, E - E†}/i in its place;  Z where L = 1;  twice that for TYP 12 to 19
 
-    the tensor T^L_K(N) normalised as N^L times the spherical harmonic C^L_K, over the C^L_L of its stretched component. Which of the two
-    follows from the species: the one along X has X, {Y, Z}, ..., along Y Y, {X, Z}, ..., along Z Z, {X, Y}, ...
+    the tensor T^L_K(N) normalised as N^L times the spherical harmonic C^L_K, divided by C^L_L of its stretched component. The species
+    decides between the two forms: operators along X have X, {Y, Z}, ...; along Y: Y, {X, Z}, ...; along Z: Z, {X, Y}, ...
     """
     x, y = ("c", "b") if z == "a" else ("a", "b")
     order, (k, cosine) = order_of(typ), shape_of(typ, z)
@@ -163,11 +164,12 @@ def _tensor_of_n(typ: int, of: Mapping[str, JOperator], z: str) -> JOperator:
 
 
 def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
+    """The operator of a code with spins."""
     powered = CodedOperator(spins=spins, n2=d.nsq, nz2=d.ksq, ns=d.ns)
     if not spins:
         if d.typ >= 12:
-            found = tensor_with_spins(d.typ, 0, axes)
-            return replace(powered, rotor=found, odd=found.odd)
+            tensor = tensor_with_spins(d.typ, 0, axes)
+            return replace(powered, rotor=tensor, odd=tensor.odd)
         plain = _plain(d._replace(nsq=0, ksq=0), axes)
         return replace(powered, rotor=Scalar(tuple(plain.items())))
     if len(spins) == 2 and d.typ == 0:
@@ -178,8 +180,8 @@ def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
         raise ValueError(f"the square of one spin, a constant, times N {NOT_YET}")
     if d.typ > 4 and d.typ not in CROSS and (len(spins) == 2 or d.typ not in ODD):
         acting = 0 if d.typ in ODD else len(spins)  # of rank 0: I1·I2 times N
-        found = tensor_with_spins(d.typ, acting, axes)
-        return replace(powered, rotor=found, odd=found.odd)
+        tensor = tensor_with_spins(d.typ, acting, axes)
+        return replace(powered, rotor=tensor, odd=tensor.odd)
     if d.typ in ODD:
         sign = 1.0 if axes[2] == "a" else -1.0  # as of Na, Nb, Nc between states
         vector: Vector = tuple(sign * float(axis == ODD[d.typ]) for axis in "abc")  # type: ignore[assignment]

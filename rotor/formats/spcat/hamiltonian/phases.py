@@ -1,15 +1,15 @@
-"""Phases of basis functions: which operators along a, b, c a file has within one state, odd or even under time reversal θ.
+"""Phases of basis functions, which decide whether odd or even operators (under time reversal θ) are real within one state.
 
-In functions that θ leaves as they are the operators of even order are real (Na², {Nb, Nc}) and those of odd order imaginary (Na, Nb Nc Na).
-Where a file has an odd operator within one state the Hamiltonian is real in other functions, those that θ C2g leaves as they are,
-C2g being half a turn about one axis g of a, b, c:
+In functions invariant under θ, operators of even order are real (Na², {Nb, Nc}) and those of odd order imaginary (Na, Nb Nc Na). If a file
+has an odd operator within one state, the Hamiltonian is real in other functions, those invariant under θ C2g, with C2g a half turn about
+one axis g of a, b, c:
 
     |f⟩ → |f⟩ where C2g = 1,  i|f⟩ where C2g = -1:      O → O where C2g leaves O alone,   O → i C2g O where it changes the sign of O
 
-so that with g = b odd operators along a and c (Na, Nc) and even ones along b ({Na, Nc}) are real, and the others are imaginary. SPFIT
-and SPCAT choose for each axis apart which of the two are real: within states by the more frequent kind of a file's parameters, or by
-PHASE of XOPT = 1 along x + 2 along y + 4 along z where odd ones are (PHASE = 8: none is), x, y, z = c, b, a in the prolate basis and
-a, b, c in the oblate one. Those of the other kind are left out. Between two states those of the other kind have the factor i.
+With g = b, odd operators along a and c (Na, Nc) and even ones along b ({Na, Nc}) are real, all others imaginary. SPFIT and SPCAT choose
+the real kind separately for each axis: within states the more frequent kind of the parameters, or by PHASE of XOPT, the sum of 1 (x),
+2 (y), 4 (z) for axes with real odd operators (PHASE = 8: none); x, y, z = c, b, a in the prolate basis and a, b, c in the oblate one.
+Operators of the other kind are left out within states, and have the factor i between two states.
 
 (H. M. Pickett, documentation of SPFIT and SPCAT, "XOPT"; the rule for the more frequent kind found with the program.)
 """
@@ -26,11 +26,11 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator, half_turn
 
-AXES_OF_PHASE = {False: "cba", True: "abc"}  # by whether the basis is oblate: of PHASE 1, 2, 4
+AXES_OF_PHASE = {False: "cba", True: "abc"}  # axes of PHASE 1, 2, 4; the key is whether the basis is oblate
 
 
 class Kind(NamedTuple):
-    """Of an operator: the axis along which it is, "" of one in orthorhombic symmetry, and whether θ changes its sign."""
+    """Axis of an operator ("" in orthorhombic symmetry), and whether θ changes its sign."""
 
     axis: str
     odd: bool
@@ -49,8 +49,10 @@ def kind_of(d: Digits, oblate: bool) -> Kind:
 
 
 class Phases(NamedTuple):
-    """Of a file: the axes along which operators within one state are odd, those of which that is settled, and whether a plain dipole
-    between two states has the factor i along an axis that is not among the odd ones, and none along those, or the reverse."""
+    """Phases of a file.
+
+    odd: axes along which odd operators within one state are real. settled: axes for which that is decided. The last field decides whether
+    a plain dipole between two states has the factor i along the axes that are not odd, or along the odd ones."""
 
     odd: frozenset[str]
     settled: frozenset[str]
@@ -62,9 +64,9 @@ class Phases(NamedTuple):
 
 
 def phases_of(file: ParameterFile, states: int, doubled: frozenset[int]) -> Phases:
-    """By PHASE of XOPT, else odd are those axes along which more parameters are odd than even.
+    """The phases by PHASE of XOPT; without it an axis is odd if more parameters along it are odd than even.
 
-    A parameter of all states counts once for each, one whose value is 0 too; those of l-doubled states have no part in it.
+    A parameter of all states counts once for each state, even if its value is 0. Parameters of l-doubled states do not count.
     """
     first = file.options[0]
     oblate = first.nvib < 0
@@ -75,48 +77,48 @@ def phases_of(file: ParameterFile, states: int, doubled: frozenset[int]) -> Phas
     wild = 10 ** state_digits(states) - 1
     for parameter in file.parameters:
         d = split_code(parameter.code, states)
-        own = len(set(range(states)) - doubled) if d.v1 == wild else int(d.v1 < states and d.v1 not in doubled)
+        count = len(set(range(states)) - doubled) if d.v1 == wild else int(d.v1 < states and d.v1 not in doubled)
         kind = kind_of(d, oblate)
-        if d.v1 == d.v2 and own and kind.axis and not is_constant(d):
-            more[kind.axis] = more.get(kind.axis, 0) + (own if kind.odd else -own)
+        if d.v1 == d.v2 and count and kind.axis and not is_constant(d):
+            more[kind.axis] = more.get(kind.axis, 0) + (count if kind.odd else -count)
     return Phases(frozenset(axis for axis, count in more.items() if count > 0), frozenset(more))
 
 
 def with_dipoles(phases: Phases, dipoles: Iterable[tuple[int, bool]], oblate: bool, as_spcat: bool) -> Phases:
-    """The phases of dipoles between states too, by those within states.
+    """Phases that include dipoles between states, from the dipoles within states.
 
     Parameters
     ----------
     phases : Phases
-        Of the parameters.
+        Phases of the parameters.
     dipoles : iterable of (int, bool)
-        Of the dipoles within states: their axis, 1 to 3, and whether they are commutators with N².
+        For each dipole within a state, the axis (1 to 3) and whether it is a commutator with N².
     oblate : bool
         Whether z is the c axis.
     as_spcat : bool
-        Whether phases along axes that are not settled are those that leave most dipoles real, as the program has it in SPCAT alone.
+        Whether phases along undecided axes make most dipoles real, as SPCAT (but not SPFIT) chooses them.
 
     Returns
     -------
     Phases
-        With `between_i`.
+        Phases with `between_i`.
     """
-    axes, given = AXES_OF_PHASE[oblate], list(dipoles)
-    least, found = len(given), (phases.odd, False)
+    axes, within_states = AXES_OF_PHASE[oblate], list(dipoles)
+    least, best = len(within_states), (phases.odd, False)
     for number in range(8 if as_spcat else 1):
         flipped = frozenset(axis for bit, axis in enumerate(axes) if number >> bit & 1)
         odd = phases.odd ^ flipped
-        real = sum(("abc"[axis - 1] in odd) != commutator for axis, commutator in given)
-        left = min(real, len(given) - real)
+        real = sum(("abc"[axis - 1] in odd) != commutator for axis, commutator in within_states)
+        left = min(real, len(within_states) - real)
         if not flipped & phases.settled and (left < least or not number):
-            least, found = left, (odd, real < len(given) - real)
-    return Phases(found[0], phases.settled, not found[1])
+            least, best = left, (odd, real < len(within_states) - real)
+    return Phases(best[0], phases.settled, not best[1])
 
 
 def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
-    """The axis g whose half turn goes with θ, "" where θ alone does, for operators along the axes used of which some are odd.
+    """The axis g whose half turn accompanies θ ("" for θ alone), for operators along the used axes, of which `odd` are odd.
 
-    Raises ValueError where no half turn fits: the Hamiltonian is complex in every choice of phases.
+    Raises ValueError if no half turn fits: the Hamiltonian is then complex for any phases.
 
     >>> turned_axis("a", frozenset("a")), turned_axis("ac", frozenset("a")), turned_axis("a", frozenset("ac"))
     ('c', 'c', 'b')
@@ -124,7 +126,7 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
     axes = sorted(set(used) - {""})
     for g in sorted(
         ("", "c", "b", "a"), key=lambda g: odd != odd_of_turned(g)
-    ):  # first that which fits the axes not used too
+    ):  # the axis that fits unused axes too is preferred
         if all((axis in odd) == (g not in ("", axis)) for axis in axes):
             return g
     along = ", ".join(f"{axis} {'odd' if axis in odd else 'even'}" for axis in axes)
@@ -135,7 +137,7 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
 
 
 def odd_of_turned(g: str) -> frozenset[str]:
-    """The axes along which odd operators are real where time reversal goes with half a turn about g.
+    """The axes along which odd operators are real if a half turn about g accompanies time reversal.
 
     >>> sorted(odd_of_turned("b")), sorted(odd_of_turned(""))
     (['a', 'c'], [])
@@ -144,9 +146,9 @@ def odd_of_turned(g: str) -> frozenset[str]:
 
 
 def half_turned(of: OperatorOfJ, axis: str, odd: bool) -> OperatorOfJ:
-    """What stands for an operator O that C2g turns around, in functions that θ C2g leaves as they are.
+    """Representation of an operator O that changes sign under C2g, in functions invariant under θ C2g.
 
-    Of an odd O, given as i O, it is i C2g O; of an even one, which has the factor i between two states, i C2g i O = -C2g O.
+    For an odd O, passed as i O, it is i C2g O; for an even one, with a factor i between two states, i C2g i O = -C2g O.
     """
 
     def operator(j: int, representation: str) -> JOperator:

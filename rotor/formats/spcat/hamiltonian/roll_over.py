@@ -1,4 +1,4 @@
-"""Names of levels where the diagonal of a Hamiltonian does not rise with K, as in an oblate top written in prolate axes.
+"""Labels of levels where the diagonal of a Hamiltonian does not rise with K, as for an oblate top in prolate axes.
 
 SPCAT names the states of a Wang block by energy, as K rises (DIAG 0). Two of its rules matter where the diagonal falls (`kroll`, `hdiag`
 and `ordblk` in H. M. Pickett's program): functions that no element connects are named apart; and with DIAG 0 it takes the elements of
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
     from rotor.tops.operators import Operators
 
-_FIRST_LOOKED_AT = 5  # K: the diagonal is followed from the last function of a block with K up to it on
-_CLEAR = 0.5  # above it no other function of a state, and no other state of a function, has a larger share
-_NO_ELEMENT = 1e-13  # of the largest energy: round-off of a matrix made from its eigenvectors
+_FIRST_LOOKED_AT = 5  # the diagonal is tested from the last function of a block with K up to this value
+_CLEAR = 0.5  # a larger weight is the largest one of its state and of its function
+_NO_ELEMENT = 1e-13  # round-off of a matrix computed from its eigenvectors, relative to the largest energy
 
 
 class Diagonal(Enum):
-    """How the diagonal of a Hamiltonian runs, which decides how levels get names.
+    """Behaviour of the diagonal of a Hamiltonian, which decides how levels are labelled.
 
-    RISES : with K (falls, in an oblate basis). FALLS : somewhere. FALLS_IN_K : somewhere, and levels are called by N and K.
+    RISES: with K (falls in an oblate basis). FALLS: at some K. FALLS_IN_K: at some K, and levels are labelled by N and K.
     """
 
     RISES = 0
@@ -43,12 +43,12 @@ class Diagonal(Enum):
 def falls_with_k(
     states: Iterable[Mapping[str, Operators]], values: Mapping[str, float], highest_n: int, oblate: bool
 ) -> int | None:
-    """The lowest N where the diagonal of a state does not rise with K in steps of two (fall, in an oblate basis); None up to the highest.
+    """The lowest N at which the diagonal of a state does not rise (in an oblate basis, fall) with K in steps of two; None without any.
 
-    Of H = Σ c N^2p Nz^2q ½(N₊^2n + N₋^2n) the terms with n = 0 count.
+    The diagonal consists of the terms with n = 0 of H = Σ c N^2p Nz^2q ½(N₊^2n + N₋^2n).
     """
     n, k = np.arange(highest_n + 1.0), np.arange(highest_n + 1.0)
-    found = []
+    lowest_n = []
     for operators in states:
         diagonal = np.zeros((highest_n + 1, highest_n + 1))
         for name, powers in operators.items():
@@ -57,12 +57,12 @@ def falls_with_k(
                     diagonal += values[name] * factor * np.outer((n * (n + 1)) ** p, k ** (2 * q))
         steps = (diagonal[:, 2:] - diagonal[:, :-2]) * (-1.0 if oblate else 1.0)
         wrong = ((steps < 0) & (k[2:] <= n[:, None])).any(axis=1)
-        found += np.flatnonzero(wrong)[:1].tolist()
-    return min(found, default=None)
+        lowest_n += np.flatnonzero(wrong)[:1].tolist()
+    return min(lowest_n, default=None)
 
 
 def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats, diag: int) -> Ints:
-    """The groups of functions that levels are named by, parted where no element connects them.
+    """The groups of functions that label levels, divided into connected parts.
 
     Parameters
     ----------
@@ -72,14 +72,14 @@ def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats
     amplitudes : (functions, states) array
         Eigenvectors in columns.
     energies : (states,) array
-        Of H, or of -H in an oblate basis.
+        Eigenvalues of H, or of -H in an oblate basis.
     diag : int
-        With 0 functions whose diagonal elements fall are groups by themselves.
+        DIAG; with 0 each function whose diagonal element falls is a separate group.
 
     Returns
     -------
     (functions,) array of int
-        Numbers from 0 on.
+        Group numbers from 0 on.
     """
     hamiltonian = (amplitudes * (energies - energies.mean())) @ amplitudes.T
     linked = np.abs(hamiltonian) > _NO_ELEMENT * np.abs(energies).max(initial=0.0)
@@ -91,13 +91,13 @@ def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats
 
 
 def clear_functions(amplitudes: Floats) -> Ints | None:
-    """The function (states,) that has more than half of each state; None where a state has none."""
+    """The function (states,) with more than half of the weight of each state; None if a state has none."""
     shares = amplitudes**2
     return shares.argmax(axis=0) if (shares.max(axis=0) > _CLEAR).all() else None
 
 
 def _rolled_over(groups: Ints, k: Ints, diagonal: Floats) -> NDArray[np.bool_]:
-    """Which functions SPCAT takes out of the matrix: of each group from the first on whose diagonal element is below that before it."""
+    """Functions that SPCAT removes from the matrix: in each group all from the first whose diagonal element falls."""
     apart = np.zeros(len(k), dtype=bool)
     for group in np.unique(groups):
         members = np.flatnonzero(groups == group)

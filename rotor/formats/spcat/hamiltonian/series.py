@@ -36,8 +36,8 @@ from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
 
-Factor = Callable[[int, Floats, Floats], Floats]  # of J, K' and K''
-_PAIR_TYPES = (*range(12), 20)  # TYP of what may have a series within l-doubled states
+Factor = Callable[[int, Floats, Floats], Floats]  # function of J, K' and K''
+_PAIR_TYPES = (*range(12), 20)  # TYP of operators that may have a series within l-doubled states
 
 
 @dataclass(frozen=True)
@@ -76,31 +76,32 @@ def series_of(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]]
     Returns
     -------
     Series
-        Those that are not given are 0.
+        Constants; those without a parameter are 0.
 
     Raises
     ------
     ValueError
-        For a code with TYP 91 to 99 that names no constant.
+        For a code with TYP 91 to 99 that is not a constant.
     """
     options, wild = file.options[0], 10 ** state_digits(states) - 1
-    found = Series(nofc=options.nofc, g12=options.g12)
+    series = Series(nofc=options.nofc, g12=options.g12)
     for parameter in file.parameters:
         d = split_code(parameter.code, states)
         if not is_constant(d):
             continue
         low, high = sorted((d.v1, d.v2))
-        for own in [(v, v) for v in range(states)] if low == wild else [(low, high)]:
-            _set(found, d, parameter, own)
+        for pair in [(v, v) for v in range(states)] if low == wild else [(low, high)]:
+            _set(series, d, parameter, pair)
     for pair in pairs:
         lower, other = min(pair), max(pair)
-        found.rho[other] = found.rho.get(lower, 0.0)
-        for constants in (found.a, found.b):
+        series.rho[other] = series.rho.get(lower, 0.0)
+        for constants in (series.a, series.b):
             constants.update({(n, other, other): constants.get((n, lower, lower), 0.0) for n in range(5)})
-    return found
+    return series
 
 
 def _set(series: Series, d: Digits, parameter: Parameter, pair: tuple[int, int]) -> None:
+    """Store the constant of a series."""
     number = (d.typ - 91) // 2
     if d.i1 or d.i2 or d.ns or d.ff or d.ex:
         raise ValueError(f"parameter {parameter.code}: a constant of a series has no spin, no FF and no EX")
@@ -123,23 +124,23 @@ def term_of(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Co
     Parameters
     ----------
     d : Digits
-        Of the code.
+        Fields of the code.
     axes : str
-        Those at x, y, z: bca or bac.
+        The axes x, y, z: bca or bac.
     series : Series
         The constants of the file.
     states : (int, int)
-        Whose constants it takes.
+        States whose constants apply.
 
     Returns
     -------
     CodedOperator
-        By its elements over |J k⟩.
+        The operator by its elements over |J k⟩.
 
     Raises
     ------
     ValueError
-        For two series at once, and a base that is not known.
+        For two series at once, and for an unsupported base operator.
     """
     if d.typ > 90 and (d.i1 or d.i2):
         raise ValueError(f"a spin with TYP {d.typ}, which SPCAT passes over: EX with TYP 4 and above has one")
@@ -178,6 +179,7 @@ def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float,
 
 
 def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
+    """Factor of a Fourier term."""
     up, low = angles_by_k(n, series, states)
 
     def factor(j: int, above: Floats, below: Floats) -> Floats:
@@ -189,23 +191,23 @@ def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
 
 
 def factor_of_k(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
-    """What a Fourier term multiplies an element with: of one K with NOFC; ½(K' + K'') for the sine of n = 0, as the program has it.
+    """Factor of an element in a Fourier term: a single K with NOFC; ½(K' + K'') for the sine of n = 0, as in the program.
 
     Parameters
     ----------
     n : int
         The harmonic.
     sine : bool
-        A sine, else a cosine.
+        Sine or cosine.
     series : Series
         The constants of the file.
     states : (int, int)
-        Of K' and of K''.
+        The states of K' and of K''.
 
     Returns
     -------
     callable
-        Of J, K' and K''.
+        Function of J, K' and K''.
     """
     if sine and n == 0:
         return lambda j, above, below: (above + below) / 2
@@ -215,6 +217,8 @@ def factor_of_k(n: int, sine: bool, series: Series, states: tuple[int, int]) -> 
 
 
 def _sampled(n: int, sine: bool) -> Factor:
+    """Factor with NOFC, which selects a single K."""
+
     def factor(j: int, above: Floats, below: Floats) -> Floats:
         twice = above + below
         return np.where((abs(twice) + 1) // 2 == n, np.sign(twice) if sine else 1.0, 0.0)
@@ -223,7 +227,7 @@ def _sampled(n: int, sine: bool) -> Factor:
 
 
 def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> CodedOperator:
-    """The operator with the function of its series."""
+    """The operator of a term of an Euler series."""
     plain = d._replace(ex=0, ksq=0, nsq=0)
     if d.typ >= 90:
         number = (d.typ - 90) // 2
@@ -240,36 +244,38 @@ def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Cod
     a, b = (constants.get((number, *states), 0.0) for constants in (series.a, series.b))
     base = operator_of(plain, axes)
     if base.rotor is not None:
-        function = _of_each(a, b, d.nsq, ksq, extra)
+        function = _euler_function(a, b, d.nsq, ksq, extra)
         mean = lambda m, n, above, below: (function(m, above) + function(n, below)) / 2  # noqa: E731
         return replace(base, rotor=multiplied(base.rotor, mean, 1.0, base.odd))
-    if base.of_j is not None:
+    if base.by_j is not None:
         return _multiplied(base, _mean(d.nsq, ksq, (a, b), extra), False, axes)
     parts = [
         _by_elements(plain_of_j({(0, 0, n): factor}), _mean(d.nsq + p, ksq + q, (a, b), extra), 1.0)
         for (p, q, n), factor in (base.plain or {}).items()
     ]
-    return replace(base, plain=None, of_j=_summed(parts))
+    return replace(base, plain=None, by_j=_summed(parts))
 
 
 def _mean(n2: int, k2: int, constants: tuple[float, float], extra: bool) -> Factor:
-    """½(f' + f'') with NSQ, KSQ; over D once more where `extra`."""
-    of_k = _of_each(*constants, n2, k2, extra)
-    return lambda j, above, below: 0.5 * (of_k(j, above) + of_k(j, below))
+    """½(f' + f'') with NSQ and KSQ, divided by D once more if `extra`."""
+    f = _euler_function(*constants, n2, k2, extra)
+    return lambda j, above, below: 0.5 * (f(j, above) + f(j, below))
 
 
-def _of_each(a: float, b: float, n2: int, k2: int, extra: bool) -> Callable[[int, Floats], Floats]:
-    """f of J and K."""
+def _euler_function(a: float, b: float, n2: int, k2: int, extra: bool) -> Callable[[int, Floats], Floats]:
+    """f as a function of J and K."""
 
-    def of_k(j: int, k: Floats) -> Floats:
+    def f(j: int, k: Floats) -> Floats:
         square = j * (j + 1.0) - k**2
         below = 1 + a * k**2 + b * square
         return np.asarray((square / below) ** n2 * (k**2 / below) ** k2 / (below if extra else 1.0))
 
-    return of_k
+    return f
 
 
 def _summed(parts: Sequence[OperatorOfJ]) -> OperatorOfJ:
+    """Sum of operators."""
+
     def operator(j: int, representation: str) -> JOperator:
         whole = parts[0](j, representation)
         for part in parts[1:]:
@@ -280,16 +286,19 @@ def _summed(parts: Sequence[OperatorOfJ]) -> OperatorOfJ:
 
 
 def _multiplied(base: CodedOperator, factor: Factor, sine: bool, axes: str) -> CodedOperator:
-    own = (1j if axes[2] == "a" else -1j) if sine else 1.0
-    whole = 1.0 / own if base.odd else own
+    """An operator times the factor of a series."""
+    phase = (1j if axes[2] == "a" else -1j) if sine else 1.0
+    whole = 1.0 / phase if base.odd else phase
     if base.rotor is not None:
         alike = multiplied(base.rotor, lambda m, n, above, below: factor(n, above, below), whole, base.odd != sine)
         return replace(base, rotor=alike, odd=base.odd != sine)
-    of = base.of_j or plain_of_j(base.plain or {})
-    return replace(base, plain=None, of_j=_by_elements(of, factor, whole), odd=base.odd != sine)
+    of = base.by_j or plain_of_j(base.plain or {})
+    return replace(base, plain=None, by_j=_by_elements(of, factor, whole), odd=base.odd != sine)
 
 
 def _by_elements(of: OperatorOfJ, factor: Factor, whole: complex) -> OperatorOfJ:
+    """An operator whose elements are multiplied by a factor."""
+
     def operator(j: int, representation: str) -> JOperator:
         k = np.arange(-j, j + 1.0)
         bands = of(j, representation).bands
@@ -310,7 +319,7 @@ def symmetry_type(d: Digits, oblate: bool) -> int:
     if not d.ff or not harmonic(d.ff)[0]:
         return typ
     along = 60 if oblate else 20
-    if typ < 20:  # of no axis: a sine makes it one of z
+    if typ < 20:  # no axis; a sine adds the axis z
         step = 0 if typ < 4 else 2 * (typ - 3) if typ < 12 else 2 * (typ - 11)
         return along + max(step, 1) - 1
     if along <= typ < along + 20:
@@ -321,6 +330,6 @@ def symmetry_type(d: Digits, oblate: bool) -> int:
 
 
 def refuse_within_pairs(d: Digits, states: Sequence[int], doubled: frozenset[int]) -> None:
-    """ValueError for a series of an operator of more than second order, or along x or y, of l-doubled states."""
+    """Raise ValueError for l-doubled states with a series of an operator above second order, or along x or y."""
     if is_series(d) and set(states) & doubled and d.typ < 90 and d.typ not in _PAIR_TYPES:
         raise ValueError(f"a series of this operator within l-doubled states {NOT_YET}")

@@ -1,4 +1,4 @@
-"""Spin terms of more than second order and spin terms of series, by their elements over |N k⟩.
+"""Spin terms above second order and spin terms of series, by their elements over |N k⟩.
 
 The operator of a TYP is a tensor T^L_K made of N (`operators`, X, Y, Z as there). With a spin one N is replaced by it, with two spins
 two are. With φ± = φ_x ± iφ_y of the direction cosines that are contracted with the spins,
@@ -27,15 +27,15 @@ from rotor.quantum.tensors import Complexes, spherical_components
 from rotor.quantum.wang.j_operators import JOperator, components, identity, lowering, raising
 from rotor.tops.operators import Operators
 
-FactorOfBoth = Callable[[int, int, Floats, Floats], Floats]  # of N', N, K', K
-OverK = Callable[[int, int, str], Complexes]  # of N', N and the representation
+FactorOfBoth = Callable[[int, int, Floats, Floats], Floats]  # function of N', N, K', K
+OverK = Callable[[int, int, str], Complexes]  # function of N', N and the representation
 
 
 @lru_cache(maxsize=256)
 def tensor_with_spins(typ: int, spins: int, axes: str) -> ByElements:
-    """The operator of TYP 5 to 79 with one or two different spins; with its factor i, in an oblate basis -i, where L is odd.
+    """The operator of TYP 5 to 79 with one or two different spins, with a factor i (-i in an oblate basis) for odd L.
 
-    Raises ValueError for TYP 20, 40, 60 with two spins, a scalar of them, which is of another rank.
+    Raises ValueError for TYP 20, 40, 60 with two spins, whose scalar product has another rank.
     """
     order = order_of(typ)
     rank = min(order, spins)
@@ -55,6 +55,7 @@ def tensor_with_spins(typ: int, spins: int, axes: str) -> ByElements:
 
 
 def _imaginary(axes: str, odd: bool) -> complex:
+    """1, or i (-i in an oblate basis) for odd L."""
     if not odd:
         return 1.0
     return 1j if axes[2] == "a" else -1j
@@ -66,7 +67,7 @@ Where = tuple[int, int, str]  # N', N, representation
 def _with_conjugate(
     order: int, k: int, rank: int, cosine: bool, frame: tuple[str, str, str], where: Where
 ) -> Complexes:
-    """E + E†, or (E - E†)/i, with spins in place of some N; {Z, E} in place of E where K = L - 1."""
+    """E + E†, or (E - E†)/i, with spins replacing N; {Z, E} replaces E for K = L - 1."""
     right = 1.0 if "".join(frame) in ("abc", "bca", "cab") else -1.0
     up, down = (_stretched(order, rank, frame, sign, where) for sign in (1, -1))
     if k < order:
@@ -76,12 +77,13 @@ def _with_conjugate(
 
 
 def _stretched(order: int, rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
-    """A of the module text, or with - in place of +."""
+    """A of the head of this module, or the operator with - in place of +."""
     _, n, representation = where
     return np.asarray(_ladder_of_cosines(rank, frame, sign, where) @ _n(frame, sign, n, representation, order - rank))
 
 
 def _ladder_of_cosines(rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
+    """φ± or φ± φ± over |N k⟩."""
     m, n, representation = where
     x, y, _ = frame
     if rank == 0:
@@ -89,19 +91,21 @@ def _ladder_of_cosines(rank: int, frame: tuple[str, str, str], sign: int, where:
     if rank == 1:
         return _vector(x, 1, where) + sign * 1j * _vector(y, 1, where)
     i, k = "abc".index(x), "abc".index(y)
-    found = np.zeros((2, 3, 3))
-    found[0, i, i], found[0, k, k], found[1, i, k], found[1, k, i] = 1.0, -1.0, 1.0, 1.0
-    real, imaginary = (symmetric_top_elements(m, n, spherical_components(one, 2, representation)) for one in found)
+    tensors = np.zeros((2, 3, 3))
+    tensors[0, i, i], tensors[0, k, k], tensors[1, i, k], tensors[1, k, i] = 1.0, -1.0, 1.0, 1.0
+    real, imaginary = (
+        symmetric_top_elements(m, n, spherical_components(tensor, 2, representation)) for tensor in tensors
+    )
     return np.asarray(real + sign * 1j * imaginary)
 
 
 def _vector(axis: str, rank: int, where: Where) -> Complexes:
-    """φ along an axis, of rank 0 N."""
+    """φ along an axis; for rank 0, N."""
     m, n, representation = where
     if rank == 0:
         square = components(n, representation)[axis].matrix
         return square if m == n else np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
-    along = [float(axis == one) for one in "abc"]
+    along = [float(axis == letter) for letter in "abc"]
     return symmetric_top_elements(m, n, spherical_components(along, 1, representation))
 
 
@@ -113,6 +117,7 @@ def _n(frame: tuple[str, str, str], sign: int, n: int, representation: str, powe
 
 
 def _commutator(frame: tuple[str, str, str], sign: int, operator: Complexes, where: Where) -> Complexes:
+    """[N∓, operator]."""
     m, n, representation = where
     left, right = (_n(frame, sign, j, representation, 1) for j in (m, n))
     return np.asarray(left @ operator - operator @ right)
@@ -126,16 +131,16 @@ def multiplied(rotor: Rotor, factor: FactorOfBoth, whole: complex, odd: bool) ->
     rotor : Rotor
         The operator.
     factor : callable
-        Of N', N, K' and K.
+        Function of N', N, K' and K.
     whole : complex
         The number.
     odd : bool
-        Whether time reversal changes the sign of what results.
+        Whether time reversal changes the sign of the result.
 
     Returns
     -------
     ByElements
-        By its elements over |N k⟩.
+        The operator by its elements over |N k⟩.
     """
     base = over_k(rotor)
 
@@ -151,7 +156,7 @@ def over_k(rotor: Rotor) -> OverK:
     if isinstance(rotor, ByElements):
         return rotor.matrix
     if isinstance(rotor, Scalar):
-        return lambda m, n, representation: _of_powers(rotor, m, n)
+        return lambda m, n, representation: _power_elements(rotor, m, n)
     assert isinstance(rotor, Cosines | CosinesWithN)
     c = np.array(rotor.components, dtype=float)
     if isinstance(rotor, CosinesWithN):
@@ -163,7 +168,7 @@ def over_k(rotor: Rotor) -> OverK:
 
 
 def plain_of_j(operators: Operators) -> OperatorOfJ:
-    """Powers (p, q, n) as an operator of one J, for what connects two states."""
+    """Powers (p, q, n) as an operator of one J, for interactions of two states."""
 
     def operator(j: int, representation: str) -> JOperator:
         total = 0.0 * identity(j)
@@ -175,7 +180,8 @@ def plain_of_j(operators: Operators) -> OperatorOfJ:
     return operator
 
 
-def _of_powers(rotor: Scalar, m: int, n: int) -> Complexes:
+def _power_elements(rotor: Scalar, m: int, n: int) -> Complexes:
+    """Elements of powers of N."""
     if m != n:
         return np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
     return plain_of_j(dict(rotor.operators))(n, "").matrix
@@ -186,8 +192,8 @@ def _with_n(c: Floats, where: Where) -> Complexes:
     m, n, representation = where
     total = np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
     up, low = components(m, representation), components(n, representation)
-    for i, one in enumerate("abc"):
-        cosine = _vector(one, 1, where)
+    for i, letter in enumerate("abc"):
+        cosine = _vector(letter, 1, where)
         for k, other in enumerate("abc"):
             if c[i, k]:
                 total += c[i, k] / 2 * (cosine @ low[other].matrix + up[other].matrix @ cosine)

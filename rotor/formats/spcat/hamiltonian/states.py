@@ -1,7 +1,7 @@
-"""What the option lines of a .par file say of each state: spins, range of K, weights; and how levels are called there.
+"""Options of each state in a .par file: spins, range of K, weights, and labels of levels.
 
-The first line sets the defaults of all states; where VSYM is negative another line follows, for the state |NVIB|, and says what
-differs there (H. M. Pickett, documentation of SPFIT and SPCAT, "line 3, option information").
+The first line sets the defaults of all states. If VSYM is negative another line follows with the differences for the state |NVIB|
+(H. M. Pickett, documentation of SPFIT and SPCAT, "line 3, option information").
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from rotor.formats.spcat.hamiltonian.codes import NOT_YET, split_code
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 
-SPECIES = {"ee": "A", "eo": "a", "oo": "b", "oe": "c"}  # of the rotational function, by parities of Ka and Kc
+SPECIES = {"ee": "A", "eo": "a", "oo": "b", "oe": "c"}  # species of rotational functions by parities of Ka and Kc
 
 
 class Fold(NamedTuple):
-    """K - l modulo n of the levels of a top with an n-fold axis that have weights: A or B species, and those of E species."""
+    """K - l modulo n of the levels of A or B species and of E species that have weights, for a top with an n-fold axis."""
 
     n: int
     alone: int
@@ -35,14 +35,14 @@ _FOLDS = {
 }  # fmt: skip  # by IAX
 
 
-EVERY_K = 10**6  # a KNMAX that cuts nothing
+EVERY_K = 10**6  # a KNMAX without effect
 
 
 @dataclass(frozen=True)
 class StateOptions:
-    """Of one state: doubled spins in the order of coupling, range of K, axis and weights, weight of E levels, l.
+    """Options of one state: doubled spins in the order of coupling, range of K, axis and weights, weight of E levels, l.
 
-    i_tot: the last two spins, or with a threefold axis the last three, are coupled to a total first.
+    i_tot: whether the last two spins (three with a threefold axis) are coupled to a total first.
     """
 
     number: int
@@ -58,17 +58,17 @@ class StateOptions:
 
     @property
     def fold(self) -> int:
-        """n of the n-fold axis whose weights the state has, 0 for those of a half turn."""
+        """n of the n-fold axis of the weights, 0 for weights of a half turn."""
         return _FOLDS[self.iax].n if self.iax in _FOLDS else 0
 
     @property
     def equivalent(self) -> int:
-        """How many of the last spins are coupled to a total first: 0, 2 or 3."""
+        """Number of last spins that are coupled to a total first: 0, 2 or 3."""
         return (3 if self.fold == 3 else 2) if self.i_tot else 0
 
     @property
     def linear(self) -> bool:
-        """Whether K = 0 alone is in the basis."""
+        """Whether the basis has only K = 0."""
         return self.kmin == self.kmax == 0
 
     @property
@@ -78,19 +78,19 @@ class StateOptions:
 
     @property
     def is_cut(self) -> bool:
-        """Whether KNMIN or KNMAX leaves K out of a basis of several K."""
+        """Whether KNMIN or KNMAX excludes K from a basis of several K."""
         return not self.has_one_k and (self.kmin > 0 or self.kmax < EVERY_K)
 
     def with_every_k(self) -> StateOptions:
-        """The state with every K to N in its basis, unless it has one K."""
+        """The state with all K up to N in its basis, unless it has a single K."""
         return self if self.has_one_k else replace(self, kmin=0, kmax=EVERY_K)
 
     def with_k_to(self, highest_n: int) -> StateOptions:
-        """The state without a KNMAX that leaves nothing out up to the highest N."""
+        """The state without a KNMAX that excludes nothing up to the highest N."""
         return self if self.has_one_k or self.kmax < highest_n else replace(self, kmax=EVERY_K)
 
     def weights(self, ka: Ints, kc: Ints, k: Ints, odd_spins: Ints | int = 0) -> Ints:
-        """Nuclear-spin weight of one component of levels, as the file has it; zero or less where a level does not exist.
+        """Nuclear-spin weight of one component of levels, as in the file; zero or less for a level that does not exist.
 
         Parameters
         ----------
@@ -99,7 +99,7 @@ class StateOptions:
         k : (n,) array of int
             K along the axis of the basis.
         odd_spins : (n,) array of int or int, optional
-            Odd where half a turn across the axis changes the sign of the function of equivalent spins: the two weights change places.
+            Odd if a half turn across the axis changes the sign of the function of equivalent spins, which exchanges the two weights.
 
         Returns
         -------
@@ -115,32 +115,35 @@ class StateOptions:
         return np.where(class_of == fold.alone, weight, paired)
 
     def _has_e(self, weight: Ints) -> NDArray[np.bool_]:
-        """Whether E levels stand in Wang blocks of such a weight: of a threefold axis those of weight 0 are left out as a whole, so that
-        half of the E levels are there, with twice their weight in the file."""
+        """Whether E levels exist in Wang blocks of this weight.
+
+        For a threefold axis blocks of weight 0 are left out entirely, so that half of the E levels are listed, with twice their weight."""
         return np.asarray((weight > 0) | (self.fold != 3))
 
     def odd_spins(self, quanta: Mapping[str, Ints]) -> Ints | int:
-        """Of levels by their quantum numbers: odd I_tot of two equivalent spins, functions of species A2 of three."""
+        """Odd for levels with odd I_tot of two equivalent spins, or functions of species A2 of three."""
         return np.asarray(quanta["i_sym"] % 6 == 1, dtype=np.int64) if self.equivalent == 3 else quanta.get("i_tot", 0)
 
     def class_weight(self, ka: Ints, kc: Ints, odd_spins: Ints | int = 0) -> Ints:
-        """WTPL or WTMN by the parities of Ka and Kc, (n,), E levels apart."""
+        """WTPL or WTMN by the parities of Ka and Kc, (n,), without E levels."""
         odd = {1: ka % 2, 2: (ka + kc) % 2, 3: kc % 2}.get(self.iax, (ka + kc) % 2)
         return np.where((odd + odd_spins) % 2 == 0, self.plus, self.minus)
 
     def block_weights(self, ka: Ints, kc: Ints, k: Ints) -> Ints:
-        """Weights of the A (or B) and of the E levels in the Wang block of a level, (n, 2), 0 where there are none; n-fold axis."""
-        fold, own = _FOLDS[self.iax], np.where((ka + kc) % 2 == 0, self.plus, self.minus)
+        """Weights of the A (or B) and of the E levels in the Wang block of a level, (n, 2), for an n-fold axis; 0 if there are none."""
+        fold, class_weight = _FOLDS[self.iax], np.where((ka + kc) % 2 == 0, self.plus, self.minus)
         steps = np.arange(0, 2 * fold.n, 2)  # K that stand in one Wang block, modulo n
         classes = (k[:, None] - self.l_code + steps) % fold.n
         alone = (classes == fold.alone).any(axis=1)
         paired = np.isin(classes, fold.paired).any(axis=1) | (
             self.iax == 7
         )  # which names both kinds of blocks of a 4-fold axis
-        return np.stack([np.where(alone, own, 0), np.where(paired & self._has_e(own), self.e_weight, 0)], axis=1)
+        return np.stack(
+            [np.where(alone, class_weight, 0), np.where(paired & self._has_e(class_weight), self.e_weight, 0)], axis=1
+        )
 
     def is_e(self, k: Ints) -> NDArray[np.bool_]:
-        """Which levels are of E species, whose K is not signed."""
+        """Whether levels are of E species; their K has no sign."""
         fold = _FOLDS.get(self.iax)
         if fold is None or fold.n < 3 or self.equivalent == 3:
             return np.zeros(np.shape(k), dtype=bool)
@@ -148,9 +151,9 @@ class StateOptions:
 
 
 def doubled_spins(spind: int) -> tuple[int, ...]:
-    """2I of every spin that SPIND names, the one coupled first at its end; with a last digit 0 two digits a spin.
+    """2I of the spins in SPIND, whose last digit belongs to the spin coupled first; with a last digit 0 each spin has two digits.
 
-    A digit 1 before others holds the place of a spin of size 0, which has its quantum number and splits nothing.
+    A leading digit 1 is a spin of size 0, a placeholder that adds a quantum number but no splitting.
 
     >>> doubled_spins(44), doubled_spins(-32), doubled_spins(1), doubled_spins(-1080), doubled_spins(61), doubled_spins(161)
     ((3, 3), (1, 2), (), (7,), (0, 5), (0, 5))
@@ -165,23 +168,24 @@ def doubled_spins(spind: int) -> tuple[int, ...]:
 
 
 def states_of(file: ParameterFile) -> tuple[StateOptions, ...]:
-    """The options of every state; ValueError for an axis of weights that is not computed yet, and l-doubled states."""
+    """The options of all states; ValueError for an unsupported axis of weights or l-doubled states."""
     first = file.options[0]
     return tuple(_state(v, options_of_state(file, v), first) for v in range(max(abs(first.nvib), 1)))
 
 
 def options_of_state(file: ParameterFile, v: int) -> Options:
-    """The option line of a state; where it has none of its own, the first, of which the digits of VSYM say who exchanges weights."""
+    """The option line of a state, else the first line, in which the digits of VSYM mark states with exchanged weights."""
     first = file.options[0]
-    own = [line for line in file.options[1:] if abs(line.nvib) == v]
-    if own:
-        return own[-1]
+    stated = [line for line in file.options[1:] if abs(line.nvib) == v]
+    if stated:
+        return stated[-1]
     digits = str(max(first.vsym, 0))[::-1]
     swapped = not file.options[1:] and v < len(digits) and int(digits[v]) % 2 == 1
     return replace(first, wtpl=first.wtmn, wtmn=first.wtpl) if swapped else first
 
 
 def _state(v: int, line: Options, first: Options) -> StateOptions:
+    """The options of a state from its line and the first line."""
     factor = 100 if first.ewt >= 0 else 1000
     code, weight = divmod(abs(line.ewt), factor)
     iax, spins = abs(line.iax), doubled_spins(line.spind)
@@ -205,7 +209,7 @@ def _state(v: int, line: Options, first: Options) -> StateOptions:
 
 
 def _check_total(v: int, line: Options, spins: tuple[int, ...], e_species: tuple[int, int]) -> None:
-    """ValueError for a total spin that is not computed: other than of two or three, of unequal ones, with levels of E species."""
+    """Raise ValueError for an unsupported total spin: not of two or three spins, of unequal spins, or with levels of E species."""
     fold = _FOLDS[-line.iax].n if -line.iax in _FOLDS else 2
     if fold > 3:
         raise ValueError(
@@ -231,7 +235,7 @@ def _check_total(v: int, line: Options, spins: tuple[int, ...], e_species: tuple
 
 
 def is_odd(ka: Ints, kc: Ints) -> NDArray[np.bool_]:
-    """Which levels have a species that SPCAT counts as odd: Ba and Bc, Ka + Kc odd."""
+    """Whether levels have a species that SPCAT counts as odd: Ba and Bc, Ka + Kc odd."""
     return np.asarray((ka + kc) % 2 == 1)
 
 
@@ -256,5 +260,5 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
     )
     energies = any(not any(d[:8]) for d in digits)
     mixed = any(d.typ == 4 and d.ksq for d in digits) and any(d.typ > 4 for d in digits)  # terms of both reductions
-    own = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
-    return orthorhombic and own and not energies and not mixed
+    plain_dipoles = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
+    return orthorhombic and plain_dipoles and not energies and not mixed

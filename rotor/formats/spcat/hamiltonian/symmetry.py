@@ -1,7 +1,7 @@
-"""What the symmetry that option lines declare forbids: such parameters, or parts of them, SPCAT leaves out with a warning in its .out.
+"""Parameters, or parts of them, that the declared symmetry forbids; SPCAT leaves them out with a warning in its .out file.
 
-An n-fold axis (IAX 6 to 11) allows Δk - Δl = 0, ±n, ... only. Operators that connect levels of unequal nuclear-spin weights alone
-are left out too, and so are those between states whose axes differ.
+An n-fold axis (IAX 6 to 11) allows only Δk - Δl = 0, ±n, .... Operators that connect only levels of unequal nuclear-spin weights are left
+out too, and operators between states whose axes differ.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ _SPECIES = ((0, 0), (0, 1), (1, 1), (1, 0))  # A, Ba, Bb, Bc by parities of Ka a
 
 
 def l_values(states: Sequence[StateOptions], pairs: Sequence[Pair]) -> dict[int, int]:
-    """l of the l-doubled states by number: that of the state with K l > 0 is positive."""
-    found: dict[int, int] = {}
+    """l of the l-doubled states by number, positive for the state with K l > 0."""
+    l_of_state: dict[int, int] = {}
     for pair in pairs:
         size = min(states[pair.first].l_code, states[pair.second].l_code)
-        found |= {pair.first: size, pair.second: -size}
-    return found
+        l_of_state |= {pair.first: size, pair.second: -size}
+    return l_of_state
 
 
 def forbidden(
     typ: int, low: StateOptions, high: StateOptions, del_l: int, oblate: bool, doubled: bool, spins: Sequence[int] = ()
 ) -> str:
-    """Why an operator between two states, or within one, has no elements; nothing where it has some.
+    """The reason why symmetry forbids an operator between two states, or within one; empty if it is allowed.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ def forbidden(
     oblate : bool
         Whether z is the c axis.
     doubled : bool
-        Whether one of the states is l-doubled: the species of such levels are not looked at.
+        Whether one of the states is l-doubled; the species of its levels are not tested.
     spins : sequence of int, optional
-        Numbers of the spins that it acts on, from 1.
+        Numbers, from 1, of the spins on which it acts.
 
     Returns
     -------
@@ -72,13 +72,13 @@ def forbidden(
 
 
 def exchange_of(typ: int, low: StateOptions, high: StateOptions) -> int:
-    """The part of an operator with one of two equivalent spins that joins levels of one weight: 1 the even one, -1 the odd one, 0 both."""
+    """The part of an operator with one of two equivalent spins that connects levels of equal weight: 1 even, -1 odd, 0 both."""
     even, odd = (some_weights_agree(typ, low, high, turned) for turned in (0, 1))
     return int(even) - int(odd)
 
 
 def some_weights_agree(typ: int, low: StateOptions, high: StateOptions, odd_spins: int = 0) -> bool:
-    """Whether an operator by its TYP (20, 40, 60: of the species of Na, Nb, Nc) joins levels of one weight.
+    """Whether an operator of a TYP (20, 40, 60: species of Na, Nb, Nc) connects levels of equal weight.
 
     Parameters
     ----------
@@ -87,12 +87,12 @@ def some_weights_agree(typ: int, low: StateOptions, high: StateOptions, odd_spin
     low, high : StateOptions
         Of the two states; the same twice within one state.
     odd_spins : int, optional
-        1 where it changes the sign of the function of equivalent spins too.
+        1 if it also changes the sign of the function of equivalent spins.
 
     Returns
     -------
     bool
-        Whether two such levels have one weight.
+        Whether such levels exist.
     """
     turn = TURNS[axis_of(typ)]
     for species in _SPECIES:
@@ -106,51 +106,53 @@ def some_weights_agree(typ: int, low: StateOptions, high: StateOptions, odd_spin
 
 @lru_cache(maxsize=4096)
 def _weights(state: StateOptions, ka: int, kc: int, odd_spins: int = 0) -> tuple[int, ...]:
-    """Of A (or B) and of E levels in the Wang block of a species, whichever axis K is along."""
-    one, other = np.array([ka]), np.array([kc])
+    """Weights of A (or B) and of E levels in the Wang block of a species, for K along either axis."""
+    ka_array, kc_array = np.array([ka]), np.array([kc])
     if state.fold < 3:
-        return (int(state.class_weight(one, other, odd_spins)[0]),)
-    along = {int(k): state.block_weights(one, other, np.array([k]))[0] for k in (ka, kc)}
-    return tuple(sorted({int(weight) for found in along.values() for weight in found}))
+        return (int(state.class_weight(ka_array, kc_array, odd_spins)[0]),)
+    along = {int(k): state.block_weights(ka_array, kc_array, np.array([k]))[0] for k in (ka, kc)}
+    return tuple(sorted({int(weight) for pair in along.values() for weight in pair}))
 
 
 SpeciesPairs = frozenset[tuple[str, str]]
 
 
 def species_pairs(up: StateOptions, low: StateOptions, turned: tuple[bool, bool]) -> SpeciesPairs | None:
-    """The species of Wang blocks of two states between which there are elements, those whose levels have the same weights; None for all.
+    """Pairs of species of Wang blocks of two states that an operator may connect, those with equal weights; None for all.
 
-    turned: of each state, whether half a turn across the axis changes its sign: of l-doubled states the second component, y.
+    turned: for each state, whether a half turn across the axis changes its sign, as for the second component y of l-doubled states.
     """
     if low.equivalent or up.equivalent:
         return None
-    own, other = (_by_species(state, flip) for state, flip in zip((up, low), turned, strict=True))
-    found = frozenset((s, t) for s in own for t in other if own[s] == other[t])
-    return found if len(found) < len(own) * len(other) else None
+    up_weights, low_weights = (_by_species(state, flip) for state, flip in zip((up, low), turned, strict=True))
+    pairs = frozenset((s, t) for s in up_weights for t in low_weights if up_weights[s] == low_weights[t])
+    return pairs if len(pairs) < len(up_weights) * len(low_weights) else None
 
 
 def _by_species(state: StateOptions, turned: bool) -> dict[str, tuple[int, ...]]:
+    """Weights of a state by species."""
     swapped = replace(state, plus=state.minus, minus=state.plus) if turned else state
     return {"eo"[ka] + "eo"[kc]: _weights(swapped, ka, kc) for ka, kc in _SPECIES}
 
 
 def symmetric_part(operator: CodedOperator, axes: str) -> CodedOperator:
-    """Of Nb² and Nc², with a spin or without, the part that an axis of more than two folds along z leaves: without ΔK = 2."""
+    """The part of Nb² and Nc² (also with a spin) that an axis of more than two folds along z allows, without ΔK = 2."""
     if operator.plain is not None:
         return replace(operator, plain={powers: value for powers, value in operator.plain.items() if powers[2] == 0})
     return operator if not _is_matrix(operator) else _scaled_across(operator, axes, 0.0)
 
 
 def halved_across(operator: CodedOperator, axes: str) -> CodedOperator:
-    """An operator with one of three equivalent spins, its part with ΔK ≠ 0 halved: that is what its code stands for in SPCAT.
+    """An operator with one of three equivalent spins, with the part of ΔK ≠ 0 halved, as SPCAT defines its code.
 
-    With the tensors of the three nuclei, turned by 120° from one to the next, levels agree with the program's where the value of its
-    parameter with ΔK = 1 or 2 is twice that of a nucleus coupled by itself; with ΔK = 0 it is the same.
+    With tensors of the three nuclei that are turned by 120° from one to the next, levels agree with the program's if its parameter with
+    ΔK = 1 or 2 is twice that of a single nucleus; with ΔK = 0 both are equal.
     """
     return operator if not _is_matrix(operator) else _scaled_across(operator, axes, 0.5)
 
 
 def _is_matrix(operator: CodedOperator) -> bool:
+    """Whether an operator has a matrix of components."""
     return isinstance(operator.rotor, Cosines | CosinesWithN) and np.ndim(operator.rotor.components) == 2
 
 

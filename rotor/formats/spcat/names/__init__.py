@@ -1,1 +1,1 @@
-"""SPFIT's files and named constants, both ways."""
+"""Conversion between SPFIT's files and named constants."""

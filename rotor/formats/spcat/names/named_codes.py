@@ -1,4 +1,4 @@
-"""Named constants of states and spins as SPFIT's parameters: which codes stand for a name, and with which factors.
+"""Named constants of states and spins as SPFIT's parameters: the codes of each name, and their factors.
 
 | name | codes, in the basis Ir (axes a, b, c) |
 |---|---|
@@ -46,11 +46,11 @@ from rotor.tops.spins.spin_weights import SpinWeights
 _CROSS = {PAIRS[letters]: typ for typ, letters in CROSS.items()}
 _KINDS = (NuclearQuadrupole, SpinRotation, SpinSpin)
 
-Codes = dict[int, dict[str, float]]  # value of a code by named constants: what each has to be multiplied with
+Codes = dict[int, dict[str, float]]  # factors of the named constants in the value of each code
 
 
 def codes_of_names(constants: TopConstants) -> Codes:
-    """Of every code that a file of the top has, which constants its value is made of, and how much of each.
+    """For each code of the file of a top, the constants in its value and their factors.
 
     Raises ValueError for constants in another representation than Ir and IIIl.
     """
@@ -58,7 +58,7 @@ def codes_of_names(constants: TopConstants) -> Codes:
         raise ValueError(
             f"constants in representation {constants.representation}: SPFIT's files have Ir and IIIl alone; convert them first"
         )
-    return _of_own_states(constants) | _of_pairs_and_spins(constants)
+    return _rotational_codes(constants) | _interaction_codes(constants)
 
 
 def is_oblate(constants: Constants) -> bool:
@@ -67,37 +67,38 @@ def is_oblate(constants: Constants) -> bool:
 
 
 def _scheme(constants: TopConstants) -> Scheme | None:
-    found = scheme_of(constants.top, constants.effects)
-    return found if found.spins else None
+    scheme = scheme_of(constants.top, constants.effects)
+    return scheme if scheme.spins else None
 
 
 def _states(constants: TopConstants) -> int:
     return 1 if constants.top.states is None else constants.top.states.count
 
 
-def _of_own_states(constants: TopConstants) -> Codes:
-    """Of the rotation in every state: what each parameter of a file of that state alone is made of."""
+def _rotational_codes(constants: TopConstants) -> Codes:
+    """Factors of the rotational parameters of each state."""
     top, out, states = constants.top, Codes(), _states(constants)
     for v in range(states):
         values: dict[str, Any] = dict(top.constants.values) if v == 0 or top.states is None else top.states.of_state(v)
         if v:
             out[join_code(Digits(0, 0, 0, 0, 0, 0, 0, 0, v, v), states)] = {f"E[{v}]": 1.0}
             values.pop("E", None)
-        own = Constants(
+        state_constants = Constants(
             kind=constants.kind, reduction=constants.reduction, representation=constants.representation, **values
         )
-        option = options_of(own, SpinWeights(), 1)
-        file = ParameterFile("", Header(npar=1), (option,), parameters_of(own))
-        known, matrix = constants_and_matrix(file)
+        option = options_of(state_constants, SpinWeights(), 1)
+        file = ParameterFile("", Header(npar=1), (option,), parameters_of(state_constants))
+        read_back, matrix = constants_and_matrix(file)
         back = np.linalg.inv(matrix)
         for parameter, row in zip(file.parameters, back, strict=True):
             code = join_code(split_code(parameter.code)._replace(v1=v, v2=v), states)
             suffix = f"[{v}]" if v else ""
-            out[code] = {f"{name}{suffix}": float(f) for name, f in zip(known.values, row, strict=True) if f}
+            out[code] = {f"{name}{suffix}": float(f) for name, f in zip(read_back.values, row, strict=True) if f}
     return out
 
 
-def _of_pairs_and_spins(constants: TopConstants) -> Codes:
+def _interaction_codes(constants: TopConstants) -> Codes:
+    """Factors of interactions and spin constants."""
     out, scheme, oblate = Codes(), _scheme(constants), is_oblate(constants.top.constants)
     terms = {
         term.name: term
@@ -106,30 +107,31 @@ def _of_pairs_and_spins(constants: TopConstants) -> Codes:
         for term in effect.spin_terms(constants.top)
     }
     for name in constants.values:
-        found: dict[Digits, float] = {}
+        factors: dict[Digits, float] = {}
         if name in terms and scheme is not None:
-            found = _of_spins(parse_name(name), terms[name], scheme, constants, oblate)
+            factors = _spin_codes(parse_name(name), terms[name], scheme, constants, oblate)
         elif "," in name:
             parts = parse_name(name)
             assert parts.states is not None
             typ, (low, high) = TYPES_BETWEEN[parts.symbol], parts.states
             sign = -1.0 if oblate and parts.symbol.startswith("G") else 1.0
-            found = {Digits(0, 0, 0, 0, 0, typ, parts.nz2, parts.n2, low, high): sign}
-        for digits, factor in found.items():
+            factors = {Digits(0, 0, 0, 0, 0, typ, parts.nz2, parts.n2, low, high): sign}
+        for digits, factor in factors.items():
             out.setdefault(_code(name, digits, _states(constants)), {})[name] = factor
     return out
 
 
 def _code(name: str, digits: Digits, states: int) -> int:
+    """The code with these fields."""
     if digits.nsq > 9 or digits.ksq > 9:
         raise ValueError(f"{name}: SPFIT's codes have powers of N² and of Nz² up to 9 (J and K to the power 18)")
     return join_code(digits, states)
 
 
-def _of_spins(
+def _spin_codes(
     parts: ParameterName, term: SpinTerm, scheme: Scheme, constants: TopConstants, oblate: bool
 ) -> dict[Digits, float]:
-    """The codes of a constant of spins, by the matrix c_ij that it multiplies."""
+    """The codes of a spin constant, from the matrix c_ij that it multiplies."""
     states, places = _states(constants), [scheme.place(spin) + 1 for spin in term.spins]
     i1, i2 = max(places), (min(places) if len(places) == 2 else 0)
     wild = 0 if states == 1 else 10 ** state_digits(states) - 1
@@ -143,24 +145,26 @@ def _of_spins(
             f"{parts.text}: no code of SPFIT says what the two orders of a spin-rotation constant differ by (its commutators with N², "
             "I1 = 0 and I2 > 0, are other operators); leave it out, or stay with .toml"
         )
-    of_three = scheme.equivalent == 3 and max(places) > len(scheme.spins) - 3
-    found = _of_matrix(np.array(rotor.components, dtype=float), isinstance(rotor, CosinesWithN), oblate, of_three)
-    return {base._replace(typ=typ): term.factor * factor for typ, factor in found.items()}
+    acts_on_three = scheme.equivalent == 3 and max(places) > len(scheme.spins) - 3
+    factors = _matrix_codes(
+        np.array(rotor.components, dtype=float), isinstance(rotor, CosinesWithN), oblate, acts_on_three
+    )
+    return {base._replace(typ=typ): term.factor * factor for typ, factor in factors.items()}
 
 
-def _of_matrix(c: Floats, whole: bool, oblate: bool, of_three: bool) -> dict[int, float]:
-    """TYP and factors of Σ c_ij: of all of the matrix, or of its traceless part, which TYP 1, 2 or 3 of z and TYP 4 make up.
+def _matrix_codes(c: Floats, whole: bool, oblate: bool, acts_on_three: bool) -> dict[int, float]:
+    """TYP and factors of Σ c_ij: of the whole matrix, or of its traceless part by TYP 1, 2 or 3 (for z) and TYP 4.
 
-    of_three: of one of three equivalent spins the parts that change K count twice, see `symmetry.halved_across`.
+    acts_on_three: for one of three equivalent spins the parts that change K count twice, see `symmetry.halved_across`.
     """
     x, y, z = ("abc".index(axis) for axis in basis_axes(oblate))
-    diagonal, times = np.diag(c), 2.0 if of_three else 1.0
+    diagonal, times = np.diag(c), 2.0 if acts_on_three else 1.0
     mean, across = float(diagonal[x] + diagonal[y]) / 2, times * float(diagonal[x] - diagonal[y]) / 4
-    found = {typ: times * float(c[i, k]) for (i, k), typ in _CROSS.items()}
+    factors = {typ: times * float(c[i, k]) for (i, k), typ in _CROSS.items()}
     if not whole:
-        found |= {z + 1: float(diagonal[z]) - mean, 4: across}
-    elif of_three or diagonal[0] == diagonal[1] == diagonal[2] or diagonal[x] == -diagonal[y]:
-        found |= {0: mean, z + 1: float(diagonal[z]) - mean, 4: across}
+        factors |= {z + 1: float(diagonal[z]) - mean, 4: across}
+    elif acts_on_three or diagonal[0] == diagonal[1] == diagonal[2] or diagonal[x] == -diagonal[y]:
+        factors |= {0: mean, z + 1: float(diagonal[z]) - mean, 4: across}
     else:
-        found |= {i + 1: float(diagonal[i]) for i in range(3)}
-    return {typ: factor for typ, factor in found.items() if abs(factor) > 1e-12}
+        factors |= {i + 1: float(diagonal[i]) for i in range(3)}
+    return {typ: factor for typ, factor in factors.items() if abs(factor) > 1e-12}

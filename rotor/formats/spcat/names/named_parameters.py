@@ -1,4 +1,4 @@
-"""The .par or .var file of a top of named constants, with its spins and states: the way back from `named_top`."""
+"""The .par or .var file of a top with named constants, spins and states: the inverse of `named_top`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rotor.tops.top import Top
 def named_parameter_file(top: Top, kmax: int) -> ParameterFile:
     """The file of a top, for levels with K up to `kmax`; spins in the order in which they are coupled.
 
-    Raises ValueError, naming the constant or the weights, for what an SPFIT file cannot say.
+    Raises ValueError, with the constant or the weights, for what an SPFIT file cannot express.
     """
     return named_parameters(TopConstants(top, top.spin_constants is not None), top.name, kmax)[0]
 
@@ -29,7 +29,7 @@ def named_parameter_file(top: Top, kmax: int) -> ParameterFile:
 def named_parameters(constants: TopConstants, title: str, kmax: int) -> tuple[ParameterFile, Floats]:
     """The file of named constants with their errors, and M (parameters, constants) with values of the file = M @ constants.
 
-    A parameter with a constant whose error is not known has 1e-37, which holds it. Raises ValueError as `named_parameter_file`.
+    A parameter that contains a constant of unknown error has the error 1e-37, which holds it. Raises ValueError as `named_parameter_file`.
     """
     codes, names = codes_of_names(constants), list(constants.values)
     matrix = np.zeros((len(codes), len(names)))
@@ -45,36 +45,36 @@ def named_parameters(constants: TopConstants, title: str, kmax: int) -> tuple[Pa
     return ParameterFile(title, header, _option_lines(constants, kmax), parameters), matrix
 
 
-def _error(factors: Mapping[str, float], known: Mapping[str, float]) -> float:
-    """√Σ (factor · error)², as if the errors were independent."""
-    if not set(factors) <= set(known):
+def _error(factors: Mapping[str, float], errors: Mapping[str, float]) -> float:
+    """√Σ (factor · error)² for independent errors."""
+    if not set(factors) <= set(errors):
         return FIXED
-    return float(np.sqrt(sum((factor * known[name]) ** 2 for name, factor in factors.items()))) or FIXED
+    return float(np.sqrt(sum((factor * errors[name]) ** 2 for name, factor in factors.items()))) or FIXED
 
 
 def _label(factors: Mapping[str, float]) -> str:
-    """The constants that a parameter consists of."""
+    """The constants of a parameter, as text."""
     parts = [name if factor == 1 else f"{factor:.4g}*{name}" for name, factor in factors.items()]
     return "+".join(parts).replace("+-", "-").replace("-1*", "-")
 
 
 def _option_lines(constants: TopConstants, kmax: int) -> tuple[Options, ...]:
-    """One line for all states, or where their weights differ one for each."""
+    """One option line for all states, or one for each if their weights differ."""
     top = constants.top
     count = 1 if top.states is None else top.states.count
     weights = [top.states.weights.get(v, top.spin_weights) if top.states else top.spin_weights for v in range(count)]
     spins = top.spin_constants if constants.hyperfine else None
-    lines = [_option_line(top, spins, one, kmax) for one in weights]
+    lines = [_option_line(top, spins, state_weights, kmax) for state_weights in weights]
     sign = -1 if lines[0].nvib < 0 else 1
     first = replace(lines[0], nvib=sign * count)
-    if all(one == weights[0] for one in weights):
+    if all(state_weights == weights[0] for state_weights in weights):
         return (first,)
     others = [replace(line, nvib=sign * v, vsym=-1 if v < count - 1 else 0) for v, line in enumerate(lines)][1:]
     return (replace(first, vsym=-1), *others)
 
 
 def _option_line(top: Top, spins: SpinConstants | None, weights: SpinWeights, kmax: int) -> Options:
-    """With the spins, if there are some; IAX below 0 where two or three of them have a total spin."""
+    """The option line with spins; IAX is negative if two or three of them have a total spin."""
     line = options_of(top.constants, weights, kmax)
     if spins is None:
         return line
@@ -85,7 +85,7 @@ def _option_line(top: Top, spins: SpinConstants | None, weights: SpinWeights, km
 
 
 def spind_of(twice: Mapping[str, int]) -> int:
-    """SPIND of spins in the order of coupling: 2I + 1 digit by digit from the right, above 9 two digits each and a last 0.
+    """SPIND of spins in the order of coupling: 2I + 1 as digits from the right, or two digits each and a last 0 if one is above 9.
 
     >>> spind_of({"S": 1, "14N": 2}), spind_of({"10B": 6, "other": 9}), spind_of({})
     (32, 10070, 1)

@@ -1,9 +1,8 @@
 """A .par or .var file with spins and several states as a top of named constants: chi_aa(14N), B[1], G_c[0,1], ...
 
-The files know sizes of spins and no isotopes: a spin is called after the isotope that labels such as chi_aa(14N) name, where its size
-is that, else by its place in SPIND, I1, I2, ...; electrons are no spins of another kind there. Nuclei of one total spin (IAX below 0)
-have it by the name I. What has no name here (l-doubled states, terms outside orthorhombic symmetry in one state, spin-orbit terms) is
-refused with its meaning;
+The files contain sizes of spins but no isotopes. A spin is named after the isotope in labels such as chi_aa(14N) if the size agrees, else
+by its place in SPIND, I1, I2, ...; the files do not distinguish electrons. Nuclei with a total spin (IAX below 0) share the name I. Terms
+without a name here (l-doubled states, terms outside orthorhombic symmetry in one state, spin-orbit terms) are refused with their meaning;
 `rotor.formats.spcat.predict` computes the files themselves.
 """
 
@@ -22,7 +21,7 @@ from rotor.formats.spcat.file_spins import with_their_spins
 from rotor.formats.spcat.hamiltonian.code_types import PAIRS, TYPES_BETWEEN, axis_of
 from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, basis_axes, constants_of, is_linear, join_code, split_code
 from rotor.formats.spcat.hamiltonian.dipole_codes import dipoles_of
-from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, real_ones, reasons_of_states
+from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, real_lines, reasons_of_states
 from rotor.formats.spcat.hamiltonian.phases import phases_of
 from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
 from rotor.formats.spcat.hamiltonian.states import StateOptions, options_of_state, states_of
@@ -47,11 +46,11 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     Parameters
     ----------
     file : ParameterFile
-        Of a .par or .var file.
+        A .par or .var file.
     intensities : IntensityFile, optional
-        For the dipoles of the states and between them.
+        Dipoles of the states and between them.
     errors : bool, optional
-        Whether the errors of parameters become uncertainties, of constants that are one parameter.
+        Whether errors of parameters become uncertainties of constants that are one parameter.
 
     Returns
     -------
@@ -62,22 +61,22 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     Raises
     ------
     ValueError
-        Naming the field or the parameter, for what has no name.
+        With the field or the parameter, for terms without a name.
     """
     states, first = states_of(file), file.options[0]
     _refuse(file, states)
     lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
     odd = phases_of(file, len(states), frozenset()).odd
-    lines, imaginary = real_ones(lines, odd, frozenset())
+    lines, imaginary = real_lines(lines, odd, frozenset())
     lines, without_spins = with_their_spins(lines, states)
     left_out += imaginary + without_spins + reasons_of_states(file, len(states))
     if odd and any(axis_of(line.typ) for line in lines):
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
     rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
 
-    letter, own = _letter(file, rows), _own_parameters(rows, len(states))
+    letter, parameters_of_states = _letter(file, rows), _own_parameters(rows, len(states))
     constants, energies = [], []
-    for v, parameters in enumerate(own):
+    for v, parameters in enumerate(parameters_of_states):
         option = replace(options_of_state(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
         option = replace(option, nvib=-1 if first.nvib < 0 else 1, vsym=0, text="")
         energies.append(sum(p.value for p in parameters if not any(split_code(p.code)[:8])))
@@ -101,6 +100,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
 
 
 def _refuse(file: ParameterFile, states: tuple[StateOptions, ...]) -> None:
+    """Raise ValueError for options and operators without named constants."""
     first = file.options[0]
     digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
     reasons = {
@@ -115,13 +115,13 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...]) -> None:
         "SPIND: spins that differ from state to state": len({s.spins for s in states}) > 1,
         "KNMAX: linear states beside others": len({s.linear for s in states}) > 1,
     }
-    for what, found in reasons.items():
-        if found:
+    for what, applies in reasons.items():
+        if applies:
             raise ValueError(f"{what} {NO_NAME}")
 
 
 def _constants_of_state(v: int, file: ParameterFile, errors: bool) -> Constants:
-    """The constants of one state; ValueError, with its number, for those whose order is not that of the axes, A >= B >= C."""
+    """The constants of one state; ValueError, with its number, unless A >= B >= C for its axes."""
     try:
         return constants_of(file, errors=errors)
     except AxisOrderError as reason:
@@ -129,13 +129,14 @@ def _constants_of_state(v: int, file: ParameterFile, errors: bool) -> Constants:
 
 
 def _refuse_unlike(constants: list[Constants]) -> None:
-    kinds = list(dict.fromkeys(one.kind for one in constants))
+    """Raise ValueError for states of different kinds of top."""
+    kinds = list(dict.fromkeys(state_constants.kind for state_constants in constants))
     if len(kinds) > 1:
         raise ValueError(f"states of the kinds {' and '.join(kinds)} in one file: a top has one kind of constants")
 
 
 def _letter(file: ParameterFile, rows: list[tuple[CodedLine, Parameter]]) -> str:
-    """The letter of the reduction that some state shows, for all of them; else that of the file."""
+    """The letter of the reduction of all states: the one that a state shows, else that of the file."""
     plain = [split_code(p.code, abs(file.options[0].nvib)) for line, p in rows if line.operator.plain is not None]
     if any(d.typ > 4 for d in plain):
         return "s"
@@ -143,8 +144,8 @@ def _letter(file: ParameterFile, rows: list[tuple[CodedLine, Parameter]]) -> str
 
 
 def _own_parameters(rows: list[tuple[CodedLine, Parameter]], count: int) -> list[list[Parameter]]:
-    """The parameters of each state without spins, under the codes of one state; those of every state at each."""
-    own: list[list[Parameter]] = [[] for _ in range(count)]
+    """The parameters of each state without spins, with the codes of one state; parameters of all states occur in each."""
+    by_state: list[list[Parameter]] = [[] for _ in range(count)]
     for line, parameter in rows:
         if line.operator.rotor is not None or (line.states and line.states[0] != line.states[1]):
             continue
@@ -156,13 +157,13 @@ def _own_parameters(rows: list[tuple[CodedLine, Parameter]], count: int) -> list
         if digits.typ in (1, 2, 3) and len(line.operator.plain) == 2:  # across an axis of more than two folds
             parts = [replace(plain, code=100, value=plain.value / 2), replace(plain, code=1000, value=-plain.value / 2)]
         for v in range(count) if line.states is None else line.states[:1]:
-            own[v] += parts
-    return own
+            by_state[v] += parts
+    return by_state
 
 
 def _couplings(rows: list[tuple[CodedLine, Parameter]], count: int, first: Options, turned: bool) -> dict[str, float]:
-    """What connects two states without a spin, by name; values of one name are added."""
-    found: dict[str, float] = {}
+    """Interactions of two states without spins, by name; values of equal names are added."""
+    values: dict[str, float] = {}
     sign = -1.0 if first.nvib < 0 else 1.0  # of G in an oblate basis
     for line, parameter in rows:
         if line.operator.rotor is not None or line.states is None or line.states[0] == line.states[1]:
@@ -182,8 +183,8 @@ def _couplings(rows: list[tuple[CodedLine, Parameter]], count: int, first: Optio
             raise ValueError(f"parameter {parameter.code}: this coupling of two states {NO_NAME}")
         for name, factor in terms.items():
             full = f"{name}[{line.states[0]},{line.states[1]}]"
-            found[full] = found.get(full, 0.0) + factor * parameter.value
-    return found
+            values[full] = values.get(full, 0.0) + factor * parameter.value
+    return values
 
 
 def _with_powers(symbol: str, n2: int, nz2: int, ns: int = 0) -> str:
@@ -192,24 +193,24 @@ def _with_powers(symbol: str, n2: int, nz2: int, ns: int = 0) -> str:
 
 
 def _weights(file: ParameterFile, states: tuple[StateOptions, ...], symmetric: bool) -> list[SpinWeights]:
-    """The weights of every state; ValueError where a common divisor of one state is none of another."""
-    found, divisors = [], []
+    """The weights of all states; ValueError if states have different common divisors."""
+    weights, divisors = [], []
     for v, state in enumerate(states):
         option = replace(options_of_state(file, v), vsym=0, spind=-1 if file.options[0].spind < 0 else 1)
         option = replace(option, nvib=-1 if file.options[0].nvib < 0 else 1, iax=abs(option.iax))
         if state.equivalent == 3:
-            found.append(SpinWeights())  # with their spins all levels are of A species
+            weights.append(SpinWeights())  # with their spins all levels are of A species
             divisors.append(2 * max(state.plus, 1))
         elif state.fold in (3, 5) and state.plus != state.minus:
             option = replace(option, iax=state.iax, wtpl=state.plus, wtmn=state.minus, ewt=-state.e_weight)
-            found.append(weights_of(option, symmetric))
+            weights.append(weights_of(option, symmetric))
             divisors.append(gcd(*fold_parts(state.fold, state.plus, state.minus, state.e_weight)))
         else:
-            found.append(weights_of(option))
+            weights.append(weights_of(option))
             divisors.append(2 * (gcd(state.plus, state.minus) if not is_linear(option) else max(state.plus, 1)))
     if len(set(divisors)) > 1:
         raise ValueError(f"WTPL, WTMN: weights of states whose common divisors differ {NO_NAME}")
-    return found
+    return weights
 
 
 def _dipoles(
@@ -226,10 +227,10 @@ def _dipoles(
 def _refuse_phases(
     couplings: Mapping[str, float], dipoles: Mapping[tuple[int, int], tuple[float, float, float]]
 ) -> None:
-    """ValueError where dipoles between states have a phase that a top has not: the program gives them i if they stand alone."""
+    """Raise ValueError for dipoles between states with a phase that a top cannot have: SPCAT gives them i without dipoles in states."""
     across = any(low != high and any(mu) for (low, high), mu in dipoles.items())
-    own = any(low == high and any(mu) for (low, high), mu in dipoles.items())
-    if across and not own and couplings:
+    has_dipole_in_state = any(low == high and any(mu) for (low, high), mu in dipoles.items())
+    if across and not has_dipole_in_state and couplings:
         raise ValueError(f"dipoles between coupled states alone, which SPCAT takes times i, {NO_NAME}")
 
 
@@ -243,14 +244,14 @@ def _states(
     if len(constants) == 1:
         return None
     values: dict[str, float] = {}
-    for v, one in enumerate(constants[1:], 1):
+    for v, state_value in enumerate(constants[1:], 1):
         values[f"E[{v}]"] = energies[v] - energies[0]
-        values |= {f"{name}[{v}]": value for name, value in one.values.items()}
-    own = {(v, v): (0.0, 0.0, 0.0) for v in range(len(constants))} if dipoles else {}
-    others = {v: one for v, one in enumerate(weights) if one != weights[0]}
+        values |= {f"{name}[{v}]": value for name, value in state_value.values.items()}
+    zero_dipoles = {(v, v): (0.0, 0.0, 0.0) for v in range(len(constants))} if dipoles else {}
+    others = {v: state_value for v, state_value in enumerate(weights) if state_value != weights[0]}
     if others:
         others[0] = weights[0]
-    return StateConstants(values | couplings, weights=others, dipoles=own | dict(dipoles))
+    return StateConstants(values | couplings, weights=others, dipoles=zero_dipoles | dict(dipoles))
 
 
 # spins
@@ -258,30 +259,30 @@ def _states(
 
 @dataclass
 class _Sum:
-    """The terms of one kind and of one choice of spins, powers and states: matrices along a, b, c, or numbers, and their errors."""
+    """Terms of one kind with the same spins, powers and states: matrices along a, b, c (or numbers), and their errors."""
 
     kind: str
     values: list[Floats] = field(default_factory=list)
     errors: list[float] = field(default_factory=list)
 
     def named(self) -> dict[str, tuple[float, float | None]]:
-        """Elements by name, each with its error where it is of one parameter."""
+        """Elements by name, each with its error if it comes from one parameter."""
         total = np.sum(self.values, axis=0)
         out: dict[str, tuple[float, float | None]] = {}
         for letters in _letters(self.kind, total):
-            parts = [_element(one, letters) for one in self.values]
+            parts = [_element(matrix, letters) for matrix in self.values]
             spreads = [abs(part) * error for part, error in zip(parts, self.errors, strict=True) if part]
-            known = len(spreads) == 1 and spreads[0] > 0
+            has_error = len(spreads) == 1 and spreads[0] > 0
             value = float(f"{_element(total, letters):.15g}")
             out[f"{self.kind}_{letters}" if letters else self.kind] = (
                 value,
-                float(f"{spreads[0]:.12g}") if known else None,
+                float(f"{spreads[0]:.12g}") if has_error else None,
             )
         return out
 
 
 def _letters(kind: str, total: Floats) -> list[str]:
-    """The elements by which a tensor is given, those of 0 left out; of spin-rotation a scalar alone where it is one."""
+    """The nonzero elements that define a tensor; for spin-rotation only the scalar if it is one."""
     if kind == "J":
         return [""]
     if kind == "C" and np.allclose(total, total[0, 0] * np.eye(3), rtol=0, atol=1e-14 * np.abs(total).max()):
@@ -311,58 +312,59 @@ def _spins(
         if line.operator.rotor is None:
             continue
         try:
-            kind, matrix = _tensor(_of_one(line, states[0], oblate))
+            kind, matrix = _tensor(_single_nucleus(line, states[0], oblate))
         except ValueError as reason:
             raise ValueError(f"parameter {parameter.code}: {reason}") from None
         o, value = line.operator, parameter.value
-        of_state = "" if line.states is None or len(states) == 1 else f"[{','.join(map(str, _once(line.states)))}]"
+        state_suffix = "" if line.states is None or len(states) == 1 else f"[{','.join(map(str, _once(line.states)))}]"
         spins = ",".join(called[place - 1] for place in _once(sorted(o.spins)))
-        key = kind, f"{_with_powers('', o.n2, o.nz2, o.ns)}({spins}){of_state}"
-        one = sums.setdefault(key, _Sum(kind))
-        one.values.append(value * (matrix[::-1, ::-1] if turned and matrix.ndim else matrix))
+        key = kind, f"{_with_powers('', o.n2, o.nz2, o.ns)}({spins}){state_suffix}"
+        term_sum = sums.setdefault(key, _Sum(kind))
+        term_sum.values.append(value * (matrix[::-1, ::-1] if turned and matrix.ndim else matrix))
         spread = parameter.error or 0.0
-        one.errors.append(spread / abs(value) if errors and spread > HELD_BELOW and value else 0.0)
+        term_sum.errors.append(spread / abs(value) if errors and spread > HELD_BELOW and value else 0.0)
     values: dict[str, float] = {}
     spreads: dict[str, float] = {}
-    for (_, rest), one in sums.items():
-        for symbol, (value, error) in one.named().items():
+    for (_, rest), term_sum in sums.items():
+        for symbol, (value, error) in term_sum.named().items():
             values[symbol + rest] = value
             if error:
                 spreads[symbol + rest] = error
     if not sizes:
         return None
     totals = dict.fromkeys(called[len(called) - equivalent :], "I") if equivalent else {}
-    twice, of_others = (
+    twice, weights_are_of_others = (
         dict(zip(called, sizes, strict=True)),
         equivalent == 2,
     )  # whose functions WTPL and WTMN never count
-    return SpinConstants(values, twice, uncertainties=spreads, totals=totals, weights_of_others=of_others)
+    return SpinConstants(values, twice, uncertainties=spreads, totals=totals, weights_of_others=weights_are_of_others)
 
 
-def _of_one(line: CodedLine, state: StateOptions, oblate: bool) -> CodedLine:
-    """A line with what it is of one nucleus: the parts that change K of one of three equivalent nuclei count half there."""
-    of_three = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
-    return line._replace(operator=halved_across(line.operator, basis_axes(oblate))) if of_three else line
+def _single_nucleus(line: CodedLine, state: StateOptions, oblate: bool) -> CodedLine:
+    """A line as the term of one nucleus; for one of three equivalent nuclei the parts that change K are halved."""
+    acts_on_three = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
+    return line._replace(operator=halved_across(line.operator, basis_axes(oblate))) if acts_on_three else line
 
 
 def _names_of_spins(rows: list[tuple[CodedLine, Parameter]], sizes: tuple[int, ...]) -> list[str]:
-    """What the spins are called: S or the isotope in the labels of the parameters of one alone, if the size is right; else I1, I2, ..."""
-    found = [f"I{place}" for place in range(1, len(sizes) + 1)]
+    """Names of the spins: S or the isotope in labels of parameters with one spin, if the size agrees; else I1, I2, ..."""
+    names = [f"I{place}" for place in range(1, len(sizes) + 1)]
     for line, parameter in rows:
         places, inside = set(line.operator.spins), re.search(r"\(([^(),]+)\)", parameter.label)
-        if inside and len(places) == 1 and (name := inside[1].strip()) not in found:
+        if inside and len(places) == 1 and (name := inside[1].strip()) not in names:
             place = min(places) - 1
             if name.startswith("S") or is_isotope(name, sizes[place]):
-                found[place] = name
-    return found
+                names[place] = name
+    return names
 
 
 def _once(states: Iterable[int]) -> list[int]:
+    """States, each once."""
     return list(dict.fromkeys(states))
 
 
 def _tensor(line: CodedLine) -> tuple[str, Floats]:
-    """Which tensor a spin term belongs to, and the matrix, or 1, that its value multiplies."""
+    """The tensor of a spin term, and the matrix (or 1) that its value multiplies."""
     rotor, spins = line.operator.rotor, line.operator.spins
     if isinstance(rotor, Scalar) and len(spins) == 2:
         return "J", np.array(1.0)
