@@ -142,7 +142,7 @@ def comparison_of(molecule: MoleculeFile, shared: Path) -> Comparison:
 
 def in_range(comparison: Comparison, j_max: int, k_max: int | None) -> np.ndarray:
     """Which matched lines have J and Ka of both states within the limits."""
-    rows = comparison.of_reference
+    rows = comparison.reference_rows
     states = np.abs(np.stack([comparison.reference.quanta_upper[rows], comparison.reference.quanta_lower[rows]]))
     j, k = states[..., 0].max(axis=0), states[..., 1].max(axis=0)
     return (j <= j_max) & (k <= k_max) if k_max is not None else j <= j_max

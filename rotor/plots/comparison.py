@@ -95,8 +95,8 @@ def _draw_mirror(axes: Any, comparison: Comparison, names: tuple[str, str]) -> N
     both = np.concatenate([comparison.reference.lgint, comparison.ours.lgint])
     bottom = float(np.floor(both[np.isfinite(both)].min())) - 0.3
     sides = (
-        (comparison.reference, comparison.of_reference, comparison.missing, 1.0, name_text(names[0]) or "first list"),
-        (comparison.ours, comparison.of_ours, comparison.extra, -1.0, name_text(names[1]) or "second list"),
+        (comparison.reference, comparison.reference_rows, comparison.missing, 1.0, name_text(names[0]) or "first list"),
+        (comparison.ours, comparison.our_rows, comparison.extra, -1.0, name_text(names[1]) or "second list"),
     )
     for lines, matched, alone, sign, name in sides:
         label = f"{name}: {len(matched)} matched" if len(matched) else name
@@ -131,9 +131,9 @@ def _draw_differences(axes: Any, comparison: Comparison) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.7)
     off = comparison.differences("frequency_mhz")
     factor, unit = next((f, name) for most, f, name in _DIFFERENCES if np.abs(off).max(initial=0.0) <= most)
-    ghz = comparison.reference.frequency_mhz[comparison.of_reference] / 1e3
+    ghz = comparison.reference.frequency_mhz[comparison.reference_rows] / 1e3
     seen = comparison.measured
-    errors: Floats = comparison.reference.error_mhz[comparison.of_reference]
+    errors: Floats = comparison.reference.error_mhz[comparison.reference_rows]
     if (~seen).any():
         axes.plot(
             ghz[~seen], factor * off[~seen], ".", color=BLUE, markersize=3, rasterized=len(off) > MOST_VECTOR_STICKS

@@ -125,7 +125,7 @@ def comparison_record(compared: Compared, other: str, shown: int) -> dict[str, A
         "temperature_source": compared.temperature_source,
         "likely_temperature_k": compared.likely_temperature_k,
         "spins_collapsed": comparison.collapsed,
-        "matched": len(comparison.of_ours),
+        "matched": len(comparison.our_rows),
         "missing": len(comparison.missing),
         "extra": len(comparison.extra),
         "other_states": comparison.other_states,

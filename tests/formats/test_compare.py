@@ -24,14 +24,14 @@ DOUBLET = (
 def test_a_list_is_equal_to_itself_and_a_change_is_seen():
     ours = prediction(SAMPLES / "so2").catalogue
     same = compare(ours, ours)
-    assert len(same.of_ours) == len(ours)
+    assert len(same.our_rows) == len(ours)
     assert (len(same.missing), len(same.extra), np.abs(same.differences("lgint")).max()) == (0, 0, 0)
 
     rng = np.random.default_rng(1)
     shuffled = ours.take(rng.permutation(len(ours))[5:])
     shuffled = replace(shuffled, frequency_mhz=shuffled.frequency_mhz + 0.25)
     comparison = compare(ours, shuffled)
-    assert (len(comparison.of_ours), len(comparison.missing), len(comparison.extra)) == (len(ours) - 5, 5, 0)
+    assert (len(comparison.our_rows), len(comparison.missing), len(comparison.extra)) == (len(ours) - 5, 5, 0)
     np.testing.assert_allclose(comparison.differences("frequency_mhz"), 0.25, atol=1e-9)  # round-off of 1e7 MHz
     assert len(compare(shuffled, ours).extra) == 5
 
@@ -39,7 +39,7 @@ def test_a_list_is_equal_to_itself_and_a_change_is_seen():
 def test_components_of_a_doublet_are_one_line_whatever_the_signs():
     merged = replace(read_cat(DOUBLET).take([0]), lgint=[np.log10(2) - 3.8105], g_upper=[36])
     comparison = compare(read_cat(DOUBLET), merged)
-    assert (len(comparison.of_ours), len(comparison.missing), len(comparison.extra)) == (1, 0, 0)
+    assert (len(comparison.our_rows), len(comparison.missing), len(comparison.extra)) == (1, 0, 0)
     assert comparison.differences("lgint")[0] == pytest.approx(0, abs=1e-12)  # round-off
     assert comparison.differences("g_upper")[0] == 0
     apart = replace(read_cat(DOUBLET), frequency_mhz=[73577.4513, 73577.4523])
@@ -50,7 +50,7 @@ def test_lines_of_other_states_are_counted_not_compared():
     ground = b"  115271.2018  0.0005 -5.0105 2    0.0000  3  285031202 1 0         0 0         \n"
     excited = b"  114221.7523  0.0005 -9.0105 2 2143.2711  3  285031202 1 1         0 1         \n"
     comparison = compare(read_cat(ground + excited), read_cat(FIRST_LINE))
-    assert (len(comparison.of_ours), len(comparison.missing), comparison.other_states) == (1, 0, 1)
+    assert (len(comparison.our_rows), len(comparison.missing), comparison.other_states) == (1, 0, 1)
 
 
 def test_strengths_of_many_decades_are_added_without_loss():
@@ -107,7 +107,7 @@ WHOLE = b"   26175.5000  0.0010 -5.3300 3    0.0000  6  52009 202 1 0         0 
 
 def test_components_of_a_spin_are_one_line_beside_a_list_without():
     comparison = compare(read_cat(SPLIT), read_cat(WHOLE))
-    assert (len(comparison.of_ours), len(comparison.missing), len(comparison.extra), comparison.collapsed) == (
+    assert (len(comparison.our_rows), len(comparison.missing), len(comparison.extra), comparison.collapsed) == (
         1,
         0,
         0,
@@ -133,12 +133,14 @@ def test_a_catalogue_with_quadrupole_splitting_meets_an_unsplit_prediction(share
     ours = catalogue(rotor.api.line_list(top, jmax=82, min_lgint=-99.0, untrusted=True))
     comparison = compare(reference, ours)
     assert comparison.collapsed
-    assert (len(comparison.of_ours), len(comparison.missing)) == (
+    assert (len(comparison.our_rows), len(comparison.missing)) == (
         1186,
         0,
     )  # every line of the catalogue has its partner
-    off = np.abs(comparison.differences("frequency_mhz")) / comparison.reference.frequency_mhz[comparison.of_reference]
-    j, k = np.abs(comparison.reference.quanta_upper[comparison.of_reference, :2].T)
+    off = (
+        np.abs(comparison.differences("frequency_mhz")) / comparison.reference.frequency_mhz[comparison.reference_rows]
+    )
+    j, k = np.abs(comparison.reference.quanta_upper[comparison.reference_rows, :2].T)
     inside = (j <= 49) & (k <= 9)
     assert inside.sum() == 445
     assert off[inside].max() < 3e-5  # 2.7e-5: constants without sextic terms

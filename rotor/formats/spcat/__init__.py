@@ -1,1 +1,1 @@
-"""The files of SPFIT and SPCAT: .cat, .egy, .lin, .int, .par/.var, and the codes their parameters go by."""
+"""Files of SPFIT and SPCAT (.cat, .egy, .lin, .int, .par, .var) and their parameter codes."""

@@ -1,4 +1,4 @@
-"""Block and place of levels as SPCAT numbers them in the first two columns of its .egy file.
+"""Block number and place of levels, as in the first two columns of SPCAT's .egy file.
 
 Functions stand in sub-blocks of one state v, one species of the Wang functions and one coupling pattern of the spins, those of a
 species that has a weight. Sub-blocks that some parameter connects make a block of every F; blocks are numbered by their first
@@ -36,7 +36,7 @@ _SPECIES = np.array([[0, 3], [1, 2]])  # by Ka odd, Kc odd; Bx and Bz change pla
 
 
 class SubBlock(NamedTuple):
-    """State, species and pattern, in the order in which the program makes sub-blocks."""
+    """State, species and coupling pattern; sub-blocks are ordered as in SPCAT."""
 
     v: int
     species: int
@@ -45,7 +45,7 @@ class SubBlock(NamedTuple):
 
 @dataclass(frozen=True)
 class Blocks:
-    """The sub-blocks of every block; by state the range of K, the doubled spins, and 2(N - F), 2(J - F), ... of its patterns."""
+    """The sub-blocks of each block; by state, the range of K, the doubled spins, and 2(N - F), 2(J - F), ... of the patterns."""
 
     members: tuple[tuple[SubBlock, ...], ...]
     limits: dict[int, tuple[int, int]]
@@ -58,7 +58,7 @@ class Blocks:
         Parameters
         ----------
         levels : sequence of SubBlock
-            That of each of n levels.
+            Sub-block of each of n levels.
         n, k, twice_f : (n,) arrays of int
             N, |K| and doubled F.
 
@@ -76,36 +76,39 @@ class Blocks:
         return np.array(block, dtype=np.int64), np.array(rank, dtype=np.int64)
 
     def _starts(self, twice_f: int) -> dict[SubBlock, tuple[int, int]]:
-        """The block of every sub-block of one F, and how many functions stand before it there."""
-        found = {}
+        """The block of each sub-block of one F, and the number of functions before it in the block."""
+        starts = {}
         for place, block in enumerate(self.members):
             before = 0
             for sub in block:
-                found[sub] = place, before
+                starts[sub] = place, before
                 before += self._size(sub, twice_f)
-        return found
+        return starts
 
     def _size(self, sub: SubBlock, twice_f: int) -> int:
-        """Functions of a sub-block at one F; 0 where its pattern does not exist there."""
+        """Number of functions of a sub-block at one F; 0 if its pattern does not exist there."""
         steps = self.rises[sub.v][sub.pattern]
         sums = twice_f + steps
-        if (sums < 0).any() or (sums[:-1] + sums[1:] < self.spins[sub.v]).any():  # no triangle of two sums and the spin
+        if (sums < 0).any() or (
+            sums[:-1] + sums[1:] < self.spins[sub.v]
+        ).any():  # two sums and the spin form no triangle
             return 0
         n = int(sums[0]) // 2
         return max((min(self.limits[sub.v][1], n) - self._least_k(sub, n)) // 2 + 1, 0)
 
     def _least_k(self, sub: SubBlock, n: int) -> int:
+        """The smallest K of a sub-block at one N."""
         return _least_k(sub.species if n % 2 == 0 else 3 - sub.species, self.limits[sub.v][0])
 
 
 def _least_k(species: int, first: int) -> int:
-    """The least K from `first` on that the functions of a species have at even N."""
+    """The smallest K ≥ `first` of the functions of a species at even N."""
     least = (0, 1, 1, 2)[species]
     return least if least >= first else first + (first - least) % 2
 
 
 def blocks_of(file: ParameterFile, groups: Sequence[Group]) -> Blocks | None:
-    """The blocks of a file; None for what is not known here (see above)."""
+    """The blocks of a file; None for cases that are not supported (see the head of this module)."""
     states = sorted((state for group in groups for state in group.states), key=lambda state: state.number)
     digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
     if any(state.equivalent or state.l_code for state in states):
@@ -119,18 +122,26 @@ def blocks_of(file: ParameterFile, groups: Sequence[Group]) -> Blocks | None:
         if _exists(state, species, oblate)
         for pattern in range(len(rises[state.number]))
     ]
-    of_state = {state.number: state for state in states}
+    options_by_state = {state.number: state for state in states}
     labels = _components(
-        subs, of_state, rises, [_reach(d, len(states), oblate) for d in digits if not is_constant(d)], file, oblate
+        subs,
+        options_by_state,
+        rises,
+        [_reach(d, len(states), oblate) for d in digits if not is_constant(d)],
+        file,
+        oblate,
     )
-    members = [[sub for sub, own in zip(subs, labels, strict=True) if own == label] for label in sorted(set(labels))]
+    members = [
+        [sub for sub, component in zip(subs, labels, strict=True) if component == label]
+        for label in sorted(set(labels))
+    ]
     ordered = tuple(tuple(sorted(block, key=lambda s: (s.pattern, s.v, s.species))) for block in members)
     limits = {state.number: (state.kmin, state.kmax) for state in states}
     return Blocks(ordered, limits, {state.number: state.spins for state in states}, rises)
 
 
 def _rises(spins: tuple[int, ...]) -> Ints:
-    """2(N - F), 2(J - F), ... 0 of every coupling pattern, (patterns, spins + 1)."""
+    """2(N - F), 2(J - F), ... 0 of all coupling patterns, (patterns, spins + 1)."""
     if not spins:
         return np.zeros((1, 1), dtype=np.int64)
     steps = pattern_steps(spins)
@@ -139,15 +150,15 @@ def _rises(spins: tuple[int, ...]) -> Ints:
 
 
 def _exists(state: StateOptions, species: int, oblate: bool) -> bool:
-    """Whether the program makes sub-blocks of a species: K in its range for even N or odd, and a weight."""
-    least = min(_least_k(one, state.kmin) for one in (species, 3 - species))
+    """Whether SPCAT forms sub-blocks of a species: K in its range for even or odd N, and a weight."""
+    least = min(_least_k(parity_species, state.kmin) for parity_species in (species, 3 - species))
     return state.kmax >= least and _weight(state, species, oblate)[0] > 0
 
 
 def _weight(state: StateOptions, species: int, oblate: bool) -> tuple[int, ...]:
-    """What weights must agree between sub-blocks that are connected; the first is above 0 where one exists."""
-    own = species if not oblate else (0, 3, 2, 1)[species]
-    ka, kc = (np.array([one]) for one in np.argwhere(own == _SPECIES)[0])
+    """The weights that must agree between connected sub-blocks; the first is above 0 if the sub-block exists."""
+    rotated_species = species if not oblate else (0, 3, 2, 1)[species]
+    ka, kc = (np.array([parity]) for parity in np.argwhere(rotated_species == _SPECIES)[0])
     along = kc if oblate else ka
     if state.fold < 3:
         return (int(state.weights(ka, kc, along)[0]),)
@@ -158,7 +169,7 @@ def _weight(state: StateOptions, species: int, oblate: bool) -> tuple[int, ...]:
 
 
 class _Reach(NamedTuple):
-    """What a parameter connects: states, species, and by how much each sum of angular momenta may change, doubled."""
+    """Sub-blocks that a parameter connects: states, change of species, and largest doubled change of each sum of angular momenta."""
 
     states: tuple[int, int] | None
     species: int
@@ -166,6 +177,7 @@ class _Reach(NamedTuple):
 
 
 def _reach(d: Digits, states: int, oblate: bool) -> _Reach:
+    """The sub-blocks that a code connects."""
     low, high = sorted((d.v1, d.v2))
     species = int(_SPECIES[TURNS[axis_of(d.typ)]])
     if oblate:
@@ -177,12 +189,12 @@ def _reach(d: Digits, states: int, oblate: bool) -> _Reach:
 
 
 def _ranks(spins: Sequence[int], d: Digits) -> tuple[int, ...]:
-    """Largest changes of N, J, F1, ..., doubled, up to the spin that is coupled last of those named."""
+    """Largest doubled changes of N, J, F1, ..., up to the last coupled of the acting spins."""
     if not spins:
         return ()
     first, last = spins[0], spins[-1]
-    of_n = 0 if d.typ == 0 and d.ns < 5 else 1 if len(spins) == 1 else 2
-    return (*([2 * of_n] * first), *([2] * (last - first)))
+    rotational_rank = 0 if d.typ == 0 and d.ns < 5 else 1 if len(spins) == 1 else 2
+    return (*([2 * rotational_rank] * first), *([2] * (last - first)))
 
 
 def _components(
@@ -193,17 +205,17 @@ def _components(
     file: ParameterFile,
     oblate: bool,
 ) -> list[int]:
-    """The number of the first sub-block that each is connected with."""
+    """For each sub-block the number of the first sub-block in its connected component."""
     labels, ixx = list(range(len(subs))), file.options[0].ixx
     acting = list(dict.fromkeys(reaches))
     for i, k in combinations(range(len(subs)), 2):
         a, b = subs[i], subs[k]
         if labels[i] == labels[k] or _weight(states[a.v], a.species, oblate) != _weight(states[b.v], b.species, oblate):
             continue
-        one, other = rises[a.v][a.pattern], rises[b.v][b.pattern]
-        if len(one) != len(other):
+        rises_a, rises_b = rises[a.v][a.pattern], rises[b.v][b.pattern]
+        if len(rises_a) != len(rises_b):
             continue
-        change = np.abs(one - other)
+        change = np.abs(rises_a - rises_b)
         if any(ixx >> place & 1 and change[place] for place in range(len(change) - 1)):
             continue
         if any(_connects(reach, a, b, change) for reach in acting):
@@ -213,6 +225,7 @@ def _components(
 
 
 def _connects(reach: _Reach, a: SubBlock, b: SubBlock, change: Ints) -> bool:
+    """Whether a parameter connects two sub-blocks."""
     pair = (min(a.v, b.v), max(a.v, b.v))
     if a.species ^ b.species != reach.species or (reach.states != pair if reach.states else a.v != b.v):
         return False
@@ -221,7 +234,7 @@ def _connects(reach: _Reach, a: SubBlock, b: SubBlock, change: Ints) -> bool:
 
 
 def sub_blocks(group: Group, levels: Levels, negative: bool) -> tuple[list[SubBlock], Ints]:
-    """The sub-block of every level of a group and its |K|; negative: of a symmetric top the component with -K."""
+    """Sub-block and |K| of each level of a group; negative: for a symmetric top, of the component -K."""
     quanta, n = levels.quanta, levels.rotational
     v = np.array([state.number for state in group.states])[quanta.get("v", np.zeros(len(n), dtype=np.int64))]
     if "kc" in quanta:

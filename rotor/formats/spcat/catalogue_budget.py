@@ -1,4 +1,4 @@
-"""Error budget of the frequencies of a catalogue (`rotor.requests.budget`): printed decimals, and the errors that the catalogue states."""
+"""Error budget of the frequencies of a catalogue (`rotor.requests.budget`): printed decimals and stated errors."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from rotor.formats.spcat.compare import in_mhz
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 
-STRONG = 0.1  # of the strongest line: weaker ones do not count
-WIDE_MHZ, WIDE_DECIMALS = 99999999.0, 3  # frequencies beyond have fewer decimals
+STRONG = 0.1  # weaker lines, relative to the strongest, are ignored
+WIDE_MHZ, WIDE_DECIMALS = 99999999.0, 3  # higher frequencies have fewer decimals
 MODEL = ErrorTerm(None, "a catalogue does not say what its lines leave out")
 
 
 def catalogue_budget(lines: Catalogue) -> ErrorBudget:
-    """The errors of frequencies as a file prints them, of the lines above a tenth of the strongest.
+    """The errors of printed frequencies, for lines above a tenth of the strongest.
 
     >>> j = np.full((1, 6), -32768)
     >>> line = Catalogue([115271.2018], [0.0005], [-5.0], [2], [0.0], [3], [28503], [101], j, j)
@@ -34,7 +34,7 @@ what its lines leave out'
 
 
 def stored_budget(frequency_mhz: Floats, error_mhz: Floats, lgint: Floats) -> ErrorBudget:
-    """The errors of frequencies in double precision."""
+    """The errors of frequencies stored in double precision."""
     rounding = ErrorTerm(ROUNDING * float(frequency_mhz.max(initial=0.0)), "double precision")
     return listed_budget(rounding, error_mhz, lgint)
 
@@ -53,12 +53,12 @@ def listed_budget(rounding: ErrorTerm, error_mhz: Floats, lgint: Floats) -> Erro
 
 
 def _stated(error_mhz: Floats, lgint: Floats) -> ErrorTerm:
-    """The largest error of strong lines; not estimated where one of them has none."""
+    """The largest error of strong lines; not estimated if one of them has no error."""
     if not len(error_mhz):
         return ErrorTerm(None, "there is no line")
     errors = error_mhz[lgint >= lgint.max() + np.log10(STRONG)]
-    known = errors[np.isfinite(errors) & (errors > 0)]
-    if len(known) < len(errors):
-        others = f"; the largest of the others is {known.max():.2g} MHz" if len(known) else ""
-        return ErrorTerm(None, f"{len(errors) - len(known)} of {len(errors)} strong lines have no error{others}")
+    stated = errors[np.isfinite(errors) & (errors > 0)]
+    if len(stated) < len(errors):
+        others = f"; the largest of the others is {stated.max():.2g} MHz" if len(stated) else ""
+        return ErrorTerm(None, f"{len(errors) - len(stated)} of {len(errors)} strong lines have no error{others}")
     return ErrorTerm(float(errors.max()), "errors of the file; largest of the lines above a tenth of the strongest")

@@ -1,4 +1,4 @@
-"""Two catalogues side by side: which lines both have, which only one, how far they differ, and measured lines merged in."""
+"""Comparison of two catalogues: common and missing lines, differences, and merging of measured lines."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Rows = NDArray[np.int64]
 
 TWIN_MHZ = 2e-4  # lines of one label closer than this are components of one line: two digits of print
 INFRARED_DECIMALS = 6
-MOST_OF_SLOPE = 2000  # lines from which a temperature is judged, the strongest
+MOST_OF_SLOPE = 2000  # number of strongest lines from which a temperature is estimated
 
 
 def in_mhz(catalogue: Catalogue) -> tuple[Floats, Floats]:
-    """Frequencies and errors in MHz, (n,) each: infrared catalogues and lines with a negative error have cm⁻¹."""
+    """Frequencies and errors in MHz, (n,) each; infrared catalogues and lines with a negative error are in cm⁻¹."""
     infrared = catalogue.layout.decimals[0] == INFRARED_DECIMALS
     factor = np.where(infrared | (catalogue.error_mhz < 0), units.MHZ_PER_CM, 1.0)
     return catalogue.frequency_mhz * factor, np.abs(catalogue.error_mhz) * factor
@@ -30,18 +30,18 @@ def in_mhz(catalogue: Catalogue) -> tuple[Floats, Floats]:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Lines of two catalogues matched by quantum numbers, components of one line added on both sides.
+    """Lines of two catalogues matched by quantum numbers, with components of a line merged in both.
 
-    reference, ours: the catalogues with components added, in MHz, rising in frequency. of_reference, of_ours: rows of
-    the matched lines, (m,) each. missing: rows of `reference` that ours has not, extra: rows of `ours` that the
-    reference has not. other_states: lines left out because the other side has no quantum number to tell them by.
-    collapsed: whether components that differ in quantum numbers of spins were added, since one side has more of these.
+    reference, ours: the catalogues with components added, in MHz, rising in frequency. reference_rows, our_rows: rows of
+    the matched lines, (m,) each. missing: unmatched rows of `reference`. extra: unmatched rows of `ours`. other_states: lines left out
+    because the other catalogue lacks the quantum number that identifies them. collapsed: whether hyperfine components were merged, since
+    one catalogue has more spin quantum numbers.
     """
 
     reference: Catalogue
     ours: Catalogue
-    of_reference: Rows
-    of_ours: Rows
+    reference_rows: Rows
+    our_rows: Rows
     missing: Rows
     extra: Rows
     other_states: int
@@ -50,20 +50,20 @@ class Comparison:
     def differences(self, column: str) -> Floats:
         """Ours minus the reference in a column of `Catalogue`, (m,)."""
         ours, reference = getattr(self.ours, column), getattr(self.reference, column)
-        return np.asarray(ours[self.of_ours].astype(float) - reference[self.of_reference])
+        return np.asarray(ours[self.our_rows].astype(float) - reference[self.reference_rows])
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """Which matched lines the reference calls measured in a laboratory (a negative tag), (m,)."""
-        return np.asarray(self.reference.tag[self.of_reference] < 0)
+        """Whether the reference marks each matched line as measured in a laboratory (negative tag), (m,)."""
+        return np.asarray(self.reference.tag[self.reference_rows] < 0)
 
 
 def compare(reference: Catalogue, ours: Catalogue) -> Comparison:
-    """Match the lines of two catalogues by their quantum numbers, signs of K dropped.
+    """Match the lines of two catalogues by their quantum numbers, without signs of K.
 
-    Where one side has more quantum numbers of spins than the other, the components of each line are added on both sides.
-    Where one side has more of the others (a vibrational state, say), its lines with zeros there are compared and the rest
-    counted in `other_states`. Lines of one label are matched in order of frequency.
+    If one catalogue has more spin quantum numbers, hyperfine components are merged in both. If it has more of the others (such as a
+    vibrational state), only its lines with zeros there are compared and `other_states` counts the rest. Lines with equal labels are matched
+    in order of frequency.
     """
     collapsed = bool(len(reference) and len(ours)) and spin_quanta(reference) != spin_quanta(ours)
     if collapsed:
@@ -78,8 +78,8 @@ def compare(reference: Catalogue, ours: Catalogue) -> Comparison:
     return Comparison(
         reference=left,
         ours=right,
-        of_reference=at_left,
-        of_ours=at_right,
+        reference_rows=at_left,
+        our_rows=at_right,
         missing=np.setdiff1d(np.arange(len(left)), at_left),
         extra=np.setdiff1d(np.arange(len(right)), at_right),
         other_states=others,
@@ -88,7 +88,7 @@ def compare(reference: Catalogue, ours: Catalogue) -> Comparison:
 
 
 def within(comparison: Comparison, range_mhz: tuple[float, float], least_lgint: float) -> Comparison:
-    """The comparison without extra lines outside a range of frequencies or weaker than a bound: the other list ends there."""
+    """The comparison without extra lines outside a range of frequencies or below an intensity, where the reference ends."""
     ours, extra = comparison.ours, comparison.extra
     frequency, lgint = ours.frequency_mhz[extra], ours.lgint[extra]
     inside = (frequency >= range_mhz[0]) & (frequency <= range_mhz[1]) & (lgint >= least_lgint)
@@ -99,18 +99,18 @@ TEMPERATURES_K = np.geomspace(1.0, 3000.0, 801)  # steps of 1 %
 
 
 def likely_temperature_k(comparison: Comparison, temperature_k: float) -> float:
-    """The temperature at which the intensities of the reference are most alike those of ours, which are at `temperature_k`.
+    """The temperature at which intensities of the reference agree best with ours at `temperature_k`.
 
     That of a grid of 1 % at which the median size of the differences of lgint from their median is least; both are those of
     exp(-E"/kT) (1 - exp(-hν/kT)) times what no temperature changes. nan where fewer than three lines are matched, or all of
     them start from one energy.
     """
-    rows = comparison.of_reference[np.argsort(-comparison.reference.lgint[comparison.of_reference])[:MOST_OF_SLOPE]]
-    selected = np.isin(comparison.of_reference, rows)
-    energy = comparison.reference.energy_lower_cm[comparison.of_reference][selected]
+    rows = comparison.reference_rows[np.argsort(-comparison.reference.lgint[comparison.reference_rows])[:MOST_OF_SLOPE]]
+    selected = np.isin(comparison.reference_rows, rows)
+    energy = comparison.reference.energy_lower_cm[comparison.reference_rows][selected]
     if len(energy) < 3 or np.ptp(energy) == 0:
         return float("nan")
-    frequency = comparison.reference.frequency_mhz[comparison.of_reference][selected]
+    frequency = comparison.reference.frequency_mhz[comparison.reference_rows][selected]
     off = comparison.differences("lgint")[selected]
 
     def populated(kelvin: Floats) -> Floats:
@@ -124,17 +124,18 @@ def likely_temperature_k(comparison: Comparison, temperature_k: float) -> float:
 
 
 def _count(catalogue: Catalogue) -> int:
+    """Number of quantum numbers of a state."""
     return int((catalogue.qnfmt % 10).max(initial=0)) or catalogue.quanta_upper.shape[1]
 
 
 def _ground(catalogue: Catalogue, width: int) -> Catalogue:
-    """The lines whose quantum numbers beyond `width` are zero or blank, frequencies and errors in MHz."""
+    """The lines whose quantum numbers beyond `width` are zero or blank, with frequencies and errors in MHz."""
     beyond = np.concatenate([catalogue.quanta_upper[:, width:], catalogue.quanta_lower[:, width:]], axis=1)
     return _plain(catalogue.take(((beyond == 0) | (beyond == BLANK)).all(axis=1)))
 
 
 def _plain(catalogue: Catalogue) -> Catalogue:
-    """Frequencies and errors in MHz."""
+    """The catalogue with frequencies and errors in MHz."""
     frequency, error = in_mhz(catalogue)
     plain = replace(catalogue.layout, decimals=(4, 4, 4, 4), spelling={})
     return replace(catalogue, frequency_mhz=frequency, error_mhz=error, layout=plain)
@@ -147,7 +148,7 @@ def _labels(catalogue: Catalogue, width: int) -> NDArray[np.int64]:
 
 
 def _components_added(catalogue: Catalogue, width: int) -> Catalogue:
-    """Lines of one label and one frequency as one, intensities and degeneracies added, rising in frequency."""
+    """Merge lines of equal label and frequency: intensities and degeneracies are added, lines rise in frequency."""
     if not len(catalogue):
         return catalogue
     labels = _labels(catalogue, width)
@@ -173,7 +174,7 @@ class _Keys(NamedTuple):
 
 
 def _keys(left: Catalogue, right: Catalogue, width: int) -> _Keys:
-    """One number for each line: of its label, and of its place among the lines with that label."""
+    """An integer for each line, from its label and its place among lines with this label."""
     labels = np.concatenate([_labels(left, width), _labels(right, width)])
     _, code = np.unique(labels, axis=0, return_inverse=True)
     code = code.reshape(-1).astype(np.int64)
@@ -183,7 +184,7 @@ def _keys(left: Catalogue, right: Catalogue, width: int) -> _Keys:
 
 
 def _place_within(code: Rows) -> Rows:
-    """How many earlier lines have the same code, (n,)."""
+    """Number of earlier lines with the same code, (n,)."""
     order = np.argsort(code, kind="stable")
     ordered = code[order]
     begins = np.flatnonzero(np.concatenate(([True], np.diff(ordered) != 0))) if len(code) else np.zeros(0, np.int64)
@@ -193,9 +194,9 @@ def _place_within(code: Rows) -> Rows:
 
 
 class Agreement(NamedTuple):
-    """How well a prediction meets measured lines: their number, median and rms of |obs - calc|, share within 3 σ.
+    """Agreement of a prediction with measured lines: their number, median and rms of |obs - calc|, share within 3 σ.
 
-    no_error: lines whose file gives an error of 0; they count in the median, not in the share.
+    no_error: number of lines with a stated error of 0; they count in the median, not in the share.
     """
 
     lines: int
@@ -206,23 +207,23 @@ class Agreement(NamedTuple):
 
 
 def agreement(comparison: Comparison, chosen: NDArray[np.bool_] | None = None) -> Agreement:
-    """How the prediction meets the measured lines of the reference, all or those `chosen` of the matched ones, (m,)."""
+    """Agreement with the measured lines of the reference: all, or those `chosen` among the matched ones, (m,)."""
     seen = comparison.measured if chosen is None else comparison.measured & chosen
     off = np.abs(comparison.differences("frequency_mhz"))[seen]
-    sigma = comparison.reference.error_mhz[comparison.of_reference][seen]
+    sigma = comparison.reference.error_mhz[comparison.reference_rows][seen]
     if not len(off):
         return Agreement(0, float("nan"), float("nan"), float("nan"), 0)
-    known = sigma > 0
-    share = float(np.mean(off[known] <= 3 * sigma[known])) if known.any() else float("nan")
+    has_error = sigma > 0
+    share = float(np.mean(off[has_error] <= 3 * sigma[has_error])) if has_error.any() else float("nan")
     rms = float(np.sqrt(np.mean(off**2)))
-    return Agreement(len(off), float(np.median(off)), rms, share, int(np.count_nonzero(~known)))
+    return Agreement(len(off), float(np.median(off)), rms, share, int(np.count_nonzero(~has_error)))
 
 
 def with_measured_lines(predicted: Catalogue, measured: Catalogue) -> Catalogue:
-    """The predicted lines, those with a measured line of the same label (a negative tag) taking frequency and error of it.
+    """The predicted lines, with frequency and error of measured lines (negative tag) of equal label.
 
-    Both components of a K doublet take the frequency of the one measured line. The tag becomes negative, as in the
-    catalogues of JPL and CDMS; sorted anew. Measured lines that are not predicted are left out.
+    Both components of a K doublet take the frequency of a single measured line. The tag becomes negative, as in the catalogues of JPL and
+    CDMS, and lines are sorted again. Measured lines that are not predicted are left out.
     """
     width = min(_count(predicted), _count(measured))
     seen = _ground(measured, width)
@@ -230,29 +231,30 @@ def with_measured_lines(predicted: Catalogue, measured: Catalogue) -> Catalogue:
     labels = np.concatenate([_labels(predicted, width), _labels(seen, width)])
     _, code = np.unique(labels, axis=0, return_inverse=True)
     code = code.reshape(-1)
-    of_predicted, of_seen = code[: len(predicted)], code[len(predicted) :]
-    _, once, times = np.unique(of_seen, return_index=True, return_counts=True)
+    predicted_code, seen_code = code[: len(predicted)], code[len(predicted) :]
+    _, once, times = np.unique(seen_code, return_index=True, return_counts=True)
     if (times > 1).any():  # several measured lines of one label: they must be one frequency
-        _refuse_two_frequencies(seen, of_seen)
+        _refuse_two_frequencies(seen, seen_code)
 
     source = np.full(int(code.max(initial=-1)) + 1, -1)
-    source[of_seen[once]] = once
-    row = source[of_predicted]
-    found = row >= 0
+    source[seen_code[once]] = once
+    row = source[predicted_code]
+    is_measured = row >= 0
     columns: dict[str, Any] = {name: getattr(predicted, name).copy() for name in DTYPES}
-    columns["frequency_mhz"][found] = seen.frequency_mhz[row[found]]
-    columns["error_mhz"][found] = seen.error_mhz[row[found]]
-    columns["tag"][found] = -np.abs(columns["tag"][found])
+    columns["frequency_mhz"][is_measured] = seen.frequency_mhz[row[is_measured]]
+    columns["error_mhz"][is_measured] = seen.error_mhz[row[is_measured]]
+    columns["tag"][is_measured] = -np.abs(columns["tag"][is_measured])
     merged = replace(predicted, **columns, layout=replace(predicted.layout, spelling={}))
     return merged.take(np.argsort(merged.frequency_mhz, kind="stable"))
 
 
 def _refuse_two_frequencies(seen: Catalogue, code: Rows) -> None:
+    """Raise ValueError for measured lines of equal label and different frequencies."""
     order = np.lexsort((seen.frequency_mhz, code))
     apart = (np.diff(code[order]) == 0) & (np.diff(seen.frequency_mhz[order]) > TWIN_MHZ)
     if apart.any():
-        one, two = order[np.argmax(apart)], order[np.argmax(apart) + 1]
+        first, second = order[np.argmax(apart)], order[np.argmax(apart) + 1]
         raise ValueError(
-            f"measured lines at {seen.frequency_mhz[one]} and {seen.frequency_mhz[two]} MHz have one label; "
+            f"measured lines at {seen.frequency_mhz[first]} and {seen.frequency_mhz[second]} MHz have one label; "
             "give the quantum number that distinguishes them, or one of them"
         )

@@ -1,4 +1,4 @@
-"""Levels and lines of any .par or .var file as SPCAT lists them: K doublets as two lines, quantum numbers by its rules (`file_quanta`)."""
+"""Levels and lines of any .par or .var file as SPCAT lists them: K doublets as two lines, quantum numbers as in `file_quanta`."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ Quanta = NDArray[np.int16]
 
 @dataclass(frozen=True)
 class GroupLines:
-    """The lines of one group, one component of a K doublet each: columns (n,) and quantum numbers (n, width).
+    """The lines of one group, one for each component of a K doublet: columns (n,) and quantum numbers (n, width).
 
-    found: the transitions that they belong to.
+    transitions: the transitions of these lines.
     """
 
     frequency_mhz: Floats
@@ -39,14 +39,14 @@ class GroupLines:
     upper: Quanta
     lower: Quanta
     error_mhz: Floats
-    found: Transitions
+    transitions: Transitions
 
 
 _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower", "error_mhz")
 
 
 def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> Transitions:
-    """The transitions between levels of a group that exist, have one weight and may pass the cut of an .int file.
+    """The transitions between existing levels of equal weight in a group that may pass the cut of an .int file.
 
     Parameters
     ----------
@@ -62,36 +62,39 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
     Returns
     -------
     Transitions
-        Frequencies in MHz and strengths in D². Lines between unequal weights are those that the program leaves out too.
+        Frequencies in MHz and strengths in D². Lines between unequal weights are left out, as in SPCAT.
     """
     if not (group.effect.moments or group.effect.others):
         none = np.zeros(0, dtype=np.int32)
         return Transitions(np.zeros(0), np.zeros(0), none, none)
-    found = all_transitions(
+    transitions = all_transitions(
         levels,
         dict(group.effect.moments),
         (0.0, request.fqlim_ghz * 1e3),
         cut=_wide_cut(levels, request, q),
         moments=group.effect.others,
     )
-    exists = np.ones(len(found.lower), dtype=bool)
+    exists = np.ones(len(transitions.lower), dtype=bool)
     if (levels.weight <= 0).any():
-        exists = (levels.weight[found.lower] > 0) & (levels.weight[found.upper] > 0)
+        exists = (levels.weight[transitions.lower] > 0) & (levels.weight[transitions.upper] > 0)
     if any(state.fold > 2 and state.equivalent < 3 for state in group.states):
-        exists &= share_a_weight(group, levels, found.upper, found.lower)
+        exists &= share_a_weight(group, levels, transitions.upper, transitions.lower)
     else:
-        exists &= equally_weighted(levels, found.upper, found.lower)
-    order = rising_order(found.frequency_mhz)  # what is in order is put in order quickly later on
+        exists &= equally_weighted(levels, transitions.upper, transitions.lower)
+    order = rising_order(transitions.frequency_mhz)  # sorted lines make later sorting fast
     rows = order if exists.all() else order[exists[order]]
-    return _rows(found, rows)
+    return _rows(transitions, rows)
 
 
-def _rows(found: Transitions, rows: Ints) -> Transitions:
-    return Transitions(*(getattr(found, name)[rows] for name in ("frequency_mhz", "strength_debye2", "upper", "lower")))
+def _rows(transitions: Transitions, rows: Ints) -> Transitions:
+    """Selected transitions."""
+    return Transitions(
+        *(getattr(transitions, name)[rows] for name in ("frequency_mhz", "strength_debye2", "upper", "lower"))
+    )
 
 
 def _wide_cut(levels: Levels, request: Request, q: float) -> IntensityCut | None:
-    """A cut that no line of the file is below, None where STR0 is below all numbers."""
+    """An intensity cut below all lines of the file; None if STR0 underflows."""
     kt, least = request.temperature_k * units.MHZ_PER_K, _NEARLY * 10.0**request.str0
     with np.errstate(over="ignore"):  # far below zero and cold: every line passes
         populated = (
@@ -102,7 +105,7 @@ def _wide_cut(levels: Levels, request: Request, q: float) -> IntensityCut | None
 
 
 def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:
-    """Which transitions of a top with an n-fold axis the program makes: all between blocks that have a weight in common.
+    """Whether SPCAT lists transitions of a top with an n-fold axis: those between blocks with a common weight.
 
     Parameters
     ----------
@@ -118,7 +121,7 @@ def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices)
     (n,) array of bool
         Whether a weight of A or B species or of E species is that of one of these in the other block.
     """
-    if levels.kind in ("prolate", "oblate"):  # where both weights are one
+    if levels.kind in ("prolate", "oblate"):  # both weights are equal
         return np.ones(len(upper), dtype=bool)
     quanta = levels.quanta
     along, v = quanta["kc"] if group.oblate else quanta["ka"], quanta.get("v", np.zeros(len(levels), dtype=np.int64))
@@ -129,58 +132,65 @@ def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices)
     return np.asarray(((high[:, :, None] == low[:, None, :]) & (high[:, :, None] > 0)).any(axis=(1, 2)))
 
 
-def weights_of_lines(group: Group, levels: Levels, found: Transitions) -> Ints:
-    """The nuclear-spin weight of each line, or one of all: that of its level in the later block, by F, first state and species, one
-    component of ±K."""
+def weights_of_lines(group: Group, levels: Levels, transitions: Transitions) -> Ints:
+    """The nuclear-spin weight of each line, or a single one for all, for one component of ±K.
+
+    It is the weight of the level in the later block, by F, first state and species."""
     weight = levels.weight // levels.components
     if len(weight) and weight.min() == weight.max():
         return np.full(1, weight[0])
-    if (weight[found.upper] == weight[found.lower]).all() or "kc" not in levels.quanta:
-        return np.asarray(weight[found.lower])
+    if (weight[transitions.upper] == weight[transitions.lower]).all() or "kc" not in levels.quanta:
+        return np.asarray(weight[transitions.lower])
     ka, kc = levels.quanta["ka"] % 2, levels.quanta["kc"] % 2
     species = np.array([[0, 3], [1, 2]])[(kc, ka) if group.oblate else (ka, kc)]
     v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
     order = (levels.multiplicity * (len(group.states) + 1) + v) * 4 + species
-    for block in levels.blocks:  # which comes where its first state and species do
+    for block in levels.blocks:  # blocks are ordered by their first state and species
         rows = slice(block.start, block.start + len(block.energies_mhz))
         order[rows] = order[rows].min()
-    return np.asarray(np.where(order[found.upper] > order[found.lower], weight[found.upper], weight[found.lower]))
+    return np.asarray(
+        np.where(
+            order[transitions.upper] > order[transitions.lower], weight[transitions.upper], weight[transitions.lower]
+        )
+    )
 
 
 def equally_weighted(levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:
-    """Which transitions join levels of one nuclear-spin weight; between others there are none, whatever the dipole is."""
+    """Whether transitions connect levels of equal nuclear-spin weight; others do not exist for any dipole."""
     weight = levels.weight // levels.components
     if len(weight) and weight.min() == weight.max():
         return np.ones(len(upper), dtype=bool)
     return np.asarray(weight[upper] == weight[lower])
 
 
-_NEARLY = 0.999  # of the cut: what is found so is looked at with all digits and both terms of the cut
-LEAST_MHZ = 0.00005  # a line that would print as 0.0000 is not in the program's files
+_NEARLY = (
+    0.999  # factor of a preliminary cut; the selected lines are tested with full precision and both terms of the cut
+)
+LEAST_MHZ = 0.00005  # the program does not list lines that would print as 0.0000
 _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
 
 
 def within(request: Request, frequency_mhz: Floats, intensity: Floats) -> NDArray[np.bool_]:
-    """Which lines are below FQLIM and strong enough."""
+    """Whether lines are below FQLIM and strong enough."""
     limits = (frequency_mhz > LEAST_MHZ) & (frequency_mhz < request.fqlim_ghz * 1e3)
     return np.asarray(limits & (intensity > least_intensity(request, frequency_mhz)))
 
 
 def least_intensity(request: Request, frequency_mhz: Floats) -> Floats:
-    """The intensity in nm² MHz below which a line is left out, (n,): 10^STR0 + 10^STR1 (ν/300 GHz)²."""
+    """The lowest intensity of a listed line in nm² MHz, (n,): 10^STR0 + 10^STR1 (ν/300 GHz)²."""
     return np.asarray(10.0**request.str0 + 10.0**request.str1 * (frequency_mhz / _STR_SCALE_MHZ) ** 2)
 
 
 def lines_of(
     group: Group,
     levels: Levels,
-    found: Transitions,
+    transitions: Transitions,
     form: Format,
     request: Request,
     q: float,
     spread: Floats | None = None,
 ) -> GroupLines:
-    """The lines of a group within the limits of an .int file, those of one component of a K doublet each.
+    """The lines of a group within the limits of an .int file, one for each component of a K doublet.
 
     Parameters
     ----------
@@ -188,7 +198,7 @@ def lines_of(
         The connected states.
     levels : Levels
         Their levels.
-    found : Transitions
+    transitions : Transitions
         Frequencies in MHz and strengths in D² between them.
     form : Format
         Which quantum numbers there are.
@@ -197,37 +207,37 @@ def lines_of(
     q : float
         Partition function as the file counts it.
     spread : (levels, k) array, optional
-        MHz; the differences have the errors of the lines as their lengths, which are 0 without it.
+        ∂E/∂p F in MHz; the length of a difference of rows is the error of a line. Without it errors are 0.
 
     Returns
     -------
     GroupLines
         Frequencies and lower energies in MHz, intensities in nm² MHz.
     """
-    intensity = _intensity(group, levels, found, request, q)
-    there = within(request, found.frequency_mhz, intensity)
-    if not there.all():
-        chosen = np.flatnonzero(there)
-        found, intensity = _rows(found, chosen), intensity[chosen]
-    up, low = found.upper, found.lower
+    intensity = _intensity(group, levels, transitions, request, q)
+    listed = within(request, transitions.frequency_mhz, intensity)
+    if not listed.all():
+        chosen = np.flatnonzero(listed)
+        transitions, intensity = _rows(transitions, chosen), intensity[chosen]
+    up, low = transitions.upper, transitions.lower
     error = np.zeros(len(up)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
     g_upper = (levels.multiplicity * (levels.weight // levels.components))[up]
-    columns = (found.frequency_mhz, intensity, levels.energy_mhz[low], error)
+    columns = (transitions.frequency_mhz, intensity, levels.energy_mhz[low], error)
     index, upper, lower = _one_component_each(group, levels, form, up, low)
     frequency, strength, energy, error = (column[index] for column in columns)
-    return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error, found)
+    return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error, transitions)
 
 
-def _intensity(group: Group, levels: Levels, found: Transitions, request: Request, q: float) -> Floats:
+def _intensity(group: Group, levels: Levels, transitions: Transitions, request: Request, q: float) -> Floats:
     """The intensity of one component of each line in nm² MHz."""
     kt = request.temperature_k * units.MHZ_PER_K
-    out = LGINT_NM2_MHZ / q * found.frequency_mhz
-    out *= found.strength_debye2
+    out = LGINT_NM2_MHZ / q * transitions.frequency_mhz
+    out *= transitions.strength_debye2
     if (levels.components > 1).any():
-        out /= np.maximum(levels.components[found.upper], levels.components[found.lower])
-    out *= weights_of_lines(group, levels, found)
-    below = np.expm1(-found.frequency_mhz / kt)
-    below *= -np.exp(-levels.energy_mhz / kt)[found.lower]
+        out /= np.maximum(levels.components[transitions.upper], levels.components[transitions.lower])
+    out *= weights_of_lines(group, levels, transitions)
+    below = np.expm1(-transitions.frequency_mhz / kt)
+    below *= -np.exp(-levels.energy_mhz / kt)[transitions.lower]
     out *= below
     return out
 
@@ -235,7 +245,7 @@ def _intensity(group: Group, levels: Levels, found: Transitions, request: Reques
 def _one_component_each(
     group: Group, levels: Levels, form: Format, up: Indices, low: Indices
 ) -> tuple[Ints | slice, Quanta, Quanta]:
-    """Which transition each line of one component of ±K belongs to, and the quantum numbers of its levels, (lines, width)."""
+    """The transition of each line of one component of ±K, and the quantum numbers of its levels, (lines, width)."""
     plus = quanta_of(group, levels, form).astype(np.int16)
     if (levels.components == 1).all():
         return slice(None), rows_of(plus, up), rows_of(plus, low)
@@ -265,9 +275,9 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
     form : Format
         Which quantum numbers there are.
     tag : int
-        Of the species.
+        Tag of the species.
     dr : int
-        2 where all states are those of linear molecules, else 3.
+        2 if all states are linear, else 3.
 
     Returns
     -------
@@ -301,7 +311,7 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
 
 
 def _rising(frequency_mhz: Floats) -> Ints | slice:
-    """What puts frequencies in order, those that are equal as they stand."""
+    """The stable order of rising frequencies."""
     if (frequency_mhz[1:] >= frequency_mhz[:-1]).all():
         return slice(None)
     return rising_order(frequency_mhz)
@@ -317,7 +327,7 @@ def as_level_list(
     spreads: Sequence[Floats | None] | None = None,
     blocks: Blocks | None = None,
 ) -> LevelList:
-    """The levels of all groups as an .egy file has them, ±K apart, by block and place in it, with all their quantum numbers.
+    """The levels of all groups as in an .egy file: ±K separate, by block and place, with all quantum numbers.
 
     Parameters
     ----------
@@ -326,9 +336,9 @@ def as_level_list(
     form : Format
         Which quantum numbers there are.
     spreads : sequence of (levels, k) array, optional
-        Of each group in MHz; the lengths of their rows are the errors of the energies, which are 0 without them.
+        For each group, in MHz; the lengths of rows are the errors of the energies. Without them errors are 0.
     blocks : Blocks, optional
-        How the program numbers them; without it blocks count 9999 levels each, by F and energy.
+        Block numbers of SPCAT; without them a block has 9999 levels, by F and energy.
 
     Returns
     -------
@@ -367,7 +377,7 @@ def as_level_list(
 
 
 def _numbers(group: Group, levels: Levels, blocks: Blocks | None, negative: bool, rows: Ints) -> tuple[Ints, Ints]:
-    """Block and place of some rows of levels."""
+    """Block and place of rows of levels."""
     if blocks is None:
         return np.ones(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.int64)
     subs, k = sub_blocks(group, levels, negative)

@@ -1,6 +1,6 @@
-"""Levels of any .par or .var file: states that are connected are solved together, the others apart, then listed as one.
+"""Levels of any .par or .var file: connected states are solved together, other groups separately, and all are listed together.
 
-Each group of connected states has a top that stands for its symmetry, and the file's own operators as its one effect.
+Each group of connected states has a top that represents its symmetry, and the operators of the file as its only effect.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.file_spins import coupled_spins, of_coupled_spins, with_their_spins
+from rotor.formats.spcat.file_spins import coupled_spins, lines_of_coupled_spins, with_their_spins
 from rotor.formats.spcat.hamiltonian.code_types import axis_of
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, dipoles_of, moment_of
@@ -56,9 +56,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Group:
-    """States that are solved together: their options by number here, the top that stands for their symmetry, the effect.
+    """States that are solved together: their options by number, the top that represents their symmetry, and the effect.
 
-    axial_kmax: the largest K of a symmetric top whose K is good. diag: how levels are named. by_k: whether they are called by N and K.
+    axial_kmax: the largest K of a symmetric top with good K. diag: labelling rule DIAG. by_k: whether labels are N and K.
     """
 
     states: tuple[StateOptions, ...]
@@ -75,16 +75,16 @@ class Group:
         return self.states[0].spins
 
     def levels(self, twice_f: tuple[int, int], executor: Executor | None = None) -> Levels:
-        """The levels with F (doubled) from the first to the last of `twice_f`, with the file's weights.
+        """The levels with doubled F from the first to the last of `twice_f`, with the weights of the file.
 
-        The zero weights of levels that do not exist stay in the table.
+        Levels that do not exist are listed with weight 0.
         """
         if self.spins or self.effect.others:
-            every = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
+            all_f = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
             exist = None if self.top.kind == "linear" else self._exist
-            if self.effect.pairs:  # which of its levels exist is known once they are named by l
+            if self.effect.pairs:  # labels by l must be known before existing levels can be selected
                 exist = None
-            levels = levels_of_f(self.top, (self.effect,), every, None, executor, exist)
+            levels = levels_of_f(self.top, (self.effect,), all_f, None, executor, exist)
             if self.effect.pairs:
                 levels = named_by_l_with_spins(levels, self.effect.pairs, str(levels.representation))
         else:
@@ -98,14 +98,14 @@ class Group:
         return replace(levels, weight=self._weights(levels))
 
     def falls_from(self, highest_n: int) -> int | None:
-        """The lowest N where the diagonal of the Hamiltonian does not rise with K (fall, in an oblate basis); None up to the highest."""
+        """The lowest N at which the diagonal of the Hamiltonian does not rise (oblate: fall) with K; None up to the highest N."""
         if self.top.kind != "asymmetric":
             return None
         states = [self.effect.operators(self.top), *(state.terms for state in self.effect.states(self.top))]
         return falls_with_k(states, self.effect.parameters(self.top), highest_n, self.oblate)
 
     def diagonal(self, highest_n: int) -> Diagonal:
-        """How the diagonal of the Hamiltonian runs up to the highest N."""
+        """Behaviour of the diagonal of the Hamiltonian up to the highest N."""
         if self.falls_from(highest_n) is None:
             return Diagonal.RISES
         return Diagonal.FALLS_IN_K if self.by_k else Diagonal.FALLS
@@ -117,35 +117,36 @@ class Group:
         return weighted and twice_f[0] <= twice_f[1] and any(state.kmin <= highest for state in self.states)
 
     def _exist(self, labels: Ints) -> NDArray[np.bool_]:
-        """Which labels v, Ka, Kc, N, ..., F belong to levels of a weight."""
+        """Whether labels v, Ka, Kc, N, ..., F belong to levels with a weight."""
         v, ka, kc = labels[:, 0], labels[:, 1], labels[:, 2]
         if self.top.kind in ("prolate", "oblate"):
             return np.asarray(ka <= self.axial_kmax)
-        found = np.zeros(len(labels), dtype=bool)
+        exists = np.zeros(len(labels), dtype=bool)
         for place, state in enumerate(self.states):
             odd = state.odd_spins({"i_tot": labels[:, -2] // 2, "i_sym": labels[:, -3] // 2}) if state.i_tot else 0
-            found |= (v == place) & (state.weights(ka, kc, kc if self.oblate else ka, odd) > 0)
-        return found
+            exists |= (v == place) & (state.weights(ka, kc, kc if self.oblate else ka, odd) > 0)
+        return exists
 
     def _weights(self, levels: Levels) -> Ints:
+        """Weights of levels, summed over components."""
         n, quanta = levels.rotational, levels.quanta
         v = quanta.get("v", np.zeros(len(levels), dtype=np.int64))
         total = np.zeros(len(levels), dtype=np.int64)
         for place, state in enumerate(self.states):
             for ka, kc, k, alike in _components(levels, n, self.oblate):
-                own = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, state.odd_spins(quanta)), 0)
-                total += np.where((v == place) & alike, np.maximum(own, 0), 0)
+                component_weight = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, state.odd_spins(quanta)), 0)
+                total += np.where((v == place) & alike, np.maximum(component_weight, 0), 0)
         return total
 
 
 def _components(levels: Levels, n: Ints, oblate: bool) -> list[tuple[Ints, Ints, Ints, Ints]]:
-    """Ka, Kc, K of each component of the rows, and which rows have it: ±K of a symmetric top are two."""
-    quanta, every = levels.quanta, np.ones(len(levels), dtype=bool)
+    """Ka, Kc, K of each component and the rows that have it; a symmetric top has two components ±K."""
+    quanta, all_rows = levels.quanta, np.ones(len(levels), dtype=bool)
     if "kc" in quanta:
-        return [(quanta["ka"], quanta["kc"], quanta["kc"] if oblate else quanta["ka"], every)]
+        return [(quanta["ka"], quanta["kc"], quanta["kc"] if oblate else quanta["ka"], all_rows)]
     k = quanta.get("k", np.zeros_like(n))
-    upper, lower = n - k, n - k + 1  # the other K of the two components; of K = 0 the first alone
-    pairs = [(upper, every), (lower, k > 0)]
+    upper, lower = n - k, n - k + 1  # the other K of both components; K = 0 has only the first
+    pairs = [(upper, all_rows), (lower, k > 0)]
     return [(other, k, k, alike) if oblate else (k, other, k, alike) for other, alike in pairs]
 
 
@@ -164,8 +165,8 @@ def groups_of(
 ) -> list[Group]:
     """The groups of connected states, by their lowest numbers; the basis has K from KNMIN to KNMAX.
 
-    as_spcat: moments are those that SPCAT computes where it errs. full_basis: the basis has every K to N, unless KNMIN = KNMAX, where K
-    is a quantum number of the state, such as l. highest_n: of the levels to be solved, so that a larger KNMAX is not looked at.
+    as_spcat: reproduce erroneous moments of SPCAT. full_basis: the basis has all K up to N, unless KNMIN = KNMAX, where K is a quantum
+    number of the state, such as l. highest_n: highest N of the levels; a larger KNMAX has no effect.
     """
     states = states_of(file)
     if full_basis:
@@ -180,7 +181,7 @@ def groups_of(
     own_axes = moments_within_states(dipoles, others, states, members)
     phases = with_dipoles(phases, own_axes, oblate, as_spcat and bool(phases.odd))
     lines = _acting(file, states, doubled, phases.odd)[0]
-    dipoles, others = _of_both_components(dipoles, doubled), _others_of_both(others, doubled)
+    dipoles, others = _dipoles_of_both_components(dipoles, doubled), _others_of_both(others, doubled)
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     lines = with_their_spins(lines, states)[0]
     light = Light(dipoles, others, series_of(file, len(states), doubled), phases, own_axes)
@@ -191,10 +192,10 @@ def groups_of(
 
 
 class Light(NamedTuple):
-    """The dipoles of a file by pairs of states, moments of other kinds, constants of its series, its phases; `moments_within_states`.
+    """Dipoles of a file by pairs of states, other moments, constants of series, phases, and `moments_within_states`.
 
-    Where no more electric moments within states are of odd order (a dipole, with TYP 0, 3, 4, ...) than of even order, the program
-    takes each between two states times i.
+    Unless more electric moments within states have odd order (a dipole, TYP 0, 3, 4, ...) than even order, the program multiplies each
+    moment between two states by i.
     """
 
     dipoles: Dipoles
@@ -207,7 +208,7 @@ class Light(NamedTuple):
 def moments_within_states(
     dipoles: Dipoles, others: list[tuple[Dipole, DipoleCode]], states: tuple[StateOptions, ...], members: frozenset[int]
 ) -> list[tuple[int, bool]]:
-    """The axes of the electric moments within one state that join levels of one weight, and whether they are of even order."""
+    """Axes of electric moments within one state that connect levels of equal weight, and whether their order is even."""
     plain = [(v, axis, False) for (v, w), mu in dipoles.items() for axis, value in enumerate(mu, 1) if v == w and value]
     plain += [
         (code.states[0], code.axis, code.typ in EVEN_ORDER)
@@ -220,7 +221,7 @@ def moments_within_states(
 
 
 def left_out(file: ParameterFile) -> list[str]:
-    """A sentence for every parameter that the declared symmetry forbids, or whose spins or states the file does not have."""
+    """A sentence for each parameter that the declared symmetry forbids, or whose spins or states do not exist."""
     states = states_of(file)
     doubled = pairs_of(states)
     lines, reasons = _acting(file, states, doubled, phases_of(file, len(states), members_of_pairs(doubled)).odd)
@@ -235,7 +236,7 @@ def members_of_pairs(doubled: list[Pair]) -> frozenset[int]:
 def _acting(
     file: ParameterFile, states: tuple[StateOptions, ...], doubled: list[Pair], odd: frozenset[str]
 ) -> tuple[list[CodedLine], list[str]]:
-    """The lines that symmetry allows and that are real where operators along some axes are odd, and why others are left out."""
+    """The lines that symmetry allows and that are real with the odd axes of the file, and why others are left out."""
     lines, forbidden = allowed(coded_lines(file, len(states), doubled), states, doubled, file.options[0].nvib < 0)
     lines, imaginary = real_lines(lines, odd, members_of_pairs(doubled))
     return lines, forbidden + imaginary
@@ -244,64 +245,70 @@ def _acting(
 def allowed(
     lines: list[CodedLine], states: tuple[StateOptions, ...], doubled: list[Pair], oblate: bool
 ) -> tuple[list[CodedLine], list[str]]:
-    """The parameter lines that the declared symmetry allows, as SPCAT takes them, and why the others are left out.
+    """The parameter lines that the declared symmetry allows, as in SPCAT, and why others are left out.
 
     Parameters
     ----------
     lines : list of CodedLine
-        All parameters that compute.
+        All supported parameters.
     states : tuple of StateOptions
         All states of the file.
     doubled : list of Pair
-        The l-doubled ones.
+        The l-doubled pairs.
     oblate : bool
         Whether z is the c axis.
 
     Returns
     -------
     lines : list of CodedLine
-        Those that act.
+        Lines that act.
     reasons : list of str
-        A sentence for each that is left out.
+        A sentence for each line that is left out.
     """
     l_of = l_values(states, doubled)
-    found, reasons = list[CodedLine](), list[str]()
+    acting, reasons = list[CodedLine](), list[str]()
     for line in lines:
         concerned = [(v, v) for v in range(len(states))] if line.states is None else [line.states]
         why = []
         for low, high in concerned:
             del_l = abs(l_of.get(low, 0) - l_of.get(high, 0)) * (-1 if line.reversed_ else 1)
-            own = states[low], states[high]
-            why.append(forbidden(line.typ, *own, del_l, oblate, bool({low, high} & set(l_of)), line.operator.spins))
+            both_states = states[low], states[high]
+            why.append(
+                forbidden(line.typ, *both_states, del_l, oblate, bool({low, high} & set(l_of)), line.operator.spins)
+            )
         if all(why):
             reasons.append(line.left_out(why[0]))
             continue
         folded = line.typ in (1, 2, 3) and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
         axes = basis_axes(oblate)
-        found.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
-    return found, list(dict.fromkeys(reasons))  # a line of the file may be one for each state
+        acting.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
+    return acting, list(dict.fromkeys(reasons))  # a line of the file may be one for each state
 
 
 def _turns_alone(state: StateOptions, line: CodedLine) -> bool:
-    """Whether an axis of more than two folds turns an operator onto itself: it touches none of three equivalent spins."""
+    """Whether an axis of more than two folds leaves an operator invariant: it acts on none of three equivalent spins."""
     touches = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
     return state.fold > 2 and not touches
 
 
-def _of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
-    """Dipoles of l-doubled states: that of the one with K l > 0 is that of both."""
-    return {own: moment for states, moment in dipoles.items() for own in _at_components(states, pairs)}
+def _dipoles_of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
+    """Dipoles with those of the state K l > 0 of an l-doubled pair copied to both states."""
+    return {
+        pair_of_states: moment for states, moment in dipoles.items() for pair_of_states in _at_components(states, pairs)
+    }
 
 
 def _others_of_both(others: list[tuple[Dipole, DipoleCode]], pairs: list[Pair]) -> list[tuple[Dipole, DipoleCode]]:
-    """Moments of other kinds likewise."""
+    """Other moments, with those of the state K l > 0 of an l-doubled pair copied to both states."""
     return [
-        (dipole, code._replace(states=own)) for dipole, code in others for own in _at_components(code.states, pairs)
+        (dipole, code._replace(states=pair_of_states))
+        for dipole, code in others
+        for pair_of_states in _at_components(code.states, pairs)
     ]
 
 
 def _at_components(states: tuple[int, int], pairs: list[Pair]) -> list[tuple[int, int]]:
-    """Between which states a moment of a file acts: that of the l-doubled one with K l > 0 on both, of the other on none."""
+    """Pairs of states on which a moment acts: for an l-doubled state with K l > 0 both states of the pair, for the other none."""
     firsts, seconds = {pair.first: pair.second for pair in pairs}, {pair.second for pair in pairs}
     low, high = states
     if low != high and {low, high} & (set(firsts) | seconds):
@@ -320,6 +327,7 @@ def _group(
     title: str,
     doubled: list[Pair],
 ) -> Group:
+    """The group of these states."""
     oblate = first.nvib < 0
     numbers = tuple(state.number for state in states)
     spins = states[0].spins
@@ -334,12 +342,12 @@ def _group(
         )
         for dipole, code in acting
     )
-    own = [line for line in lines if line.states is None or set(line.states) <= set(here)]
-    usable = of_coupled_spins(own, states, not doubled, basis_axes(oblate))
+    group_lines = [line for line in lines if line.states is None or set(line.states) <= set(here)]
+    usable = lines_of_coupled_spins(group_lines, states, not doubled, basis_axes(oblate))
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
     if kind in ("prolate", "oblate") and beside:
-        kind = "asymmetric"  # |N K⟩ does not tell K from -K, which such moments turn into each other or leave alone
+        kind = "asymmetric"  # |N K⟩ does not distinguish K from -K, which such moments may exchange
     limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states)
     coupled = coupled_spins(states[0], first)
     turned = _turned(usable, light, doubled)
@@ -350,7 +358,7 @@ def _group(
         moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
     axes, apart = basis_axes(oblate), _apart(states, pairs)
     effect = FileEffect(usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, axes, turned, apart)
-    if pairs:  # raises for what is not allowed between l-doubled states, before any level is solved
+    if pairs:  # raises for operators forbidden between l-doubled states, before levels are solved
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
@@ -359,15 +367,17 @@ def _group(
 
 
 def _apart(states: list[StateOptions], pairs: tuple[Pair, ...]) -> dict[tuple[int, int], SpeciesPairs]:
-    """By pairs of states the species between which there are elements, where weights forbid others."""
+    """Species with elements by pairs of states, where weights forbid others."""
     second = {pair.second for pair in pairs}
-    every = [(v, w) for v in range(len(states)) for w in range(v, len(states))]
-    found = {(v, w): species_pairs(states[v], states[w], (v in second, w in second)) for v, w in every}
-    return {both: species for both, species in found.items() if species is not None}
+    pairs_of_states = [(v, w) for v in range(len(states)) for w in range(v, len(states))]
+    allowed_species = {
+        (v, w): species_pairs(states[v], states[w], (v in second, w in second)) for v, w in pairs_of_states
+    }
+    return {both: species for both, species in allowed_species.items() if species is not None}
 
 
 def _turned(lines: Iterable[CodedLine], light: Light, doubled: list[Pair]) -> str:
-    """The axis whose half turn goes with time reversal where operators within one state are odd, "" where none does."""
+    """The axis whose half turn accompanies time reversal if operators within one state are odd, else ""."""
     turned = turned_axis([axis_of(line.typ) for line in lines], light.phases.odd)
     if turned and doubled:
         raise ValueError(
@@ -377,7 +387,7 @@ def _turned(lines: Iterable[CodedLine], light: Light, doubled: list[Pair]) -> st
     return turned
 
 
-# the symmetry alone counts: the file's own operators are the whole Hamiltonian
+# only the symmetry of these tops matters: the operators of the file are the whole Hamiltonian
 _STANDS_FOR = {
     ("linear", False): Constants(B=1.0), ("linear", True): Constants(B=1.0),
     ("prolate", False): Constants(A=2.0, B=1.0), ("oblate", True): Constants(B=2.0, C=1.0),
@@ -389,7 +399,7 @@ _ANY_TOP = Top(Constants(B=1.0))
 
 
 def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool, symmetric: bool) -> str:
-    """linear; the symmetric kind whose axis is that of the basis, where K is good; else asymmetric."""
+    """Kind of top: linear; symmetric about the axis of the basis if K is good; else asymmetric."""
     alone = len(states) == 1
     plain = [powers for line in lines if line.operator.plain for powers in line.operator.plain]
     if (
@@ -410,6 +420,6 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
 
 
 def _limits(states: list[StateOptions]) -> dict[int, tuple[int, int]]:
-    """KNMIN and KNMAX by the places of the states whose basis they cut."""
+    """KNMIN and KNMAX by state, where they restrict the basis."""
     cut = [(place, state) for place, state in enumerate(states) if state.kmin > 0 or state.kmax < EVERY_K]
     return {place: (state.kmin, state.kmax) for place, state in cut}

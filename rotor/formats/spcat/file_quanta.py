@@ -1,4 +1,4 @@
-"""How levels of any .par or .var file are called: quantum numbers by SPCAT's rules.
+"""Quantum numbers of levels of any .par or .var file by SPCAT's rules.
 
 Quantum numbers are N, then nothing, K or Ka Kc, then v where there are several states, then J, F1, ... F, half-integers rounded up.
 Where that makes more than six (ten, where NLINE is negative), one number that counts the coupling patterns stands for all but F.
@@ -22,9 +22,9 @@ from rotor.quantum.levels import Levels
 
 @dataclass(frozen=True)
 class Format:
-    """How a file's levels are called: columns of rotation (1, 2 or 3), whether v is listed, spins at most, columns at most.
+    """Format of quantum numbers: columns of rotation (1, 2 or 3), whether v is listed, largest numbers of spins and of columns.
 
-    equivalent: how many spins are coupled to a total, 0, 2 or 3.
+    equivalent: number of spins that are coupled to a total, 0, 2 or 3.
     """
 
     rotation: int
@@ -35,16 +35,16 @@ class Format:
 
     @property
     def before_spins(self) -> int:
-        """Columns before those of spins."""
+        """Number of columns before those of spins."""
         return self.rotation + self.states
 
     @property
     def aggregate(self) -> bool:
-        """Whether one number stands for the coupling pattern."""
+        """Whether a single number replaces the coupling pattern."""
         return self.before_spins + self.spins > self.most
 
     def aggregates(self, spins: int) -> bool:
-        """Whether it stands for that of states with so many spins: not where their own quantum numbers fill no more columns."""
+        """Whether a single number replaces the pattern of states with this number of spins, whose quantum numbers need more columns."""
         return self.aggregate and spins > self.width - self.before_spins
 
     @property
@@ -53,7 +53,7 @@ class Format:
         return self.before_spins + (2 if self.aggregate else self.spins)
 
     def qnfmt(self, spins: tuple[int, ...]) -> int:
-        """The code of a group whose doubled spins are these.
+        """QNFMT of a group with these doubled spins.
 
         >>> Format(3, True, 1).qnfmt((2,)), Format(3, False, 2).qnfmt((3, 3)), Format(1, False, 0).qnfmt(())
         (1405, 325, 101)
@@ -77,7 +77,7 @@ class Format:
 
 
 def format_of(file: ParameterFile, groups: list[Group]) -> Format:
-    """How the levels of a file are called."""
+    """Format of the quantum numbers of a file."""
     first = file.options[0]
     linear = all(state.linear for group in groups for state in group.states)
     rotation = 3 if first.spind > 0 else 1 if linear else 2
@@ -87,18 +87,18 @@ def format_of(file: ParameterFile, groups: list[Group]) -> Format:
 
 
 def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
-    """The quantum numbers of every row as the file prints them, of one component of ±K.
+    """The quantum numbers of each row as the file lists them, for one component of ±K.
 
     Parameters
     ----------
     group : Group
-        The connected states that the levels belong to.
+        The connected states of the levels.
     levels : Levels
         n solved levels.
     form : Format
         Which columns there are.
     negative : bool, optional
-        Of a K doublet whose two levels differ in species, the one with -K.
+        Whether to list the component -K of a K doublet whose levels differ in species.
 
     Returns
     -------
@@ -139,15 +139,15 @@ def _rotation(group: Group, levels: Levels, v: Ints, form: Format, negative: boo
 
 
 def _unsigned(group: Group, v: Ints, k: Ints) -> NDArray[np.bool_]:
-    """Which levels are of E species or l-doubled: the sign of K, or the parity of the other K, says nothing of them."""
-    found = np.zeros(len(k), dtype=bool)
+    """Whether levels are of E species or l-doubled, so that the sign of K, or the parity of the other K, has no meaning."""
+    unsigned = np.zeros(len(k), dtype=bool)
     for place, state in enumerate(group.states):
-        found |= (v == place) & state.is_e(k)
-    return found
+        unsigned |= (v == place) & state.is_e(k)
+    return unsigned
 
 
 def _ka_kc(group: Group, levels: Levels, v: Ints) -> list[Ints]:
-    """Ka and Kc; of E species the K that is not along the axis is N - K, and N - K + 1 in the first state of an l-doubled pair."""
+    """Ka and Kc; for E species the K across the axis is N - K, or N - K + 1 in the first state of an l-doubled pair."""
     n, ka, kc = levels.rotational, levels.quanta["ka"], levels.quanta["kc"]
     along = kc if group.oblate else ka
     firsts = [pair.first for pair in group.effect.pairs]

@@ -1,6 +1,6 @@
-"""The spins of a file's states: the parameter lines that act on them, and what a total spin of equivalent nuclei makes of a line.
+"""Spins of a file's states: parameter lines that act on them, and their form with a total spin of equivalent nuclei.
 
-With two equivalent spins the part of a line counts that joins levels of one weight; with three some lines have factors of the program.
+With two equivalent spins only the part of a line acts that connects levels of equal weight; with three, lines may have a factor of SPCAT.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rotor.quantum.spins.terms import Spin
 
 
 def with_their_spins(lines: list[CodedLine], states: tuple[StateOptions, ...]) -> tuple[list[CodedLine], list[str]]:
-    """The lines whose spins SPIND names, and why the others are left out, as SPCAT leaves them out."""
+    """The lines whose spins occur in SPIND, and why others are left out, as in SPCAT."""
     usable, reasons = list[CodedLine](), list[str]()
     for line in lines:
         why = _missing_spin(line, states)
@@ -30,7 +30,7 @@ def with_their_spins(lines: list[CodedLine], states: tuple[StateOptions, ...]) -
 
 
 def _missing_spin(line: CodedLine, states: tuple[StateOptions, ...]) -> str:
-    """Why a spin term can act on none of its states, empty where it can."""
+    """The reason why a spin term acts on none of its states; empty if it acts."""
     spins = line.operator.spins
     needed = _highest_spin(line)
     concerned = states if line.states is None else [states[v] for v in line.states]
@@ -47,14 +47,14 @@ def _missing_spin(line: CodedLine, states: tuple[StateOptions, ...]) -> str:
 
 
 def _highest_spin(line: CodedLine) -> int:
-    """The number of the last spin that a line is of, 0 where it is of none."""
+    """The highest number of the spins of a line; 0 without spins."""
     return max((*line.operator.spins, 1 if line.operator.ns else 0), default=0)
 
 
-def of_coupled_spins(
+def lines_of_coupled_spins(
     lines: Iterable[CodedLine], states: Sequence[StateOptions], by_exchange: bool, axes: str
 ) -> tuple[CodedLine, ...]:
-    """The lines of connected states, as they act in functions of the total spin of equivalent nuclei.
+    """The lines of connected states in functions of the total spin of equivalent nuclei.
 
     Parameters
     ----------
@@ -63,14 +63,14 @@ def of_coupled_spins(
     states : sequence of StateOptions
         The connected states, which have the same spins.
     by_exchange : bool
-        Whether levels of one state that differ in the parity of a total spin of two have weights of their own: not in l-doubled ones.
+        Whether levels of a state with even and odd total spin of two nuclei have different weights; not for l-doubled states.
     axes : str
-        Those of the basis.
+        Axes x, y, z of the basis.
 
     Returns
     -------
     tuple of CodedLine
-        Without those of spins that these states have not.
+        Lines without those of spins that these states do not have.
     """
     first = states[0]
     usable = tuple(line for line in lines if _highest_spin(line) <= len(first.spins))
@@ -78,24 +78,24 @@ def of_coupled_spins(
         of = {state.number: state for state in states}
         return tuple(part for line in usable for part in _by_exchange(line, of))
     if first.equivalent == 3:
-        return tuple(_of_three(line, len(first.spins), axes) for line in usable)
+        return tuple(_with_factors_of_three(line, len(first.spins), axes) for line in usable)
     return usable
 
 
 def _by_exchange(line: CodedLine, of: Mapping[int, StateOptions]) -> list[CodedLine]:
-    """A line with the part of it that joins levels of one weight; one of all states, which differ in it, is one for each state."""
+    """A line restricted to the part that connects levels of equal weight, with one line for each state if this part differs."""
     if not line.operator.spins:
         return [line]
     if line.states:
         return [line._replace(exchange=exchange_of(line.typ, *(of[v] for v in line.states)))]
-    found = {v: exchange_of(line.typ, state, state) for v, state in of.items()}
-    if len(set(found.values())) == 1:
-        return [line._replace(exchange=next(iter(found.values())))]
-    return [line._replace(states=(v, v), exchange=part) for v, part in found.items()]
+    part_by_state = {v: exchange_of(line.typ, state, state) for v, state in of.items()}
+    if len(set(part_by_state.values())) == 1:
+        return [line._replace(exchange=next(iter(part_by_state.values())))]
+    return [line._replace(states=(v, v), exchange=part) for v, part in part_by_state.items()]
 
 
-def _of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:
-    """A line with the factors that the program has for three equivalent spins."""
+def _with_factors_of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:
+    """A line with SPCAT's factors for three equivalent spins."""
     touches = max(line.operator.spins, default=0) > spins - 3
     if touches and isinstance(line.operator.rotor, ByElements):
         raise ValueError(
@@ -105,9 +105,8 @@ def _of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:
 
 
 def coupled_spins(state: StateOptions, first: Options) -> tuple[Spin, ...]:
-    """The spins of a state in the order of coupling, the last of them to a total where they are equivalent; ValueError for options
-    that are not computed with it."""
-    others = len(state.spins) - state.equivalent  # which are not coupled to a total
+    """The spins of a state in the order of coupling, equivalent last ones with a total; ValueError for unsupported options."""
+    others = len(state.spins) - state.equivalent  # spins without a total
     _check_three(state, others, first)
     return tuple(
         Spin(f"I{place}", twice, total="I_tot" if place > others else "") for place, twice in enumerate(state.spins, 1)
@@ -115,7 +114,7 @@ def coupled_spins(state: StateOptions, first: Options) -> tuple[Spin, ...]:
 
 
 def _check_three(state: StateOptions, others: int, first: Options) -> None:
-    """ValueError for options that are not computed with a total spin of three."""
+    """Raise ValueError for options that are not supported with a total spin of three."""
     if state.equivalent < 3:
         return
     if first.diag in BY_DIAG:

@@ -1,4 +1,4 @@
-"""A top from a .var and an .int file, and back: constants, spin weights, dipole, in one vibrational state."""
+"""Conversion between a top of one vibrational state and .var and .int files: constants, spin weights, dipole."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NO_NAME = (
 
 
 def weights_of(options: Options, symmetric: bool = True) -> SpinWeights:
-    """The spin weights of an option line, reduced by their common divisor; Q in the .int file may carry it still.
+    """The spin weights of an option line, divided by their common divisor, which Q in the .int file may still contain.
 
     IAX 1, 2, 3: WTPL and WTMN for rotational states even and odd under a half turn about a, b, c. IAX 6, 9: WTPL
     where K is a multiple of 3 or 5, EWT elsewhere; where they differ, at K = 0 by the parity of J, of a symmetric top alone. An
@@ -75,12 +75,12 @@ def _fold_weights(options: Options, plus: int, minus: int, symmetric: bool) -> S
 
 
 def fold_parts(fold: int, plus: int, minus: int, e_weight: int) -> list[int]:
-    """Twice the weights of K = 0 with J even and odd and of the E levels; where one of the first is 0, half of the E levels are there.
+    """Twice the weights of K = 0 with J even and odd and of the E levels; if one of the first is 0, only half of the E levels exist.
 
     Parameters
     ----------
     fold : int
-        n of the axis.
+        n of the n-fold axis.
     plus, minus : int
         WTPL and WTMN.
     e_weight : int
@@ -89,7 +89,7 @@ def fold_parts(fold: int, plus: int, minus: int, e_weight: int) -> list[int]:
     Returns
     -------
     list of int
-        0even, 0odd, 1, ..., n - 1.
+        Weights of 0even, 0odd, 1, ..., n - 1.
     """
     return [2 * plus, 2 * minus, *[2 * e_weight if min(plus, minus) > 0 else e_weight] * (fold - 1)]
 
@@ -97,8 +97,8 @@ def fold_parts(fold: int, plus: int, minus: int, e_weight: int) -> list[int]:
 def options_of(constants: Constants, weights: SpinWeights, kmax: int) -> Options:
     """The option line for one vibrational state, K up to `kmax`.
 
-    Levels of asymmetric tops are ordered by DIAG = 3: with 0 the field's program gives first-order energies for
-    eigenvalues where the diagonal no longer rises with K. Raises ValueError for weights that an option line cannot say.
+    Levels of asymmetric tops are ordered by DIAG = 3: with 0 SPCAT returns first-order energies instead of eigenvalues where the diagonal
+    does not rise with K. Raises ValueError for weights that an option line cannot express.
     """
     kind = constants.kind
     oblate = kind == "oblate" or constants.representation == "IIIl"
@@ -128,7 +128,7 @@ def _coded_weights(weights: SpinWeights, oblate: bool) -> tuple[int, int, int, i
         others = {weight for name, weight in by_class.items() if not name.startswith("0")}
         iax = {4: 6, 6: 9}.get(len(by_class), 0)
         plus, minus = by_class["0even"], by_class["0odd"]
-        if iax and len(others) == 1:  # where one of the two is 0, SPCAT has one level of each E pair alone
+        if iax and len(others) == 1:  # if one of the two is 0, SPCAT lists only one level of each E pair
             return iax, plus, minus, others.pop() * (1 if min(plus, minus) else 2)
     elif weights.rule == "K":
         others = set(weights.values[1:])
@@ -157,10 +157,10 @@ def dipole_of(file: IntensityFile) -> tuple[float, float, float]:
 
 
 def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) -> Top:
-    """The top of a .par or .var file, with the dipole of an .int file where one is given.
+    """The top of a .par or .var file, with the dipole of an optional .int file.
 
-    The symmetry axis of a symmetric top is a in a prolate and c in an oblate one, whichever basis the file has.
-    Raises ValueError for what is read but not computed yet: spins, more than one vibrational state, internal rotation.
+    The symmetry axis of a symmetric top is a if prolate and c if oblate, independent of the basis of the file. Raises ValueError for spins,
+    more than one vibrational state, and internal rotation.
     """
     constants = constants_of(parameters)
     if intensities is not None and intensities.request.flags >= 1000:
@@ -177,7 +177,7 @@ def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) 
 
 
 def names_what_is_not_there(parameters: ParameterFile) -> bool:
-    """Whether a parameter of a file with one state and no spin is of a spin or of another state, which the program passes over."""
+    """Whether a file with one state and no spin has parameters of a spin or another state, which SPCAT ignores."""
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
     return any(
         d.i1 or d.i2 or (d.v1 != d.v2 and 9 not in (d.v1, d.v2)) or (d.v1 == d.v2 and 0 < d.v1 < 9) for d in digits
@@ -192,13 +192,13 @@ def parameter_file(top: Top, kmax: int) -> ParameterFile:
 
 
 def intensity_file(top: Top, request: Request) -> IntensityFile:
-    """The .int file of a top, with the dipoles of its states and between them; a component of exactly zero has no line."""
+    """The .int file of a top, with dipoles within and between states; components of exactly zero have no line."""
     if top.dipole_abc_debye is None:
         raise ValueError(f"{top.name or 'the top'} has no dipole; expected one for an .int file, (μa, μb, μc) in D")
     count = 1 if top.states is None else top.states.count
-    given = top.states.dipoles if top.states else {}
-    moments = {(v, v): given.get((v, v), top.dipole_abc_debye) for v in range(count)}
-    moments |= {pair: moment for pair, moment in given.items() if pair[0] != pair[1]}
+    state_dipoles = top.states.dipoles if top.states else {}
+    moments = {(v, v): state_dipoles.get((v, v), top.dipole_abc_debye) for v in range(count)}
+    moments |= {pair: moment for pair, moment in state_dipoles.items() if pair[0] != pair[1]}
     width = 0 if count == 1 else state_digits(count)
     dipoles = tuple(
         Dipole((low * 10**width + high) * 10 + axis, value)
@@ -210,7 +210,7 @@ def intensity_file(top: Top, request: Request) -> IntensityFile:
 
 
 def common_weight(options: Options) -> int:
-    """The common divisor that `weights_of` takes out of WTPL, WTMN and EWT, and that Q in the .int file carries."""
+    """The common divisor of WTPL, WTMN and EWT, which `weights_of` removes and Q in the .int file contains."""
     if is_linear(options) and options.iax == 1:  # every level has the one weight
         return options.wtpl if options.vsym % 2 == 0 else options.wtmn
     used = [options.wtpl, options.wtmn] + ([abs(options.ewt)] if options.iax in FOLD else [])

@@ -1,6 +1,6 @@
-"""What SPCAT does with an .int and a .var or .par file: a catalogue with the file's Q, limits, cut, weights and labels.
+"""Catalogue predicted from an .int and a .var or .par file as by SPCAT, with the Q, limits, cut, weights and labels of the files.
 
-Where that program passes over something in silence, the prediction carries a note that says so.
+Notes of the prediction report input that SPCAT ignores silently.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from rotor.tops.top import Top
 
 @dataclass(frozen=True)
 class Prediction:
-    """A predicted catalogue and what it was made from.
+    """A predicted catalogue with the data behind it.
 
     catalogue: as the program would list it, in cm⁻¹ where FLAGS says so, E″ from the Hamiltonian's zero, degeneracies with the
     weights as the file has them. lines: the same lines before K doublets were parted, weights reduced, E″ from the lowest level.
@@ -59,16 +59,16 @@ class Prediction:
 
     @cached_property
     def levels(self) -> LevelList | None:
-        """The levels as the program would list them, where the file has spins or several states; made when they are asked for."""
+        """The levels as SPCAT would list them, for files with spins or several states; computed at first use."""
         return None if self.listing is None else self.listing()
 
 
 def predict_file(
     path: str | os.PathLike[str], *, own_q: bool = False, as_spcat: bool = False, full_basis: bool = False
 ) -> Prediction:
-    """The catalogue that belongs to an .int file, with the .var (else .par) file of the same name beside it.
+    """The catalogue of an .int file and the .var (else .par) file of the same name.
 
-    own_q, as_spcat, full_basis: see `predict`. Raises ValueError, with file and line, for what cannot be read or is not computed yet.
+    own_q, as_spcat, full_basis: see `predict`. Raises ValueError, with file and line, for unreadable or unsupported input.
     """
     return predict(
         read_par(parameters_beside(path)), read_int(path), own_q=own_q, as_spcat=as_spcat, full_basis=full_basis
@@ -76,7 +76,7 @@ def predict_file(
 
 
 def levels_of_file(path: str | os.PathLike[str], *, as_spcat: bool = False, full_basis: bool = False) -> LevelList:
-    """The levels that belong to an .int file as SPCAT lists them in its .egy file, from FBGN to FEND; see `predict_file`."""
+    """The levels of an .int file from FBGN to FEND as SPCAT lists them in its .egy file; see `predict_file`."""
     parameters, intensities = read_par(parameters_beside(path)), read_int(path)
     if intensities.request.flags >= wavenumbers.FROM:
         parameters, intensities = wavenumbers.files_in_mhz(parameters, intensities)
@@ -84,12 +84,12 @@ def levels_of_file(path: str | os.PathLike[str], *, as_spcat: bool = False, full
 
 
 def parameters_beside(path: str | os.PathLike[str]) -> Path:
-    """The .var file beside an .int file, or its .par file where there is no .var."""
+    """The .var file of the same name as an .int file, else its .par file."""
     beside = [Path(path).with_suffix(suffix) for suffix in (".var", ".par")]
-    found = next((p for p in beside if p.exists()), None)
-    if found is None:
+    existing = next((p for p in beside if p.exists()), None)
+    if existing is None:
         raise ValueError(f"{path}: an .int file has no constants; its .var or .par must stand beside it")
-    return found
+    return existing
 
 
 def predict(
@@ -113,23 +113,22 @@ def predict(
     intensities : IntensityFile
         The .int file.
     own_q : bool, optional
-        The partition function is summed from the levels, whatever FEND and KNMAX are, instead of taken from QROT.
+        Sum the partition function over all levels, independent of FEND and KNMAX, instead of using QROT.
     as_spcat : bool, optional
-        Numbers are the program's also where it errs: QROT below 1, some moments. DIAG below 0 is refused then.
+        Reproduce SPCAT's numbers even where it errs: QROT below 1, some moments. DIAG below 0 is then refused.
     full_basis : bool, optional
-        KNMIN and KNMAX are lifted: every K to N is in the basis; by default K runs from KNMIN to KNMAX.
+        Ignore KNMIN and KNMAX: the basis has all K up to N. By default K runs from KNMIN to KNMAX.
 
     Returns
     -------
     Prediction
-        Catalogue, lines, Q, and notes on what the program passes over in silence and what KNMAX leaves out.
+        Catalogue, lines, Q, and notes on input that SPCAT ignores silently and on the effect of KNMAX.
 
     Raises
     ------
     ValueError
-        For an empty range of F, for a Q or a temperature that is not above 0, and for what is read but not computed
-        yet, by its meaning: series with spins, operators of odd order within one state, some cases of l-doubled states and of
-        spins of equivalent nuclei in a total spin.
+        For an empty range of F, for Q or a temperature not above 0, and for unsupported input: series with spins, operators of odd
+        order within one state, some cases of l-doubled states and of total spins of equivalent nuclei.
 
     Examples
     --------
@@ -162,17 +161,17 @@ def predict(
     is_cut = not full_basis and options.knmax < request.fend and not is_linear(options)
     top = None if is_cut or others_names else _named_top(parameters, intensities)
     if top is None:
-        made, of_states, q, listing, notes = predicted(
+        listed, lines_of_states, q, listing, notes = predicted(
             parameters, intensities, own_q=own_q, as_spcat=as_spcat, full_basis=full_basis
         )
-        return Prediction(made, of_states, q, request, (*notes, *further), listing)
+        return Prediction(listed, lines_of_states, q, request, (*notes, *further), listing)
 
     if as_spcat and top.kind == "asymmetric":
         refuse_undiagonalized(options.diag)
     top = replace(top, covariance=constants_covariance(parameters))
     common = common_weight(options)
     q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot
-    lines = _lines_asked_for(top, request, q / common)
+    lines = _requested_lines(top, request, q / common)
     return Prediction(
         catalogue=_as_the_program_lists(lines, options, common, request.tag),
         lines=lines,
@@ -183,11 +182,11 @@ def predict(
 
 
 def _named_top(parameters: ParameterFile, intensities: IntensityFile) -> Top | None:
-    """The top by the names of its constants, None where it has to be solved by the codes of the file.
+    """The top with named constants; None if the codes of the file must be solved.
 
-    That is so for spins, states and other operators, for constants that do not follow A >= B >= C, for a spherical top with a dipole,
-    and where the sign of SPIND asks for quantum numbers of the other kind: N and K of an asymmetric top, N, Ka and Kc of a symmetric
-    or linear one.
+    Codes are solved for spins, states and other operators, for constants not in the order A >= B >= C, for a spherical top with a dipole,
+    and if the sign of SPIND requests quantum numbers of the other kind: N and K of an asymmetric top, N, Ka and Kc of a symmetric or linear
+    one.
     """
     first = parameters.options[0]
     if not is_plain(parameters, intensities) or (is_linear(first) and first.nvib < 0):  # whose axis is not z
@@ -211,11 +210,11 @@ def summed_q(top: Top, options: Options, temperature_k: float) -> PartitionFunct
 
 
 def _ground_mhz(top: Top) -> float:
-    """The lowest level that exists; it is among J = 0 to 3 whatever the weights are."""
+    """The lowest existing level (MHz), which has J ≤ 3 for any weights."""
     return solve_levels(top, 3, vectors=False).ground_mhz
 
 
-def _lines_asked_for(top: Top, request: Request, q_reduced: float) -> Lines:
+def _requested_lines(top: Top, request: Request, q_reduced: float) -> Lines:
     """The lines within the request's limits. `Lines` counts energies from the lowest level, QROT from zero."""
     t = request.temperature_k
     above_zero = _ground_mhz(top) / units.MHZ_PER_K / t if math.isfinite(t) and t > 0 else 0.0
@@ -235,10 +234,11 @@ def _lines_asked_for(top: Top, request: Request, q_reduced: float) -> Lines:
 
 
 def _as_the_program_lists(lines: Lines, options: Options, common: int, tag: int) -> Catalogue:
-    made = catalogue(lines, tag)
+    """The catalogue of lines as SPCAT lists it."""
+    listed = catalogue(lines, tag)
     from_zero = (lines.levels.energy_mhz / units.MHZ_PER_CM)[lines.lower]
-    made = replace(made, energy_lower_cm=from_zero, g_upper=made.g_upper * common)
-    return _parted_doublets(made, FOLD[options.iax]) if _parts_doublets(lines.levels, options) else made
+    listed = replace(listed, energy_lower_cm=from_zero, g_upper=listed.g_upper * common)
+    return _parted_doublets(listed, FOLD[options.iax]) if _parts_doublets(lines.levels, options) else listed
 
 
 def _parts_doublets(levels: Levels, options: Options) -> bool:
@@ -246,11 +246,10 @@ def _parts_doublets(levels: Levels, options: Options) -> bool:
 
 
 def _parted_doublets(merged: Catalogue, fold: int) -> Catalogue:
-    """Each line of a K doublet as the two lines that the program prints.
+    """The catalogue with each line of a K doublet as two lines, as in SPCAT.
 
-    Where K is a multiple of the fold the two states of a doublet differ in symmetry (A1, A2); the program distinguishes them by
-    the sign of K, and a line with ΔK = 0 joins -K to K. The others (E) are printed twice with one label. Lines with
-    ΔK ≠ 0 stay as they are.
+    If K is a multiple of the fold the two states of a doublet differ in symmetry (A1, A2); the sign of K distinguishes them, and a line
+    with ΔK = 0 connects -K with K. All others (E) are listed twice with the same label. Lines with ΔK ≠ 0 are unchanged.
     """
     upper, lower = merged.quanta_upper[:, 1], merged.quanta_lower[:, 1]
     doublet = (upper == lower) & (upper > 0)
@@ -272,7 +271,7 @@ def _parted_doublets(merged: Catalogue, fold: int) -> Catalogue:
 
 
 def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
-    """What SPCAT does in silence with these files, and what is done here."""
+    """Notes on what SPCAT does silently with these files, and what is computed here."""
     options, notes = parameters.options[0], note_of_npar(parameters)
     if not is_linear(options):  # a KNMAX below FEND is here only where it is lifted
         notes += notes_of_full_basis(states_of(parameters), request.fend)
@@ -293,7 +292,7 @@ def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
 
 
 def _not_written(request: Request) -> list[str]:
-    """What FLAGS ask for and is not made here: the tens say whether SPCAT writes a .str file."""
+    """Note on output that FLAGS request and that is not written here, a .str file (tens digit)."""
     if request.flags // 10 % 10 == 0:
         return []
     return [
@@ -303,7 +302,7 @@ def _not_written(request: Request) -> list[str]:
 
 
 def _diagonal_rolls_over(top: Top, jmax: int) -> int | None:
-    """The lowest J where ⟨K|H|K⟩ of a Wang block turns around as K rises."""
+    """The lowest J at which ⟨K|H|K⟩ of a Wang block ceases to rise (or fall) with K."""
     operators, representation = hamiltonian(top), str(top.constants.representation)
     rise = 1.0 if representation[:2] == "Ir" else -1.0
     for j in range(2, jmax + 1):

@@ -1,4 +1,4 @@
-"""What SPCAT does with files that have spins, several states or operators outside orthorhombic symmetry.
+"""Prediction from files with spins, several states or operators outside orthorhombic symmetry.
 
 The other files go through `predict`, with constants by their names.
 """
@@ -45,8 +45,8 @@ from rotor.spectra.transitions import Transitions
 from rotor.thermodynamics import PartitionFunction
 from rotor.tops.top import Top
 
-_TAIL = 1e-7  # of Q: what may lie beyond the last F
-_STEP = 8  # F that are added to Q at a time
+_TAIL = 1e-7  # largest share of Q beyond the last F
+_STEP = 8  # number of F that are added to Q at a time
 _LAST = 2000
 
 
@@ -67,24 +67,24 @@ def predicted(
     intensities : IntensityFile
         The .int file.
     own_q : bool, optional
-        Whether Q is summed from the levels, with every K, instead of taken from QROT.
+        Whether Q is summed over the levels, with all K, instead of taken from QROT.
     as_spcat : bool, optional
-        Whether moments are those that SPCAT computes where it errs.
+        Whether to reproduce erroneous moments of SPCAT.
     full_basis : bool, optional
-        Whether KNMIN and KNMAX are lifted.
+        Whether to ignore KNMIN and KNMAX.
 
     Returns
     -------
     catalogue : Catalogue
-        As the program would list it.
+        The catalogue as SPCAT would list it.
     lines : Lines
-        The same lines before K doublets were parted.
+        The lines before K doublets were divided.
     q : float
-        As the file counts it.
+        Partition function with the weights and the zero of energy of the file.
     levels : callable
-        What makes the list of levels as the program would write it.
+        Makes the list of levels as SPCAT would write it.
     notes : list of str
-        What the program passes over in silence.
+        Notes on input that SPCAT ignores silently.
 
     Raises
     ------
@@ -104,23 +104,25 @@ def predicted(
     transitions = [transitions_of(group, levels, request, q) for group, levels in solved]
     spreads = _spreads(solved, parameters)
     listed = [
-        lines_of(group, levels, found, form, request, q, spread)
-        for (group, levels), found, spread in zip(solved, transitions, spreads, strict=True)
+        lines_of(group, levels, allowed, form, request, q, spread)
+        for (group, levels), allowed, spread in zip(solved, transitions, spreads, strict=True)
     ]
-    pieces = [(own, form.qnfmt(group.spins)) for own, (group, _) in zip(listed, solved, strict=True)]
-    made = as_catalogue(pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3)
+    pieces = [(group_lines, form.qnfmt(group.spins)) for group_lines, (group, _) in zip(listed, solved, strict=True)]
+    listed_catalogue = as_catalogue(
+        pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3
+    )
     notes = notes_of_files(parameters, intensities, as_spcat)
     if any(state.is_cut for group in groups for state in group.states):
         notes += notes_of_basis(groups, _groups_to_solve(parameters, intensities, as_spcat, True), request)
     notes += notes_of_diagonal(groups, parameters.options[0].diag, _highest_n(parameters, request))
     if full_basis:
         notes += notes_of_full_basis(states_of(parameters), _highest_n(parameters, request))
-    lines = _lines(parameters, solved, [own.found for own in listed], form, request, q)
-    with_spread = [one for one in spreads if one is not None]
+    lines = _lines(parameters, solved, [group_lines.transitions for group_lines in listed], form, request, q)
+    with_spread = [spread_of_group for spread_of_group in spreads if spread_of_group is not None]
     if with_spread:
         lines = replace(lines, given_spread=np.concatenate(with_spread))
     plain = [(group, replace(levels, blocks=())) for group, levels in solved]
-    return made, lines, q, partial(_level_list, parameters, plain, form, spreads), notes
+    return listed_catalogue, lines, q, partial(_level_list, parameters, plain, form, spreads), notes
 
 
 def _level_list(
@@ -129,12 +131,12 @@ def _level_list(
     form: Format,
     spreads: Sequence[Floats | None],
 ) -> LevelList:
-    """The levels as the program lists them, with its numbers of blocks and places."""
+    """The levels as SPCAT lists them, with its block numbers and places."""
     return as_level_list(solved, form, spreads, blocks_of(parameters, [group for group, _ in solved]))
 
 
 def refuse_undiagonalized(diag: int) -> None:
-    """ValueError for DIAG below 0, which asks for diagonal elements in place of eigenvalues."""
+    """Raise ValueError for DIAG below 0, which requests diagonal elements instead of eigenvalues."""
     if diag < 0:
         raise ValueError(
             f"DIAG = {diag}: diagonal elements in place of eigenvalues, which is read but not computed; give DIAG = 0, or leave "
@@ -143,16 +145,16 @@ def refuse_undiagonalized(diag: int) -> None:
 
 
 def _solved(groups: list[Group], request: Request, form: Format) -> list[tuple[Group, Levels]]:
-    """The levels of every group from FBGN to FEND; those of states above MAXV count as levels that do not exist."""
-    found = [(group, group.levels(f_range(group, request))) for group in groups]
+    """The levels of all groups from FBGN to FEND; levels of states above MAXV have weight 0."""
+    groups_and_levels = [(group, group.levels(f_range(group, request))) for group in groups]
     if request.maxv >= 0 and form.states:
-        found = [(group, _up_to(request.maxv, group, levels)) for group, levels in found]
-    if not any((levels.weight > 0).any() for _, levels in found):
+        groups_and_levels = [(group, _up_to(request.maxv, group, levels)) for group, levels in groups_and_levels]
+    if not any((levels.weight > 0).any() for _, levels in groups_and_levels):
         raise ValueError(
             f"no level has a weight from FBGN = {request.fbgn} to FEND = {request.fend}, MAXV = {request.maxv}; give other limits or "
             "weights (WTPL, WTMN, EWT)"
         )
-    return found
+    return groups_and_levels
 
 
 def _up_to(maxv: int, group: Group, levels: Levels) -> Levels:
@@ -174,7 +176,7 @@ def _highest_n(parameters: ParameterFile, request: Request) -> int:
 def levels_of_files(
     parameters: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False, full_basis: bool = False
 ) -> LevelList:
-    """The levels of an .int file from FBGN to FEND as SPCAT lists them, whether they have names of this package or not.
+    """The levels of an .int file from FBGN to FEND as SPCAT lists them, with or without named constants.
 
     Energies in cm⁻¹ from the zero of the Hamiltonian, their errors by the covariance of the file, degeneracies with the weights of the
     file. Raises ValueError as `predict.predict` does.
@@ -186,32 +188,32 @@ def levels_of_files(
 
 
 def _spreads(solved: list[tuple[Group, Levels]], parameters: ParameterFile) -> list[Floats | None]:
-    """What the covariance of the file makes of the levels of each group."""
+    """∂E/∂p F for the levels of each group, with F of the covariance of the file."""
     factor, names = variance_factor(parameters), line_names(parameters)
     return [level_spreads(group, levels, names, factor) for group, levels in solved]
 
 
 def _with_levels(groups: list[Group], request: Request) -> list[Group]:
-    """The groups with levels from FBGN to FEND; ValueError where no group has any."""
-    found = [group for group in groups if group.has_levels(f_range(group, request))]
-    if not found:
+    """The groups with levels from FBGN to FEND; ValueError if there are none."""
+    present = [group for group in groups if group.has_levels(f_range(group, request))]
+    if not present:
         limits = sorted({(state.kmin, state.plus, state.minus) for group in groups for state in group.states})
         raise ValueError(
             f"no level exists from FBGN = {request.fbgn} to FEND = {request.fend}: N must reach KNMIN and a weight be above 0; "
             f"KNMIN, WTPL, WTMN of the states are {limits}"
         )
-    return found
+    return present
 
 
 def level_spreads(group: Group, levels: Levels, names: Sequence[str], factor: Floats | None) -> Floats | None:
-    """What the covariance of a file's parameters makes of each level, ∂E/∂p F; None without one.
+    """∂E/∂p F for each level, whose rows give errors of levels and lines; None without a covariance.
 
     Parameters
     ----------
     group : Group
-        Of states, with their effect and top.
+        States with their effect and top.
     levels : Levels
-        Of the group.
+        Levels of the group.
     names : sequence of str
         The parameters of the file, in the order of the rows of `factor`.
     factor : (parameters, k) array or None
@@ -224,9 +226,9 @@ def level_spreads(group: Group, levels: Levels, names: Sequence[str], factor: Fl
     """
     if factor is None:
         return None
-    own = tuple(group.effect.parameters(group.top))
-    rows = [names.index(name) for name in own]
-    return np.asarray(level_derivatives(group.top, levels, own) @ factor[rows])
+    parameters = tuple(group.effect.parameters(group.top))
+    rows = [names.index(name) for name in parameters]
+    return np.asarray(level_derivatives(group.top, levels, parameters) @ factor[rows])
 
 
 def f_range(group: Group, request: Request) -> tuple[int, int]:
@@ -236,23 +238,23 @@ def f_range(group: Group, request: Request) -> tuple[int, int]:
 
 
 def summed_q(groups: list[Group], temperature_k: float) -> PartitionFunction:
-    """Q summed over all levels of all groups, F by F until the rest is below 1e-7 of it; the file's weights, its zero of energy."""
+    """Q summed over all levels of all groups, with F until the rest is below 1e-7; weights and zero of energy are those of the file."""
     if not (math.isfinite(temperature_k) and temperature_k > 0):
         raise ValueError(f"temperature {temperature_k} K: a temperature is above 0 K")
     kt = temperature_k * units.MHZ_PER_K
     total, last = 0.0, 0
     for group in groups:
-        half, f, own, before = sum(group.spins) % 2, 0, 0.0, math.inf
+        half, f, group_sum, before = sum(group.spins) % 2, 0, 0.0, math.inf
         while True:
             levels = group.levels((2 * f + half, 2 * (f + _STEP) - 2 + half))
             piece = float((levels.degeneracy * np.exp(-levels.energy_mhz / kt)).sum())
-            own, f = own + piece, f + _STEP
-            if piece < before < math.inf and piece * piece / (before - piece) < _TAIL * own:
+            group_sum, f = group_sum + piece, f + _STEP
+            if piece < before < math.inf and piece * piece / (before - piece) < _TAIL * group_sum:
                 break
             if f > _LAST:
                 raise ValueError(f"Q({temperature_k:g} K) needs levels beyond F = {_LAST}; give QROT")
             before = piece
-        total, last = total + own, max(last, f - 1)
+        total, last = total + group_sum, max(last, f - 1)
     return PartitionFunction(
         temperature_k, total, last, _TAIL, f"summed from levels to F = {last}, relative error below {_TAIL:g}"
     )
@@ -266,7 +268,7 @@ def _lines(
     request: Request,
     q: float,
 ) -> Lines:
-    """The lines of the catalogue as this package has them: one table of levels for all groups, one line for both components of ±K."""
+    """The lines of the catalogue with one table of levels for all groups and one line for both components of ±K."""
     starts = np.cumsum([0, *(len(levels) for _, levels in solved[:-1])]).astype(np.int32)
     levels = _joined(solved, form)
     t = request.temperature_k
@@ -286,7 +288,7 @@ def _lines(
 
 
 def _joined(tables: list[tuple[Group, Levels]], form: Format) -> Levels:
-    """The levels of all groups in one table, v as the file numbers it; a level without a spin that others have repeats its total."""
+    """The levels of all groups in one table, with v of the file; a level without a spin that others have repeats its last sum."""
     most = max((levels for _, levels in tables), key=lambda levels: len(levels.quanta))
     names = [name for name in most.quanta if name != "v"]
     quanta: dict[str, Ints] = {}
@@ -321,21 +323,21 @@ def _column(levels: Levels, name: str, most: Levels) -> Ints:
 
 
 def _shown(parameters: ParameterFile, group: Group) -> Top:
-    """The top of the lowest state by its named constants, where they have names; else the one that stands for the symmetry."""
+    """The top of the lowest state with named constants, if they have names; else the top that represents its symmetry."""
     states = max(abs(parameters.options[0].nvib), 1)
-    own = []
+    parameters_of_state = []
     for parameter in parameters.parameters:
         d = split_code(parameter.code, states)
         wild = d.v1 == d.v2 and d.v1 >= states
         if not (d.i1 or d.i2 or d.ns) and d.typ < 12 and any(d[:8]) and (wild or d.v1 == d.v2 == 0):
             code = (d.typ * 10 + d.ksq) * 1000 + d.nsq * 100
-            own.append(replace(parameter, code=code, constrained=False, text=""))
+            parameters_of_state.append(replace(parameter, code=code, constrained=False, text=""))
     first = parameters.options[0]
     option = replace(first, spind=-1 if first.spind < 0 else 1, nvib=-1 if first.nvib < 0 else 1, knmin=0, text="")
     if group.states[0].linear:
         option = replace(option, spind=-1, knmax=0)
     try:
-        constants = constants_of(replace(parameters, options=(option,), parameters=tuple(own)))
+        constants = constants_of(replace(parameters, options=(option,), parameters=tuple(parameters_of_state)))
     except ValueError:
         return group.top
     return replace(group.top, constants=constants)

@@ -1,6 +1,6 @@
-"""Notes of a prediction: what SPCAT does in silence with the same files, what KNMIN and KNMAX leave out, where the program errs.
+"""Notes of a prediction: silent actions of SPCAT with the same files, effects of KNMIN and KNMAX, and errors of SPCAT.
 
-Each place where `as_spcat` changes a number has one note.
+Each number that `as_spcat` changes has a note.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, ParameterFile, not
 
 
 def notes_of_files(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
-    """Notes that follow from the files alone, without their levels."""
+    """Notes that follow from the files without their levels."""
     notes = [*note_of_npar(parameters), *left_out(parameters)]
     if parameters.options[0].diag < 0 and not as_spcat:
         notes.append(UNDIAGONALIZED_NOTE)
@@ -33,14 +33,14 @@ def notes_of_files(parameters: ParameterFile, intensities: IntensityFile, as_spc
 
 
 def note_of_qrot(request: Request, as_spcat: bool) -> list[str]:
-    """A note for QROT below 1, which SPCAT takes for 1."""
+    """A note for QROT below 1, which SPCAT replaces by 1."""
     if not 0 < request.qrot < 1:
         return []
     return [f"QROT = {request.qrot:g} is below 1: {_choice('SPCAT takes 1', as_spcat)}"]
 
 
 def _choice(program: str, as_spcat: bool) -> str:
-    """What the program does, and whether that is computed here."""
+    """Text on what SPCAT does, and whether it is reproduced here."""
     return (
         f"{program}, and so do these numbers"
         if as_spcat
@@ -49,7 +49,7 @@ def _choice(program: str, as_spcat: bool) -> str:
 
 
 def _notes_of_moments(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
-    """Notes of the dipole lines for which SPCAT computes another moment than is documented, and of their phases."""
+    """Notes on dipole lines for which SPCAT deviates from its documentation, and on their phases."""
     states = states_of(parameters)
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     oblate = parameters.options[0].nvib < 0
@@ -61,9 +61,12 @@ def _notes_of_moments(parameters: ParameterFile, intensities: IntensityFile, as_
         notes.append(f"{lines}: {_choice(program, as_spcat)}")
 
     members = members_of_pairs(pairs_of(states))
-    own, within = phases_of(parameters, len(states), members), moments_within_states(dipoles, others, states, members)
-    phases = with_dipoles(own, within, oblate, False)
-    if phases.odd and with_dipoles(own, within, oblate, True) != phases:
+    file_phases, within = (
+        phases_of(parameters, len(states), members),
+        moments_within_states(dipoles, others, states, members),
+    )
+    phases = with_dipoles(file_phases, within, oblate, False)
+    if phases.odd and with_dipoles(file_phases, within, oblate, True) != phases:
         program = "SPCAT settles the phases along axes without odd parameters by the dipoles, SPFIT does not"
         notes.append(f"phases: {_choice(program, as_spcat)}")
     if phases.between_i and not phases.odd and _has_unlike_orders(dipoles, [code for _, code in others if code.axis]):
@@ -73,7 +76,7 @@ def _notes_of_moments(parameters: ParameterFile, intensities: IntensityFile, as_
 
 
 def _has_unlike_orders(dipoles: Dipoles, others: Iterable[DipoleCode]) -> bool:
-    """Whether electric moments of even and of odd order stand between the same two states."""
+    """Whether there are electric moments of even and of odd order between the same two states."""
     orders = {states: {False} for states in dipoles}
     for code in others:
         orders.setdefault(code.states, set()).add(code.typ in EVEN_ORDER)
@@ -81,14 +84,14 @@ def _has_unlike_orders(dipoles: Dipoles, others: Iterable[DipoleCode]) -> bool:
 
 
 def notes_of_basis(groups: list[Group], whole: list[Group], request: Request) -> list[str]:
-    """What KNMIN and KNMAX leave out, and by how much they change the levels that remain.
+    """Levels that KNMIN and KNMAX exclude, and the shifts of the remaining levels.
 
     Parameters
     ----------
     groups : list of Group
-        With the basis of the file.
+        Groups with the basis of the file.
     whole : list of Group
-        With every K.
+        Groups with all K.
     request : Request
         Highest F.
 
@@ -109,8 +112,10 @@ def _note_of_cut(group: Group, whole: list[Group], request: Request) -> str:
     half = sum(group.spins) % 2
     twice_f = 2 * request.fend - half
     levels, count = _energies([group], twice_f)
-    every, total = _energies(whole, twice_f)
-    shift = max((abs(energy - every[label]) for label, energy in levels.items() if label in every), default=0.0)
+    all_energies, total = _energies(whole, twice_f)
+    shift = max(
+        (abs(energy - all_energies[label]) for label, energy in levels.items() if label in all_energies), default=0.0
+    )
     limits = ", ".join(_limits_of(state) for state in group.states if state.is_cut)
     angular = f"F = {twice_f}/2" if half else f"{'F' if group.spins else 'J'} = {twice_f // 2}"
     moved = (
@@ -129,7 +134,7 @@ def _limits_of(state: StateOptions) -> str:
 
 
 def _energies(groups: Iterable[Group], twice_f: int) -> tuple[dict[tuple[int, ...], float], int]:
-    """Energies (MHz) of the levels of one F that exist, by their state in the file and their quantum numbers; their number, ±K as two."""
+    """Energies (MHz) of the existing levels of one F by state and quantum numbers, and their number, counting ±K as two."""
     energies, count = dict[tuple[int, ...], float](), 0
     for group in groups:
         levels = group.levels((twice_f, twice_f))
@@ -143,7 +148,7 @@ def _energies(groups: Iterable[Group], twice_f: int) -> tuple[dict[tuple[int, ..
 
 
 def notes_of_diagonal(groups: Iterable[Group], diag: int, highest_n: int) -> list[str]:
-    """A note with DIAG = 0 where the diagonal of the Hamiltonian falls with K, so that names by energy are not those by K."""
+    """A note for DIAG = 0 if the diagonal of the Hamiltonian falls with K, so that labels by energy differ from those by K."""
     falls = [n for group in groups if (n := group.falls_from(highest_n)) is not None]
     if diag or not falls:
         return []
@@ -154,7 +159,7 @@ def notes_of_diagonal(groups: Iterable[Group], diag: int, highest_n: int) -> lis
 
 
 def notes_of_full_basis(states: Iterable[StateOptions], highest_n: int) -> list[str]:
-    """A note for every KNMIN and KNMAX that is lifted and would leave out levels up to the highest N."""
+    """A note for each ignored KNMIN and KNMAX that would exclude levels up to the highest N."""
     lifted = [state for state in states if state.with_k_to(highest_n).is_cut]
     return [
         f"{_limits_of(state)} is lifted by --full-basis: every K to N is in the basis, which is not what the file says"
@@ -162,11 +167,11 @@ def notes_of_full_basis(states: Iterable[StateOptions], highest_n: int) -> list[
     ]
 
 
-MOST_K = 99  # in the quantum numbers of a catalogue
+MOST_K = 99  # largest K in the quantum numbers of a catalogue
 
 
 def notes_of_range(states: Iterable[StateOptions], name: str) -> list[str]:
-    """A note for files that are read as a top, whose basis has every K whatever KNMIN and KNMAX say."""
+    """A note for files that are read as a top, whose basis has all K independent of KNMIN and KNMAX."""
     cut = [_limits_of(state) for state in states if state.with_k_to(MOST_K).is_cut]
     if not cut:
         return []

@@ -1,7 +1,7 @@
-"""What a .var file knows of its errors: the covariance C = D V Vᵀ D of the parameters, as a factor that makes errors of lines.
+"""Covariance C = D V Vᵀ D of the parameters of a .var file, as a factor for errors of lines.
 
-D are the errors beside the parameters, V (upper triangular, column by column, ten characters a number) what stands behind them;
-without V the errors count as uncorrelated, as SPCAT takes them. A parameter with a minus sign keeps its ratio to the one before.
+D are the errors of the parameter lines; V (upper triangular, column by column, ten characters for each number) follows them. Without V the
+errors are uncorrelated, as in SPCAT. A parameter with a minus sign has a fixed ratio to the one before.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, constants_and_matr
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.tops.covariance import Covariance
 
-FREE_ABOVE = 1e15  # MHz: an a-priori error so large is none; SPFIT counts it as no datum either
+FREE_ABOVE = 1e15  # MHz; a larger a-priori error counts as none, as in SPFIT
 _WIDTH = 10
 
 
 def variance_factor(file: ParameterFile) -> Floats | None:
-    """F (parameters, k) in MHz with F Fᵀ the covariance of the parameter lines; None where none has an estimated error.
+    """F (parameters, k) in MHz with F Fᵀ the covariance of the parameter lines; None without estimated errors.
 
-    Raises ValueError for correlations that are of another number of parameters, or no numbers.
+    Raises ValueError for correlations of another number of parameters, or that are not numbers.
     """
     errors = np.array([_estimated(parameter) for parameter in file.parameters])
     if not errors.any():
@@ -70,11 +70,10 @@ def _is_of_numbers(line: str) -> bool:
 
 
 def _correlations(file: ParameterFile) -> Floats:
-    """V (k, k), upper triangular; (0, 0) where none stands there.
+    """V (k, k), upper triangular; (0, 0) if the file has none.
 
-    As for SPCAT (`getpar`, `getvar`) there is none behind fewer parameters than NPAR; nor is a text behind them, such as another list
-    that is put aside, one.
-    """
+    As in SPCAT (`getpar`, `getvar`), V is ignored after fewer parameters than NPAR, and so is text after the parameters, such as another
+    list."""
     rows = list(takewhile(_is_of_numbers, file.rest.splitlines()))
     if len(file.parameters) < file.header.npar:
         rows = []

@@ -1,4 +1,4 @@
-"""Files with constants in cm⁻¹ (FLAGS of 1000 and more): the same files in MHz, and the catalogue in cm⁻¹ that SPCAT makes of them.
+"""Files with constants in cm⁻¹ (FLAGS of 1000 and more): conversion to MHz, and catalogues in cm⁻¹ as SPCAT writes them.
 
 There FQLIM is in cm⁻¹, a frequency that prints as 0.000000 is left out, and STR1 counts (ν cm/300 000)², ν in cm⁻¹ as the program has it in
 its variable of MHz; frequencies and errors of the catalogue have six decimals (H. M. Pickett, documentation of SPFIT and SPCAT, "FLAGS";
@@ -17,18 +17,18 @@ from rotor.formats.spcat.text.catalogue import Catalogue, Layout
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 
-FROM = 1000  # FLAGS from which on constants are in cm⁻¹
+FROM = 1000  # constants are in cm⁻¹ for FLAGS of at least this value
 _LEAST_CM = 5e-7
 _DECIMALS = (6, 6, 4, 4)
 
 
 def files_in_mhz(parameters: ParameterFile, intensities: IntensityFile) -> tuple[ParameterFile, IntensityFile]:
-    """Both files in MHz."""
+    """Both files converted to MHz."""
     return parameters_in_mhz(parameters), request_in_mhz(intensities)
 
 
 def parameters_in_mhz(file: ParameterFile) -> ParameterFile:
-    """The same parameters with values and errors in MHz.
+    """The parameters with values and errors in MHz.
 
     >>> from rotor.formats.spcat.text.par import read_par
     >>> parameters_in_mhz(read_par(b"CO\\n 1 0 0 0\\nl -1 1 0 0\\n 100 1.9225 1e-37\\n")).parameters[0].value.__round__(3)
@@ -47,27 +47,27 @@ def _in_mhz(parameter: Parameter, states: int) -> Parameter:
 
 
 def request_in_mhz(file: IntensityFile) -> IntensityFile:
-    """The same request with its limits as they are in MHz.
+    """The request with its limits in MHz.
 
     >>> round(request_in_mhz(IntensityFile("", Request(flags=1001, fqlim_ghz=100.0), ())).request.fqlim_ghz, 6)
     2997.92458
     """
-    asked: Request = file.request
+    request: Request = file.request
     limits = {
-        "flags": asked.flags % FROM,
-        "fqlim_ghz": asked.fqlim_ghz * units.MHZ_PER_CM * 1e-3,
-        "str1": asked.str1 - 2.0 * math.log10(units.MHZ_PER_CM),
+        "flags": request.flags % FROM,
+        "fqlim_ghz": request.fqlim_ghz * units.MHZ_PER_CM * 1e-3,
+        "str1": request.str1 - 2.0 * math.log10(units.MHZ_PER_CM),
     }
-    return replace(file, request=replace(asked, **limits, text=""))  # type: ignore[arg-type]
+    return replace(file, request=replace(request, **limits, text=""))  # type: ignore[arg-type]
 
 
 def catalogue_in_cm(catalogue: Catalogue) -> Catalogue:
-    """The lines of a catalogue in MHz with frequencies and errors in cm⁻¹ and six decimals."""
+    """The lines of a catalogue in MHz, with frequencies and errors converted to cm⁻¹ with six decimals."""
     frequency = catalogue.frequency_mhz / units.MHZ_PER_CM
-    made = replace(
+    converted = replace(
         catalogue,
         frequency_mhz=frequency,
         error_mhz=catalogue.error_mhz / units.MHZ_PER_CM,
         layout=Layout(decimals=_DECIMALS),
     )
-    return made.take(frequency >= _LEAST_CM)
+    return converted.take(frequency >= _LEAST_CM)

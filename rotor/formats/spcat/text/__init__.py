@@ -1,1 +1,1 @@
-"""The texts of SPFIT and SPCAT: reading and writing each file, before any meaning is given to its codes."""
+"""Text of SPFIT's and SPCAT's files: reading and writing, without interpretation of codes."""

@@ -124,16 +124,16 @@ def _fill(
         fits &= _put_decimal(row, 21, 29, lgint[i], decimals[2], scales[2])
         fits &= _put_whole(row, 29, 31, dr[i])
         fits &= _put_decimal(row, 31, 41, energy[i], decimals[3], scales[3])
-        known = 0 <= g_upper[i] < degeneracies.shape[0]
+        has_text = 0 <= g_upper[i] < degeneracies.shape[0]
         for column in range(3):
-            row[41 + column] = degeneracies[g_upper[i] if known else 0, column]
+            row[41 + column] = degeneracies[g_upper[i] if has_text else 0, column]
         fits &= _put_whole(row, 44, 51, tag[i])
         fits &= _put_whole(row, 51, 55, qnfmt[i])
         fits &= _put_quanta(row, 55, upper[i], quanta, lowest, blank)
         fits &= _put_quanta(row, 55 + width, lower[i], quanta, lowest, blank)
         for column in range(55 + 2 * width, out.shape[1]):
             row[column] = _SPACE
-        plain[i] = fits and known
+        plain[i] = fits and has_text
 
 
 def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -> Mask:

@@ -33,9 +33,9 @@ from rotor.formats.spcat.text.rows import (
 )
 
 COMPILED_FROM = 2_000_000  # lines; the compiler takes 0.3 s to load and saves 0.15 µs a line
-_FEW = 20_000  # lines, which take some hundredths of a second
+_FEW = 20_000  # lines that take a few hundredths of a second
 _COMPILED = "rotor.formats.spcat.text._kernels"
-_CHUNK = 1 << 14  # lines handled at once: about 1 MB of text, which a processor's cache holds
+_CHUNK = 1 << 14  # lines handled at once: about 1 MB of text, which fits a processor's cache
 _BOM = b"\xef\xbb\xbf"
 _BLANKS = b" \t\r\n\x1a"  # a line of these alone is blank; ^Z ended files under DOS
 
@@ -97,7 +97,7 @@ def _wide_rows(rows: Text, columns: Columns, layout: Layout, fill: Callable[...,
 
 
 def _odd_line(catalogue: Catalogue, index: int) -> bytes:
-    """A line that stays as it was spelled, or whose numbers need a form of their own."""
+    """A line with its stored spelling, or whose numbers do not fit the usual columns."""
     record, layout = _within_format(catalogue.record(index), index), catalogue.layout
     stored = layout.spelling.get(index)
     if stored is not None and _record_of(stored) == record:
@@ -187,8 +187,8 @@ def read_cat(source: str | os.PathLike[str] | bytes) -> Catalogue:
     beginning = _BOM if text.startswith(_BOM) else b""
     lines = _lines_of(text, len(beginning))
     layout = replace(_layout_of(text, lines), beginning=beginning)
-    columns, known = _read_plain(text, lines, layout)
-    return _assembled(text, name, lines, layout, columns, known)
+    columns, is_plain = _read_plain(text, lines, layout)
+    return _assembled(text, name, lines, layout, columns, is_plain)
 
 
 class _Lines(NamedTuple):
@@ -233,10 +233,10 @@ def _decimals_in(line: bytes, part: slice) -> int:
 
 def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Mask]:
     """The numbers of all lines, and which lines are just what those numbers would be written as."""
-    known = np.zeros(len(lines.starts), dtype=np.bool_)
+    is_plain = np.zeros(len(lines.starts), dtype=np.bool_)
     width = _width_guess(text, lines)
     parts = []
-    for start in range(0, len(known), _CHUNK):
+    for start in range(0, len(is_plain), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         rows, regular = _rows_of(text, lines, chunk)
         padded = np.full((len(rows), max(lines.length, QUANTA + 4 * width) + 2), ord(" "), dtype=np.uint8)
@@ -244,9 +244,9 @@ def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Ma
         columns = take_rows(padded, width, layout.decimals)
         plain = _plain_rows(padded, columns, layout, put_rows)
         plain &= (padded[:, : lines.length] == rows).all(axis=1) & _quanta_present(columns)
-        known[chunk] = regular & plain
+        is_plain[chunk] = regular & plain
         parts.append(columns)
-    return _joined(parts, width), known
+    return _joined(parts, width), is_plain
 
 
 def _width_guess(text: bytes, lines: _Lines) -> int:
@@ -287,10 +287,10 @@ def _empty(lines: int, width: int) -> Columns:
     )
 
 
-def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: Columns, known: Mask) -> Catalogue:
-    """The catalogue, the lines not known yet read one by one; blank lines go with the line that follows."""
+def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: Columns, is_plain: Mask) -> Catalogue:
+    """The catalogue; lines that are not plain are read one by one, and blank lines belong to the line that follows."""
     records: dict[int, Record] = {}
-    for number in np.flatnonzero(~known).tolist():
+    for number in np.flatnonzero(~is_plain).tolist():
         line = text[lines.starts[number] : lines.stops[number]]
         if line.strip(_BLANKS):
             records[number] = _careful_record(line, f"{name}, line {number + 1}")
@@ -300,14 +300,14 @@ def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: C
                 )
     columns = _with_records(columns, records)
 
-    stored = known.copy()
+    stored = is_plain.copy()
     stored[list(records)] = True
     numbers, stops = np.flatnonzero(stored), lines.stops[stored]
     begins = np.concatenate(([len(layout.beginning)], stops[:-1]))[: len(stops)]
-    odd = ~known[stored] | (begins < lines.starts[stored])
+    odd = ~is_plain[stored] | (begins < lines.starts[stored])
     spelling = {i: text[begins[i] : stops[i]] for i in np.flatnonzero(odd).tolist()}
     ending = text[stops[-1] if len(stops) else len(layout.beginning) :]
-    whole = columns if len(numbers) == len(known) else Columns._make(column[numbers] for column in columns)
+    whole = columns if len(numbers) == len(is_plain) else Columns._make(column[numbers] for column in columns)
     return Catalogue(*whole, layout=replace(layout, spelling=spelling, ending=ending))
 
 

@@ -1,4 +1,4 @@
-"""A catalogue's lines as columns of numbers, and what its text holds beside them."""
+"""Lines of a catalogue as columns of numbers, and the layout of its text."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_TAG = 999_999
 
 @dataclass(frozen=True)
 class Layout:
-    """What a catalogue's text holds beyond its numbers, so that it is written as it was read.
+    """Layout of a catalogue's text, so that it is written as it was read.
 
     line_length: characters of a line without its end; None for those of the field's program, 80, or 55 and four for
     each quantum number of a state where there are more than six.
@@ -129,11 +129,16 @@ def catalogue_of(
 
     Parameters
     ----------
-    numbers : frequency_mhz, lgint, energy_lower_cm, g_upper, each (n,), and error_mhz where one is known, else 0
-    quanta_upper, quanta_lower : (n, 6) or wider
-    qnfmt : one for all, or of every line, (n,)
-    tag : of the species
-    linear : whether Q rises as that of a linear molecule does, DR = 2
+    numbers : mapping
+        frequency_mhz, lgint, energy_lower_cm, g_upper, each (n,), and error_mhz (0 if unknown).
+    quanta_upper, quanta_lower : (n, 6) array or wider
+        Quantum numbers of both states.
+    qnfmt : int or (n,) array
+        Format of the quantum numbers, for all lines or each.
+    tag : int, optional
+        Tag of the species.
+    linear : bool, optional
+        Whether Q rises as for a linear molecule, DR = 2.
 
     Returns
     -------
@@ -143,7 +148,7 @@ def catalogue_of(
     Raises
     ------
     ValueError
-        For a tag that has no place in its six digits.
+        For a tag of more than six digits.
     """
     if not 0 <= tag <= MAX_TAG:
         raise ValueError(f"tag {tag}: a catalogue's tag has at most six digits")
@@ -163,16 +168,16 @@ def catalogue_of(
 
 
 def _column(name: str, values: Any, dtype: type[np.generic]) -> NDArray[Any]:
-    """The column in its type, with the right number of axes and no value changed by it."""
-    given = np.asarray(values)
+    """The column in its type; ValueError for a wrong shape or values that would change."""
+    array = np.asarray(values)
     axes = 2 if name.startswith("quanta") else 1
-    if given.ndim != axes:
-        raise ValueError(f"{name} has shape {given.shape}; expected shape {'(n, 6)' if axes == 2 else '(n,)'}")
-    if given.dtype == dtype:
-        return given
+    if array.ndim != axes:
+        raise ValueError(f"{name} has shape {array.shape}; expected shape {'(n, 6)' if axes == 2 else '(n,)'}")
+    if array.dtype == dtype:
+        return array
     with np.errstate(invalid="ignore"):
-        column = given.astype(dtype)
-    if np.issubdtype(dtype, np.integer) and not np.array_equal(column, given):
-        wrong = given[column != given].flat[0]
+        column = array.astype(dtype)
+    if np.issubdtype(dtype, np.integer) and not np.array_equal(column, array):
+        wrong = array[column != array].flat[0]
         raise ValueError(f"{name} holds {wrong!r}; expected whole numbers that fit {np.dtype(dtype).name}")
     return column

@@ -34,13 +34,11 @@ class Level(NamedTuple):
 class LevelList:
     """Levels, columns of equal length n.
 
-    block, rank (n,): where in the program's Hamiltonian (of an .int file as `block_numbers` says). energy_cm, error_cm (n,): cm⁻¹.
-    mixing (n,): share of the state that gives the label. degeneracy (n,): of M and of nuclear spins. quanta (n, w): -32768 where
-    there is none.
-    pattern (n,): the number that stands for the coupling pattern in a .cat file of more than six quanta, in brackets before all of
-    them here; -32768 where there is none.
-    texts: what was read that is not written so from the numbers: derivatives and vectors among the levels, other
-    spacing; it begins with what stands before the level. rest: what follows the last level.
+    block, rank (n,): block of the program's Hamiltonian and place in it (see `block_numbers`). energy_cm, error_cm (n,): cm⁻¹. mixing (n,):
+    weight of the function that labels the level. degeneracy (n,): of M and of nuclear spins. quanta (n, w): -32768 if blank. pattern (n,):
+    the number that replaces the coupling pattern in a .cat file of more than six quantum numbers, in brackets here; -32768 if blank.
+    texts: text that differs from what would be written from the numbers (derivatives and vectors among the levels, other spacing), with
+    what precedes the level. rest: text after the last level.
     """
 
     block: NDArray[np.int32]
@@ -107,8 +105,8 @@ def _level_list(levels: list[Level], texts: dict[int, str], rest: str) -> LevelL
     whole = [np.array(columns[i], dtype=np.int32) for i in (0, 1, 5)]
     real = [np.array(columns[i], dtype=np.float64) for i in (2, 3, 4)]
     pattern = np.array([BLANK if level.pattern is None else level.pattern for level in levels], dtype=np.int16)
-    known = pattern if (pattern != BLANK).any() else None
-    return LevelList(whole[0], whole[1], real[0], real[1], real[2], whole[2], quanta, texts, rest, known)
+    stated_pattern = pattern if (pattern != BLANK).any() else None
+    return LevelList(whole[0], whole[1], real[0], real[1], real[2], whole[2], quanta, texts, rest, stated_pattern)
 
 
 def read_level(line: Line) -> Level:

@@ -81,11 +81,11 @@ def read_words(
     count : int
         How many numbers at most.
     remark_from : int, optional
-        Behind so many numbers words may stand in place of a number, without a slash before them: they end the list. A letter that
-        looks like a digit (O.5, l0) is no such word.
+        After this many numbers a word ends the list even without a slash before it. A letter that looks like a digit (O.5, l0) does not
+        count as a word.
     abutting : bool, optional
-        A number may begin with its point or sign where another ends, as fixed columns that are full leave them: 0.01000.0 is 0.01000
-        and .0, as the field's programs read it.
+        Whether a number may begin with its point or sign directly after another, as in full fixed columns: 0.01000.0 is 0.01000 and .0,
+        as SPFIT reads it.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def number(line: Line, words: Sequence[Word], index: int, name: str, default: fl
 
 
 def whole(line: Line, words: Sequence[Word], index: int, name: str, default: int | None = None) -> int:
-    """The same of a whole number with at most 30 digits; a decimal point and what follows it are passed over."""
+    """The integer `index` of a line, with at most 30 digits; a decimal point and what follows it are ignored. See `number`."""
     word = _present(line, words, index, name, default is not None)
     if word.text is None:
         return default or 0

@@ -27,7 +27,7 @@ from rotor.units import MHZ_PER_CM
 QUANTA_FIELDS = 12  # at least
 MOST_QUANTA = 10  # of a state
 _REMARK_FROM = 2  # numbers: words in place of the weight are a remark
-NO_ERROR_MHZ = 0.01  # of a line that states none, as in SPFIT
+NO_ERROR_MHZ = 0.01  # error of a line without a stated error, as in SPFIT
 _NUMBER, _BETWEEN, _END = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)", r"(?:[ \t]*,[ \t]*|[ \t]+)", r"[ \t]*(?:/|$)"
 _AS_USUAL = re.compile(  # one to three numbers and nothing that must be looked at again
     rf"[ \t]*{_NUMBER}(?:{_END}|{_BETWEEN}{_NUMBER}(?:{_END}|{_BETWEEN}{_NUMBER}(?=[ \t,/]|$)))", re.ASCII
@@ -194,8 +194,8 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0, most: i
             )
     measured = [_numbers(line, width) for line in plain]
     count = width if missing is None else 2 * per_state
-    known = [row[: _leading(row) if missing is None else count] for row in fields]
-    quanta = np.array([row + (BLANK,) * (width - len(row)) for row in known], dtype=np.int16).reshape(-1, width)
+    present = [row[: _leading(row) if missing is None else count] for row in fields]
+    quanta = np.array([row + (BLANK,) * (width - len(row)) for row in present], dtype=np.int16).reshape(-1, width)
     columns = np.array([numbers for numbers, _ in measured], dtype=np.float64).reshape(-1, 3)
     rest = "".join(line.text for line in lines[end if texts else 0 :])
     without_error = frozenset(i for i, (_, words) in enumerate(measured) if words < 2)
@@ -271,16 +271,16 @@ def note_of_remarks(lines: LineList, blends: NDArray[np.int64]) -> list[str]:
     counts = np.bincount(blends[blends >= 0], minlength=1)
     shared = np.flatnonzero((blends >= 0) & (counts[blends] > 1)).tolist()
     width = lines.fields
-    found = []
+    blended = []
     for i in shared:
         body = lines.texts.get(i, "").rstrip("\r\n").rpartition("\n")[2]
         words, at = read_words(Line(body, i, ""), 3 * width, 3, _REMARK_FROM)
         if len(words) == _REMARK_FROM and at < len(body) and body[at] != "/":
-            found.append(i)
-    if not found:
+            blended.append(i)
+    if not blended:
         return []
     return [
-        f"{len(found)} blended lines have words where their weight may stand, the first is line {found[0] + 1}: their weight is 1, "
+        f"{len(blended)} blended lines have words where their weight may stand, the first is line {blended[0] + 1}: their weight is 1, "
         "where SPFIT takes the next digits; write the weight, or / before the words"
     ]
 
@@ -308,8 +308,8 @@ def read_measured(line: Line, width: int = QUANTA_FIELDS) -> Measured:
 
 def _numbers(line: Line, width: int) -> tuple[tuple[float, float, float], int]:
     """Frequency, error and weight behind so many fields of quantum numbers of a plain line, and how many of them are written."""
-    if found := _AS_USUAL.match(line.text, 3 * width):
-        texts = [text for text in found.groups() if text is not None]
+    if match := _AS_USUAL.match(line.text, 3 * width):
+        texts = [text for text in match.groups() if text is not None]
         values = [float(text) for text in texts]
         if all(map(math.isfinite, values)):
             frequency, error, weight = (*values, *(NO_ERROR_MHZ, 1.0)[len(values) - 1 :])
@@ -385,8 +385,8 @@ def _line_text(lines: LineList, index: int) -> str:
 def _stored(text: str, index: int, per_state: int, width: int) -> Measured:
     """The numbers of a line as it was read, blank fields among them where lines lack quantum numbers."""
     line = Line(text.rstrip("\r\n").rpartition("\n")[2], index, "stored text")
-    found, fields = read_measured(line, width), _fields(_plain(line), width)[: 2 * per_state]
-    return found._replace(quanta=fields + (BLANK,) * (2 * per_state - len(fields))) if per_state else found
+    numbers, fields = read_measured(line, width), _fields(_plain(line), width)[: 2 * per_state]
+    return numbers._replace(quanta=fields + (BLANK,) * (2 * per_state - len(fields))) if per_state else numbers
 
 
 def write_lin(lines: LineList, path: str | os.PathLike[str]) -> None:

@@ -188,10 +188,10 @@ def _parameter(line: Line) -> Parameter:
 
 def note_of_npar(file: ParameterFile) -> list[str]:
     """A note for a file with fewer parameters than NPAR says."""
-    found = len(file.parameters)
-    if file.header.npar <= found:
+    count = len(file.parameters)
+    if file.header.npar <= count:
         return []
-    return [f"NPAR = {file.header.npar}, but the file has {counted(found, 'parameter')}: all count"]
+    return [f"NPAR = {file.header.npar}, but the file has {counted(count, 'parameter')}: all count"]
 
 
 def format_par(file: ParameterFile) -> bytes:

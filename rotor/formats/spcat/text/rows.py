@@ -167,9 +167,9 @@ def _put_quanta(out: Text, quanta: NDArray[np.int16]) -> Mask:
 
 
 def _put_degeneracy(out: Text, values: NDArray[np.int32]) -> Mask:
-    known = (values >= 0) & (values < len(degeneracy_table()))
-    out[:] = degeneracy_table()[np.where(known, values, 0)]
-    return np.asarray(known)
+    fits = (values >= 0) & (values < len(degeneracy_table()))
+    out[:] = degeneracy_table()[np.where(fits, values, 0)]
+    return np.asarray(fits)
 
 
 def _put_field(out: Text, values: NDArray[Any], put: Callable[[Text, Any], Mask]) -> Mask | bool:
