@@ -30,22 +30,26 @@ def main() -> None:
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
     root = hasattr(os, "geteuid") and os.geteuid() == 0
     with tempfile.TemporaryDirectory() as place, sync_playwright() as started:
-        service = open_session(write_case(Path(place)), [str(Path(place) / NAME)], temperature_k=KELVIN)
-        server = ViewServer(service)
-        thread = server.run_in_thread()
         browser = started.chromium.launch(executable_path=chromium, args=["--no-sandbox"] if root else [])
-        page = browser.new_page(viewport={"width": 1280, "height": 760})
-        page.goto(server.address)
-        page.wait_for_selector("[data-ready=yes]")
-        for step in STEPS:
-            step(page)
-            page.wait_for_timeout(900)
-            if step.__doc__ and step.__name__.startswith("view_"):
-                page.screenshot(path=target / f"{step.__name__}.png")
+        spectrum = write_case(Path(place))
+        for molecules, session, steps in (([str(Path(place) / NAME)], "known", KNOWN), ([], "unknown", UNKNOWN)):
+            file = Path(place) / f"{session}.view.json"
+            service = open_session(spectrum, molecules, session=file, temperature_k=KELVIN)
+            server = ViewServer(service)
+            thread = server.run_in_thread()
+            page = browser.new_page(viewport={"width": 1280, "height": 760})
+            page.goto(server.address)
+            page.wait_for_selector("[data-ready=yes]")
+            for step in steps:
+                step(page)
+                page.wait_for_timeout(900)
+                if step.__name__.startswith("view_"):
+                    page.screenshot(path=target / f"{step.__name__}.png")
+            page.close()
+            server.stop()
+            thread.join(10)
+            service.session.release()
         browser.close()
-        server.stop()
-        thread.join(10)
-        service.session.release()
 
 
 def press(page: Any, *keys: str) -> None:
@@ -93,7 +97,21 @@ def view_dark(page: Any) -> None:
     press(page, "l", "2", "t", "0")
 
 
-STEPS = (view_opened, view_peak, assigned, view_fitted, view_rows, view_dark)
+def view_searched(page: Any) -> None:
+    """Species and lines of `rotor assign` from the spectrum alone."""
+    page.click("text=Search unknown molecules")
+    page.wait_for_selector("text=species 1", timeout=60_000)
+    page.wait_for_timeout(1000)
+    press(page, "3")
+
+
+def view_levels(page: Any) -> None:
+    """Refitted; levels and combination differences of the assigned lines."""
+    press(page, "r", "5")
+
+
+KNOWN = (view_opened, view_peak, assigned, view_fitted, view_rows, view_dark)
+UNKNOWN = (view_searched, view_levels)
 
 if __name__ == "__main__":
     main()

@@ -42,7 +42,7 @@ function h(tag, attributes = {}, ...children) {
   element.append(...children.flat(3).filter((child) => child != null && child !== false));
   return element;
 }
-const fixed = (value, digits) => (value == null || !isFinite(value) ? "–" : value.toFixed(digits));
+const fixed = (value, digits) => (value == null || !isFinite(value) ? "–" : value.toFixed(digits).replace("-", "−"));
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 const SPECIES = { A: 0, E: 1, AA: 10, AE: 11, EA: 12, EE: 13, "EE*": 14 }; // of the permutations of turning groups
 const quantum = (q, name, halves) => (halves.includes(name) ? (q % 2 ? `${q}/2` : `${q / 2}`)
@@ -178,11 +178,12 @@ function bokehLoaded() { // an exported page and a notebook have BokehJS before 
 }
 
 const thin = (text) => text.replace(/\d+/, (whole) => (whole.length > 4 ? whole.replace(/\B(?=(\d{3})+$)/g, "\u2009") : whole));
-function spaced() { // frequencies at the ticks: 17 990 with a thin space
-  const formatter = new Bokeh.BasicTickFormatter({ use_scientific: false }), plain = formatter.doFormat.bind(formatter);
-  formatter.doFormat = (ticks, options) => plain(ticks, options).map(thin);
+function formatted(change, options = {}) { // texts at the ticks, each changed by a function of text and number
+  const formatter = new Bokeh.BasicTickFormatter(options), plain = formatter.doFormat.bind(formatter);
+  formatter.doFormat = (ticks, axis) => plain(ticks, axis).map((text, i) => change(text, ticks[i]));
   return formatter;
 }
+const spaced = () => formatted(thin, { use_scientific: false }); // frequencies: 17 990 with a thin space
 
 // --- A figure of Bokeh with pointer handling of our own: drag, wheel, selection, nearest point
 
@@ -191,7 +192,7 @@ class Plot {
     this.app = app; this.place = place; this.painted = [];
     const { Range1d } = Bokeh;
     this.figure = new Bokeh.Plotting.Figure({
-      tools: "", toolbar_location: null, sizing_mode: "stretch_both", min_border: 4, min_border_right: 26, output_backend: "canvas",
+      tools: "", toolbar_location: null, sizing_mode: "stretch_both", min_border: 4, min_border_left: 72, min_border_right: 26, output_backend: "canvas",
       x_range: new Range1d({ start: 0, end: 1 }), y_range: new Range1d({ start: 0, end: 1 }), lod_threshold: null,
     });
     this.fixedY = fixedY;
@@ -272,9 +273,10 @@ class SpectrumWindow extends Plot {
     super(app, place, { label: "Spectrum above, predicted lines as sticks" });
     this.first = first; this.last = last; this.busy = false; this.again = false; this.data = { x: [], y: [], sticks: {} };
     const f = this.figure;
-    f.xaxis.axis_label = "frequency (MHz)";
+    f.xaxis.axis_label = "Frequency (MHz)";
     f.xaxis.formatter = spaced();
-    f.yaxis.axis_label = app.info.unit === "K" && app.info.notes.some((note) => note.includes("intensities in K assumed")) ? "intensity" : `intensity (${app.info.unit})`;
+    f.yaxis.axis_label = app.info.unit === "K" && app.info.notes.some((note) => note.includes("intensities in K assumed")) ? "Intensity" : `Intensity (${app.info.unit})`;
+    f.yaxis.formatter = formatted((text, y) => (this.mirrored && y < this.foot ? "" : text)); // sticks have no unit of intensity
     this.trace = this.source({ x: [], y: [] });
     this.model = this.source({ x: [], y: [] });
     this.sticks = this.source({ x: [], y0: [], y1: [], color: [] });
@@ -332,7 +334,7 @@ class SpectrumWindow extends Plot {
     if (model && app.settings.emission) for (let i = 0; i < model.x.length;
       i++) if (model.x[i] >= this.first && model.x[i] <= this.last) high = Math.max(high, model.y[i]);
     if (!isFinite(low)) { low = 0; high = 1; }
-    const tall = Math.max(high - Math.min(low, 0), 1e-30), mirrored = !app.settings.overlaid;
+    const tall = Math.max(high - Math.min(low, 0), 1e-30), mirrored = this.mirrored = !app.settings.overlaid && Object.keys(sticks).length > 0;
     let strongest = 0;
     for (const one of Object.values(sticks)) one.x.forEach((at,
       i) => { if (at >= this.first && at <= this.last && one.height[i] > strongest) strongest = one.height[i]; });
@@ -363,7 +365,7 @@ class SpectrumWindow extends Plot {
     }
     this.marks.data = marks;
     this.zero.location = foot;
-    const bottom = mirrored && Object.keys(sticks).length ? foot - tall * 1.02 : Math.min(low, 0) - 0.05 * tall;
+    const bottom = mirrored ? foot - tall * 1.02 : Math.min(low, 0) - 0.05 * tall;
     this.figure.y_range.setv({ start: bottom, end: top + 0.03 * tall });
   }
   near(at, reach = 7) { // the predicted line nearest to a pointer, within so many pixels
@@ -389,7 +391,7 @@ class ResidualPlot extends Plot {
   constructor(app, place) {
     super(app, place, { label: "Observed minus calculated frequency of the assigned lines" });
     const f = this.figure;
-    f.xaxis.axis_label = "frequency (MHz)"; f.yaxis.axis_label = "obs − calc (kHz)";
+    f.xaxis.axis_label = "Frequency (MHz)"; f.yaxis.axis_label = "Obs − calc (kHz)";
     f.xaxis.formatter = spaced();
     this.bars = this.source({ x: [], y0: [], y1: [], color: [] });
     this.points = this.source({ x: [], y: [], color: [], fill: [], marker: [] });
@@ -447,7 +449,7 @@ class LoomisWood extends Plot {
     const f = this.figure;
     this.half = app.transport.data?.loomis_wood.half_width_mhz ?? Math.max(2, 20 * app.info.channel_mhz); this.scale = 1; this.rows = [];
       this.busy = false; this.first = 0; this.row = null; this.total = 0; this.count = ROWS;
-    f.xaxis.axis_label = "distance from the expected line (MHz)";
+    f.xaxis.axis_label = "Distance from the expected line (MHz)";
     f.yaxis.visible = false; f.ygrid.visible = false;
     this.traces = this.source({ xs: [], ys: [] });
     this.texts = this.source({ x: [], y: [], text: [] });
@@ -857,11 +859,14 @@ export class App {
 
   panels() {
     TABS.forEach((name, i) => this.tabButtons[i].setAttribute("aria-selected", String(name === this.tab)));
-    const held = document.activeElement?.closest?.("[data-field]")?.dataset.field, top = this.panel.scrollTop;
+    const active = document.activeElement, field = active?.closest?.("[data-field]")?.dataset.field, top = this.panel.scrollTop;
+    const keyboard = active?.matches?.(":focus-visible"), place = [...this.panel.querySelectorAll("button, input, select, summary")].indexOf(active);
     if (this.sliding) return; // a slider that is being dragged stays
     this.panel.replaceChildren(...[this[`panel${this.tab}`]()].flat(3).filter((part) => part != null && part !== false));
     this.panel.scrollTop = top;
-    if (held) this.panel.querySelector(`[data-field="${CSS.escape(held)}"]`)?.focus();
+    const again = field ? this.panel.querySelector(`[data-field="${CSS.escape(field)}"]`)
+      : this.panel.querySelectorAll("button, input, select, summary")[place];
+    if (field || (keyboard && place >= 0)) (again?.textContent === active.textContent ? again : this.panel).focus(); // the keyboard stays where it was
   }
   swatch(number) { return h("span",
     { class: "swatch", style: `background:${PALETTE[this.theme][(this.species[number]?.colour ?? 0) % 7]}` }); }
