@@ -5,7 +5,7 @@ The matrices are those of `basis.state_elements`, which fits and derivatives hav
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from rotor.quantum.basis.state_elements import StateElements, StateTerms
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.coupled import names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
-from rotor.quantum.levels import Levels, SolvedBlock, weights_by_state
+from rotor.quantum.levels import Levels, SolvedBlock, placed, weights_by_state
 from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator
@@ -118,7 +118,7 @@ def coupled_levels(
     solved = (
         executor.map(solve_coupled, *zip(*pieces, strict=True)) if executor else (solve_coupled(*p) for p in pieces)
     )
-    blocks = tuple(_placed(block for of_some_j in solved for block in of_some_j))
+    blocks = tuple(placed(block for of_some_j in solved for block in of_some_j))
 
     labels = np.concatenate([block.labels for block in blocks])
     quanta = {"v": labels[:, 0]} if len(model.states) > 1 else {}
@@ -157,13 +157,6 @@ def _refuse_mixed_weights(levels: Levels) -> None:
                 f"({', '.join(levels.quanta)} = {levels.labels(np.array([block.start]))[0].strip()} and "
                 f"{levels.labels(np.array([row]))[0].strip()}): symmetry forbids that; check the effect or the spin weights"
             )
-
-
-def _placed(solved: Iterator[SolvedBlock]) -> Iterator[SolvedBlock]:
-    start = 0
-    for block in solved:
-        yield replace(block, start=start)
-        start += len(block.energies_mhz)
 
 
 def solve_coupled(model: Model, every_j: Sequence[int]) -> list[SolvedBlock]:

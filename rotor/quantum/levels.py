@@ -7,8 +7,8 @@ Nothing outside this folder computes a row from quantum numbers: `Levels.find` a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -140,6 +140,15 @@ class SolvedBlock(Block):
     def alone(self) -> bool:
         """Whether it is a Wang block that nothing couples with others."""
         return self.labels is None
+
+
+def placed(blocks: Iterable[Any]) -> Iterator[Any]:
+    """Blocks that have states, with the row of the first state of each."""
+    start = 0
+    for block in blocks:
+        if len(block.energies_mhz):
+            yield block if block.start == start else replace(block, start=start)
+            start += len(block.energies_mhz)
 
 
 def single_block(basis: WangBlock, energies_mhz: Floats, vectors: Floats, start: int) -> SolvedBlock:

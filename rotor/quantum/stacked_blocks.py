@@ -25,7 +25,7 @@ from rotor.quantum.wang.basis import WangBlock
 
 
 @dataclass(frozen=True)
-class Stack:
+class ParityStates:
     """The states of the blocks of one J with K even (parity 0) or odd (1).
 
     columns: (size, n) eigenvectors over K = parity, parity + 2, ...; 0 at K = 0 of E-. blocks: by their sign, with the slice of
@@ -54,7 +54,7 @@ def are_whole(blocks: Iterable[SolvedBlock]) -> bool:
     )
 
 
-def stacks_by_j(blocks: Iterable[SolvedBlock]) -> Iterator[tuple[int, dict[int, Stack]]]:
+def stacks_by_j(blocks: Iterable[SolvedBlock]) -> Iterator[tuple[int, dict[int, ParityStates]]]:
     """Each J, rising, with its stacks by their parity. The blocks must be whole and in the order of J."""
     of_j: list[SolvedBlock] = []
     for block in blocks:
@@ -66,12 +66,12 @@ def stacks_by_j(blocks: Iterable[SolvedBlock]) -> Iterator[tuple[int, dict[int, 
         yield of_j[0].basis.j, _stacked(of_j)
 
 
-def _stacked(blocks: list[SolvedBlock]) -> dict[int, Stack]:
+def _stacked(blocks: list[SolvedBlock]) -> dict[int, ParityStates]:
     chosen = ((parity, [b for b in blocks if b.basis.first_k % 2 == parity]) for parity in (0, 1))
     return {parity: _stack(members, members[0].basis.j, parity) for parity, members in chosen if members}
 
 
-def _stack(blocks: list[SolvedBlock], j: int, parity: int) -> Stack:
+def _stack(blocks: list[SolvedBlock], j: int, parity: int) -> ParityStates:
     columns = np.empty(((j - parity) // 2 + 1, sum(block.basis.size for block in blocks)))
     of_sign, at = {}, 0
     for block in blocks:
@@ -80,7 +80,7 @@ def _stack(blocks: list[SolvedBlock], j: int, parity: int) -> Stack:
         columns[: block.basis.first_k // 2, here] = 0.0
         of_sign[block.basis.sign] = block, here
         at = here.stop
-    return Stack(j, parity, columns, of_sign)
+    return ParityStates(j, parity, columns, of_sign)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,9 @@ class Vector:
                     out[rise, parity, stays] = real, -real
         return out
 
-    def products(self, ups: dict[int, Stack], lows: dict[int, Stack]) -> Iterator[tuple[SolvedBlock, Product]]:
+    def products(
+        self, ups: dict[int, ParityStates], lows: dict[int, ParityStates]
+    ) -> Iterator[tuple[SolvedBlock, Product]]:
         """Every pair of blocks that the vector connects, by its upper block, each pair once.
 
         ups, lows: the stacks of J and of J - 1, or twice those of J.
@@ -124,14 +126,14 @@ class Vector:
             if other is not None and any(self.sizes[1:]) and (other.j < up.j or parity):  # E with O is O with E
                 yield from self._across(up, other)
 
-    def _along(self, up: Stack, low: Stack) -> Iterator[tuple[SolvedBlock, Product]]:
+    def _along(self, up: ParityStates, low: ParityStates) -> Iterator[tuple[SolvedBlock, Product]]:
         partner, _ = self.partners[up.j - low.j, up.parity, True]
         moved = _shifted(up, low, 0)
         moved *= self.sizes[0]
         signs = (1, -1) if up.j > low.j else (1,)  # + with - is - with +
         yield from _pairs(up, low, moved, partner, signs)
 
-    def _across(self, up: Stack, low: Stack) -> Iterator[tuple[SolvedBlock, Product]]:
+    def _across(self, up: ParityStates, low: ParityStates) -> Iterator[tuple[SolvedBlock, Product]]:
         of_real, of_imaginary = self.partners[up.j - low.j, up.parity, False]
         raised, lowered = _shifted(up, low, 1), _shifted(up, low, -1)
         _, real, imaginary = self.sizes
@@ -146,7 +148,7 @@ class Vector:
 
 
 def _pairs(
-    up: Stack, low: Stack, moved: Floats, partner: int, signs: tuple[int, ...]
+    up: ParityStates, low: ParityStates, moved: Floats, partner: int, signs: tuple[int, ...]
 ) -> Iterator[tuple[SolvedBlock, Product]]:
     for sign in signs:
         if sign in up.blocks and partner * sign in low.blocks:
@@ -154,7 +156,7 @@ def _pairs(
             yield block, Product(moved[other.basis.first_k // 2 :, here], other)
 
 
-def _shifted(up: Stack, low: Stack, step: int) -> Floats:
+def _shifted(up: ParityStates, low: ParityStates, step: int) -> Floats:
     """c(K) U(K + step) over the K of the lower stack, (low size, n_up); 0 where K + step is beyond the upper one."""
     offset, size = (low.parity + step - up.parity) // 2, len(low.columns)
     first, last = max(0, -offset), min(size, len(up.columns) - offset)

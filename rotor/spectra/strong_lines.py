@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.stacked_blocks import Product, Stack, Vector, stacks_by_j
+from rotor.quantum.stacked_blocks import ParityStates, Product, Vector, stacks_by_j
 from rotor.quantum.tensors import BodyTensor
 
 SMALLEST_MHZ = 1e-30  # replaces 0 between states of equal energy
@@ -49,7 +49,7 @@ def strong_lines(
     vector, most = Vector(dipole), sum(abs(part) ** 2 for part in dipole.components)
     counts = reaching(levels, needed, most)
     memory = _Memory(len(levels))
-    below: dict[int, Stack] = {}
+    below: dict[int, ParityStates] = {}
     before = -2
     lower = {block.basis.j for block in blocks if counts[block.start]}
     near = lower.union(*({j - 1, j + 1} for j in lower))

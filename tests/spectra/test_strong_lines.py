@@ -115,7 +115,9 @@ def test_limited_blocks_take_the_way_of_single_pairs():
     assert are_whole(levels.blocks)
     last = levels.blocks[-1]
     cut_off = last.basis._replace(first_k=last.basis.first_k + 2, size=last.basis.size - 1)
-    assert not are_whole([*levels.blocks[:-1], dataclasses.replace(last, basis=cut_off)])
+    assert not are_whole(
+        [*levels.blocks[:-1], dataclasses.replace(last, parts=(last.parts[0]._replace(basis=cut_off),))]
+    )
     few = dataclasses.replace(last, vectors=last.vectors[:, :1], energies_mhz=last.energies_mhz[:1])
     assert not are_whole([few])
 

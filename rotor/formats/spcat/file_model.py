@@ -24,8 +24,8 @@ from rotor.formats.spcat.hamiltonian.file_effect import (
     real_lines,
     reasons_of_states,
 )
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l, pairs_of
-from rotor.formats.spcat.hamiltonian.l_spins import named_by_l_with_spins
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, pairs_of
+from rotor.formats.spcat.hamiltonian.l_spins import named_by_l
 from rotor.formats.spcat.hamiltonian.labels import named_by
 from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
 from rotor.formats.spcat.hamiltonian.phases import Phases, odd_of_turned, phases_of, turned_axis, with_dipoles
@@ -85,15 +85,13 @@ class Group:
             if self.effect.pairs:  # labels by l must be known before existing levels can be selected
                 exist = None
             levels = levels_of_f(self.top, (self.effect,), all_f, None, executor, exist)
-            if self.effect.pairs:
-                levels = named_by_l_with_spins(levels, self.effect.pairs, str(levels.representation))
         else:
             levels = solve_levels(
                 self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
             )
-            if self.effect.pairs:
-                levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
-        if not self.effect.pairs:
+        if self.effect.pairs:
+            levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
+        else:
             levels = named_by(levels, self.diag, self.oblate, self.diagonal(levels.jmax))
         return replace(levels, weight=self._weights(levels))
 

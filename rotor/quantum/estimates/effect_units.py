@@ -6,7 +6,7 @@ The levels are solved once. Blocks that contain a label are then expanded over b
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -81,8 +81,7 @@ def unit_levels(
     block_of_row = np.searchsorted(starts, rows, side="right") - 1
     numbers = distinct(block_of_row).tolist()
     blocks = [levels.blocks[number] for number in numbers]
-    makers = _Makers(top, levels, names, blocks, functions, naming)
-    units = [makers.unit(number, block) for number, block in enumerate(blocks)]
+    units = list(_named_blocks(top, levels, names, blocks, functions, naming))
     inside = [np.flatnonzero(block_of_row == number) for number in numbers]
 
     def find(place: int, names: Ints) -> tuple[Ints, Ints]:
@@ -125,36 +124,31 @@ def _names_by(block: SpinBlock, functions: Floats, names: Ints) -> Ints:
     return np.asarray(names[assigned((functions @ over_basis) ** 2, np.ones(len(names), dtype=np.int64))])
 
 
-class _Makers:
-    """Linear blocks of solved blocks of any kind, with the rule that labels their states."""
-
-    def __init__(
-        self,
-        top: Top,
-        levels: Levels,
-        names: Sequence[str],
-        blocks: Sequence[Any],
-        functions: Functions | None,
-        naming: Naming | None,
-    ) -> None:
-        self._functions, self._naming, self._representation = functions, naming, str(levels.representation)
-        if isinstance(blocks[0], SpinBlock):
-            self._linear = linear_blocks_of_spins(top, levels.effects, names, blocks)
+def _named_blocks(
+    top: Top,
+    levels: Levels,
+    names: Sequence[str],
+    blocks: Sequence[Any],
+    functions: Functions | None,
+    naming: Naming | None,
+) -> Iterator[NamedBlock]:
+    """The linear block of each solved block with the rule that labels its states."""
+    if isinstance(blocks[0], SpinBlock):
+        linear_blocks = linear_blocks_of_spins(top, levels.effects, names, blocks)
+    else:
+        linear_blocks = linear_blocks_of(top, levels, names, blocks)
+    representation = str(levels.representation)
+    for linear, block in zip(linear_blocks, blocks, strict=True):
+        if functions:
+            yield _turned(linear, *functions(block))
+        elif isinstance(block, SpinBlock):
+            yield linear, _names_with_spins(block)
+        elif naming:
+            yield linear, naming(vertices_of(block), representation)
+        elif block.alone:
+            yield linear, NamedFunctions(np.zeros(linear.size, dtype=np.int64), _by_rank, Follows.MOSTLY)
         else:
-            self._linear = linear_blocks_of(top, levels, names, blocks)
-
-    def unit(self, number: int, block: Any) -> NamedBlock:
-        """A linear block with the rule that labels its states."""
-        linear = self._linear[number]
-        if self._functions:
-            return _turned(linear, *self._functions(block))
-        if isinstance(block, SpinBlock):
-            return linear, _names_with_spins(block)
-        if self._naming:
-            return linear, self._naming(vertices_of(block), self._representation)
-        if block.alone:
-            return linear, NamedFunctions(np.zeros(linear.size, dtype=np.int64), _by_rank, Follows.MOSTLY)
-        return linear, by_overlaps(vertices_of(block), self._representation)
+            yield linear, by_overlaps(vertices_of(block), representation)
 
 
 def _turned(block: LinearBlock, functions: Floats, names: Ints) -> NamedBlock:

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
-_MOST = 100  # largest number of patterns of an F; tables of coefficients grow with its square
 
 
 class Functions(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.arrays import hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import Levels, weights_by_state
+from rotor.quantum.levels import Levels, placed, weights_by_state
 from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, functions_of_blocks, plan_of
 from rotor.quantum.spins.operators import AxialState
@@ -89,7 +89,7 @@ def levels_of_f(
     solved = solved_blocks(plan, every_f, exist)
     if n_range:
         solved = [_within(block, n_range) for block in solved]
-    blocks = tuple(_placed(solved))
+    blocks = tuple(placed(solved))
     return _table(top, effects, plan.shared, blocks, highest if n_range is None else n_range[1])
 
 
@@ -118,7 +118,7 @@ def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequen
         raise ValueError(
             "functions of three equivalent nuclei are not products of a rotational state and a coupling pattern"
         )
-    blocks = tuple(_placed(functions_of_blocks(plan, every_f)))
+    blocks = tuple(placed(functions_of_blocks(plan, every_f)))
     return _table(top, effects, plan.shared, blocks, highest), plan
 
 
@@ -134,15 +134,6 @@ def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
     chosen = (n >= n_range[0]) & (n <= n_range[1])
     cut = {name: getattr(block, name)[chosen] for name in ("energies_mhz", "labels", "mixing")}
     return replace(block, vectors=block.vectors[:, chosen], **cut)
-
-
-def _placed(blocks: Iterable[SpinBlock]) -> Iterator[SpinBlock]:
-    """Blocks that have states, with the row of the first state of each."""
-    start = 0
-    for block in blocks:
-        if len(block.energies_mhz):
-            yield block if block.start == start else replace(block, start=start)
-            start += len(block.energies_mhz)
 
 
 def _table(

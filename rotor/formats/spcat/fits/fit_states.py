@@ -19,8 +19,7 @@ from rotor.formats.spcat.file_model import Group, groups_of, line_names
 from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
 from rotor.formats.spcat.fits.at_zero import left_at_zero
 from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
-from rotor.formats.spcat.hamiltonian.l_doubled import functions_of_l, named_by_l
-from rotor.formats.spcat.hamiltonian.l_spins import functions_with_spins, named_by_l_with_spins
+from rotor.formats.spcat.hamiltonian.l_spins import functions_by_l, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import named_by, naming_by
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
@@ -29,8 +28,7 @@ from rotor.quantum.estimates.labelled_spins import assigned_with_spins
 from rotor.quantum.label_tracking import LabelledBlocks, joined
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
 from rotor.quantum.labelled_states import labelled_states
-from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import SpinBlock
+from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.wang.rotation import solve_rotation
 
@@ -218,7 +216,7 @@ def _assign_with_spins(
 
     def rows_of(levels: Levels, chosen: Ints) -> Ints:
         if group.effect.pairs:
-            levels = named_by_l_with_spins(levels, group.effect.pairs, str(levels.representation))
+            levels = named_by_l(levels, group.effect.pairs, str(levels.representation))
         return _rows_of(group, levels, form, labels[here[chosen]])
 
     functions = partial(_functions_of, group) if group.effect.pairs else None
@@ -261,14 +259,7 @@ def _assign_in_blocks(
 
 def _functions_of(group: Group, levels: Levels) -> Functions:
     """The functions that label levels of l-doubled states."""
-    pairs, representation = group.effect.pairs, str(levels.representation)
-
-    def functions(block: SolvedBlock | SpinBlock) -> tuple[Floats, Ints]:
-        if isinstance(block, SpinBlock):
-            return functions_with_spins(block, pairs, representation)
-        return functions_of_l(block, pairs, representation)
-
-    return functions
+    return partial(functions_by_l, pairs=group.effect.pairs, representation=str(levels.representation))
 
 
 def _places_of_group(group: Group, form: Format, labels: Ints) -> Ints:

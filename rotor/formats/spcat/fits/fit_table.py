@@ -20,7 +20,6 @@ from rotor.formats.spcat.hamiltonian.codes import (
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 
 _RIGID = (Named("A", 10000, 1), Named("B", 20000, 1), Named("C", 30000, 1))
-_WITHOUT_STATES = 100_000  # codes without spins, series and states are smaller
 
 
 def publication_rows(fit_input: SpfitInput, fit: Fit) -> list[Row]:

@@ -26,13 +26,12 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.hamiltonian.labels import renamed
 from rotor.formats.spcat.hamiltonian.states import StateOptions
-from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.operators import AxialState, Basis
+from rotor.quantum.levels import SolvedBlock
+from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import assigned
 from rotor.quantum.states import Coupling, OperatorOfJ
-from rotor.quantum.wang.basis import Part, WangBlock, names_of
+from rotor.quantum.wang.basis import Part, names_of
 from rotor.quantum.wang.j_operators import JOperator, between_blocks, j_z
 
 
@@ -174,57 +173,27 @@ def couplings_with_pairs(
 # Names of levels
 
 
-def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Levels:
-    """Relabel levels: v of a pair by the sign of K l, Ka and Kc of the function |K, l⟩ ± |-K, -l⟩ with the largest weight."""
-    labels_and_weights = [_names_of_block(block, pairs, representation) for block in levels.blocks]
-    return renamed(levels, *zip(*labels_and_weights, strict=True))
-
-
 def functions_of_l(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
     """The functions (n, n), in rows, that label the states of a block, and their labels v, Ka, Kc (n, 3).
 
     States that are not l-doubled have basis functions, a pair has |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0. A half turn across the
     axis changes the sign of y; of the two functions with K = 0, the one of y therefore has the other species, Ka + Kc = N + 1.
     """
-    return functions_of_parts(block.parts, len(block.vectors), pairs, representation)
-
-
-def functions_of_parts(
-    places: Sequence[tuple[int, Basis, int]], size: int, pairs: Sequence[Pair], representation: str
-) -> tuple[Floats, Ints]:
-    """Functions and labels as from `functions_of_l`, for any parts of a basis.
-
-    Parameters
-    ----------
-    places : sequence of (int, WangBlock, int)
-        State, Wang block and first place of each part.
-    size : int
-        Number of functions.
-    pairs : sequence of Pair
-        l-doubled states.
-    representation : str
-        Which principal axes are x, y, z.
-
-    Returns
-    -------
-    functions : (size, size) array
-        In rows.
-    names : (size, 3) array of int
-        v, Ka, Kc.
-    """
+    if any(isinstance(part.basis, AxialState) for part in block.parts):
+        raise ValueError(_UNCOUPLED)
+    size = len(block.vectors)
     functions, names = list[Floats](), list[tuple[int, int, int]]()
     second = {pair.first: pair.second for pair in pairs}
     members = {v for pair in pairs for v in pair}
-    parts = [Part(v, _wang(basis), start) for v, basis, start in places]
-    for part in parts:
+    for part in block.parts:
         for place, (k, ka, kc) in enumerate(zip(part.basis.k.tolist(), *_by_k(part, representation), strict=True)):
             unit_vector = np.zeros(size)
-            unit_vector[part.start + place] = 1.0
+            unit_vector[part.place.start + place] = 1.0
             if part.v not in members:
                 functions.append(unit_vector)
                 names.append((part.v, ka, kc))
             elif part.v in second:
-                for v, function in _functions_with_l(unit_vector, k, part, parts, second[part.v], representation):
+                for v, function in _functions_with_l(unit_vector, k, part, block.parts, second[part.v], representation):
                     functions.append(function)
                     names.append((v, ka, kc))
             elif k == 0:
@@ -238,14 +207,7 @@ def functions_of_parts(
 _UNCOUPLED = "l-doubled states without a coupling of their components; give -2Aζ (TYP 20) for them"
 
 
-def _wang(basis: Basis) -> WangBlock:
-    """The Wang block of a basis."""
-    if isinstance(basis, AxialState):
-        raise ValueError(_UNCOUPLED)
-    return basis
-
-
-def _names_of_block(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
+def names_of_block(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
     """Labels and weights of the states of a block."""
     functions, names = functions_of_l(block, pairs, representation)
     shares = (functions @ block.vectors) ** 2
@@ -273,6 +235,6 @@ def _functions_with_l(
             at = partner.basis.k.tolist().index(k)
             element = between_blocks(part.basis, partner.basis, operator).real[part.basis.k.tolist().index(k), at]
             other = np.zeros_like(unit_vector)
-            other[partner.start + at] = np.sign(element)
+            other[partner.place.start + at] = np.sign(element)
             return [(part.v, (unit_vector + other) / sqrt(2.0)), (second, (unit_vector - other) / sqrt(2.0))]
     raise ValueError(_UNCOUPLED)

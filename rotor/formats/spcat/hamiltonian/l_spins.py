@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, functions_of_parts, over_real_states
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, functions_of_l, names_of_block, over_real_states
 from rotor.formats.spcat.hamiltonian.labels import renamed
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
@@ -83,34 +83,39 @@ def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
     return type(rotor)(components)
 
 
-def named_by_l_with_spins(levels: Levels, pairs: Sequence[Pair], representation: str) -> Levels:
+def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Levels:
     """Relabel levels: v of a pair by the sign of K l, and labels of the function |K, l⟩ ± |-K, -l⟩ with the largest weight."""
-    labels_and_weights = []
+    labels_and_weights = list[tuple[Ints, Floats]]()
     functions_by_block: dict[int, tuple[Floats, Ints]] = {}
     for block in levels.blocks:
+        if not isinstance(block, SpinBlock):
+            labels_and_weights.append(names_of_block(block, pairs, representation))
+            continue
         for part in block.parts:
             if part.number not in functions_by_block:
-                functions_by_block[part.number] = _functions(part.rotor, pairs, representation)
-        labels_and_weights.append(_names_of_block(block, functions_by_block))
+                functions_by_block[part.number] = functions_of_l(part.rotor, pairs, representation)
+        labels_and_weights.append(_names_with_spins(block, functions_by_block))
     return renamed(levels, *zip(*labels_and_weights, strict=True))
 
 
-def functions_with_spins(block: SpinBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
-    """The functions (n, n), in rows over the basis, that label the states of a block, and their labels (n, 3 + pattern).
+def functions_by_l(block: SolvedBlock | SpinBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
+    """The functions (n, n), in rows over the basis, that label the states of a block, and their labels.
 
-    They are |K, l⟩ ± |-K, -l⟩ of `l_doubled.functions_of_l` with each coupling pattern; labels are v, Ka, Kc and the doubled pattern.
+    They are |K, l⟩ ± |-K, -l⟩ of `l_doubled.functions_of_l` with each coupling pattern; labels: v, Ka, Kc, doubled pattern if any.
     """
+    if not isinstance(block, SpinBlock):
+        return functions_of_l(block, pairs, representation)
     functions = np.zeros((block.parts[-1].place.stop,) * 2)
     names = list[Ints]()
     for part in block.parts:
-        rotational, labels = _functions(part.rotor, pairs, representation)
+        rotational, labels = functions_of_l(part.rotor, pairs, representation)
         functions[part.place, part.place] = np.kron(np.eye(part.repeats), rotational)
         for pattern in block.patterns[part.patterns]:
             names.append(np.hstack([labels, np.broadcast_to(pattern, (len(labels), len(pattern)))]))
     return functions, np.concatenate(names)
 
 
-def _names_of_block(block: SpinBlock, functions_by_block: dict[int, tuple[Floats, Ints]]) -> tuple[Ints, Floats]:
+def _names_with_spins(block: SpinBlock, functions_by_block: dict[int, tuple[Floats, Ints]]) -> tuple[Ints, Floats]:
     """Labels and weights of the states of a block."""
     names, shares = list[Ints](), list[Floats]()
     for part in block.parts:
@@ -125,9 +130,3 @@ def _names_of_block(block: SpinBlock, functions_by_block: dict[int, tuple[Floats
     return np.concatenate(names)[function_of_state], np.asarray(
         table[function_of_state, np.arange(len(function_of_state))]
     )
-
-
-def _functions(rotor: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
-    """Labelling functions of a rotational block, and their labels."""
-    places = [(part.v, part.basis, part.place.start) for part in rotor.parts]
-    return functions_of_parts(places, len(rotor.vectors), pairs, representation)
