@@ -37,7 +37,7 @@ from rotor.assignment.request import AssignRequest, answer_assign
 LEAST_SNR = 100.0
 CERTAIN = "certain"
 ENOUGH_LINES = 6  # of a 13C species above six times the noise
-EDGES = (0.0, 0.5, 0.8, 0.95, 0.99, 0.999, 1.0)  # of probabilities in the reliability diagram
+EDGES = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)  # of probabilities in the reliability diagram
 
 
 @dataclass(frozen=True)

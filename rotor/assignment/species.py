@@ -50,7 +50,9 @@ STRONG_STAGES = (
     Stage(60, 0, 120),
     Stage(60, 120, 420),
 )  # of a further species, while several of the strongest peaks are left
-GUESS_STAGES = (Stage(60, 0, 60), Stage(180, 0, 90), Stage(60, 60, 200), Stage(400, 0, 60))  # within narrow bounds
+GUESS_STAGES = (  # within narrow bounds
+    Stage(60, 0, 60), Stage(180, 0, 90), Stage(60, 60, 200), Stage(400, 0, 60), Stage(180, 90, 400), Stage(60, 200, 1200),
+)  # fmt: skip
 NEXT_STAGES = (Stage(60, 0, 120),)
 SCARCE = 45  # most peaks for which all families are tried: the cost of a family is cubic in their number
 
