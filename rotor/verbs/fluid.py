@@ -164,7 +164,8 @@ def _new_box(inputs: BoxInput, settings: Settings) -> NewBox:
         raise ValueError(f"{source!r}: the model is {settings.model}; write --model {source} too")
     if "," in settings.model or source not in ("water", settings.model):
         raise ValueError(
-            f"{source!r}: a box is made of one model: write {settings.model.split(',')[0]!r} (or 'water') with its --model"
+            f"{source!r}: a box is made of one model, whose name stands twice: 'rotor fluid trappe-n2 --model trappe-n2'; "
+            f"models are {', '.join(sorted(MODELS))}"
         )
     model = model_of(settings.model)
     if source == "water" and model.symbols != ("O", "H", "H"):

@@ -40,7 +40,7 @@ def show(answer: InfoAnswer, report: Report) -> None:
     top, content = answer.request.top, report.content
     print(top_facts.heading(top))
     show_facts(_facts(top, content))
-    conformers = _conformers_table(content.get("conformers", []))
+    conformers = _conformers_table(content.get("conformers", []), top)
     axes, nuclei, q = _axes_table(content), _nuclei_table(top, content), _q_table(content)
     for table in (_constants_table(top), _states_table(top), axes, nuclei, q, conformers):
         if table:
@@ -182,14 +182,17 @@ def _q_table(content: Mapping[str, Any]) -> Table:
     return Table("", columns, rows, frozenset({"remark"}))
 
 
-def _conformers_table(records: Sequence[Mapping[str, Any]]) -> Table | None:
-    """Energies, constants and dipoles of the conformers, if they were requested."""
+def _conformers_table(records: Sequence[Mapping[str, Any]], top: Top) -> Table | None:
+    """Energies, constants (to the digits that the error of the geometry leaves) and dipoles of the conformers, if requested."""
     if not records:
         return None
     columns = ("conformer", "E (kJ/mol)", "A (MHz)", "B (MHz)", "C (MHz)", "μa (D)", "μb (D)", "μc (D)")
-    rows = []
+    rows, relative = [], (top.molecule.uncertainty or 0.0) if top.molecule is not None else 0.0
     for number, conformer in enumerate(records, start=1):
-        constants = [f"{x:.1f}" if x < float("inf") else "-" for x in conformer["rotational_constants_mhz"]]
+        constants = [
+            top_facts.known_digits(x, relative * x) if x < float("inf") else "-"
+            for x in conformer["rotational_constants_mhz"]
+        ]
         dipole = [f"{mu + 0.0:.2f}" for mu in conformer["dipole_abc_debye"] or ()] or ["-"] * 3
         rows.append([str(number), f"{conformer['energy_kj_per_mol']:.2f}", *constants, *dipole])
     return Table("", columns, rows)

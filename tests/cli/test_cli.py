@@ -599,3 +599,11 @@ def test_tables_of_facts_have_the_constants(call, folder):
     assert call("info", "OCS", "--csv", "one.csv")[0] == 0
     row = next(csv.DictReader((folder / "one.csv").read_text().splitlines()))
     assert (row["a_mhz"], float(row["b_mhz"])) == ("", rotor.read("OCS").constants["B"])
+
+
+def test_conformers_show_no_digits_beyond_their_error(call):
+    """A geometry of MMFF94 is good to 1.2 %: two uncertain digits, so that 18 GHz has steps of 10 MHz."""
+    out = call("info", "SMILES:OCC=O", "--conformers", "10")[1]
+    row = out.split("conformer ")[1].splitlines()[1].split()
+    assert [float(cell) % 10 for cell in row[2:3]] == [0.0]
+    assert all("." not in cell for cell in row[2:5])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 import shlex
 import shutil
@@ -13,6 +14,7 @@ import pytest
 from places import ORACLES, PROJECT
 
 import rotor
+from rotor.units import BOHR_RADIUS_ANGSTROM
 
 PAGES = sorted((PROJECT / "docs" / "how_to").glob("*.md"))
 PAGE_OF_OPTIONS = PROJECT / "docs" / "options.md"
@@ -72,6 +74,13 @@ def write_files(name: str, page: Path) -> None:
             "peaks.csv", np.column_stack([lines.frequency_mhz, height])[height > 1e-3], delimiter=",",
             header="frequency_mhz,intensity", comments="",
         )  # fmt: skip
+    elif name == "quantum_chemistry":
+        shutil.copy(ORACLES / "outputs" / "water_psi4.out", "calc.out")
+        shutil.copy(ORACLES / "spectro" / "h2o.hessian", "hessian.txt")
+        case = json.loads((ORACLES / "spectro" / "spectro.json").read_text(encoding="utf-8"))["h2o"]
+        rows = zip(case["symbols"], BOHR_RADIUS_ANGSTROM * np.array(case["positions_bohr"]), strict=True)
+        atoms = [f"{symbol} {x:.10f} {y:.10f} {z:.10f}" for symbol, (x, y, z) in rows]
+        Path("geometry.xyz").write_text("\n".join([str(len(atoms)), "", *atoms]) + "\n")
     elif name == "many_molecules":
         Path("list.csv").write_text(re.search(r"```text\n(.*?)```", text, re.DOTALL)[1])
         Path("many.toml").write_text(re.search(r"```toml\n(.*?)```", text, re.DOTALL)[1])
