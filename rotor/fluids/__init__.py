@@ -1,1 +1,1 @@
-"""Rigid molecules that attract and repel: bodies, potentials, dynamics, thermostats, and the engines beside ours."""
+"""Fluids of rigid molecules: bodies, potentials, dynamics, thermostats, and external engines."""

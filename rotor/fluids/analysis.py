@@ -1,6 +1,6 @@
-"""What a path of molecules says: pair distribution, displacement and diffusion, drift; errors as correlated data have them.
+"""Analysis of trajectories: pair distribution, displacement and diffusion, drift; with errors for correlated data.
 
-Paths are arrays (frames, n, 3) in Å of n points, not folded into the cell; cells are rectangular, (3,) edges.
+Paths are arrays (frames, n, 3) in Å of n points, not wrapped into the cell; cells are rectangular, with edges (3,).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def pair_distribution(path: ArrayLike, edges: ArrayLike, r_max: float, bins: int
     path : (frames, n, 3) array
         Positions.
     edges : (3,) array
-        Of the periodic cell.
+        Edges of the periodic cell.
     r_max : float
         Largest distance, at most half of the shortest edge.
     bins : int
@@ -59,7 +59,7 @@ def pair_distribution(path: ArrayLike, edges: ArrayLike, r_max: float, bins: int
     Returns
     -------
     PairDistribution
-        With this norm an ideal gas has g = 1 for any n.
+        Normalised so that an ideal gas has g = 1 for any n.
 
     Examples
     --------
@@ -93,8 +93,8 @@ def pair_distribution(path: ArrayLike, edges: ArrayLike, r_max: float, bins: int
 def mean_square_displacement(path: ArrayLike) -> Floats:
     """⟨|r(t₀ + t) - r(t₀)|²⟩ (frames,) in Å², averaged over points and all starts t₀.
 
-    The sums over starts are correlations, done by fast Fourier transform (V. Calandrini et al., Collection SFN 12, 201
-    (2011), section 3.2). Late times rest on few starts.
+    The sums over starts are correlations, computed by fast Fourier transform (V. Calandrini et al., Collection SFN 12, 201
+    (2011), section 3.2). Late times are averages over few starts.
 
     >>> mean_square_displacement(np.arange(4.0)[:, None, None] * [[[1.0, 0.0, 0.0]]]).round(12).tolist()
     [0.0, 1.0, 4.0, 9.0]
@@ -114,7 +114,7 @@ def mean_square_displacement(path: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class Diffusion:
-    """value: D in m²/s of the box as it is. error: standard error. corrected: for an endless box, where asked for."""
+    """value: D in m²/s in the periodic box. error: standard error. corrected: extrapolated to an infinite box, or None."""
 
     value: float
     error: float
@@ -131,7 +131,7 @@ def diffusion(
     path : (frames, n, 3) array
         Unwrapped positions, Å.
     interval_ps : float
-        Between frames.
+        Time between frames.
     window_ps : (float, float)
         First and last time of the slope.
     blocks : int
@@ -140,7 +140,7 @@ def diffusion(
     Returns
     -------
     Diffusion
-        D and its error. The drift of all points together is taken out first.
+        D and its error, after subtraction of the common drift of all points.
     """
     points = _path(path)
     points = points - points.mean(axis=1, keepdims=True)
@@ -163,7 +163,7 @@ def _slope(values: Floats, interval: float) -> float:
 def yeh_hummer_correction(
     diffusion: Diffusion, temperature_k: float, viscosity_pa_s: float, edge_angstrom: float
 ) -> Diffusion:
-    """D with the drag of the periodic images taken out, D + ξ kT/(6π η L) of a cubic cell (Yeh and Hummer 2004, eq. 12).
+    """D corrected for the hydrodynamic drag of periodic images, D + ξ kT/(6π η L) for a cubic cell (Yeh and Hummer 2004, eq. 12).
 
     Parameters
     ----------
@@ -172,20 +172,20 @@ def yeh_hummer_correction(
     temperature_k : float
         Temperature.
     viscosity_pa_s : float
-        Of the model itself, which hardly depends on the box; of SPC/E at 298 K 0.729e-3 (M. A. González and J. L. F. Abascal,
+        Viscosity of the model, which hardly depends on the box; 0.729e-3 for SPC/E at 298 K (M. A. González and J. L. F. Abascal,
         J. Chem. Phys. 132, 096101 (2010)).
     edge_angstrom : float
-        Of the cell.
+        Edge of the cell.
 
     Returns
     -------
     Diffusion
-        With the correction beside.
+        With `corrected` set.
 
     Examples
     --------
-    >>> found = Diffusion(2.5e-9, 0.0)
-    >>> round(yeh_hummer_correction(found, 298.15, 0.729e-3, 18.64).corrected * 1e9, 3)
+    >>> periodic = Diffusion(2.5e-9, 0.0)
+    >>> round(yeh_hummer_correction(periodic, 298.15, 0.729e-3, 18.64).corrected * 1e9, 3)
     2.956
     """
     drag = units.BOLTZMANN_J_PER_K * temperature_k / (6 * math.pi * viscosity_pa_s * edge_angstrom * 1e-10)
@@ -193,7 +193,7 @@ def yeh_hummer_correction(
 
 
 def block_errors(series: ArrayLike) -> Floats:
-    """Standard errors by pairing neighbours again and again, (levels,): they increase to a plateau where blocks are independent.
+    """Standard errors by repeated averaging of neighbours, (levels,); they reach a plateau once blocks are independent.
 
     H. Flyvbjerg and H. G. Petersen, J. Chem. Phys. 91, 461 (1989), eqs. 23-27. The last level has eight blocks or more.
 
@@ -210,7 +210,7 @@ def block_errors(series: ArrayLike) -> Floats:
 
 
 def drift_per_ns(time_ps: ArrayLike, energy: ArrayLike) -> tuple[float, float]:
-    """Slope of an energy per ns, and its standard error from the scatter about the line (correlations counted)."""
+    """Slope of an energy per ns, and its standard error from the scatter about the line, including correlations."""
     t, e = np.asarray(time_ps, dtype=np.float64) / 1000, np.asarray(energy, dtype=np.float64)
     slope, start = np.polyfit(t, e, 1)
     rest = mean_of("", "", e - start - slope * t)

@@ -1,9 +1,8 @@
 """Error budget of the temperature of a fluid (`rotor.requests.budget`).
 
-Truncation: the departure of the conserved energy from its mean over the run, as a temperature 2 ΔE/(f k) of the f degrees of freedom: the
-largest of the rows, and where n steps lie between the rows what the largest of n normal deviates is below, 1 + √(2 ln 2n) standard
-deviations of the rows. It is counted about the mean, not from the start: the energy of the first row has the departure of that row
-itself, which a box with velocities just drawn has more of.
+Truncation: the largest deviation of the conserved energy from its mean over the run, as a temperature 2 ΔE/(f k) for f degrees of freedom.
+For n steps between rows, it is at least the bound 1 + √(2 ln 2n) of the largest of n normal deviates, in standard deviations of the rows.
+The deviation refers to the mean, not to the first row, because a box with newly drawn velocities deviates more than average.
 """
 
 from __future__ import annotations
@@ -40,7 +39,7 @@ def temperature_budget(
     bodies : int
         Molecules of the box.
     averages : sequence of Mean
-        Those of the run, the temperature among them.
+        Means of the run, including the temperature.
 
     Returns
     -------
@@ -59,7 +58,7 @@ def temperature_budget(
 
 
 def _step_error(record: FluidRecord, settings: Settings, degrees: float) -> ErrorTerm:
-    """The largest departure of the conserved energy from its mean."""
+    """The error term of the step: largest deviation of the conserved energy from its mean."""
     if len(record) < 2 or not np.isfinite(record.total_ev).all():
         return ErrorTerm(None, "a run of fewer than two rows has no departure of its conserved energy")
     away = float(np.abs(record.total_ev - record.total_ev.mean()).max())

@@ -1,7 +1,7 @@
-"""What a long run leaves on disk: rows and frames that grow, and checkpoints that are whole or not there.
+"""Files of a long run: growing rows and frames, and checkpoints that are written atomically.
 
-A checkpoint is written beside, forced to the disk and renamed. It records how long the growing files were; a run that
-continues cuts them back to that length first, so that nothing stands in them twice and no half line stays.
+A checkpoint is written to a temporary file, flushed to disk and renamed. It records the lengths of the growing files. A resumed run
+first truncates them to these lengths, so that no line is duplicated or incomplete.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ VERSION = 1
 
 
 class TextFile:
-    """A text file that grows by whole pieces: a piece that does not fit on the disk leaves the file as it was.
+    """A text file that grows by complete pieces; a piece that does not fit on the disk leaves the file unchanged.
 
-    length: bytes to keep of an existing file; None begins anew.
+    length: bytes of an existing file to continue from; None: new file.
     """
 
     def __init__(self, path: str | os.PathLike[str], length: int | None = None) -> None:
@@ -42,7 +42,7 @@ class TextFile:
             self._file.seek(length)
 
     def add(self, text: str) -> None:
-        """Append a piece; OSError, with the file as before, where the disk is full."""
+        """Append a piece; OSError, with the file unchanged, if the disk is full."""
         start, left = self._file.tell(), memoryview(text.encode("utf-8"))
         try:
             while left:
@@ -90,7 +90,7 @@ class ExtendedXyz:
 
 
 class AseTrajectory:
-    """Frames as ASE's .traj, counted by frames; one continued is copied up to the frame of the checkpoint."""
+    """Frames as ASE's .traj, counted by frames; a continued file is copied up to the frame of the checkpoint."""
 
     def __init__(self, path: str | os.PathLike[str], length: int | None = None) -> None:
         from ase.io.trajectory import Trajectory
@@ -131,11 +131,11 @@ class AseTrajectory:
             return len(file)
 
     def close(self) -> None:
-        """Nothing is held between frames."""
+        """Nothing to close between frames."""
 
 
 def trajectory_file(path: str | os.PathLike[str], length: int | None = None) -> ExtendedXyz | AseTrajectory:
-    """The file of frames that the suffix names: .traj, .xyz or .extxyz."""
+    """The trajectory file for a suffix: .traj, .xyz or .extxyz."""
     suffix = Path(path).suffix.lower()
     if suffix == ".traj":
         return AseTrajectory(path, length)
@@ -146,17 +146,17 @@ def trajectory_file(path: str | os.PathLike[str], length: int | None = None) -> 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """All that a run needs to continue exactly.
+    """The data to continue a run exactly.
 
-    arrays: of the state, and rows of the table so far where no CSV has them. about: step, settings, thermostat, lengths of
-    the growing files, what the box is made of.
+    arrays: state, and the rows of the table if there is no CSV file. about: step, settings, thermostat, lengths of
+    the growing files, fingerprint of the box.
     """
 
     arrays: Mapping[str, Floats]
     about: Mapping[str, Any]
 
     def write(self, path: str | os.PathLike[str]) -> None:
-        """Beside, to the disk, and renamed: at any moment there is the old checkpoint or the new one, whole."""
+        """Write to a temporary file, flush, and rename: at any time the complete old or new checkpoint exists."""
         target = Path(path).resolve()
         beside = target.with_name(f".{target.name}.part")
         content = io.BytesIO()
@@ -175,7 +175,7 @@ class Checkpoint:
 
 
 def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
-    """The checkpoint of a file; ValueError for a file that is none."""
+    """The checkpoint in a file; ValueError for other files."""
     import zipfile
 
     if not Path(path).is_file():
@@ -196,19 +196,19 @@ def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
 
 
 def csv_line(values: Sequence[float]) -> str:
-    """A row in full precision: the shortest text that gives each double back."""
+    """A row in full precision: the shortest texts that reproduce the doubles."""
     return ",".join(repr(float(value)) for value in values) + "\n"
 
 
 def read_rows(path: str | os.PathLike[str], length: int) -> list[list[float]]:
-    """Rows of a CSV file within its first bytes, without the head."""
+    """Rows within the first `length` bytes of a CSV file, without the heading."""
     with open(path, "rb") as file:
         lines = file.read(length).decode("utf-8").splitlines()[1:]
     return [[float(value) for value in line.split(",")] for line in lines]
 
 
 def _sync_folder(folder: Path) -> None:
-    """Force a rename to the disk where the system has folders that can be opened (not Windows)."""
+    """Flush a rename to disk, on systems that can open folders (not Windows)."""
     if os.name == "nt":
         return
     handle = os.open(folder, os.O_RDONLY)

@@ -1,10 +1,10 @@
 """Equilibration of a box that starts from a lattice: a thermostat until energy and temperatures are stationary.
 
-The box is run under Langevin's thermostat. After 1, 1.5, 2.25, ... times `SHORTEST_PS` the last half of the time is judged: potential
-energy and both temperatures have no trend when the means of its two quarters differ by less than `LIMIT` standard errors (of
-correlated data, `rotor.statistics.equipartition.statistical_inefficiency`), and both temperatures must agree with the thermostat's
-within as many. For a run at constant energy the momenta are then scaled once, so that the energy is the mean of that half: its
-temperature is the thermostat's within the error of that mean, not within the scatter of a single moment.
+The box is run with a Langevin thermostat. After 1, 1.5, 2.25, ... times `SHORTEST_PS` the last half of the time is tested: potential
+energy and both temperatures must show no trend (means of the two quarters differ by less than `LIMIT` standard errors of correlated
+data, `rotor.statistics.equipartition.statistical_inefficiency`), and both temperatures must agree with the thermostat within the same
+limit. For a run at constant energy the momenta are then scaled once, so that the energy equals the mean of that half. The temperature
+then agrees with the thermostat within the error of the mean, not only within the fluctuations.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ SHORTEST_PS, GROWTH, LONGEST_PS = 10.0, 1.5, 100.0
 FRICTION_PER_PS = 5.0
 ROW_FS = 20.0
 LIMIT = 2.5  # standard errors
-LEAST_SAMPLES = 5.0  # independent ones in a quarter
-_NEW_STREAM = 20  # of random numbers, apart from those of the run
+LEAST_SAMPLES = 5.0  # smallest number of independent values in a quarter
+_NEW_STREAM = 20  # stream of random numbers, separate from that of the run
 
 
 @dataclass(frozen=True)
 class Equilibration:
-    """How a box was equilibrated.
+    """Result of an equilibration.
 
-    time_ps: length. stationary: whether the test was passed; False after `LONGEST_PS` at the most. temperature_k,
-    rotation_over_translation: means of the last half.
+    time_ps: length. stationary: whether the test was passed within `LONGEST_PS`. temperature_k, rotation_over_translation: means of the
+    last half.
     """
 
     time_ps: float
@@ -69,13 +69,13 @@ def equilibrate(
     Parameters
     ----------
     atoms : ase.Atoms
-        Molecules with a calculator; momenta are drawn where there are none.
+        Molecules with a calculator; missing momenta are drawn.
     settings : Settings
         Model, temperature, step and ensemble of the run that follows.
     time_ps : float, optional
-        Length; by default until the box is stationary.
+        Length. Default: until the box is stationary.
     progress : callable, optional
-        As of `run_fluid`.
+        As for `run_fluid`.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def equilibrate(
     longest = LONGEST_PS if time_ps is None else time_ps
     rows: list[list[float]] = []
     aim = min(SHORTEST_PS, longest)
-    dynamics.wrench()  # a state that cannot begin is a mistake of the box
+    dynamics.wrench()  # a failure at the first step is an error of the box
     while True:
         try:
             _advance(dynamics, bath, aim, rows, progress, longest)
@@ -137,7 +137,7 @@ def _advance(
     progress: Progress,
     longest_ps: float,
 ) -> None:
-    """Step on to a time, with a row every `ROW_FS`: potential energy, both temperatures, total energy."""
+    """Propagate to a time, with a row every `ROW_FS`: potential energy, both temperatures, total energy."""
     import time
 
     steps_per_row = max(round(ROW_FS / settings.step_fs), 1)
@@ -154,7 +154,7 @@ def _advance(
 
 
 def _set_energy(atoms: Atoms, dynamics: RigidDynamics, energy_ev: float, temperature_k: float) -> None:
-    """Take out the total momentum and scale the momenta to an energy, that of the momentum (3/2 kT) taken off."""
+    """Remove the total momentum, and scale the momenta to the energy minus that of the total momentum (3/2 kT)."""
     bodies, state = dynamics.bodies, dynamics.state
     atoms.set_momenta(bodies.momenta(at_rest(bodies, state.momentum), state.angular, state.attitude))
     requested = energy_ev - 1.5 * EV_PER_K * temperature_k - float(atoms.get_potential_energy())
@@ -164,5 +164,5 @@ def _set_energy(atoms: Atoms, dynamics: RigidDynamics, energy_ev: float, tempera
 
 
 def _other_seed(seed: int) -> int:
-    """A seed whose noise is not that of the run."""
+    """A seed for noise that is independent of the run."""
     return int(np.random.SeedSequence([seed, _NEW_STREAM]).generate_state(1)[0])

@@ -1,4 +1,4 @@
-"""How a box starts: its molecules on a lattice, their overlaps relaxed, velocities drawn from the canonical ensemble."""
+"""Initial boxes: molecules on a lattice, relaxed overlaps, velocities from the canonical ensemble."""
 
 from __future__ import annotations
 
@@ -18,30 +18,30 @@ from rotor.geometry import rotations
 if TYPE_CHECKING:
     from ase import Atoms
 
-TOO_NEAR_ANGSTROM = 0.5  # no two atoms of different molecules are ever that near
+TOO_NEAR_ANGSTROM = 0.5  # atoms of different molecules are never this close
 RELAXING_STEPS = 300
 RELAXING_FS = 1.0
-RELAXING_K = 300.0  # of the speeds that relaxing molecules may reach
+RELAXING_K = 300.0  # temperature of the largest speeds during relaxation
 
 
 def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np.random.Generator) -> Atoms:
-    """A cubic periodic box of molecules on a simple cubic lattice, turned at random.
+    """A cubic periodic box of molecules on a simple cubic lattice with random orientations.
 
     Parameters
     ----------
     model : RigidModel
         Of the molecules.
     molecules : int
-        How many; the smallest lattice with enough sites is used, some left empty at random.
+        Number of molecules; the smallest lattice with enough sites is used, with random vacancies.
     density_g_cm3 : float
-        Gives the edge, with the masses of the most abundant isotopes.
+        Density; determines the edge with the masses of the most abundant isotopes.
     rng : numpy.random.Generator
         Source of the random numbers.
 
     Returns
     -------
     ase.Atoms
-        Labelled in arrays["molecule"]. Neighbours may stand too close: `relax` the box before anything is measured.
+        Molecules are labelled in arrays["molecule"]. Neighbours may be too close: use `relax` first.
 
     Examples
     --------
@@ -74,9 +74,9 @@ def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np
 
 
 def model_labels(atoms: Atoms, models: Sequence[RigidModel]) -> NDArray[np.int64]:
-    """A label of the molecule for each atom of a box whose molecules stand one after another, as the models have them.
+    """Molecule labels of the atoms of a box with consecutive molecules in the atom order of the models.
 
-    At each place the longest model that fits is taken; ValueError where none does.
+    The longest matching model is used; ValueError if none matches.
 
     >>> from ase import Atoms
     >>> from rotor.fluids.forces.models import model_of
@@ -99,7 +99,7 @@ def model_labels(atoms: Atoms, models: Sequence[RigidModel]) -> NDArray[np.int64
 
 
 def check_apart(atoms: Atoms, bodies: Bodies) -> None:
-    """ValueError where atoms of two molecules lie on top of each other, with both named."""
+    """Raise ValueError, with their names, if atoms of two molecules overlap."""
     from ase.neighborlist import neighbor_list
 
     first, second, distances = neighbor_list("ijd", atoms, TOO_NEAR_ANGSTROM)
@@ -115,10 +115,10 @@ def check_apart(atoms: Atoms, bodies: Bodies) -> None:
 
 
 def relax(atoms: Atoms, steps: int = RELAXING_STEPS, **how: Any) -> None:
-    """Let molecules slide off each other, in place: a quench, in which a molecule that moves against its force is stopped.
+    """Remove overlaps in place by a quench: a molecule that moves against its force is stopped.
 
-    Steps of 1 fs; speeds are held below those of 300 K. It finds no minimum of energy, only places from which a motion can
-    start. The atoms keep no momenta. how: as of `RigidDynamics`.
+    Steps of 1 fs; speeds are limited to those of 300 K. The result is not an energy minimum, but a valid start of a motion. Momenta are
+    discarded. how: as for `RigidDynamics`.
     """
     from ase.units import fs
 
@@ -158,8 +158,8 @@ def thermal_momenta(
     rng : numpy.random.Generator
         Source of the random numbers.
     removed : int
-        3 takes the total momentum out, each body giving the share of its mass; what remains is the canonical ensemble of 3
-        degrees fewer, not rescaled.
+        3 removes the total momentum, in proportion to the masses; the result is the canonical ensemble with 3 degrees fewer,
+        without rescaling.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def thermal_momenta(
 
 
 def at_rest(bodies: Bodies, momentum: Floats) -> Floats:
-    """Momenta (n, 3) without the total: every body gives the share of its mass."""
+    """Momenta (n, 3) without the total momentum, which is removed in proportion to the masses."""
     return np.asarray(momentum - np.outer(bodies.mass / bodies.mass.sum(), momentum.sum(axis=0)))
 
 

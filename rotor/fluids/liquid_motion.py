@@ -1,11 +1,11 @@
 """Reorientation and diffusion of the molecules of a run, with the errors of that run.
 
-    C_l(t) = ⟨P_l(u(0)·u(t))⟩,  τ_l = ∫₀^∞ C_l dt,  l = 1, 2           u along the dipole of the model, else along its first bond
-    ⟨|r(t) - r(0)|²⟩ = 6 D t                                           at times where it is a straight line
+    C_l(t) = ⟨P_l(u(0)·u(t))⟩,  τ_l = ∫₀^∞ C_l dt,  l = 1, 2           u along the dipole of the model, or along its first bond
+    ⟨|r(t) - r(0)|²⟩ = 6 D t                                           in its linear range
 
-(M. P. Allen and D. J. Tildesley, Computer Simulation of Liquids, chapter 2). C_l is integrated to `WINDOW` of a block and continued by the
-exponential of its last half. The run is cut into `BLOCKS` successive blocks, which give means and standard errors; a run whose blocks
-are short against τ, or shorter than `LEAST_BLOCK_PS`, has no answer, with the reason.
+(M. P. Allen and D. J. Tildesley, Computer Simulation of Liquids, chapter 2). C_l is integrated up to `WINDOW` of a block and extrapolated
+by the exponential of its last half. Means and standard errors come from `BLOCKS` successive blocks. If blocks are not long compared with
+τ, or shorter than `LEAST_BLOCK_PS`, the result is missing, with the reason.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from rotor.fluids.motion.bodies import Bodies
 
 BLOCKS = 5
-WINDOW = 0.5  # of a block, to which correlations are integrated
+WINDOW = 0.5  # fraction of a block up to which correlations are integrated
 LEAST_BLOCK_PS = 4.0
-FELL_TO = math.exp(-1)  # a correlation that is larger at the end of the window is not integrated
+FELL_TO = math.exp(-1)  # largest correlation at the end of the window for which the integral is given
 MOST_FRAMES = 4096
 DIFFUSION_FROM_PS = 1.0
 CM2_PER_S = 1e4  # 1 m²/s
@@ -36,7 +36,7 @@ SMALL_DIPOLE = 1e-6  # e Å
 
 
 class MotionFrames:
-    """Centres (n, 3) and attitudes (n, 4) of a run at even times, every second one dropped where they grow too many."""
+    """Centres (n, 3) and attitudes (n, 4) of a run at equal intervals, which are doubled if there are too many frames."""
 
     def __init__(self) -> None:
         self.centres: list[Floats] = []
@@ -44,7 +44,7 @@ class MotionFrames:
         self.stride, self._seen = 1, 0
 
     def add(self, centres: Floats, attitude: Floats) -> None:
-        """Take a frame, if it is its turn."""
+        """Store a frame if its time is due."""
         if self._seen % self.stride == 0:
             self.centres.append(centres.copy())
             self.attitudes.append(attitude.copy())
@@ -54,9 +54,9 @@ class MotionFrames:
 
 
 def axis_of(model: RigidModel, sites: Floats) -> Floats | None:
-    """The unit vector of a model's dipole, that of its first bond without a dipole, in the axes of `sites` (atoms, 3); None of an atom.
+    """The unit vector of a model's dipole, or of its first bond without a dipole, in the axes of `sites` (atoms, 3); None for an atom.
 
-    The dipole is a sum over the vectors from the first atom to the others, whose coefficients do not depend on the axes.
+    The dipole is expressed by the vectors from the first atom to the others, with coefficients that do not depend on the axes.
     """
     atoms = len(model.symbols)
     if atoms < 2:
@@ -71,7 +71,7 @@ def axis_of(model: RigidModel, sites: Floats) -> Floats | None:
 
 
 def axes_of(bodies: Bodies, models: Sequence[RigidModel]) -> Floats | None:
-    """The axis of every body in its principal axes (n, 3); None where one has none."""
+    """The axes of all bodies in their principal axes (n, 3); None if a body has none."""
     axes = np.zeros((len(bodies), 3))
     for species in range(len(bodies.names)):
         members = np.flatnonzero(bodies.species == species)
@@ -86,15 +86,15 @@ def axes_of(bodies: Bodies, models: Sequence[RigidModel]) -> Floats | None:
 
 
 def motion_means(frames: MotionFrames, interval_ps: float, axes: Floats | None) -> tuple[list[Mean], str]:
-    """τ1, τ2 and D of a run's frames with standard errors, and why they are missing where they are.
+    """τ1, τ2 and D of a run with standard errors, or the reason why they are missing.
 
     Parameters
     ----------
     frames : MotionFrames
     interval_ps : float
-        Between rows of the run.
+        Time between rows of the run.
     axes : (n, 3) array or None
-        The axis of every molecule in its body axes; None where a molecule has none.
+        The axes of all molecules in body axes; None if a molecule has none.
     """
     step = interval_ps * frames.stride
     length = (len(frames.centres) - 1) * step
@@ -134,7 +134,7 @@ def _mean(quantity: str, unit: str, values: Sequence[float]) -> Mean:
 
 
 def correlation_time(vectors: Floats, interval: float, order: int) -> float:
-    """τ_l of unit vectors (frames, n, 3); nan where C_l stays above 1/e in the window.
+    """τ_l of unit vectors (frames, n, 3); nan if C_l stays above 1/e in the window.
 
     >>> turning = np.array([[[math.cos(t), math.sin(t), 0.0]] for t in np.linspace(0, 40, 2001)])
     >>> math.isnan(correlation_time(np.ones((50, 1, 3)) / math.sqrt(3), 0.1, 1))
@@ -143,7 +143,7 @@ def correlation_time(vectors: Floats, interval: float, order: int) -> float:
     c = reorientation(vectors, order)[: max(int(WINDOW * len(vectors)), 2)]
     if c.min() > FELL_TO:
         return math.nan
-    # beyond where the correlation is lost in its noise there is nothing to add
+    # stop where noise exceeds the correlation
     last = int(np.argmax(c < 0.05)) or len(c)
     inner = float(np.trapezoid(c[:last], dx=interval))
     tail = c[last // 2 : last]

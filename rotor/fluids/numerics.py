@@ -5,17 +5,17 @@
 | conserved energy, 2E/k per degree, "0.5 K" | the step, by short runs of the box | bound of these, and of the run |
 | forces of Ewald's sum, "0.1 %" | its tolerance, by forces in the box | where the run ends |
 
-The conserved energy of a fluid departs from its mean by h² G(q, p), h the step and G a function of coordinates and momenta: what a
-step of order 2 conserves to order h⁴ is H + h² G. How far it departs depends on the stretch of the motion: a box that starts with
-forces at rest and velocities drawn has more of it than a settled one, and a mean over a long run hides that. So n boxes are followed
-without a thermostat over `FOLLOWED_FS`, each with velocities of its own, and the root mean squares r of their conserved energies give
-a bound for one more such stretch: the difference of one more r and the mean of n is normal with the variance σ²(1 + 1/n), so that over
-s, the standard deviation of the n, it has Student's distribution, t its quantile:
+A step of order 2 conserves H + h² G to order h⁴, with h the step and G a function of coordinates and momenta. The conserved energy H
+therefore deviates from its mean by h² G(q, p). The deviation depends on the part of the motion: a box with newly drawn velocities deviates
+more than an equilibrated one, and a mean over a long run hides that. So n boxes with different velocities are propagated without a
+thermostat over `FOLLOWED_FS`. The root mean squares r of their conserved energies give a bound for another such run: the difference
+between its r and the mean of n is normal with variance σ²(1 + 1/n); divided by the standard deviation s of the n values it follows
+Student's distribution with quantile t:
 
     r < mean(r) + t(0.99, n - 1) s(r) √(1 + 1/n)
 
-Stated is this bound, or the root mean square of the whole run where that is larger. It is that of rigid molecules with the forces of
-the scene, whose cutoff is part of the model. What a box of classical molecules leaves out:
+The stated error is the larger of this bound and the root mean square of the whole run. It holds for rigid molecules with the forces of
+the scene, whose cutoff is part of the model. Effects neglected by a box of classical molecules:
 
 | left out | size |
 |---|---|
@@ -46,12 +46,12 @@ if TYPE_CHECKING:
     from rotor.fluids.request import FluidRequest
 
 SPARE = 1.25  # the forces where a run ends are others than those that Ewald's tolerance was chosen by
-BOXES, SURE = 8, 0.99  # boxes that are followed, and the confidence of the bound
+BOXES, SURE = 8, 0.99  # number of boxes, and the confidence of the bound
 FIRST_STEP_FS, LONGEST_STEP_FS, SHORTEST_STEP_FS = 1.0, 8.0, 0.05
 EWALD_LADDER = tuple(10.0**-n for n in range(2, 11))
 REFERENCE_EWALD = 1e-12
 STEPS_FS = (8.0, 6.0, 4.0, 3.0, 2.0, 1.0, 0.5)
-FOLLOWED_FS, FINEST_STEP_FS = 48.0, 0.05  # how long a box is followed, and the step of its reference
+FOLLOWED_FS, FINEST_STEP_FS = 48.0, 0.05  # length of a run of a box, and the step of its reference
 CUTOFFS = (5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0)  # Å
 EWALD = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 FINEST_EWALD = 1e-10
@@ -59,89 +59,90 @@ SETTLING_STEPS, SHORT_STEPS = 50, (5, 20)  # after which forces are nearly those
 
 
 def with_box(request: FluidRequest) -> FluidRequest:
-    """The request with its box, made once."""
+    """The request with its box, which is made once."""
     if not isinstance(request.box, NewBox):
         return request
     box = box_of(request)
-    box.calc = None  # that of the settings is made anew, by those that are chosen
+    box.calc = None  # a new calculator is made for the chosen settings
     return replace(request, box=box, box_source=request.start)
 
 
-def _of_rotor(request: FluidRequest) -> FluidRequest:
+def _rotor_request(request: FluidRequest) -> FluidRequest:
     """The request with its box; ValueError for another engine."""
     if request.engine != "rotor":
         raise ValueError(f"accuracy: the engine {request.engine} is not swept; give numerics.step, or the engine rotor")
     return with_box(request)
 
 
-def choose_step(scene: Any, request: FluidRequest, asked: float) -> Choice:
-    """The longest step that conserves the energy to an accuracy in K; its request has a box that is made."""
-    request = _of_rotor(request)
+def choose_step(scene: Any, request: FluidRequest, allowed: float) -> Choice:
+    """The longest step that conserves the energy to an accuracy in K; the box of the returned request is made."""
+    request = _rotor_request(request)
     refuse_set(request.settings, "step_fs")
-    # of second order: the step that reaches it, in hundredths of a femtosecond, from one that is short; then shorter until it does
-    step = FIRST_STEP_FS * math.sqrt(asked / conserved_bound_k(request, FIRST_STEP_FS))
+    # The error is of second order: extrapolate from a short step, in hundredths of a femtosecond, then shorten until it is small enough.
+    step = FIRST_STEP_FS * math.sqrt(allowed / conserved_bound_k(request, FIRST_STEP_FS))
     step = min(math.floor(100.0 * step) / 100.0, LONGEST_STEP_FS)
     while step > SHORTEST_STEP_FS:
-        if (error := conserved_bound_k(request, step)) <= asked:
+        if (error := conserved_bound_k(request, step)) <= allowed:
             longest = ", nothing cheaper: the longest there is" if step == LONGEST_STEP_FS else ""
             how = f"a step of {step:g} fs{longest}; root mean square of the conserved energy about its mean"
             return Choice(replace(request, settings=replace(request.settings, step_fs=step)), how, error)
         step = math.floor(95.0 * step) / 100.0
     raise ValueError(
-        f"accuracy: {asked:g} K cannot be given: the steps would be shorter than {SHORTEST_STEP_FS:g} fs; ask for less"
+        f"accuracy: {allowed:g} K cannot be given: the steps would be shorter than {SHORTEST_STEP_FS:g} fs; ask for less"
     )
 
 
 def conserved_bound_k(request: FluidRequest, step_fs: float) -> float:
-    """What the root mean square of the conserved energy of a box over a short time is below, in K for each degree of freedom.
+    """Upper bound of the rms deviation of a box's conserved energy over a short time, in K per degree of freedom.
 
-    request: with a box that is made; the first of the boxes that are followed has its own velocities, if there are any.
+    request: with a box that is made; the first of the test boxes starts with its velocities, if it has any.
     """
     from scipy.special import stdtrit
 
-    every = []
+    deviations = []
     for number in range(BOXES):
         box: Any = request.box
         box = box.copy()
         if number:
             box.set_momenta(np.zeros((len(box), 3)))  # drawn anew at the temperature
         settings = replace(request.settings, seed=request.settings.seed + number)
-        every.append(conserved_k(answer_followed(followed(replace(request, box=box, settings=settings), step_fs))))
-    spread = float(np.std(every, ddof=1)) * math.sqrt(1.0 + 1.0 / BOXES)
-    return float(np.mean(every)) + float(stdtrit(BOXES - 1, SURE)) * spread
+        deviations.append(conserved_k(answer_followed(followed(replace(request, box=box, settings=settings), step_fs))))
+    spread = float(np.std(deviations, ddof=1)) * math.sqrt(1.0 + 1.0 / BOXES)
+    return float(np.mean(deviations)) + float(stdtrit(BOXES - 1, SURE)) * spread
 
 
-def choose_ewald(scene: Any, request: FluidRequest, asked: float) -> Choice:
-    """The coarsest tolerance of Ewald's sum that gives forces to an accuracy in percent; its request has a box that is made."""
-    request = _of_rotor(request)
-    own = request.settings
-    if own.electrostatics != "ewald":
+def choose_ewald(scene: Any, request: FluidRequest, allowed: float) -> Choice:
+    """The coarsest tolerance of the Ewald sum for an accuracy of forces in percent; the box of the returned request is made."""
+    request = _rotor_request(request)
+    settings = request.settings
+    if settings.electrostatics != "ewald":
         raise ValueError(
-            f"accuracy: {asked:g} %: of the forces is that of Ewald's sum, and {own.electrostatics} is another model; give "
+            f"accuracy: {allowed:g} %: of the forces is that of Ewald's sum, and {settings.electrostatics} is another model; give "
             'numerics.electrostatics = "ewald", or an accuracy of the conserved energy in K'
         )
-    refuse_set(own, "ewald_tolerance")
+    refuse_set(settings, "ewald_tolerance")
     for tolerance in EWALD_LADDER:
-        chosen = replace(request, settings=replace(own, ewald_tolerance=tolerance))
+        chosen = replace(request, settings=replace(settings, ewald_tolerance=tolerance))
         error = force_error(chosen)
-        if error <= asked / SPARE:
+        if error <= allowed / SPARE:
             return Choice(chosen, f"a tolerance of {tolerance:g} of Ewald's sum")
     raise ValueError(
-        f"accuracy: {asked:g} % cannot be given: Ewald's sum to {tolerance:g} is still off by {error:.2g} %"
+        f"accuracy: {allowed:g} % cannot be given: Ewald's sum to {tolerance:g} is still off by {error:.2g} %"
     )
 
 
 def force_error(request: FluidRequest) -> float:
-    """Root mean square error in percent of the forces in a box, beside Ewald's sum to 1e-12 with the same cutoff."""
-    own = request.settings
-    found, true = (
-        forces_of(request, "ewald", own.cutoff_angstrom, one)() for one in (own.ewald_tolerance, REFERENCE_EWALD)
+    """Rms error in percent of the forces in a box, relative to an Ewald sum with tolerance 1e-12 and the same cutoff."""
+    settings = request.settings
+    forces, reference = (
+        forces_of(request, "ewald", settings.cutoff_angstrom, tolerance)()
+        for tolerance in (settings.ewald_tolerance, REFERENCE_EWALD)
     )
-    return force_difference(found, true)
+    return force_difference(forces, reference)
 
 
 def sweeps_of_fluid(request: FluidRequest) -> Sweeps:
-    """The step, by energy and positions over a short time; cutoff and Ewald's tolerance, by forces."""
+    """Sweeps of the step (energy and positions over a short time), of the cutoff and of Ewald's tolerance (forces)."""
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: the knobs of the engine rotor alone are swept")
     made = with_box(request)
@@ -151,7 +152,7 @@ def sweeps_of_fluid(request: FluidRequest) -> Sweeps:
 
 
 def followed(request: FluidRequest, step_fs: float) -> FluidRequest:
-    """The box without a thermostat over a short time, by one step."""
+    """A short run of the box without a thermostat, with this step."""
     steps = max(round(FOLLOWED_FS / step_fs), 1)
     short = replace(request.settings, ensemble="nve", step_fs=step_fs, steps=steps, every=1)
     return replace(request, settings=short)
@@ -169,14 +170,14 @@ def _copied(request: FluidRequest) -> Any:
 
 
 def conserved_k(answer: Any) -> float:
-    """Root mean square of the conserved energy about its mean, for each degree of freedom in K: 2E/k over their number."""
+    """Rms deviation of the conserved energy from its mean, in K per degree of freedom: 2E/k over their number."""
     facts = answer.facts()
     return float(2.0 * facts["conserved_rms_ev"] / units.EV_PER_K / facts["degrees"]["total"])
 
 
-def _moved(found: Any, reference: Any) -> float:
+def _moved(answer: Any, reference: Any) -> float:
     """Root mean square distance in Å of the nuclei at the end."""
-    apart = found.atoms.positions - reference.atoms.positions
+    apart = answer.atoms.positions - reference.atoms.positions
     lengths = reference.atoms.cell.lengths()
     if reference.atoms.pbc.all():
         apart = apart - lengths * np.round(apart / lengths)
@@ -185,7 +186,7 @@ def _moved(found: Any, reference: Any) -> float:
 
 def _step(request: FluidRequest) -> Sweep:
     measures = (
-        Measure("conserved energy per degree", "K", lambda found, _: conserved_k(found)),
+        Measure("conserved energy per degree", "K", lambda answer, _: conserved_k(answer)),
         Measure(f"positions after {FOLLOWED_FS:g} fs", "Å", _moved),
     )
     settings = ladder(STEPS_FS, request.settings.step_fs, partial(followed, request))
@@ -194,7 +195,7 @@ def _step(request: FluidRequest) -> Sweep:
 
 
 def forces_of(request: FluidRequest, electrostatics: str, cutoff: float, tolerance: float) -> Callable[[], Any]:
-    """A call that gives the forces on the nuclei of a request with a box that is made: an (n, 3) array in eV/Å."""
+    """A function that computes the forces (n, 3) in eV/Å on the nuclei of a request whose box is made."""
     from rotor.fluids.forces.potential import RigidPotential
 
     atoms = _copied(request)
@@ -209,9 +210,9 @@ def forces_of(request: FluidRequest, electrostatics: str, cutoff: float, toleran
     return forces
 
 
-def force_difference(found: Any, reference: Any) -> float:
-    """Root mean square difference of forces in percent of their root mean square."""
-    return 100.0 * float(np.sqrt(np.mean((found - reference) ** 2) / np.mean(reference**2)))
+def force_difference(forces: Any, reference: Any) -> float:
+    """Rms difference of forces in percent of their rms."""
+    return 100.0 * float(np.sqrt(np.mean((forces - reference) ** 2) / np.mean(reference**2)))
 
 
 def _most(request: FluidRequest) -> float:
@@ -220,25 +221,25 @@ def _most(request: FluidRequest) -> float:
 
 
 def _cutoff(request: FluidRequest) -> Sweep:
-    most, own = _most(request), request.settings
-    make = partial(forces_of, request, own.electrostatics)
-    cutoffs = [one for one in CUTOFFS if one < 0.95 * most]
-    settings = ladder(cutoffs, own.cutoff_angstrom, lambda one: make(one, own.ewald_tolerance))
+    most, run_settings = _most(request), request.settings
+    make = partial(forces_of, request, run_settings.electrostatics)
+    cutoffs = [cutoff for cutoff in CUTOFFS if cutoff < 0.95 * most]
+    settings = ladder(cutoffs, run_settings.cutoff_angstrom, lambda cutoff: make(cutoff, run_settings.ewald_tolerance))
     reference = forces_of(request, "ewald", 0.99 * most, FINEST_EWALD)
     against = f"Ewald's sum to {FINEST_EWALD:g}, Lennard-Jones to {0.99 * most:.3g} Å"
     measure = Measure("force", "%", force_difference)
     return Sweep(
-        f"numerics.cutoff, {own.electrostatics}", (measure,), settings, reference, against, lambda call: call()
+        f"numerics.cutoff, {run_settings.electrostatics}", (measure,), settings, reference, against, lambda call: call()
     )
 
 
 def _ewald(request: FluidRequest) -> list[Sweep]:
-    """The tolerance of Ewald's sum, where the scene has one."""
-    own = request.settings
-    if own.electrostatics != "ewald":
+    """Sweep of the tolerance of the Ewald sum, if the scene uses one."""
+    run_settings = request.settings
+    if run_settings.electrostatics != "ewald":
         return []
-    make = partial(forces_of, request, "ewald", own.cutoff_angstrom)
-    settings = ladder(EWALD, own.ewald_tolerance, make)
+    make = partial(forces_of, request, "ewald", run_settings.cutoff_angstrom)
+    settings = ladder(EWALD, run_settings.ewald_tolerance, make)
     measure = Measure("force", "%", force_difference)
     against = f"a tolerance of {FINEST_EWALD:g}"
     return [Sweep("numerics.ewald_tolerance", (measure,), settings, make(FINEST_EWALD), against, lambda call: call())]
@@ -247,9 +248,9 @@ def _ewald(request: FluidRequest) -> list[Sweep]:
 def left_out_of_fluid(
     bodies: Bodies, force: Floats, torque: Floats, temperature_k: float, step_fs: float
 ) -> tuple[LeftOut, ...]:
-    """What a box of rigid classical molecules leaves out, in percent, largest first; vibration is not estimated.
+    """Effects that a box of rigid classical molecules neglects, in percent, largest first; vibration is not estimated.
 
-    force, torque: (n, 3) in space and in body axes, at some moment of the run; ASE's units.
+    force, torque: (n, 3) in space and in body axes, at any time of the run; ASE's units.
     """
     from rotor.fluids.motion.thermometers import step_correction
 
@@ -257,14 +258,14 @@ def left_out_of_fluid(
     quantum = step_correction(bodies, force, torque, units.HBAR_CLASSICAL / kt).total_ev / (24 * kt * count)
     degrees = int((bodies.inverse_moments > 0).sum())
     turning = step_correction(bodies, force, torque, step_fs * 1e-3 / units.ASE_TIME_PS).rotation_ev / 12
-    found = [
+    neglected = [
         LeftOut("quantum mechanics of nuclei", 100 * quantum, "%", "of kT a molecule, free energy, to order ħ²"),
         LeftOut("finite box", 100 * count ** (-1 / 3), "%", "of the diffusion, which a periodic box slows down"),
     ]
     if degrees:
         share = turning / (0.5 * degrees * kt)
-        found.append(LeftOut("finite step", 100 * share, "%", "of the rotational temperature at full steps"))
-    return largest_first([*found, LeftOut("vibration", None, "", "molecules are rigid")])
+        neglected.append(LeftOut("finite step", 100 * share, "%", "of the rotational temperature at full steps"))
+    return largest_first([*neglected, LeftOut("vibration", None, "", "molecules are rigid")])
 
 
 def plan_of_fluid(request: Any) -> Plan:
@@ -274,13 +275,13 @@ def plan_of_fluid(request: Any) -> Plan:
     settings = request.settings
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: a plan is of the engine rotor alone")
-    made: Any = replace(with_box(request), box_equilibration_ps=0.0)  # its box is made
+    ready: Any = replace(with_box(request), box_equilibration_ps=0.0)  # its box is made
     least_ps, most_ps = equilibration_range(request.equilibration_ps)
     before = round(1e3 * least_ps / settings.step_fs)
 
     def short(steps: int) -> Any:
         return answer_fluid(
-            replace(made, box=made.box.copy(), settings=replace(settings, steps=steps)), progress=lambda *_: None
+            replace(ready, box=ready.box.copy(), settings=replace(settings, steps=steps)), progress=lambda *_: None
         )
 
     seconds, settled = Growth(short, before + settings.steps, SHORT_STEPS).seconds, min(SETTLING_STEPS, settings.steps)
@@ -296,7 +297,7 @@ def plan_of_fluid(request: Any) -> Plan:
             ("forces", f"cutoff {settings.cutoff_angstrom:g} Å, {settings.electrostatics}, even liquid beyond it"),
             *([("equilibration", f"{least_ps:g} ps{until}")] if before else []),
         ),
-        counts={"atoms": len(made.box), "steps": settings.steps} | ({"equilibration steps": before} if before else {}),
+        counts={"atoms": len(ready.box), "steps": settings.steps} | ({"equilibration steps": before} if before else {}),
         seconds=seconds,
         memory_mb=peak_mb(lambda: short(settled)),
         left_out=_left_out(short(settled).atoms, settings),
@@ -304,7 +305,7 @@ def plan_of_fluid(request: Any) -> Plan:
 
 
 def _left_out(atoms: Any, settings: Any) -> tuple[LeftOut, ...]:
-    """By the forces and torques of a box."""
+    """Neglected effects, from the forces and torques of a box."""
     from rotor.fluids.forces.models import models_of, shapes_of
     from rotor.fluids.motion.dynamics import RigidDynamics
 

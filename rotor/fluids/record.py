@@ -1,4 +1,4 @@
-"""The table that every run of a fluid fills, whichever engine made it."""
+"""The table of a run of a fluid, the same for all engines."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from rotor.table import Table
 class FluidRecord(Table):
     """Energies, temperatures and pressure at n times; all arrays (n,).
 
-    time_ps. potential_ev. translation_ev, rotation_ev: kinetic energies, by the thermometer that cancels the h² term
-    where the engine allows it. total_ev: conserved (with the thermostat's part where there is one). temperature_k,
-    translation_k, rotation_k: 2 E/(k degrees). pressure_bar: not a number where an engine gives none.
+    time_ps. potential_ev. translation_ev, rotation_ev: kinetic energies, by the thermometer without h² term if the engine
+    allows it. total_ev: conserved energy, including that of a thermostat. temperature_k, translation_k, rotation_k: 2 E/(k degrees).
+    pressure_bar: nan if the engine gives none.
     """
 
     time_ps: Floats

@@ -1,4 +1,4 @@
-"""A request for a run of a fluid, and what answers it: a box that is read or made, an engine, and the table of the run."""
+"""Request and answer for a run of a fluid: a box that is read or made, an engine, and the table of the run."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ DEFAULT = Settings()
 
 @dataclass(frozen=True)
 class NewBox:
-    """A box to make: so many molecules of one model on a lattice at a density, turned at random, relaxed and equilibrated.
+    """A box to make: molecules of a model on a lattice at a density, randomly oriented, relaxed and equilibrated.
 
-    equilibration_ps: how long the thermostat acts before the run; None until the box is stationary, 0 not at all.
+    equilibration_ps: time with thermostat before the run; None: until the box is stationary, 0: none.
     """
 
     molecules: int
@@ -55,11 +55,11 @@ class NewBox:
 
 @dataclass(frozen=True, eq=False)
 class FluidRequest:
-    """A run of rigid molecules in a box; every field is checked when the request is made.
+    """A run of rigid molecules in a box; all fields are checked when the request is made.
 
     settings: model, ensemble and length of the run. box: an ase.Atoms with its cell, or a `NewBox` to make. engine: rotor,
-    openmm or lammps. threads: of the built-in potential or of the engine. box_source: where a box that was read is from.
-    box_equilibration_ps: of a box that was read, as `NewBox.equilibration_ps`; by default it starts as it is.
+    openmm or lammps. threads: of the built-in potential or of the engine. box_source: origin of a box that was read.
+    box_equilibration_ps: for a box that was read, as `NewBox.equilibration_ps`; default: none.
     """
 
     box: Atoms | NewBox
@@ -86,12 +86,12 @@ class FluidRequest:
 
     @property
     def equilibration_ps(self) -> float | None:
-        """How long the thermostat acts before the run; None until the box is stationary, 0 not at all."""
+        """Time with thermostat before the run; None: until the box is stationary, 0: none."""
         return self.box.equilibration_ps if isinstance(self.box, NewBox) else self.box_equilibration_ps
 
     @property
     def start(self) -> str:
-        """Where the box is from, in words."""
+        """The origin of the box in words."""
         if not isinstance(self.box, NewBox):
             return self.box_source
         return (
@@ -102,9 +102,9 @@ class FluidRequest:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FluidAnswer(TextOf):
-    """A run: the table, the atoms where it ended, and how it started.
+    """A run: the table, the final atoms, and the start.
 
-    equilibration: of a box that was made. motion: reorientation and diffusion of the run; motion_reason: why some of it is missing.
+    equilibration: of a box that was made. motion: reorientation and diffusion of the run; motion_reason: why parts are missing.
     """
 
     shown = "record"
@@ -119,7 +119,7 @@ class FluidAnswer(TextOf):
 
     @property
     def averaged_share(self) -> float:
-        """Share of the rows, the last ones, that means are taken over: all after an equilibration, else half."""
+        """Share of the last rows that means are taken over: all after an equilibration, otherwise half."""
         return 0.5 if self.equilibration is None else 1.0
 
     @cached_property
@@ -128,12 +128,12 @@ class FluidAnswer(TextOf):
 
     @property
     def thermometer(self) -> str:
-        """By which momenta a temperature is measured."""
+        """The momenta (thermometer) from which the temperature is computed."""
         return "mixed" if self.request.engine == "lammps" else self._count[2]
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the count of degrees of freedom depends on, and means of a box that no thermostat has brought to its temperature."""
+        """Notes on the count of degrees of freedom, and on means of a box that was not equilibrated."""
         return (*self._count[1].notes, *self._start_notes)
 
     @property
@@ -148,7 +148,7 @@ class FluidAnswer(TextOf):
 
     @property
     def density_g_cm3(self) -> float | None:
-        """Mass over volume; None where the cell does not repeat."""
+        """Mass over volume; None for a non-periodic cell."""
         bodies, atoms = self._count[0], self.atoms
         if not atoms.pbc.all():
             return None
@@ -160,14 +160,14 @@ class FluidAnswer(TextOf):
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the mean temperature can be trusted."""
+        """Error budget of the mean temperature."""
         from rotor.fluids.budgets import temperature_budget
 
         bodies, degrees, _ = self._count
         return temperature_budget(self.record, self.request.settings, degrees.total, len(bodies), self._means)
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/verbs."""
+        """Facts of the answer except its table, by the keys of docs/verbs."""
         bodies, degrees, _ = self._count
         rms, drift = conserved(self.record)
         return {
@@ -207,11 +207,11 @@ def answer_fluid(
     outputs : Outputs, optional
         Files that grow during the run.
     resume : bool
-        Continue from `outputs.checkpoint`; of our own engine alone.
+        Continue from `outputs.checkpoint`; only with the engine rotor.
     progress : callable, optional
         Called with step, steps and ns per day from time to time; without it a bar is shown on a terminal.
     on_start : callable
-        Called once everything is found to be in order.
+        Called after all checks.
 
     Returns
     -------
@@ -220,7 +220,7 @@ def answer_fluid(
     Raises
     ------
     ValueError
-        A box, outputs or an engine that do not fit, see `rotor.fluids.run.run_fluid`.
+        An unsuitable box, outputs or engine, see `rotor.fluids.run.run_fluid`.
     RunStopped
         A ValueError too: a run that stopped on its way.
     """
@@ -263,7 +263,7 @@ def _motion(atoms: Atoms, settings: Settings, frames: MotionFrames) -> tuple[lis
 
 
 def box_of(request: FluidRequest, relaxed: bool = True) -> Atoms:
-    """The box of a request, made where it is a `NewBox`. relaxed: False leaves out the quench, as a resumed run does."""
+    """The box of a request; a `NewBox` is made. relaxed: False: without the quench, as for a resumed run."""
     if not isinstance(request.box, NewBox):
         return request.box
     model, settings = model_of(request.settings.model), request.settings
@@ -276,7 +276,7 @@ def box_of(request: FluidRequest, relaxed: bool = True) -> Atoms:
 
 
 def _with_calculator(atoms: Atoms, settings: Settings, threads: int) -> Atoms:
-    """A box that was read, with the built-in potential where it has no calculator; a copy, since equilibration moves it."""
+    """A copy of a box that was read (equilibration moves it), with the built-in potential if it has no calculator."""
     copied: Atoms = atoms.copy()
     copied.calc = atoms.calc or calculator_of(settings, threads)
     return copied

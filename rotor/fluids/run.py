@@ -1,10 +1,9 @@
-"""Long runs of a fluid: rows and frames as they come, checkpoints, and exact restarts.
+"""Long runs of a fluid with growing files, checkpoints, and exact restarts.
 
-After each checkpoint the calculator discards its state (lists of neighbours, the last result), as after a
-restart: what follows depends on the checkpoint alone, and a run that was killed and resumed ends bit for bit where the
-uninterrupted one does, on one machine with the same settings and the same interval of checkpoints. A run that ends between two
-checkpoints writes none there, which would discard the calculator's state where a longer run does not: when it is continued, the
-steps since the last checkpoint are computed again.
+After each checkpoint the calculator discards its state (neighbour lists, last result), as after a restart. The further motion then
+depends only on the checkpoint: a run that was killed and resumed gives bit for bit the results of an uninterrupted one, on the same machine
+with the same settings and checkpoint interval. A run that ends between two checkpoints writes none at its end, because a longer run would
+not discard the state there; when it is continued, the steps since the last checkpoint are repeated.
 """
 
 from __future__ import annotations
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
     from rotor.statistics.degrees_of_freedom import Degrees
 
 COLUMNS = tuple(field.name for field in fields(FluidRecord))
-MAY_CHANGE = ("steps",)  # settings that a resumed run may have otherwise
+MAY_CHANGE = ("steps",)  # settings that may differ in a resumed run
 BAR_EVERY_S = 0.2
 
 Progress = Callable[[int, int, float], None]
@@ -56,10 +55,10 @@ Progress = Callable[[int, int, float], None]
 
 @dataclass(frozen=True)
 class Outputs:
-    """Files of a run; what is None or empty is not written.
+    """Files of a run; those that are None or empty are not written.
 
-    csv: rows of the table as they come. trajectories: frames, .traj, .xyz or .extxyz. frames_every: steps between frames, by
-    default those between rows. checkpoint: file to resume from. checkpoint_every: steps between checkpoints.
+    csv: growing table. trajectories: frames, .traj, .xyz or .extxyz. frames_every: steps between frames; default: as between rows.
+    checkpoint: file to resume from. checkpoint_every: steps between checkpoints.
     """
 
     csv: str | os.PathLike[str] | None = None
@@ -90,21 +89,20 @@ def run_fluid(
     Parameters
     ----------
     atoms : ase.Atoms
-        Molecules one after another, atoms in the order of their models; its own calculator, if it has one, takes the place
-        of the model's potential. Momenta are used if there are any (without their total, where that is conserved), else
-        drawn at `settings.temperature_k`.
+        Consecutive molecules with atoms in the order of their models. A calculator of the atoms replaces the potential of the model.
+        Momenta of the atoms are used (without their total, if that is conserved), or drawn at `settings.temperature_k`.
     settings : Settings
         Model, ensemble, temperature and steps.
     outputs : Outputs, optional
         Files that grow, and checkpoints; none by default.
     resume : bool
-        Continue from `outputs.checkpoint`; the files that grow are cut back to where they were then.
+        Continue from `outputs.checkpoint`; the growing files are truncated to their lengths at that time.
     progress : callable, optional
         Called with step, steps and ns per day from time to time; without it a bar is shown on a terminal.
     on_start : callable, optional
-        Called once everything is found to be in order and the files are open.
+        Called after all checks, with open files.
     frames : MotionFrames, optional
-        Takes centres and attitudes with every row.
+        Collects centres and attitudes at each row.
 
     Returns
     -------
@@ -114,7 +112,7 @@ def run_fluid(
     Raises
     ------
     ValueError
-        Molecules that do not fit their model or lie on top of each other; a checkpoint of another box or other settings.
+        Molecules that deviate from their model or overlap; a checkpoint of another box or other settings.
     RunStopped
         A ValueError too: a force that is not finite, a full disk; with the step and the last checkpoint.
     """
@@ -128,7 +126,7 @@ def run_fluid(
     if resume:
         assert outputs.checkpoint is not None
         run.restore_from(outputs.checkpoint)
-    dynamics.wrench()  # a state that cannot begin is refused before any file is opened
+    dynamics.wrench()  # an invalid initial state is refused before any file is opened
     with run.files(), progress_bar(settings.steps, progress) as shown:
         on_start()
         run.go(shown)
@@ -136,7 +134,7 @@ def run_fluid(
 
 
 def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDynamics:
-    """The dynamics of settings, with model, thermostat and, if the box is to begin, thermal momenta."""
+    """The dynamics for the settings: model, thermostat and, for a new run, thermal momenta."""
     from ase.units import fs
 
     from rotor.fluids.motion.bodies import bodies_of
@@ -199,11 +197,11 @@ def calculator_of(settings: Settings, threads: int = 1) -> Any:
 
 
 def pressure_bar(dynamics: RigidDynamics) -> float:
-    """Pressure from centres of mass, (2 K_trans + Σ R·F)/3V; not a number where the calculator gives no stress.
+    """Pressure from centres of mass, (2 K_trans + Σ R·F)/3V; nan if the calculator gives no stress.
 
-    The built-in potential's stress is that of molecules already. From others' Σ r·f over atoms is taken off what forces do
-    along the sites of each molecule, Σ s·f, since the forces that hold it rigid undo that (M. P. Allen and D. J. Tildesley,
-    Computer Simulation of Liquids, section 2.4).
+    The stress of the built-in potential is molecular. For other calculators, the atomic Σ r·f contains the intramolecular part Σ s·f,
+    which the constraint forces cancel; it is subtracted (M. P. Allen and D. J. Tildesley, Computer Simulation of Liquids,
+    section 2.4).
     """
     from rotor.fluids.forces.potential import RigidPotential
 
@@ -220,7 +218,7 @@ def pressure_bar(dynamics: RigidDynamics) -> float:
 
 
 class _Run:
-    """A run under way: its rows, its files, where its last checkpoint is."""
+    """The state of a run: rows, files, and its last checkpoint."""
 
     def __init__(
         self, dynamics: RigidDynamics, settings: Settings, outputs: Outputs, motion: MotionFrames | None = None
@@ -234,7 +232,7 @@ class _Run:
 
     @contextmanager
     def files(self) -> Iterator[None]:
-        """Open the growing files, new or where the checkpoint left them."""
+        """Open the growing files, new or at the lengths of the checkpoint."""
         outputs, lengths = self.outputs, self._lengths
         with ExitStack() as open_files:
             for path in outputs.trajectories:
@@ -247,7 +245,7 @@ class _Run:
             yield
 
     def go(self, progress: Progress) -> None:
-        """All steps that are left."""
+        """Run the remaining steps."""
         dynamics, steps = self.dynamics, self.settings.steps
         first, started, shown = dynamics.nsteps, time.perf_counter(), 0.0
         try:
@@ -279,14 +277,14 @@ class _Run:
         return FluidRecord(*columns)
 
     def restore_from(self, path: str | os.PathLike[str]) -> None:
-        """The state of a checkpoint's file; ValueError where it is none, or one of another box or run."""
+        """Restore the state from a checkpoint file; ValueError if it is invalid, or of another box or run."""
         try:
             self.restore(read_checkpoint(path))
-        except (KeyError, TypeError, AttributeError) as error:  # its keys and arrays are not those of a checkpoint
+        except (KeyError, TypeError, AttributeError) as error:  # keys or arrays of a checkpoint are missing
             raise ValueError(f"{path}: is no checkpoint of rotor fluid; name the file of --checkpoint") from error
 
     def restore(self, checkpoint: Checkpoint) -> None:
-        """State, thermostat, rows and lengths of files as they were; ValueError for another box or run."""
+        """Restore state, thermostat, rows and lengths of files; ValueError for another box or run."""
         about, arrays, path = checkpoint.about, checkpoint.arrays, self.outputs.checkpoint
         if about["box"] != self._box():
             raise ValueError(f"{path}: was written for another box (other atoms, masses, shapes or cell)")
@@ -309,7 +307,7 @@ class _Run:
         self.rows = arrays["rows"].tolist() if csv is None else read_rows(csv, about["files"]["csv"])
 
     def _write(self) -> None:
-        """A row and frames, where it is their turn."""
+        """Write a row and frames if they are due."""
         dynamics, steps_per_row = self.dynamics, self.settings.every
         time_ps = dynamics.nsteps * self.settings.step_fs * 1e-3
         if dynamics.nsteps % steps_per_row == 0:
@@ -338,7 +336,7 @@ class _Run:
         ]
 
     def _save(self) -> None:
-        """A checkpoint, after which the calculator begins afresh."""
+        """Write a checkpoint and reset the calculator."""
         path, dynamics = self.outputs.checkpoint, self.dynamics
         if path is None:
             return
@@ -363,7 +361,7 @@ class _Run:
         return [*(["csv"] if self.outputs.csv is not None else []), *map(str, self.outputs.trajectories)]
 
     def _box(self) -> str:
-        """A fingerprint of what does not change."""
+        """A fingerprint of the constant properties of the box."""
         bodies, atoms = self.dynamics.bodies, self.dynamics.atoms
         parts = (atoms.numbers, bodies.order, bodies.starts, bodies.masses, bodies.sites, atoms.cell.array, atoms.pbc)
         return hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).hexdigest()
@@ -375,13 +373,13 @@ class _Run:
 
 
 def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
-    """How fast steps went."""
+    """Simulated time per day of computing, ns."""
     return steps * settings.step_fs * 1e-6 * 86400.0 / seconds if seconds > 0.0 else 0.0
 
 
 @contextmanager
 def progress_bar(steps: int, progress: Progress | None) -> Iterator[Progress]:
-    """Where progress goes: the caller's function, else a bar on a terminal, else nowhere."""
+    """The receiver of progress: the caller's function, a bar on a terminal, or none."""
     if progress is not None or not sys.stderr.isatty():
         yield progress or (lambda step, steps, speed: None)
         return

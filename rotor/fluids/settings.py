@@ -21,18 +21,18 @@ def _read_model(text: Any) -> str:
     return str(text)
 
 
-LARGEST = 1e30  # of any number here: its powers are formed
+LARGEST = 1e30  # largest number in any setting: higher powers must not overflow
 
 
 @dataclass(frozen=True)
 class Settings:
-    """A run, apart from the atoms.
+    """Settings of a run, without the atoms.
 
     model: name in `models.MODELS`, or several joined by commas for a mixture. ensemble: nve, langevin or nose-hoover.
     temperature_k: of the thermostat and of the starting velocities. step_fs, steps: of the integrator. every: steps
     between rows of the table. cutoff_angstrom: of Lennard-Jones and of charges in real space. electrostatics:
-    reaction-field, ewald (PME in the engines) or shifted. ewald_tolerance: error of a force relative to e²/4πε0 Å², see
-    `rotor.fluids.forces.ewald.parameters_for`. friction_per_ps: of Langevin's thermostat. relaxation_fs: time
+    reaction-field, ewald (PME in external engines) or shifted. ewald_tolerance: error of a force relative to e²/4πε0 Å², see
+    `rotor.fluids.forces.ewald.parameters_for`. friction_per_ps: of the Langevin thermostat. relaxation_fs: time
     constant of Nosé-Hoover chains. seed: of velocities and noise.
     """
 

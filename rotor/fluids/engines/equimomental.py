@@ -1,9 +1,8 @@
-"""Point masses that carry a rigid molecule through an engine which holds distances: as many constraints as there are rigid modes.
+"""Point masses that represent a rigid molecule in an engine with distance constraints.
 
-A body has 6 - 3 n + (number of constraints) = 0 only if no constraint follows from others. Between all pairs of n points that
-holds for two points of a line (1), three of a plane (3) and four of space (6), never for three points on a line or more
-than four. A molecule of another kind is moved by points with the same mass, centre and moments (equimomental points:
-E. J. Routh, Dynamics of a System of Rigid Bodies, elementary part, § 33), and its sites follow them without mass.
+Constraints between all pairs of n points are independent only for two points on a line (1), three in a plane (3) and four in space (6),
+but not for three points on a line or more than four. Other molecules are represented by points with the same mass, centre and moments
+(equimomental points: E. J. Routh, Dynamics of a System of Rigid Bodies, elementary part, § 33), which carry the massless sites.
 """
 
 from __future__ import annotations
@@ -24,21 +23,20 @@ _SPACE = np.array([[1.0, 1, 1], [1.0, -1, -1], [-1.0, 1, -1], [-1.0, -1, 1]])
 
 @dataclass(frozen=True)
 class EquimomentalPoints:
-    """Points (c, 3) with masses (c,), in the model's own axes, that move as the molecule does.
+    """Points (c, 3) with masses (c,), in the axes of the model, that move like the molecule.
 
-    own: whether they are the first c sites of the model themselves, the real atoms. rank: 0 a point, 1 a line, 2 a plane,
-    3 space.
+    are_atoms: whether they are the first c sites of the model, the real atoms. rank: 0 a point, 1 a line, 2 a plane, 3 space.
     """
 
     places: Floats
     masses: Floats
-    own: bool
+    are_atoms: bool
     rank: int
 
     def weights(self, place: Floats) -> Floats:
-        """How a site follows them: the sum of weights times points is the site, the sum of weights is 1.
+        """Weights of the points for a site: site = Σ weight · point with Σ weight = 1.
 
-        Where the points span a point, line or plane, the site must lie in it.
+        The site must lie in the point, line or plane that the points span.
         """
         rows = np.vstack([self.places.T, np.ones(len(self.places))])
         weights, *_ = np.linalg.lstsq(rows, np.append(place, 1.0))
@@ -48,14 +46,14 @@ class EquimomentalPoints:
 
 
 def equimomental_points(model: RigidModel, masses: Floats) -> EquimomentalPoints:
-    """The points that carry a model whose real atoms have these masses.
+    """The points that represent a model whose real atoms have these masses.
 
-    Its own atoms where their distances are independent (an atom, a diatomic, an isosceles triangle such as water),
-    else equal masses with the second moments Σ m x xᵀ of the molecule: two at ±√(J/M) on a line, three or four at the
-    corners of a triangle or tetrahedron stretched along the principal axes.
+    These are its real atoms if their distances are independent (an atom, a diatomic, an isosceles triangle such as water),
+    otherwise equal masses with the second moments Σ m x xᵀ of the molecule: two at ±√(J/M) on a line, three or four at the
+    corners of a triangle or tetrahedron scaled along the principal axes.
 
     >>> from rotor.fluids.forces.models import model_of
-    >>> equimomental_points(model_of("spce"), np.array([15.9949, 1.0078, 1.0078])).own
+    >>> equimomental_points(model_of("spce"), np.array([15.9949, 1.0078, 1.0078])).are_atoms
     True
     """
     places = model.positions_angstrom[: len(masses)]
@@ -72,7 +70,7 @@ def equimomental_points(model: RigidModel, masses: Floats) -> EquimomentalPoints
 
 
 def _independent(places: Floats, masses: Floats, rank: int) -> bool:
-    """Whether the atoms can carry the molecule: a point, two atoms, or a triangle with two equal sides and masses."""
+    """Whether the atoms can represent the molecule: a point, two atoms, or a triangle with two equal sides and masses."""
     if len(places) < 3:
         return True
     if len(places) > 3 or rank < 2:
@@ -82,6 +80,6 @@ def _independent(places: Floats, masses: Floats, rank: int) -> bool:
 
 
 def _reached(model: RigidModel, atoms: int, centre: Floats, axes: Floats, rank: int) -> bool:
-    """Whether all sites without mass lie in the line or plane of the atoms."""
+    """Whether all massless sites lie in the line or plane of the atoms."""
     beyond = (model.positions_angstrom[atoms:] - centre) @ axes[:, rank:]
     return bool(np.all(np.abs(beyond) < 1e-9))

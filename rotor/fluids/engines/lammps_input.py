@@ -1,8 +1,8 @@
 """The files that LAMMPS reads: atoms with molecules, the pair potential, rigid bodies, an ensemble.
 
-Sites without mass get MASSLESS_U, so that a body's mass and moments are the molecule's to a few parts in 10¹¹. All bonds of a
-molecule go to its first site and do nothing: they only say which pairs lie in one molecule. LAMMPS has no reaction field:
-charges under a cutoff are passed as a table, Lennard-Jones included. Units: metal (eV, Å, ps).
+Massless sites get MASSLESS_U, which changes mass and moments of a body by a few parts in 10¹¹. All bonds of a molecule go to its first
+site and have no energy; they only mark pairs within a molecule. LAMMPS has no reaction field: the potential of charges with a cutoff,
+including Lennard-Jones, is passed as a table. Units: metal (eV, Å, ps).
 """
 
 from __future__ import annotations
@@ -27,43 +27,43 @@ TABLE_POINTS, TABLE_FROM_ANGSTROM = 20_000, 0.6
 
 @dataclass(frozen=True)
 class SiteTypes:
-    """LAMMPS' atom types, each a site that differs from the others in mass, charge, Lennard-Jones or in being alone.
+    """LAMMPS' atom types: sites that differ in mass, charge, Lennard-Jones parameters, or in being a single atom.
 
-    sites, masses: of the types. of_species: for each species the types of its sites, numbered from 1.
+    sites, masses: of the types. by_species: for each species the types of its sites, numbered from 1.
     """
 
     sites: tuple[Site, ...]
     masses: Floats
-    of_species: tuple[Ints, ...]
+    by_species: tuple[Ints, ...]
 
 
 def site_types(engine_input: EngineInput) -> SiteTypes:
     """The site types of an engine's input."""
-    known: dict[tuple[float, ...], int] = {}
-    sites, masses, of_species = [], [], []
+    number_of_type: dict[tuple[float, ...], int] = {}
+    sites, masses, by_species = [], [], []
     for kind in engine_input.species:
         numbers = []
         for k, site in enumerate(kind.model.sites):
             mass = float(kind.masses[k]) if k < len(kind.masses) else MASSLESS_U
             key = (mass, site.charge_e, site.sigma_angstrom, site.epsilon_k, len(kind.model.sites) == 1)
-            if key not in known:
-                known[key] = len(known) + 1
+            if key not in number_of_type:
+                number_of_type[key] = len(number_of_type) + 1
                 sites.append(site)
                 masses.append(mass)
-            numbers.append(known[key])
-        of_species.append(np.array(numbers))
-    return SiteTypes(tuple(sites), np.array(masses), tuple(of_species))
+            numbers.append(number_of_type[key])
+        by_species.append(np.array(numbers))
+    return SiteTypes(tuple(sites), np.array(masses), tuple(by_species))
 
 
 def data_file(engine_input: EngineInput) -> str:
     """Atoms, velocities and bonds of a box (`read_data`, atom_style full)."""
-    known = site_types(engine_input)
+    site_kinds = site_types(engine_input)
     within = np.arange(len(engine_input.site_masses)) - engine_input.first_sites[engine_input.molecule_of_site]
-    types = np.concatenate([known.of_species[k] for k in engine_input.kinds])
-    charges = np.array([site.charge_e for site in known.sites])[types - 1]
+    types = np.concatenate([site_kinds.by_species[k] for k in engine_input.kinds])
+    charges = np.array([site.charge_e for site in site_kinds.sites])[types - 1]
     bonded = np.flatnonzero(within)
     most = int(engine_input.sites_of_kinds.max())
-    lines = ["a box of rigid molecules", "", f"{len(types)} atoms", f"{len(known.sites)} atom types"]
+    lines = ["a box of rigid molecules", "", f"{len(types)} atoms", f"{len(site_kinds.sites)} atom types"]
     if len(bonded):
         lines += [
             f"{len(bonded)} bonds",
@@ -72,7 +72,7 @@ def data_file(engine_input: EngineInput) -> str:
             f"{most} extra special per atom",
         ]
     lines += ["", *(f"0 {edge:.17g} {axis}lo {axis}hi" for edge, axis in zip(engine_input.edges, "xyz", strict=True))]
-    lines += _section("Masses", [(m,) for m in known.masses])
+    lines += _section("Masses", [(m,) for m in site_kinds.masses])
     columns = zip(engine_input.molecule_of_site + 1, types, charges, *engine_input.site_positions.T, strict=True)
     lines += _section("Atoms # full", columns)
     lines += _section("Velocities", engine_input.site_velocities / units.ASE_TIME_PS)
@@ -172,7 +172,7 @@ def ensemble_commands(engine_input: EngineInput, settings: Settings) -> list[str
 
 def _types(engine_input: EngineInput, chosen: NDArray[np.bool_]) -> str:
     """Types of the chosen species."""
-    numbers = np.concatenate([site_types(engine_input).of_species[k] for k in np.flatnonzero(chosen)])
+    numbers = np.concatenate([site_types(engine_input).by_species[k] for k in np.flatnonzero(chosen)])
     return " ".join(map(str, np.unique(numbers)))
 
 

@@ -1,7 +1,7 @@
-"""A box in OpenMM: molecules as points held at their distances, sites without mass following them.
+"""A box in OpenMM: molecules as points with fixed distances, which carry massless sites.
 
-OpenMM steps with velocities half a step behind the positions (leapfrog); they are put back onto the step with the forces
-there, or left between steps under a thermostat, which acts there. Units of OpenMM: nm, ps, kJ/mol.
+OpenMM's velocities are half a step behind the positions (leapfrog). They are shifted to full steps with the forces, or left at half
+steps with a thermostat, which acts there. Units of OpenMM: nm, ps, kJ/mol.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from rotor.fluids.settings import Settings
 from rotor.units import EV_PER_ANGSTROM3_BAR
 
 KJ_PER_EV = units.ELEMENTARY_CHARGE_C * units.AVOGADRO_PER_MOL * 1e-3
-CONDUCTOR = 1e12  # a dielectric constant as good as infinite
+CONDUCTOR = 1e12  # stands for an infinite dielectric constant
 NM_PER_PS = 0.1 / units.ASE_TIME_PS  # 1 Å √(eV/u) in nm/ps
 
 
 @dataclass(frozen=True)
 class OpenMMSystem:
-    """A box as OpenMM has it.
+    """A box as an OpenMM system.
 
-    system: openmm.System. barostat: a part of it that changes nothing and measures the pressure.
+    system: openmm.System. barostat: part of the system that only measures the pressure.
     massive: (c,) its particles with mass. owners: (c,) their molecules. masses: (c,). atoms:
     (atoms,) its particles that are the real atoms. positions: (particles, 3) Å.
     """
@@ -72,7 +72,7 @@ def build_system(engine_input: EngineInput, settings: Settings, form: Form, accu
     Returns
     -------
     OpenMMSystem
-        The system, and which of its particles are what.
+        The system, with the meaning of its particles.
     """
     mm = load()
     system = mm.System()
@@ -91,14 +91,14 @@ def build_system(engine_input: EngineInput, settings: Settings, form: Form, accu
         massive += range(first, first + len(plan.masses))
         owners += [molecule] * len(plan.masses)
         atoms += range(site_at, site_at + len(model.symbols))
-        if not plan.own:
+        if not plan.are_atoms:
             positions.append(_laid(plan, model.positions_angstrom, here))
         positions.append(here)
     system.addForce(force)
     barostat = mm.MonteCarloBarostat(1.0, settings.temperature_k, 0)  # 0: it never moves anything
     system.addForce(barostat)
     if settings.ensemble == "nose-hoover":
-        system.addForce(mm.CMMotionRemover())  # its chain then counts three degrees fewer, as we do
+        system.addForce(mm.CMMotionRemover())  # its chain then counts three degrees fewer, as rotor does
     masses = np.concatenate([plans[k].masses for k in engine_input.kinds])
     return OpenMMSystem(
         system, barostat, np.array(massive), np.array(owners), masses, np.array(atoms), np.concatenate(positions)
@@ -149,19 +149,19 @@ def nonbonded(mm: Any, settings: Settings, form: Form, accuracy: float) -> Any:
 
 
 def _add_molecule(mm: Any, system: Any, force: Any, plan: EquimomentalPoints, model: Any) -> int:
-    """Particles, constraints and exclusions of one molecule; where its sites begin."""
+    """Add particles, constraints and exclusions of a molecule; return the index of its first site."""
     first = int(system.getNumParticles())
     for mass in plan.masses:
         system.addParticle(float(mass))
     for i, j in combinations(range(len(plan.masses)), 2):
         system.addConstraint(first + i, first + j, float(np.linalg.norm(plan.places[i] - plan.places[j])) / 10)
-    site_at = first if plan.own else first + len(plan.masses)
+    site_at = first if plan.are_atoms else first + len(plan.masses)
     for k, site in enumerate(model.sites):
-        if plan.own and k < len(plan.masses):
+        if plan.are_atoms and k < len(plan.masses):
             continue
         index = system.addParticle(0.0)
         system.setVirtualSite(index, _virtual_site(mm, plan, first, np.array(site.position_angstrom)))
-    if not plan.own:
+    if not plan.are_atoms:
         for _ in plan.masses:
             force.addParticle(0.0, 1.0, 0.0)
     for site in model.sites:
@@ -172,7 +172,7 @@ def _add_molecule(mm: Any, system: Any, force: Any, plan: EquimomentalPoints, mo
 
 
 def _virtual_site(mm: Any, plan: EquimomentalPoints, first: int, place: Floats) -> Any:
-    """A site without mass that follows the points with mass."""
+    """A massless site that follows the points with mass."""
     points = list(range(first, first + len(plan.places)))
     if plan.rank == 3:
         x, y = plan.places[1] - plan.places[0], plan.places[2] - plan.places[0]
@@ -188,7 +188,7 @@ def _virtual_site(mm: Any, plan: EquimomentalPoints, first: int, place: Floats) 
 
 
 def _laid(plan: EquimomentalPoints, sites: Floats, here: Floats) -> Floats:
-    """Where the points with mass are in the box, from where the sites (model's axes, box) are."""
+    """Positions of the points with mass in the box, from the sites in the axes of the model and in the box."""
     from rotor.geometry.superposition import superpose
 
     return superpose(sites, here).apply(plan.places)
@@ -198,14 +198,14 @@ def integrator(mm: Any, settings: Settings) -> Any:
     """The integrator of an ensemble."""
     step, temperature = settings.step_fs / 1000, settings.temperature_k
     if settings.ensemble == "nve":
-        made = mm.VerletIntegrator(step)
+        engine_integrator = mm.VerletIntegrator(step)
     elif settings.ensemble == "langevin":
-        made = mm.LangevinMiddleIntegrator(temperature, settings.friction_per_ps, step)
-        made.setRandomNumberSeed(settings.seed)
+        engine_integrator = mm.LangevinMiddleIntegrator(temperature, settings.friction_per_ps, step)
+        engine_integrator.setRandomNumberSeed(settings.seed)
     else:
-        made = mm.NoseHooverIntegrator(temperature, 1000 / settings.relaxation_fs, step)
-    made.setConstraintTolerance(1e-7)
-    return made
+        engine_integrator = mm.NoseHooverIntegrator(temperature, 1000 / settings.relaxation_fs, step)
+    engine_integrator.setConstraintTolerance(1e-7)
+    return engine_integrator
 
 
 @dataclass(frozen=True)
@@ -224,7 +224,7 @@ class Session:
         return self.settings.step_fs / 1000 / units.ASE_TIME_PS
 
     def state(self) -> tuple[Floats, Motion, float]:
-        """Positions (particles, 3) Å, motion of the molecules as OpenMM's velocities have it, potential energy eV."""
+        """Positions (particles, 3) Å, motion of the molecules from OpenMM's velocities, potential energy eV."""
         got = self.context.getState(positions=True, velocities=True, forces=True, energy=True)
         mine = self.build_system
         positions = np.asarray(got.getPositions(asNumpy=True)._value) * 10
@@ -235,7 +235,7 @@ class Session:
         return positions, motion, got.getPotentialEnergy()._value / KJ_PER_EV
 
     def start(self, velocities: Floats) -> None:
-        """Set velocities (massive, 3) of the first step; a leapfrog is given those half a step before."""
+        """Set the initial velocities (massive, 3); a leapfrog needs those half a step earlier."""
         mine = self.build_system
         full = np.zeros_like(mine.positions)
         full[mine.massive] = velocities
@@ -247,12 +247,12 @@ class Session:
             self.context.setVelocities(full * NM_PER_PS)
 
     def frame(self, step: int) -> Frame:
-        """What there is to say about now."""
+        """The current frame."""
         positions, stored, potential = self.state()
         between = self.settings.ensemble != "nve"
         motion = stored if between else stored.kicked(0.5 * self.step_classical)
         bath = 0.0
-        if self.settings.ensemble == "nose-hoover" and step:  # before its first step OpenMM has no chain to ask
+        if self.settings.ensemble == "nose-hoover" and step:  # OpenMM creates its chain at the first step
             bath = self.context.getIntegrator().computeHeatBathEnergy()._value / KJ_PER_EV
         pressure = self.pressure_bar(stored, motion)
         return Frame(
@@ -260,9 +260,9 @@ class Session:
         )
 
     def pressure_bar(self, stored: Motion, motion: Motion) -> float:
-        """OpenMM's molecular pressure, from energies of the box scaled up and down, with the motion on the step.
+        """OpenMM's molecular pressure, from energies of the scaled box and the motion at full steps.
 
-        It scales molecules about their geometric centres, not those of mass: another number at a moment, the same mean.
+        Molecules are scaled about their geometric centres instead of their centres of mass; the mean pressure is the same.
         """
         theirs = self.build_system.barostat.computeCurrentPressure(self.context)._value
         kinetic = motion.kinetic().translation_ev - stored.kinetic().translation_ev
@@ -278,7 +278,7 @@ def session(
     platform: str | None = None,
     threads: int = 1,
 ) -> Session:
-    """A context with the box in it, its molecules moving as given.
+    """A context with the box and its initial motion.
 
     Parameters
     ----------
@@ -311,15 +311,15 @@ def session(
     return ready
 
 
-def _context(mm: Any, system: Any, made: Any, platform: str | None, threads: int) -> Any:
-    """A context; where OpenMM chooses the platform and it is not the CPU, the first platform that works is taken."""
-    known = [mm.Platform.getPlatform(k) for k in range(mm.Platform.getNumPlatforms())]
-    chosen = platform or max(known, key=lambda candidate: float(candidate.getSpeed())).getName()
+def _context(mm: Any, system: Any, engine_integrator: Any, platform: str | None, threads: int) -> Any:
+    """A context; without a given platform, OpenMM's choice (the first one that works) unless that is the CPU."""
+    platforms = [mm.Platform.getPlatform(k) for k in range(mm.Platform.getNumPlatforms())]
+    chosen = platform or max(platforms, key=lambda candidate: float(candidate.getSpeed())).getName()
     if chosen == "CPU":
-        return mm.Context(system, made, mm.Platform.getPlatformByName("CPU"), {"Threads": str(threads)})
+        return mm.Context(system, engine_integrator, mm.Platform.getPlatformByName("CPU"), {"Threads": str(threads)})
     if platform is None:
-        return mm.Context(system, made)
-    return mm.Context(system, made, mm.Platform.getPlatformByName(platform))
+        return mm.Context(system, engine_integrator)
+    return mm.Context(system, engine_integrator, mm.Platform.getPlatformByName(platform))
 
 
 def frames(engine_input: EngineInput, settings: Settings, form: Form | None = None, **options: Any) -> Iterator[Frame]:
@@ -332,7 +332,7 @@ def frames(engine_input: EngineInput, settings: Settings, form: Form | None = No
     settings : Settings
         What is run.
     form : Form, optional
-        What of the potential is not in `settings`; see `session`.
+        Options of the potential outside `settings`; see `session`.
     options : object
         As of `session`.
 
@@ -344,7 +344,7 @@ def frames(engine_input: EngineInput, settings: Settings, form: Form | None = No
     Raises
     ------
     RuntimeError
-        Where OpenMM stops on its way.
+        If OpenMM stops during the run.
     """
     mm = load()
     try:

@@ -1,4 +1,4 @@
-"""The pair potential in the form of an engine: numbers for closed forms, or a table."""
+"""The pair potential for engines: parameters of closed forms, or a table."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from rotor.fluids.settings import Settings
 
 @dataclass(frozen=True)
 class Form:
-    """What of the potential is no part of `Settings`; the values are those of our calculator.
+    """Parameters of the potential outside `Settings`; the defaults are those of the built-in calculator.
 
-    switch_angstrom: over how much before the cutoff Lennard-Jones is switched off, 0 for a hard cut. dielectric: around the
+    switch_angstrom: width of the Lennard-Jones switch before the cutoff, 0 for a hard cut. dielectric: outside the
     sphere of the reaction field, infinite for a conductor. alpha_per_angstrom: damping of shifted charges.
     """
 
@@ -41,9 +41,9 @@ def pair_energy(
     settings : Settings
         Cutoff and electrostatics.
     form : Form
-        Of the charges under a cutoff.
+        Of the charges with a cutoff.
     charges : bool
-        False leaves the second term to a sum over the lattice.
+        False: without the second term, for a lattice sum.
 
     Returns
     -------
@@ -79,7 +79,7 @@ def _charges(r: Floats, settings: Settings, form: Form) -> tuple[Floats, Floats]
 
 
 def tail_of(engine_input: EngineInput, settings: Settings, form: Form) -> tuple[float, float]:
-    """Energy (eV) and pressure (eV/Å³) of the dispersion beyond the cutoff, the fluid taken as even there."""
+    """Energy (eV) and pressure (eV/Å³) of the dispersion beyond the cutoff, for a uniform fluid."""
     counts = np.bincount(engine_input.kinds, minlength=len(engine_input.species))
     models = tuple(kind.model for kind in engine_input.species)
     energy, pressure = tail(models, counts, settings.cutoff_angstrom, form.switch_angstrom)

@@ -1,4 +1,4 @@
-"""Frames of an engine read back: into the table that every run fills, and into a path for the analysis."""
+"""Conversion of the frames of an engine to the table of a run, and to a path for analysis."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ENGINES = ("openmm", "lammps")
 
 @dataclass(frozen=True)
 class EngineRun:
-    """What an engine has made of a box: the table, and the real atoms' places (frames, atoms, 3), molecules whole."""
+    """Results of an engine: the table, and positions (frames, atoms, 3) of the real atoms, molecules whole."""
 
     engine_input: EngineInput
     record: FluidRecord
@@ -29,7 +29,7 @@ class EngineRun:
 
 
 def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> EngineRun:
-    """Run a box by the engine of that name and read it back.
+    """Run a box with an engine and collect its results.
 
     Parameters
     ----------
@@ -50,13 +50,13 @@ def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> Eng
     Raises
     ------
     ValueError
-        For what the engine cannot represent.
+        If the engine cannot represent the input.
     ModuleNotFoundError
-        Where it is not installed.
+        If it is not installed.
     OSError
-        Where it does not load.
+        If it does not load.
     RuntimeError
-        Where it stops on its way.
+        If it stops during the run.
     """
     engine_input = engine_input_of(atoms, settings)
     seen = list(engine_frames(name, engine_input, settings, **options))
@@ -112,9 +112,8 @@ def record_of(frames: Iterable[Frame], engine_input: EngineInput, settings: Sett
 def row_of(frame: Frame, engine_input: EngineInput, settings: Settings) -> list[float]:
     """A row of the table.
 
-    Energies of motion are those of the thermometer without an error of order h² (`rotor.fluids.motion.thermometers`): mixed from
-    momenta on the step, as they are from momenta between steps, where a thermostat acts. The total has the energy on the
-    step.
+    Kinetic energies are those of the thermometer without an error of order h² (`rotor.fluids.motion.thermometers`): "mixed" for momenta
+    at full steps, unchanged for momenta at half steps, where a thermostat acts. The total contains the energy at full steps.
     """
     stored = frame.motion.kinetic()
     kinetic = stored

@@ -1,7 +1,7 @@
-"""Compiled lists of neighbouring molecules: bins, every image met once, in time O(N).
+"""Compiled lists of neighbouring molecules from bins, with each pair listed once, in time O(N).
 
-Each pair stands in one list: that of the molecule whose bin comes first (x, then y, then z, images counted as bins beyond the
-cell's edge), and inside one bin in the order of the bin. So images need no rule of their own, not even a molecule's own image.
+A pair is in the list of the molecule whose bin comes first (x, then y, then z; images are bins beyond the edge of the cell), within a
+bin in the order of the bin. Images therefore need no special rule, not even images of the same molecule.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numba import njit
 from rotor.arrays import Floats
 from rotor.fluids.forces.assembly import Integers
 
-IMAGES = 2  # a neighbour is at most that many cells away
+IMAGES = 2  # largest distance of a neighbour in cells
 
 
 @njit(cache=True)
@@ -55,19 +55,19 @@ def _gap2(place: float, low: float, width: float) -> float:
 
 @njit(cache=True)
 def _image(raw: int, bins: int, box: float) -> int:
-    """How many cells away a bin lies; out of reach (IMAGES + 1) beyond the edge where nothing repeats."""
+    """The cell of a bin relative to the central one; out of range (IMAGES + 1) beyond the edge without periodicity."""
     image = raw // bins
     return IMAGES + 1 if box == 0.0 and image != 0 else image
 
 
 @njit(cache=True, error_model="numpy")
 def _keep_near(
-    there: Floats, order: Integers, start: int, stop: int, x: float, y: float, z: float, range2: float, code: int, count: int,
+    sorted_centres: Floats, order: Integers, start: int, stop: int, x: float, y: float, z: float, range2: float, code: int, count: int,
     mine: Integers,
 ) -> int:  # fmt: skip
-    """Append the molecules from start to stop that are in range of (x, y, z); how many there are then."""
+    """Append the molecules from start to stop that are in range of (x, y, z); return the new count."""
     for p in range(start, stop):
-        dx, dy, dz = there[p, 0] - x, there[p, 1] - y, there[p, 2] - z
+        dx, dy, dz = sorted_centres[p, 0] - x, sorted_centres[p, 1] - y, sorted_centres[p, 2] - z
         mine[count] = order[p] * 128 + code
         count += 1 if dx * dx + dy * dy + dz * dz < range2 else 0
     return count
@@ -75,7 +75,7 @@ def _keep_near(
 
 @njit(cache=True, error_model="numpy")
 def _along_column(
-    m: int, raw_x: int, raw_y: int, left: float, same_column: bool, rank: int, places: Integers, starts: Integers, there: Floats,
+    m: int, raw_x: int, raw_y: int, left: float, same_column: bool, rank: int, places: Integers, starts: Integers, sorted_centres: Floats,
     order: Integers, here: Floats, box: Floats, low: Floats, width: Floats, bins: Integers, range2: float, count: int,
     mine: Integers,
 ) -> Any:  # fmt: skip
@@ -96,7 +96,7 @@ def _along_column(
             mine = _longer(mine, len(mine) + stop - start)
         x, y, z = here[0] - image_x * box[0], here[1] - image_y * box[1], here[2] - image_z * box[2]
         code = ((image_x + IMAGES) * 5 + image_y + IMAGES) * 5 + image_z + IMAGES
-        count = _keep_near(there, order, start, stop, x, y, z, range2, code, count, mine)
+        count = _keep_near(sorted_centres, order, start, stop, x, y, z, range2, code, count, mine)
     return count, mine
 
 
@@ -104,7 +104,7 @@ def _along_column(
 def _by_kind(
     mine: Integers, count: int, kinds: Integers, species: int, entries: Integers, used: int, starts: Integers
 ) -> int:
-    """Copy one molecule's list behind the others, one kind after the other, and note where each ends."""
+    """Append a molecule's list to the others, sorted by kind, and record where each kind ends."""
     for kind in range(species):
         for p in range(count):
             if species == 1 or kinds[mine[p] // 128] == kind:
@@ -125,7 +125,7 @@ def neighbour_list(
     species: int,
     farthest: float,
 ) -> Any:
-    """Starts (n x kinds + 1) and entries (128 molecule + code of the image) of all pairs nearer than `farthest`.
+    """Starts (n x kinds + 1) and entries (128 molecule + code of the image) of all pairs closer than `farthest`.
 
     box is 0 along directions that do not repeat; low, width, bins (3) divide the cell or the space that holds the molecules.
     """
@@ -133,10 +133,10 @@ def neighbour_list(
     # a literal 0 has a type of its own, for which the functions called are compiled once more
     nothing: Any = np.int64(0)
     places, first, order, rank = _sorted_into_bins(centres, low, width, bins)
-    there = np.empty((n, 3))
+    sorted_centres = np.empty((n, 3))
     for p in range(n):
         for c in range(3):
-            there[p, c] = centres[order[p], c]
+            sorted_centres[p, c] = centres[order[p], c]
     steps_x, steps_y = int(np.ceil(farthest / width[0])), int(np.ceil(farthest / width[1]))
     starts = np.zeros(n * species + 1, dtype=np.int64)
     entries, mine, used = np.empty(n * 64 + 1024, dtype=np.uint64), np.empty(1024, dtype=np.int64), nothing
@@ -152,7 +152,7 @@ def neighbour_list(
                 if abs(_image(raw_y, bins[1], box[1])) > IMAGES or left < 0.0:
                     continue
                 count, mine = _along_column(
-                    m, raw_x, raw_y, left, not ahead and raw_y == places[m, 1], rank[m], places, first, there, order, here,
+                    m, raw_x, raw_y, left, not ahead and raw_y == places[m, 1], rank[m], places, first, sorted_centres, order, here,
                     box, low, width, bins, range2, count, mine,
                 )  # fmt: skip
         if used + count > len(entries):

@@ -1,9 +1,9 @@
-"""Compiled forces between molecules: sites placed from atoms, pairs summed eight at a time, forces carried to the atoms.
+"""Compiled forces between molecules: sites are placed from atoms, pairs summed eight at a time, forces transferred to the atoms.
 
-A molecule's neighbours are first gathered into one flat array of runs of LANES numbers (x y z and the force of each of
-their sites, side by side). The distance between the runs is a constant of the program, so the compiler sees that they
-do not overlap and handles eight neighbours with one instruction; a cutoff is a mask there, never a branch. Each pair is
-met once (Newton's third law), and a thread writes to its own array of forces.
+The neighbours of a molecule are first gathered into a flat array of runs of LANES numbers (x y z and force of each of their sites). The
+distance between runs is a compile-time constant, so that the compiler can prove that they do not overlap and treats eight neighbours per
+instruction; the cutoff is a mask, not a branch. Each pair is visited once (Newton's third law), and each thread has a separate array of
+forces.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rotor.fluids.forces.assembly import Integers
 
 LANES = 128
 RUNS = 6  # x y z and force of a neighbour's site
-FAR = 1e6  # Å: where the lanes are that fill up the last eight
+FAR = 1e6  # Å: position of padding lanes
 BITS, MASK = np.uint64(7), np.uint64(127)  # an entry of the list is 128 * molecule + code of its image
 ONE, TWO = np.uint64(1), np.uint64(2)
 ERFC = (
@@ -36,7 +36,7 @@ def place_sites(
     positions: Floats, first_atom: Integers, first_site: Integers, kinds: Integers, weights: Floats, atoms: Integers, counts: Integers,
     box: Floats, reference: Floats, fresh: bool, sites: Floats, local: Floats, centres: Floats,
 ) -> float:  # fmt: skip
-    """Put every molecule together, near its reference centre (fresh: into the cell); largest move of a centre, squared.
+    """Place all molecules near their reference centres (fresh: in the cell); return the largest squared move of a centre.
 
     local: sites seen from their molecule's centre. weights[kind] has a row for each site and a last one for the centre. box
     is 0 along directions that do not repeat.
@@ -81,7 +81,7 @@ def carry_to_atoms(
     counts: Integers,
     out: Floats,
 ) -> None:
-    """Forces on sites as forces on the real atoms, by the weights that place the sites: force and torque are conserved."""
+    """Transfer forces on sites to the real atoms with the weights that place the sites; conserves force and torque."""
     out[:] = 0.0
     for m in range(len(kinds)):
         kind = kinds[m]
@@ -288,7 +288,7 @@ def _add_virial(arms: Floats, rows: Floats, sites: int, n: int, totals: Floats) 
 
 @njit(cache=True, error_model="numpy")
 def _gather(rows: Floats, local: Floats, base: Integers, arms: Floats, count: int, n: int, padded: int) -> None:
-    """Sites of the neighbours, seen from the centre of the present molecule; forces 0; the lanes to `padded` far away."""
+    """Sites of the neighbours relative to the centre of this molecule; forces 0; padding lanes up to `padded` far away."""
     for s in range(count):
         row = rows[s * RUNS * LANES : (s + 1) * RUNS * LANES]
         step = np.uint64(3 * s)
@@ -320,7 +320,7 @@ def _site_pairs(
     rows: Floats, padded: int, local: Floats, mine: Integers, pairs: Integers, numbers: Floats, cut: Floats, field: Floats,
     screened: bool, forces: Floats, totals: Floats,
 ) -> None:  # fmt: skip
-    """All pairs of sites between one molecule, whose numbers are `mine` and upwards, and its gathered neighbours."""
+    """All pairs of sites between a molecule, with sites from `mine` on, and its gathered neighbours."""
     for p in range(len(pairs)):
         at = 3 * (mine + pairs[p, 0])
         row = rows[pairs[p, 1] * RUNS * LANES : (pairs[p, 1] + 1) * RUNS * LANES]

@@ -1,4 +1,4 @@
-"""Which atoms of a box are which molecule of which model, as arrays that the kernels read."""
+"""Assignment of the atoms of a box to molecules and models, as arrays for the kernels."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from rotor.arrays import Floats
 from rotor.fluids.forces.models import RigidModel
 
 Integers = NDArray[Any]  # of whichever width
-GEOMETRY_ANGSTROM = 0.05  # a distance inside a molecule may differ by that from the model's
+GEOMETRY_ANGSTROM = 0.05  # largest deviation of a distance in a molecule from the model
 
 
 def spreading_weights(model: RigidModel) -> Floats:
     """Each site as a linear combination of the real atoms, (sites, atoms); rows add to 1.
 
-    r_site = Σ w r_atom places the site, f_atom = w f_site carries its force: Σ w = 1 keeps the force, Σ w r_atom = r_site the
-    torque. Among many solutions the shortest is taken. A site that no combination reaches (off the line of a linear molecule) is an error.
+    r_site = Σ w r_atom places the site, f_atom = w f_site transfers its force: Σ w = 1 conserves the force, Σ w r_atom = r_site the
+    torque. The solution of smallest norm is used. A site outside the span of the atoms (off the line of a linear molecule) is an error.
     """
     places, real = model.positions_angstrom, len(model.symbols)
     equations = np.vstack((places[:real].T, np.ones(real)))
@@ -37,9 +37,9 @@ def spreading_weights(model: RigidModel) -> Floats:
 
 
 def list_centre(model: RigidModel) -> tuple[Floats, float]:
-    """Weights of the atoms for a centre that keeps every site near, and the largest distance from it, Å.
+    """Weights of the atoms for a centre close to all sites, and the largest distance of a site from it, Å.
 
-    The middle of the two sites farthest apart, or the mean of all where that is nearer.
+    The midpoint of the two most distant sites, or the mean of all sites if that is closer.
     """
     weights, places = spreading_weights(model), model.positions_angstrom
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
@@ -86,12 +86,12 @@ class Assembly:
 
     @cached_property
     def reach_angstrom(self) -> Floats:
-        """How far a site of each kind may be from its list's centre, with the tolerance of the geometry."""
+        """Largest distance of a site of each kind from its list centre, including the tolerance of the geometry."""
         return np.array([list_centre(model)[1] + GEOMETRY_ANGSTROM for model in self.models])
 
     @cached_property
     def charges_e(self) -> Floats:
-        """Charge of every site in the box."""
+        """Charges of all sites in the box."""
         by_kind = [np.array([site.charge_e for site in model.sites]) for model in self.models]
         return np.concatenate([by_kind[kind] for kind in self.kinds])
 
@@ -132,16 +132,16 @@ def _by_label(symbols: list[str], labels: Integers, models: tuple[RigidModel, ..
     bounds = np.concatenate(([0], np.flatnonzero(np.diff(labels)) + 1, [len(labels)]))
     if len(bounds) - 1 != len(np.unique(labels)):
         raise ValueError('atoms of one molecule (array "molecule") do not stand together; sort the box by molecule')
-    known = {model.symbols: kind for kind, model in enumerate(models)}
+    kind_of_symbols = {model.symbols: kind for kind, model in enumerate(models)}
     kinds = []
     for start, end in pairwise(bounds):
         elements = tuple(symbols[start:end])
-        if elements not in known:
+        if elements not in kind_of_symbols:
             raise ValueError(
                 f"molecule {labels[start]} (atoms {start} to {end - 1}) is {'-'.join(elements)}; the models are "
                 f"{_spelled(models)}, their atoms in this order"
             )
-        kinds.append(known[elements])
+        kinds.append(kind_of_symbols[elements])
     return kinds
 
 
@@ -167,7 +167,7 @@ def _spelled(models: tuple[RigidModel, ...]) -> str:
 
 
 def assemble(atoms: Any, models: tuple[RigidModel, ...]) -> Assembly:
-    """The molecules of an ase.Atoms: by the integers of its array "molecule" if there is one, else as they follow each other.
+    """The molecules of an ase.Atoms: by its array "molecule" if present, otherwise by the sequence of atoms.
 
     >>> from ase.build import molecule
     >>> from rotor.fluids.forces.models import model_of

@@ -1,9 +1,9 @@
-"""Ewald's sum for charges in a cell with right angles: wave vectors, weights, and α and cutoffs from a given accuracy.
+"""Ewald sum for charges in a rectangular cell: wave vectors, weights, and α and cutoffs for a given accuracy.
 
 E = k_e [ ½ Σ' q q erfc(αr)/r + (2π/V) Σ_k≠0 exp(-k²/4α²)/k² |S(k)|² - α/√π Σ q² - Σ_inside q q erf(αr)/r ], the
 surrounding a conductor. M. P. Allen, D. J. Tildesley, Computer Simulation of Liquids, 2nd ed. (2017), ch. 6; errors: J. Kolafa,
-J. W. Perram, Mol. Simul. 9, 351 (1992). The cost grows as N times the number of wave vectors: boxes of more than some
-thousand molecules belong to an engine with particle meshes.
+J. W. Perram, Mol. Simul. 9, 351 (1992). The cost is proportional to N times the number of wave vectors; for boxes of more than some
+thousand molecules an engine with a particle mesh is faster.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def real_space_error(alpha: float, cutoff: float, charges_squared: float, count:
 
 
 def fourier_error(alpha: float, k_cut: float, charges_squared: float, count: int, volume: float) -> float:
-    """That of wave vectors beyond k_c, 2 Q² α/L √(1/(π n N)) exp(-k_c²/4α²), n = k_c L/2π, L = ∛V.
+    """Root mean square error of a force from wave vectors beyond k_c, 2 Q² α/L √(1/(π n N)) exp(-k_c²/4α²), n = k_c L/2π, L = ∛V.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def fourier_error(alpha: float, k_cut: float, charges_squared: float, count: int
 
 
 def _least(fails: Callable[[float], bool], low: float, high: float) -> float:
-    """Where a falling error meets its bound, by halving."""
+    """The point at which a decreasing error reaches its bound, by bisection."""
     for _ in range(60):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if fails(middle) else (low, middle)
@@ -98,14 +98,14 @@ def _least(fails: Callable[[float], bool], low: float, high: float) -> float:
 def parameters_for(
     tolerance: float, cutoff_angstrom: float, charges_e: Floats, lengths_angstrom: Floats
 ) -> EwaldParameters:
-    """α and k_cut for which each half of Ewald's sum has a given error.
+    """α and k_cut for which each part of the Ewald sum has the given error.
 
     Parameters
     ----------
     tolerance : float
         Root mean square error of a force over that between two unit charges 1 Å apart (14.4 eV/Å).
     cutoff_angstrom : float
-        In real space.
+        Cutoff in real space.
     charges_e : (n,) array
         All charges.
     lengths_angstrom : (3,) array
@@ -119,8 +119,8 @@ def parameters_for(
     Examples
     --------
     >>> box = np.array([31.0, 31.0, 31.0])
-    >>> found = parameters_for(1e-5, 9.0, np.tile([-0.8476, 0.4238, 0.4238], 1000), box)
-    >>> round(found.alpha_per_angstrom, 3), round(found.k_cut_per_angstrom, 2)
+    >>> ewald = parameters_for(1e-5, 9.0, np.tile([-0.8476, 0.4238, 0.4238], 1000), box)
+    >>> round(ewald.alpha_per_angstrom, 3), round(ewald.k_cut_per_angstrom, 2)
     (0.332, 1.99)
     """
     if not 1e-14 < tolerance < 1:
@@ -136,7 +136,7 @@ def parameters_for(
 class WaveVectors:
     """Half of the wave vectors of a cell, in columns of equal (nx, ny).
 
-    vectors_per_angstrom: (n, 3). weights_ev_angstrom2: 2 k_e (2π/V) exp(-k²/4α²)/k² of each, the other half counted in.
+    vectors_per_angstrom: (n, 3). weights_ev_angstrom2: 2 k_e (2π/V) exp(-k²/4α²)/k² of each, including the other half.
     columns: (m, 5) nx, ny, lowest nz, highest nz, place of nz = 0. highest: largest |nx|, |ny|. turn: 2π/L.
     """
 

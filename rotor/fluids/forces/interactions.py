@@ -1,4 +1,4 @@
-"""What two sites do to each other: mixing, the switch at the cutoff, charges under a cutoff, and what lies beyond it."""
+"""Pair interactions of sites: mixing rules, switch at the cutoff, charges with a cutoff, and the tail beyond it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class PairTables:
 
 
 def mixed(sigma: tuple[float, float], epsilon: tuple[float, float]) -> tuple[float, float]:
-    """Lorentz and Berthelot: the mean size and the geometric mean of the depths.
+    """Lorentz-Berthelot rules: arithmetic mean of the sizes, geometric mean of the depths.
 
     >>> mixed((3.0, 4.0), (1.0, 4.0))
     (3.5, 2.0)
@@ -66,8 +66,8 @@ def reaction_field(cutoff_angstrom: float, dielectric: float) -> Floats:
     """r_c², k, c of qq (1/r + k r² - c): k = (ε-1)/(2ε+1)/r_c³, c = 3ε/(2ε+1)/r_c.
 
     The shift c makes the energy 0 at the cutoff, and with a conductor outside (ε = ∞: k = 1/2r_c³, c = 3/2r_c) the force too.
-    Pairs inside a molecule feel no field: for rigid molecules that is a constant. I. G. Tironi et al., J. Chem. Phys. 102, 5451
-    (1995), without salt; the form of OpenMM's CutoffPeriodic (there ε = 78.3 by default).
+    Pairs within a molecule are omitted: for rigid molecules they only give a constant. I. G. Tironi et al., J. Chem. Phys. 102, 5451
+    (1995), without salt; the form of OpenMM's CutoffPeriodic (default there: ε = 78.3).
 
     >>> reaction_field(2.0, math.inf).tolist()
     [4.0, 0.0625, 0.75]
@@ -104,9 +104,9 @@ def switched(cutoff_angstrom: float, width_angstrom: float) -> Floats:
 
 
 def _beyond(c12: float, c6: float, cutoff: float, width: float) -> tuple[float, float]:
-    """∫ ΔU r² dr and -⅓ ∫ ΔU' r³ dr of what the switch or cut takes away, ΔU = (1 - S) U up to the cutoff, U beyond.
+    """∫ ΔU r² dr and -⅓ ∫ ΔU' r³ dr for the part ΔU removed by switch and cutoff: (1 - S) U up to the cutoff, U beyond.
 
-    By parts, the second is the first plus ⅓ r³ ΔU at a hard cut. Gauss-Legendre with 40 points where the switch is.
+    By partial integration the second is the first plus ⅓ r³ ΔU at a hard cut. The switch region uses 40 Gauss-Legendre points.
     """
     energy = c12 / (9 * cutoff**9) - c6 / (3 * cutoff**3)
     if not width:
@@ -122,7 +122,7 @@ def _beyond(c12: float, c6: float, cutoff: float, width: float) -> tuple[float, 
 def tail(
     models: tuple[RigidModel, ...], numbers: Integers, cutoff_angstrom: float, width_angstrom: float
 ) -> tuple[float, float]:
-    """Dispersion beyond the cutoff, the liquid taken as even.
+    """Dispersion beyond the cutoff, for a uniform liquid.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Rigid models of molecules: sites with charges and Lennard-Jones parameters, each set with its source.
 
-A model's real atoms come in the order in which they stand in a box; sites without mass (the M of TIP4P, the charge at
-the centre of N2) follow from their places.
+The real atoms of a model are in the order of the box; massless sites (M of TIP4P, the charge at the centre of N2) are placed from
+them.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class Site:
 
 @dataclass(frozen=True)
 class RigidModel:
-    """A molecule as sites that never move against each other; unlike sites mix by Lorentz and Berthelot.
+    """A molecule as rigidly connected sites; unlike sites follow the Lorentz-Berthelot rules.
 
-    name: as users give it. sites: real atoms first, sites without mass after them. source: of the parameters.
+    name: for users. sites: real atoms first, then massless sites. source: of the parameters.
     """
 
     name: str
@@ -148,7 +148,7 @@ MODELS: dict[str, RigidModel] = {model.name: model for model in (*_WATERS, _nitr
 
 
 def model_of(name: str) -> RigidModel:
-    """The model of that name; a ValueError lists the names there are.
+    """The model of this name; a ValueError lists the available names.
 
     >>> model_of("spce").symbols
     ('O', 'H', 'H')

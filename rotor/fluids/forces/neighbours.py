@@ -11,14 +11,14 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fluids.forces.assembly import Assembly, Integers
 
-CLOSEST_ANGSTROM = 0.5  # sites of two molecules nearer than that lie on top of each other
+CLOSEST_ANGSTROM = 0.5  # sites of two molecules closer than this overlap
 
 
 @dataclass
 class Neighbours:
-    """Lists of molecules within cutoff and skin, made anew when a centre has moved by half the skin.
+    """Lists of molecules within cutoff and skin, rebuilt when a centre has moved by half the skin.
 
-    box_angstrom: (3,), 0 along directions that do not repeat. rebuilds: how often the list was made.
+    box_angstrom: (3,), 0 along non-periodic directions. rebuilds: number of times the list was built.
     """
 
     assembly: Assembly
@@ -68,7 +68,7 @@ class Neighbours:
             )
 
     def update(self, positions_angstrom: Floats) -> None:
-        """Place all sites; make the list anew where it is too old."""
+        """Place all sites; rebuild the list if it is outdated."""
         if not np.isfinite(positions_angstrom).all():
             atom = int(np.flatnonzero(~np.isfinite(positions_angstrom).all(axis=1))[0])
             raise ValueError(f"position of atom {atom} is {positions_angstrom[atom]}: expected finite numbers")
@@ -112,7 +112,7 @@ class Neighbours:
         self.rebuilds += 1
 
     def pairs(self) -> tuple[Integers, Integers, Floats]:
-        """Every listed pair: its two molecules, and the shift that brings the second to the first, Å."""
+        """The listed pairs: two molecules, and the shift from the second to its image near the first, Å."""
         if not len(self.starts):
             raise ValueError("the list is made by update(); it was not called yet")
         first = np.repeat(np.arange(len(self.assembly)), np.diff(self.starts[:: len(self.assembly.models)]))
@@ -122,7 +122,7 @@ class Neighbours:
     def _refuse_overlaps(self) -> None:
         closest = self.closest(2 * self.assembly.reach_angstrom.max() + CLOSEST_ANGSTROM)
         if closest is not None and closest[0] < CLOSEST_ANGSTROM:
-            self.starts = self.starts[:0]  # so that asking again fails again
+            self.starts = self.starts[:0]  # a repeated call must fail again
             raise ValueError(
                 f"atoms {closest[1]} and {closest[2]} of different molecules are {closest[0]:.3g} Å apart; molecules "
                 f"on top of each other (nearer than {CLOSEST_ANGSTROM} Å) have no sensible energy: move one of them, or, if "

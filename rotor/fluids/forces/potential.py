@@ -1,9 +1,9 @@
 """Energy, forces and stress of rigid molecules as an ASE calculator: Lennard-Jones sites, charges, a cutoff by sites.
 
-Charges by reaction field, by damped shifted forces, or by Ewald's sum. The Lennard-Jones part is switched off over the last
-ångström before the cutoff, so that forces are smooth and a run at 2 fs keeps its energy; what the cutoff takes away is added
-back as an even liquid. The stress is that of molecules: Σ F_ij ⊗ R_ij with centres of mass R, to which a dynamics of rigid
-bodies adds the kinetic part of the centres.
+Charges interact by reaction field, damped shifted forces, or Ewald sum. The Lennard-Jones part is switched off over the last
+ångström before the cutoff, so that forces are smooth and a run at 2 fs conserves its energy; the removed part is added back for a
+uniform liquid. The stress is molecular: Σ F_ij ⊗ R_ij with centres of mass R, to which the dynamics of rigid bodies adds the kinetic part
+of the centres.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ VOIGT = [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]
 
 @dataclass(frozen=True)
 class Evaluation:
-    """What one set of positions gives.
+    """Results for a set of positions.
 
     terms_ev: energies by name. forces_ev_per_angstrom: (atoms, 3). virial_ev: (3, 3) molecular, Σ F_ij ⊗ R_ij, symmetric part,
     without the tail. tail_pressure_ev_per_angstrom3: of the dispersion beyond the cutoff.
@@ -62,15 +62,15 @@ class RigidPotential(Calculator):
     models : str, RigidModel or sequence of them
         Names of `rotor.fluids.forces.models.MODELS` (several joined by commas for a mixture), or other models.
     cutoff_angstrom : float
-        By sites; inf where nothing repeats.
+        Cutoff of site distances; inf for a non-periodic box.
     electrostatics : str
         reaction-field, ewald or shifted.
     dielectric : float
-        Outside the reaction field, inf a conductor.
+        Dielectric constant outside the reaction-field sphere; inf for a conductor.
     switch_width_angstrom : float
-        Of the Lennard-Jones switch, 0 cuts hard.
+        Width of the Lennard-Jones switch; 0 for a hard cut.
     damping_per_angstrom : float
-        Of shifted forces.
+        Damping of shifted forces.
     ewald : EwaldParameters, optional
         α and k_cut; without it they follow from `tolerance` (`rotor.fluids.forces.ewald.parameters_for`).
     tolerance : float
@@ -78,10 +78,10 @@ class RigidPotential(Calculator):
     long_range_correction : bool
         Whether the dispersion beyond the cutoff is added.
     skin_angstrom : float
-        Of the lists of neighbours.
+        Skin of the neighbour lists.
     threads : int
-        Results are the same bit for bit for equal threads and equal history; `reset()` discards the lists, so that a run can be
-        continued bit for bit.
+        Results are reproducible bit for bit with the same number of threads and the same history; `reset()` discards the lists, so
+        that a run can be continued bit for bit.
 
     Notes
     -----
@@ -132,12 +132,12 @@ class RigidPotential(Calculator):
             raise ValueError(f"switch_width_angstrom = {self.switch_width_angstrom}: expected 0 up to the cutoff")
 
     def reset(self) -> None:
-        """Forget results, lists and what was made for this box: the next forces are those of a new calculator, bit for bit."""
+        """Discard results, lists and data of this box: the next forces are bit for bit those of a new calculator."""
         super().reset()
         self._assembly = self._neighbours = self._ewald = None
 
     def check_state(self, atoms: Any, tol: float = 0.0) -> list[str]:
-        """What changed since the last calculation, to the bit (ASE calls this)."""
+        """Changes since the last calculation, compared exactly (called by ASE)."""
         old: Any = self.atoms
         if old is None or not _same_atoms(old, atoms):
             return list(all_changes)
@@ -146,7 +146,7 @@ class RigidPotential(Calculator):
         return [name for name in now if not np.array_equal(now[name], was[name])]
 
     def get_property(self, name: str, atoms: Any = None, allow_calculation: bool = True) -> Any:
-        """A property of atoms, from the last calculation where nothing changed (ASE calls this); lists outlive changes."""
+        """A property of atoms, cached if nothing changed (called by ASE); changes do not discard the lists."""
         if name not in self.implemented_properties:
             raise PropertyNotImplementedError(f"{name}: there are {', '.join(self.implemented_properties)}")
         if atoms is not None and self.check_state(atoms):
@@ -187,7 +187,7 @@ class RigidPotential(Calculator):
 
     @property
     def rebuilds(self) -> int:
-        """How often the lists of the present box were made."""
+        """Number of times the lists of this box were built."""
         return self._neighbours.rebuilds if self._neighbours else 0
 
     @property
@@ -217,7 +217,7 @@ class RigidPotential(Calculator):
         return Evaluation(terms, self._on_atoms(neighbours, forces), 0.5 * (virial + virial.T), pressure)
 
     def _prepared(self, atoms: Any) -> Neighbours:
-        """The lists for this box; what depends on atoms and cell is made anew where they changed."""
+        """The lists for this box; data that depend on atoms and cell are recomputed if these changed."""
         if self._assembly is None or not _same_atoms(self._known, atoms):
             self._assembly, self._known = assemble(atoms, self.models), atoms.copy()
             self._neighbours, self._ewald = None, self.ewald
@@ -244,7 +244,7 @@ class RigidPotential(Calculator):
             raise ValueError("Ewald's sum needs a cell that repeats in all three directions (pbc)")
 
     def _field_of(self) -> Floats:
-        """Numbers that the kernel of charges takes."""
+        """Parameters of the kernel of charges."""
         if self.electrostatics == "reaction-field":
             return reaction_field(self.cutoff_angstrom, self.dielectric)
         if self.electrostatics == "shifted":
@@ -359,7 +359,7 @@ def _same_atoms(old: Any, new: Any) -> bool:
 
 
 def right_angled(atoms: Any) -> Floats:
-    """Edges of the cell, Å, 0 along directions without pbc; a ValueError for other than right angles."""
+    """Edges of the cell, Å, 0 along directions without pbc; ValueError unless all angles are 90°."""
     cell, repeats = atoms.cell.array.tolist(), atoms.pbc.tolist()
     edges = [cell[c][c] for c in range(3)]
     askew = max(abs(cell[c][d]) for c in range(3) for d in range(3) if c != d)

@@ -1,7 +1,7 @@
-"""Rigid molecules of a box: which atoms are one body, its shape in principal axes, where it is and how it is turned.
+"""Rigid molecules of a box: their atoms, shapes in principal axes, centres and attitudes.
 
-Molecules of one species (the same elements and masses in the same order) share one shape, so that what is rigid is
-exactly so. A molecule cut by the cell's edge is put together first.
+Molecules of a species (the same elements and masses in the same order) share one shape, so that they are exactly rigid.
+Molecules broken by the edge of the cell are made whole first.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SHAPE_TOLERANCE_ANGSTROM = 0.01
 
 @dataclass(frozen=True)
 class Pose:
-    """Where bodies are: centres of mass (n, 3) in Å, unwrapped, and attitudes (n, 4), body to space."""
+    """Poses of bodies: centres of mass (n, 3) in Å, unwrapped, and attitudes (n, 4), body to space."""
 
     centres: Floats
     attitude: Floats
@@ -38,8 +38,7 @@ class Bodies:
 
     order (atoms,), starts (n + 1,): atoms of body b are order[starts[b]:starts[b + 1]]. sites: (atoms, 3), places in
     principal axes of the body, Å. masses: (atoms,) u. mass: (n,) u. moments: (n, 3) u Å², 0 about the axis of a linear
-    molecule, all 0 for an atom. species: (n,) index into names. notes: molecules whose count of
-    degrees depends on the rule for linear ones.
+    molecule, all 0 for an atom. species: (n,) index into names. notes: molecules near the limit between linear and bent.
     """
 
     order: Ints
@@ -57,12 +56,12 @@ class Bodies:
 
     @property
     def inverse_moments(self) -> Floats:
-        """1/I_i, (n, 3), and 0 where nothing turns."""
+        """1/I_i, (n, 3); 0 for axes without rotation."""
         return np.divide(1.0, self.moments, out=np.zeros_like(self.moments), where=self.moments > 0.0)
 
     @property
     def acting_inverse(self) -> Floats:
-        """1/I_i for stepping: a linear rotor moves as a sphere of its moment (`rotor.classical.system`), an atom never."""
+        """1/I_i for the integrator: a linear rotor moves like a sphere of its moment (`rotor.classical.system`); 0 for an atom."""
         from rotor.classical.system import acting_inverse
 
         out = np.zeros_like(self.moments)
@@ -71,16 +70,16 @@ class Bodies:
         return out
 
     def degrees(self, removed: int = 0) -> Degrees:
-        """The count of degrees of freedom, `removed` of them taken out (3 where the total momentum is held at 0)."""
+        """The degrees of freedom, minus `removed` (3 if the total momentum is held at 0)."""
         return replace(count_degrees(self.moments, removed=removed), notes=self.notes)
 
     def name_of(self, body: int) -> str:
-        """A body as an error message names it."""
+        """A body's name for error messages."""
         atoms = self.order[self.starts[body] : self.starts[body + 1]]
         return f"molecule {body} ({self.names[self.species[body]]}, atoms {_listed(atoms)})"
 
     def positions(self, pose: Pose) -> Floats:
-        """Places of all atoms, (atoms, 3), Å."""
+        """Positions of all atoms, (atoms, 3), Å."""
         from rotor.fluids.motion._body_kernels import place
 
         out = np.empty_like(self.sites)
@@ -88,7 +87,7 @@ class Bodies:
         return out
 
     def pose(self, atoms: Atoms, tolerance_angstrom: float = SHAPE_TOLERANCE_ANGSTROM) -> Pose:
-        """Where the bodies are in a box of the same atoms."""
+        """The pose of the bodies in a box of the same atoms."""
         centres, attitude = np.zeros((len(self), 3)), np.zeros((len(self), 4))
         for number, name in enumerate(self.names):
             members = np.flatnonzero(self.species == number)
@@ -126,20 +125,20 @@ def bodies_of(
     shapes: Mapping[tuple[str, ...], ArrayLike] | None = None,
     tolerance_angstrom: float = SHAPE_TOLERANCE_ANGSTROM,
 ) -> tuple[Bodies, Pose]:
-    """The rigid molecules of a box, and where they are.
+    """The rigid molecules of a box, and their poses.
 
     Parameters
     ----------
     atoms : ase.Atoms
-        Masses set by the user hold; others are those of the most abundant isotopes (`rotor.molecules.nuclei`).
+        Masses set by the user are used; others are those of the most abundant isotopes (`rotor.molecules.nuclei`).
     molecules : array or list, optional
-        A label for each atom, or the atoms of each molecule. Without it `atoms.arrays["molecule"]` holds, and without
-        that the bonds, found across the cell's edges.
+        A label for each atom, or the atoms of each molecule. Default: `atoms.arrays["molecule"]`, or without it the bonds, also across
+        the edges of the cell.
     shapes : mapping, optional
-        Places (sites, 3) of the atoms of a species by their elements, such as those of a model; else the first molecule
-        of a species is its shape.
+        Positions (sites, 3) of the atoms of a species by their elements, such as those of a model. Default: the shape of the first
+        molecule of a species.
     tolerance_angstrom : float
-        By how much an atom may stand off its place in the shape; the shape's place is used.
+        Largest deviation of an atom from the shape; the shape is used.
 
     Returns
     -------
@@ -151,7 +150,7 @@ def bodies_of(
     Raises
     ------
     ValueError
-        An atom in no molecule or in two; a shape that departs from its species; a constraint on the atoms.
+        An atom in no molecule or in two; a molecule that deviates from the shape of its species; a constraint on the atoms.
 
     Examples
     --------
@@ -191,7 +190,7 @@ def bodies_of(
 
 
 def atom_masses(atoms: Atoms) -> Floats:
-    """Masses (atoms,) in u: those set by the user, else of the most abundant isotopes.
+    """Masses (atoms,) in u: those set by the user, or of the most abundant isotopes.
 
     >>> from ase.build import molecule
     >>> atom_masses(molecule("OH")).round(4).tolist()
@@ -211,10 +210,10 @@ def atom_masses(atoms: Atoms) -> Floats:
 
 
 def whole(places: Floats, atoms: Atoms) -> Floats:
-    """Molecules of one species (k, m, 3) put together across the cell's edges, each about its first atom.
+    """Molecules of a species (k, m, 3) made whole across the edges of the cell, each about its first atom.
 
-    Each atom is taken in the image nearest to a neighbour already placed; neighbours are those of the first
-    molecule. Molecules that were whole stay where they are.
+    Each atom is placed in the image nearest to a neighbour already placed; neighbours are those of the first
+    molecule. Molecules that were whole do not move.
     """
     from ase.geometry import find_mic
 
@@ -276,7 +275,7 @@ def _labels(atoms: Atoms, molecules: ArrayLike | Sequence[Sequence[int]] | None)
 
 
 def _bonded(atoms: Atoms) -> Ints:
-    """Labels by bonds: two atoms nearer than 1.2 times the sum of their covalent radii, across edges too."""
+    """Labels by bonds: atoms closer than 1.2 times the sum of their covalent radii, also across edges."""
     from ase.neighborlist import natural_cutoffs, neighbor_list
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -308,7 +307,7 @@ class _Shape:
 
 
 def _principal(masses: Floats, places: Floats) -> _Shape:
-    """The shape of a molecule; of a linear one the sites lie on the axis and the moments are (0, I, I)."""
+    """The shape of a molecule; for a linear one the sites are on the axis and the moments are (0, I, I)."""
     if places.shape != (len(masses), 3):
         raise ValueError(f"a shape of {places.shape} for a molecule of {len(masses)} atoms")
     heavy = masses > 0.0
@@ -336,9 +335,9 @@ def _fitted(
     rows: Ints,
     formula: str,
     tolerance_angstrom: float,
-    of_model: bool = False,
+    is_model_shape: bool = False,
 ) -> tuple[Floats, Floats]:
-    """Centres (k, 3) and attitudes (k, 4) that lay the shape on molecules (k, m, 3); ValueError where it does not fit."""
+    """Centres (k, 3) and attitudes (k, 4) that superpose the shape on molecules (k, m, 3); ValueError if it does not fit."""
     centres = np.einsum("m,kmi->ki", shape.masses / shape.masses.sum(), places)
     if not shape.moments.any():
         return centres, np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))
@@ -348,8 +347,8 @@ def _fitted(
     if off[worst] > tolerance_angstrom:
         raise ValueError(
             f"molecule {members[worst]} ({formula}, atoms {_listed(rows[worst])}): an atom is {off[worst]:.3g} Å off its place "
-            f"in the shape of its {'model' if of_model else 'species'}, more than {tolerance_angstrom:g} Å; rigid molecules of "
-            f"one species have one shape{', and another model another one' if of_model else ''}"
+            f"in the shape of its {'model' if is_model_shape else 'species'}, more than {tolerance_angstrom:g} Å; rigid molecules of "
+            f"one species have one shape{', and another model another one' if is_model_shape else ''}"
         )
     return centres, fit.quaternion
 

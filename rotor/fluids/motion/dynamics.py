@@ -41,8 +41,8 @@ class RigidDynamics(MolecularDynamics):
     Parameters
     ----------
     atoms : ase.Atoms
-        With a calculator. Its momenta start the motion; what they hold beside rigid motion is left out. Positions and
-        momenta are written back after every step, whole molecules, never wrapped; masses are set on it too.
+        With a calculator. The motion starts from the rigid part of its momenta. Positions (whole molecules, unwrapped), momenta and
+        masses are written back after each step.
     timestep : float
         In ASE's unit of time: `2 * ase.units.fs`.
     thermostat : Thermostat, optional
@@ -50,10 +50,10 @@ class RigidDynamics(MolecularDynamics):
     molecules, shapes, tolerance_angstrom
         As of `rotor.fluids.motion.bodies.bodies_of`.
     removed : int, optional
-        Degrees of freedom that the motion does not have. By default 3 where nothing changes the total momentum, which must
-        then be zero, and 0 with a thermostat that does. Walls or fields change it too: give 0 with these.
+        Degrees of freedom removed from the motion. Default: 3 if the total momentum is conserved, which must then be zero, and 0 with a
+        thermostat that changes it. With walls or fields give 0.
     trajectory, logfile, loginterval
-        As of every ASE dynamics; the log's temperatures are those of rigid bodies.
+        As in other ASE dynamics; the temperatures in the log are those of rigid bodies.
 
     Examples
     --------
@@ -123,7 +123,7 @@ class RigidDynamics(MolecularDynamics):
         self.write_momenta()
 
     def wrench(self) -> tuple[Floats, Floats]:
-        """Forces (n, 3) in space and torques (n, 3) in body axes, here and now; ValueError where one is not finite."""
+        """Current forces (n, 3) in space and torques (n, 3) in body axes; ValueError if one is not finite."""
         if self._wrench is None:
             forces = self.atoms.get_forces(apply_constraint=False)
             force, torque = self.bodies.wrench(forces, self.state.attitude)
@@ -140,19 +140,19 @@ class RigidDynamics(MolecularDynamics):
 
     @property
     def thermometer(self) -> str:
-        """The thermometer without an error of order h² in this motion: "mixed", "half" with a thermostat."""
+        """The thermometer without an error of order h²: "mixed", or "half" with a thermostat."""
         return "mixed" if self.thermostat is None else "half"
 
     def kinetic(self, thermometer: str | None = None) -> Kinetic:
-        """Kinetic energies by a thermometer of `rotor.fluids.motion.thermometers`: "full", "half", "mixed", by default the best."""
+        """Kinetic energies by a thermometer of `rotor.fluids.motion.thermometers` ("full", "half", "mixed"; default: the best)."""
         factor = THERMOMETERS[thermometer or self.thermometer]
         full = kinetic_energy(self.bodies, self.state.momentum, self.state.angular)
         return full + step_correction(self.bodies, *self.wrench(), self.dt).times(factor) if factor else full
 
     def half_step_momenta(self) -> tuple[Floats, Floats]:
-        """Momenta (n, 3) and angular momenta (n, 3) in body axes half a step on: with a thermostat, those of its ensemble.
+        """Momenta (n, 3) and angular momenta (n, 3) in body axes after half a step; with a thermostat those of its ensemble.
 
-        On the step they are too small by (Ωh)²/8 in every libration of frequency Ω (`rotor.fluids.motion.thermometers`).
+        At full steps they are too small by (Ωh)²/8 for a libration of frequency Ω (`rotor.fluids.motion.thermometers`).
         """
         force, torque = self.wrench()
         return self.state.momentum + 0.5 * self.dt * force, self.state.angular + 0.5 * self.dt * torque
@@ -162,12 +162,12 @@ class RigidDynamics(MolecularDynamics):
         return temperatures(self.kinetic(thermometer), self.degrees)
 
     def conserved_energy(self) -> float:
-        """Potential and full-step kinetic energy, and what the thermostat holds: constant but for order h², eV."""
+        """Potential energy, full-step kinetic energy and energy of the thermostat, eV: constant up to order h²."""
         energy = float(self.atoms.get_potential_energy()) + self.kinetic("full").total_ev
         return energy + (self.thermostat.energy() if self.thermostat is not None else 0.0)
 
     def refresh(self) -> None:
-        """Discard the calculator's results, so that what follows depends on the present state alone."""
+        """Discard the calculator's results, so that the further motion depends only on the current state."""
         if hasattr(self.atoms.calc, "reset"):
             self.atoms.calc.reset()
         self._wrench = None
@@ -180,7 +180,7 @@ class RigidDynamics(MolecularDynamics):
         self.refresh()
 
     def todict(self) -> dict[str, Any]:
-        """What ASE writes into the head of a trajectory."""
+        """The header of an ASE trajectory."""
         name = "none" if self.thermostat is None else type(self.thermostat).__name__
         return super().todict() | {"thermostat": name}  # type: ignore[no-any-return]
 
@@ -189,7 +189,7 @@ class RigidDynamics(MolecularDynamics):
         self.atoms.arrays["positions"][...] = self._positions
 
     def write_momenta(self) -> None:
-        """Bring the state's momenta to the atoms, after a change in `state`."""
+        """Write the momenta of `state` to the atoms."""
         self._momenta = self.bodies.momenta(self.state.momentum, self.state.angular, self.state.attitude)
         self.atoms.arrays["momenta"][...] = self._momenta
 

@@ -1,4 +1,4 @@
-"""Where rigid molecules are and how they move, and the two flows that a step is made of: drifts and kicks.
+"""State of rigid molecules in motion, and the two flows of a step: drifts and kicks.
 
 Units are ASE's: Å, u, eV, and Å √(u/eV) for times, so that momenta are in √(u eV) and angular momenta in Å √(u eV).
 """
@@ -21,8 +21,8 @@ _WHOLE_STEP = np.ones(1)
 class State:
     """n bodies in motion; the arrays are changed in place by the flows.
 
-    centres, momentum: (n, 3), in space. spin: (n, 7), angular momentum in principal axes and attitude. carry: (n, 7), what
-    rounding has left out of spin (`rotor.classical.integrators._step_kernels`).
+    centres, momentum: (n, 3), in space. spin: (n, 7), angular momentum in principal axes and attitude. carry: (n, 7), compensation of
+    the rounding errors of spin (`rotor.classical.integrators._step_kernels`).
     """
 
     centres: Floats
@@ -56,9 +56,9 @@ class State:
 class Flows:
     """Drifts and kicks of given bodies.
 
-    The drift is the free motion: of the centre exact; of the attitude `SymmetricTopSplitting` of the core, exact for linear
-    molecules, symmetric tops and spheres, and for asymmetric ones in error by less than the kicks are
-    (benchmarks/bench_thermometers.py compares it with `RotationSplitting`).
+    The drift is the free motion: exact for the centre; for the attitude `SymmetricTopSplitting`, which is exact for linear molecules,
+    symmetric and spherical tops; for asymmetric tops its error is smaller than that of the kicks (benchmarks/bench_thermometers.py
+    compares it with `RotationSplitting`).
     """
 
     bodies: Bodies

@@ -1,4 +1,4 @@
-"""Three thermometers of a stepped motion, and which of them is free of the error of order h².
+"""Three estimates of the kinetic energy in a motion with finite steps; one has no error of order h².
 
 A step of length h moves a libration of angular frequency Ω under a shadow Hamiltonian. With s = Ωh/2 and the kick-drift-kick
 step (velocity Verlet) an ensemble at kT of that Hamiltonian has (E. Hairer, C. Lubich, G. Wanner, Geometric Numerical
@@ -8,8 +8,8 @@ p²/2m + ½ m Ω² (1 - s²) x² fix it)
     ⟨p²/m⟩ = kT s √(1 - s²)/asin s   = kT (1 - (Ωh)²/6 + ...)    momenta at full steps,
     ⟨p²/m⟩ = kT s/(√(1 - s²) asin s) = kT (1 + (Ωh)²/12 + ...)   momenta at half steps.
 
-Torques on light atoms are the fastest, so rotations look colder than translations at full steps. The mean over both half
-steps next to a full one needs no memory, since p ± ½ h F are these momenta:
+Librations of light atoms are fastest, so rotations appear colder than translations at full steps. The mean over the two half
+steps next to a full step follows from the momenta p ± ½ h F:
 
     K_half = K_full + h²/8 Σ F²/m,     (2 K_half + K_full)/3 = K_full + h²/12 Σ F²/m,
 
@@ -55,7 +55,7 @@ class Kinetic:
 
 @dataclass(frozen=True)
 class Temperatures:
-    """2 K/(k f) in K, of all degrees, of translations and of rotations; not a number where there are none."""
+    """2 K/(k f) in K, for all degrees, translations and rotations; nan without such degrees."""
 
     all_k: float
     translation_k: float

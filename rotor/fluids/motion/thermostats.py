@@ -1,9 +1,9 @@
 """Thermostats for rigid molecules: Langevin noise and Nosé-Hoover chains, both in the middle of the step.
 
-Acting between two half drifts, on the momenta of the half step, leaves the positions with a smaller error than acting at
-the ends of the step: for a harmonic libration with none (B. Leimkuhler and C. Matthews, J. Chem. Phys. 138, 174102 (2013);
-Z. Zhang et al., J. Chem. Phys. 147, 034109 (2017), for chains too). Angular momenta and noise are in principal axes, moments
-beside them: a component L_i has the variance I_i kT in every attitude.
+A thermostat that acts between two half drifts, on the half-step momenta, gives positions with a smaller error than at the ends of the
+step; for a harmonic libration with none (B. Leimkuhler and C. Matthews, J. Chem. Phys. 138, 174102 (2013); Z. Zhang et al., J. Chem.
+Phys. 147, 034109 (2017), for chains too). Angular momenta and noise are in principal axes, where a component L_i has the variance
+I_i kT at any attitude.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from rotor.statistics.degrees_of_freedom import Degrees
 # H. Yoshida, Phys. Lett. A 150, 262 (1990): weights of a step of order 4, w, 1 - 2w, w
 _W = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
 _YOSHIDA = (_W, 1.0 - 2.0 * _W, _W)
-ROUNDS = 2  # of Yoshida's three sub-steps within one act of a chain
+ROUNDS = 2  # repetitions of Yoshida's three sub-steps per action of a chain
 
 
 class Thermostat(ABC):
-    """What changes momenta in the middle of a step so that the ensemble is canonical at `temperature_k`."""
+    """Changes momenta in the middle of a step so that the ensemble is canonical at `temperature_k`."""
 
     conserves_momentum: bool
 
@@ -43,7 +43,7 @@ class Thermostat(ABC):
 
     @abstractmethod
     def act(self, state: State, time: float) -> None:
-        """Change the momenta as the bath does in a time."""
+        """Apply the bath to the momenta for a time."""
 
     @abstractmethod
     def energy(self) -> float:
@@ -51,7 +51,7 @@ class Thermostat(ABC):
 
     @abstractmethod
     def state_dict(self) -> dict[str, Any]:
-        """All that changes during a run, as JSON can hold it without loss."""
+        """The variables that change during a run, in a form that JSON stores without loss."""
 
     @abstractmethod
     def restore(self, state_dict: dict[str, Any]) -> None:
@@ -64,7 +64,7 @@ class Langevin(Thermostat):
         p → e^(-γt) p + √(m kT (1 - e^(-2γt))) ξ,    L_i → e^(-γt) L_i + √(I_i kT (1 - e^(-2γt))) ξ_i
 
     (the Ornstein-Uhlenbeck part of R. L. Davidchack, T. E. Ouldridge, M. V. Tretyakov, J. Chem. Phys. 142, 144114 (2015),
-    with one friction for all). It conserves no total: all 3N degrees of translation are there.
+    with a common friction). The total momentum is not conserved: all 3N translational degrees count.
 
     friction: 1/(ASE's unit of time): `1e-3 / ase.units.fs` is 1/ps. rng: of the noise; its state is saved for restarts.
     """
@@ -160,13 +160,13 @@ class NoseHoover(Thermostat):
     relaxation : float
         Time constant τ in ASE's unit of time.
     links : int
-        Of a chain.
+        Links of a chain.
     separate : bool
-        One chain for translations and one for rotations, else one for both.
+        Separate chains for translations and rotations instead of a common one.
 
     Notes
     -----
-    The chain counts exactly the degrees that move: three fewer where the total momentum is zero and stays so.
+    The chain counts exactly the moving degrees: three fewer if the total momentum is zero and conserved.
     """
 
     conserves_momentum = True
