@@ -1,1 +1,1 @@
-"""Pictures, one file a kind."""
+"""Pictures, one kind in a file."""

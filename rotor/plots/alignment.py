@@ -1,4 +1,4 @@
-"""A picture of alignment: the pulses above, cosines against time below, the classical gas dashed beside the quantum one."""
+"""Picture of alignment: pulses above, cosines against time below; the classical gas is dashed."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from rotor.plots.view import WHOLE, View, show_part
 
 SIZE_INCHES = (7.2, 4.6)
 NAMES = {"cos2theta": "⟨cos²θ⟩", "costheta": "⟨cosθ⟩", "cos2theta_2d": "⟨cos²θ$_{2D}$⟩"}
-NARROW = 1 / 100  # of the times shown: shorter pulses are drawn as a line at their middle
-PER_TW = 1e12  # W/cm²
+NARROW = 1 / 100  # of the time range: shorter pulses are drawn as a line
+PER_TW = 1e12  # W/cm² in 1 TW/cm²
 
 
 def alignment_figure(trace: AlignmentTrace, *, classical: Mapping[str, Floats] | None = None, title: str = "") -> Any:
-    """A matplotlib figure of cosines against time, of two times or more; `classical` are those of a gas, by the same names.
+    """A matplotlib figure of cosines against time; `classical` has cosines of a classical gas, by the same names.
 
-    Raises ValueError for a trace of one time.
+    Raises ValueError for a trace with fewer than two times.
     """
     if len(trace.t_ps) < 2:
         raise ValueError("a picture of a trace needs two times or more")
@@ -51,32 +51,32 @@ def plot_alignment(
     Parameters
     ----------
     trace : AlignmentTrace
-        Of two times or more.
+        At least two times.
     path : path
         Its suffix chooses the format.
     classical : mapping, optional
         Cosines of a classical gas at the same times, by the same names.
     title : str
-        Above the picture.
+        Title of the picture.
     view : View
-        Times (ps) and cosines shown, and another title.
+        Range of times (ps) and cosines, and another title.
     provenance : mapping, optional
         Further facts for the metadata.
 
     Raises
     ------
     ValueError
-        For a trace of one time, and for a suffix that is no picture.
+        For a trace with fewer than two times, and for another suffix.
     """
     checked_suffix(path)
     title = title if view.title is None else view.title
     figure = alignment_figure(trace, classical=classical, title=title)
-    show_part(figure.axes[1], view)  # the cosines; times of both panels go together
+    show_part(figure.axes[1], view)  # the cosines; both panels share the times
     save_described(figure, path, title, joined(provenance, trace.provenance))
 
 
 def _pulses(axes: Any, trace: AlignmentTrace) -> None:
-    """Pulses in TW/cm² or kV/cm, from 0 to the peak; relative to their own peaks where a kick or both kinds are among them."""
+    """Draw pulses in TW/cm² or kV/cm; relative to their peaks if they include a kick or both units."""
     name, unit = _scale(trace)
     highest = 0.0
     for pulse in trace.pulses:
@@ -95,7 +95,7 @@ def _pulses(axes: Any, trace: AlignmentTrace) -> None:
 
 
 def _scale(trace: AlignmentTrace) -> tuple[str, float | None]:
-    """The title of the axis of the pulses, and its unit in that of `pulse.strength`; none for relative heights."""
+    """Title of the pulse axis, and its unit in the unit of `pulse.strength`; None for relative heights."""
     pulses = trace.pulses
     if any(isinstance(pulse, Kick) for pulse in pulses) or len({pulse.acts_on for pulse in pulses}) != 1:
         return "Pulses\n(relative)", None
@@ -119,6 +119,6 @@ def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) 
     axes.set_xlabel("Time (ps)")
     axes.set_xlim(
         trace.t_ps[0] - 0.01 * (trace.t_ps[-1] - trace.t_ps[0]), trace.t_ps[-1]
-    )  # a pulse at the first time is seen
+    )  # a margin shows a pulse at the first time
     if len(trace.cosines) > 1 or classical:
         axes.legend(frameon=False, fontsize=8)

@@ -1,4 +1,4 @@
-"""A free rotation as a film: the body in space beside the momentum sphere, as .gif or .mp4."""
+"""Film of a free rotation: the body in space beside the momentum sphere, as .gif or .mp4."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ Names = tuple[str, str, str]
 FRAMES = 150
 FRAMES_PER_SECOND = 25
 DOTS_PER_INCH = 80
-LIMIT = 1.45  # half the width of each of the two places; the body fits into a sphere of radius 1.15
-_EYE = np.array([[0.0, 1.0, 0.0], [-0.3, 0.0, 0.954], [0.954, 0.0, 0.3]])  # rows right, up, towards the eye; L is up
+LIMIT = 1.45  # half the width of each panel; the body fits into a sphere of radius 1.15
+_EYE = np.array(
+    [[0.0, 1.0, 0.0], [-0.3, 0.0, 0.954], [0.954, 0.0, 0.3]]
+)  # rows: right, up, towards the viewer; L points up
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 _FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 _FACE_NORMALS = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], dtype=float)
@@ -34,14 +36,14 @@ _FACE_COLOURS = ("#0072B2", "#56B4E9", "#A06A92", "#CC79A7", "#009E73", "#7CCBB0
 
 @dataclass(frozen=True)
 class Atoms:
-    """Atoms to draw: positions (n, 3) in the principal frame about the centre of mass, their symbols, their bonds."""
+    """Atoms to draw: positions (n, 3) in Å in the principal frame about the centre of mass, and symbols."""
 
     positions: Floats
     symbols: tuple[str, ...]
 
     @property
     def bonds(self) -> list[tuple[int, int]]:
-        """Pairs nearer than 1.25 times the sum of their covalent radii (ASE's, of Cordero et al. 2008)."""
+        """Pairs closer than 1.25 times the sum of their covalent radii (ASE's, of Cordero et al. 2008)."""
         from ase.data import atomic_numbers, covalent_radii
 
         radii = covalent_radii[[atomic_numbers[s] for s in self.symbols]]
@@ -51,9 +53,9 @@ class Atoms:
 
 
 def box_edges(moments: ArrayLike) -> Floats:
-    """Half edges (3,) of the uniform box of these principal moments, the longest at 1: e_i² ~ I_j + I_k - I_i.
+    """Half edges (3,) of the uniform box with these principal moments, the longest scaled to 1: e_i² ~ I_j + I_k - I_i.
 
-    Moments that break the triangle inequality, which no real body has, give a plate.
+    Moments that violate the triangle inequality, which no real body has, give a plate.
 
     >>> box_edges([2.0, 5.0, 5.0]).round(4).tolist()  # edges 1, 1, 2: moments as 2 : 5 : 5
     [1.0, 0.5, 0.5]
@@ -64,16 +66,16 @@ def box_edges(moments: ArrayLike) -> Floats:
 
 
 def check_film(path: str | os.PathLike[str]) -> None:
-    """ValueError unless a film of that suffix can be made here."""
+    """Raise ValueError unless this installation can make a film of this suffix."""
     suffix = Path(path).suffix.lower()
     if suffix not in (".gif", ".mp4"):
-        raise ValueError(f"{os.fspath(path)}: a film is .gif or .mp4; the suffix names the format")
+        raise ValueError(f"{os.fspath(path)}: a film is a .gif or .mp4 file")
     if suffix == ".mp4":
         from matplotlib.animation import FFMpegWriter
 
         if not FFMpegWriter.isAvailable():
             raise ValueError(
-                f"{os.fspath(path)}: an mp4 is made by ffmpeg, which is not installed here; install it, or ask for a .gif"
+                f"{os.fspath(path)}: an mp4 needs ffmpeg, which is not installed; install it, or write a .gif"
             )
 
 
@@ -89,45 +91,45 @@ def animate(
     frames: int = FRAMES,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write a film of one free rotation from the first to the last of `times`, at even steps of the exact motion.
+    """Write a film of a free rotation from the first to the last of `times`, in even steps of the exact motion.
 
-    Left the body in space, L upright: the atoms, or without them the uniform box that has these moments. Right the
-    path of L over the momentum sphere in the body.
+    Left: the body in space, with L upright, drawn as its atoms or, without them, as the uniform box with its moments. Right: the
+    path of L on the momentum sphere in the body.
 
     Parameters
     ----------
     motion : FreeMotion
-        Of one body, in any units.
+        Motion of one body, in any units.
     times : (n,) array
-        In the units of the motion, of which only the range counts.
+        In the units of the motion; only their range counts.
     path : path
         A .gif or .mp4 file.
     atoms : Atoms, optional
-        To be drawn in place of the box.
+        Drawn instead of the box.
     axis_names : (str, str, str), optional
-        Of the principal axes.
+        Names of the principal axes.
     time_unit : str, optional
-        Of the times shown.
+        Unit of the displayed times.
     time_factor : float, optional
-        By which times are multiplied before they are shown.
+        Factor of the displayed times.
     frames : int, optional
-        Pictures of the film.
+        Number of frames.
     provenance : mapping, optional
-        What the comment of the file (of the gif format, or the tag of an mp4) shall say besides version.
+        Content of the comment (.gif) or comment tag (.mp4) in addition to program and version.
 
     Raises
     ------
     ValueError
-        For a suffix that cannot be made here and for times that are all the same.
+        For a suffix that cannot be written here, and for equal times.
     """
     check_film(path)
     times = np.asarray(times, dtype=np.float64)
     if not times.size or np.ptp(times) == 0.0:
-        raise ValueError("a film needs two different times, a first and a last")
+        raise ValueError("a film needs at least two different times")
     when = np.linspace(times.min(), times.max(), frames)
     momentum, attitude = motion.at(when)
     path_of_l = momentum / np.linalg.norm(motion.momentum0)
-    turned = _EYE @ _upright(rotate(motion.attitude0, motion.momentum0)) @ to_matrix(attitude)
+    to_view = _EYE @ _upright(rotate(motion.attitude0, motion.momentum0)) @ to_matrix(attitude)
 
     figure, (left, right) = _empty_stage()
     view = view_of(motion.moments, path_of_l[0])
@@ -142,7 +144,9 @@ def animate(
         for i in range(frames):
             for part in body:
                 part.remove()
-            body = _draw_box(left, motion.moments, turned[i]) if atoms is None else _draw_atoms(left, atoms, turned[i])
+            body = (
+                _draw_box(left, motion.moments, to_view[i]) if atoms is None else _draw_atoms(left, atoms, to_view[i])
+            )
             clock.set_text(f"$t$ = {when[i] * time_factor:.4g} {time_unit}".rstrip())
             dot.set_data(*view.flat(path_of_l[i : i + 1]).T)
             trail.set_data(*view.flat(path_of_l[: i + 1]).T)
@@ -151,8 +155,8 @@ def animate(
 
 @contextmanager
 def _filmed(figure: Any, path: Path, provenance: Mapping[str, Any]) -> Iterator[Callable[[], None]]:
-    """A function that adds the figure, as it is then, to a film; at the end the film is written, with what made it."""
-    description = json.dumps({"program": "rotor", "version": version(), **provenance})  # ASCII, as a gif demands
+    """Yield a function that adds the current figure to a film; at the end, write the film with its provenance."""
+    description = json.dumps({"program": "rotor", "version": version(), **provenance})  # ASCII, which gif requires
     if path.suffix.lower() == ".mp4":
         from matplotlib.animation import FFMpegWriter
 
@@ -181,7 +185,7 @@ def _filmed(figure: Any, path: Path, provenance: Mapping[str, Any]) -> Iterator[
 
 
 def _empty_stage() -> tuple[Any, Any]:
-    """A figure with a place for the body and one for the sphere, both within ±LIMIT."""
+    """A figure with one panel for the body and one for the sphere, both within ±LIMIT."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -191,12 +195,12 @@ def _empty_stage() -> tuple[Any, Any]:
     for axes in (left, right):
         axes.set(xlim=(-LIMIT, LIMIT), ylim=(-LIMIT, LIMIT), aspect="equal")
         axes.axis("off")
-        axes.set_title("", y=1.0)  # a fixed place, else every frame looks for one
+        axes.set_title("", y=1.0)  # a fixed position; otherwise each frame computes one
     return figure, (left, right)
 
 
 def _with_backdrop(figure: Any) -> tuple[Any, Any]:
-    """A stage with what was drawn so far as one image behind it: it is drawn once, not in every frame."""
+    """A new stage with the current drawing as background image, so that it is drawn once and not for each frame."""
     figure.canvas.draw()
     stage, places = _empty_stage()
     stage.figimage(np.array(figure.canvas.buffer_rgba()), zorder=-10)
@@ -204,13 +208,15 @@ def _with_backdrop(figure: Any) -> tuple[Any, Any]:
 
 
 def _upright(momentum: Floats) -> Floats:
-    """The rotation (3, 3) of space that brings L to the vertical, by the shortest way."""
+    """The rotation (3, 3) of space that takes L to the vertical by the shortest way."""
     unit = momentum / np.linalg.norm(momentum)
     half_way = unit + np.array([0.0, 0.0, 1.0])
     if np.linalg.norm(half_way) < 1e-8:  # L points straight down
         return np.diag([1.0, -1.0, -1.0])
     half_way /= np.linalg.norm(half_way)
-    half_turn = 2.0 * np.outer(half_way, half_way) - np.eye(3)  # takes L up and turns the rest by π about the vertical
+    half_turn = 2.0 * np.outer(half_way, half_way) - np.eye(
+        3
+    )  # takes L to the vertical, with an extra turn by π about it
     return np.asarray(np.diag([-1.0, -1.0, 1.0]) @ half_turn)
 
 
@@ -224,25 +230,25 @@ def _draw_still_parts(axes: Any, view: View, moments: Floats, path_of_l: Floats,
 
 
 def _draw_momentum(axes: Any) -> None:
-    """The fixed direction of L in space."""
+    """Draw the fixed direction of L in space."""
     up = (_EYE @ np.array([0.0, 0.0, 1.42]))[:2]
     axes.annotate("", up, -0.92 * up, zorder=0, arrowprops={"arrowstyle": "-|>", "color": "0.45", "lw": 1.2})
     axes.text(up[0] + 0.09, up[1] - 0.03, "$L$", color="0.35", va="center")
 
 
-def _draw_box(axes: Any, moments: Floats, turned: Floats) -> list[Any]:
-    """The faces that the eye sees of the box of these moments; `turned` (3, 3) takes body axes to right, up, eye."""
+def _draw_box(axes: Any, moments: Floats, to_view: Floats) -> list[Any]:
+    """Draw the visible faces of the box with these moments; `to_view` (3, 3) takes body axes to right, up, viewer."""
     edges = np.maximum(box_edges(moments), 0.03)  # a plate or a rod stays visible
-    corners = _CORNERS * (1.15 * edges / np.linalg.norm(edges)) @ turned.T
+    corners = _CORNERS * (1.15 * edges / np.linalg.norm(edges)) @ to_view.T
     return [
         axes.fill(*corners[list(face), :2].T, facecolor=colour, edgecolor="black", linewidth=0.8, alpha=0.95)[0]
-        for face, normal, colour in zip(_FACES, _FACE_NORMALS @ turned.T, _FACE_COLOURS, strict=True)
+        for face, normal, colour in zip(_FACES, _FACE_NORMALS @ to_view.T, _FACE_COLOURS, strict=True)
         if normal[2] > 0.0
     ]
 
 
-def _draw_atoms(axes: Any, atoms: Atoms, turned: Floats) -> list[Any]:
-    """Balls and sticks from the back to the front."""
+def _draw_atoms(axes: Any, atoms: Atoms, to_view: Floats) -> list[Any]:
+    """Draw balls and sticks from back to front."""
     from ase.data import atomic_numbers, covalent_radii
     from ase.data.colors import jmol_colors
     from matplotlib.patches import Circle
@@ -250,7 +256,7 @@ def _draw_atoms(axes: Any, atoms: Atoms, turned: Floats) -> list[Any]:
     numbers = [atomic_numbers[s] for s in atoms.symbols]
     radii = 0.55 * covalent_radii[numbers]
     scale = 1.15 / float(np.max(np.linalg.norm(atoms.positions, axis=1) + radii))
-    seen = scale * atoms.positions @ turned.T
+    seen = scale * atoms.positions @ to_view.T
     parts = []
     for i, j in atoms.bonds:
         along = (seen[j] - seen[i]) / np.linalg.norm(seen[j] - seen[i])

@@ -1,4 +1,4 @@
-"""A picture of an assignment: peaks above, predictions of each species mirrored below, what is left at the bottom."""
+"""Picture of an assignment: peaks above, mirrored predictions of each species below, unexplained peaks at the bottom."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def plot_assignment(
     view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw an assignment into a picture.
+    """Draw an assignment.
 
     Parameters
     ----------
@@ -28,14 +28,14 @@ def plot_assignment(
     path : path
         A .png, .pdf or .svg file.
     view : View
-        Frequencies (MHz) and intensities shown, another title.
+        Range of frequencies (MHz) and intensities, and another title.
     provenance : mapping, optional
-        What the metadata of the file shall say.
+        Content of the file's metadata.
 
     Raises
     ------
     ValueError
-        For a suffix that is no picture, and for nothing in the view.
+        For another suffix, and for an empty view.
     """
     checked_suffix(path)
     title = view.title or f"{answer.request.peaks.source or 'spectrum'}: {len(answer.species)} species"
@@ -43,7 +43,7 @@ def plot_assignment(
 
 
 def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> Any:
-    """A matplotlib figure: peaks and mirrored predictions, below them the peaks that nothing explains."""
+    """A matplotlib figure of peaks and mirrored predictions, with unexplained peaks below."""
     with styled():
         figure = new_figure((9.0, 5.5))
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
@@ -70,7 +70,7 @@ def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> A
 
 
 def predicted_sticks(species: AssignedSpecies, band_mhz: tuple[float, float]) -> tuple[Any, Any]:
-    """Frequencies and heights of the lines of a species in a band, the strongest as high as was fitted."""
+    """Frequencies and heights of the lines of a species in a band, scaled to the fitted strength."""
     from rotor.spectra.lines import line_list
 
     lines = line_list(

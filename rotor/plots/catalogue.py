@@ -1,4 +1,4 @@
-"""A picture of a catalogue: its lines as sticks, those measured in a laboratory in a colour of their own."""
+"""Picture of a catalogue: lines as sticks, measured lines in another colour."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ MEASURED = ORANGE
 def plot_catalogue(
     lines: Catalogue, path: str | os.PathLike[str], *, title: str = "", view: View = WHOLE, command: str = ""
 ) -> None:
-    """Draw log10 of the intensity against frequency into a picture; measured lines (a negative tag) stand out.
+    """Draw log10 of the intensity against frequency, with measured lines (negative tags) in another colour.
 
     Parameters
     ----------
     lines : Catalogue
-        What is drawn.
+        Lines to draw.
     path : path
         A .png, .pdf or .svg file.
     title : str, optional
-        Above the picture.
+        Title of the picture.
     view : View
-        Frequencies (MHz) and log10 of intensities shown, and another title.
+        Range of frequencies (MHz) and log10 of intensities, and another title.
     command : str, optional
         Written into the file's metadata.
 
@@ -47,9 +47,9 @@ def plot_catalogue(
 
 
 def catalogue_figure(lines: Catalogue, *, title: str = "", least: float = math.inf, axes: Any = None) -> Any:
-    """A matplotlib figure of log10 of the intensity against frequency, measured lines in a colour of their own.
+    """A matplotlib figure of log10 of the intensity against frequency, with measured lines in another colour.
 
-    Sticks begin below the weakest line, or at `least` where that is lower. axes : drawn on instead of a new figure.
+    Sticks start below the weakest line, or at `least` if that is lower. axes: drawn on instead of a new figure.
     """
     frequency, _ = in_mhz(lines)
     bottom = min(float(lines.lgint.min()) - 0.3, least)

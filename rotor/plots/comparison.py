@@ -1,4 +1,4 @@
-"""Two lists of lines as a mirror plot: one above the axis, the other below, and under it how far matched lines are apart."""
+"""Mirror plot of two line lists: one above the axis, the other below, with differences of matched lines underneath."""
 
 from __future__ import annotations
 
@@ -35,18 +35,18 @@ def plot_comparison(
     view: View = WHOLE,
     command: str = "",
 ) -> None:
-    """Draw a comparison of two line lists into a picture.
+    """Draw a comparison of two line lists.
 
     Parameters
     ----------
     comparison : Comparison
-        What is drawn, see `comparison_figure`.
+        Comparison to draw, see `comparison_figure`.
     path : path
         A .png, .pdf or .svg file.
     names : (str, str), optional
-        Of the two lists.
+        Names of the two lists.
     view : View
-        Frequencies shown (MHz), and a title; the vertical limits are those of the lists.
+        Range of frequencies (MHz), and a title; the lists fix the vertical limits.
     command : str, optional
         Written into the file's metadata.
 
@@ -69,15 +69,15 @@ def comparison_figure(comparison: Comparison, *, names: tuple[str, str] = ("", "
     Parameters
     ----------
     comparison : Comparison
-        The reference is drawn upwards, the other list downwards, each by log10 of intensity; lines of one list alone in a
-        colour of their own.
+        The reference is drawn upwards, the other list downwards, as log10 of intensity; unmatched lines in
+        another colour.
     names : (2,) strings
-        Of the reference and of the other list.
+        Names of the reference and the other list.
 
     Raises
     ------
     ValueError
-        Without lines on either side.
+        If both lists are empty.
     """
     if not len(comparison.reference) and not len(comparison.ours):
         raise ValueError("neither list has a line to draw; widen the range or lower the cut")
@@ -104,7 +104,7 @@ def _draw_mirror(axes: Any, comparison: Comparison, names: tuple[str, str]) -> N
         _sticks(axes, lines, alone, (sign, bottom, UNPAIRED), f"{len(alone)} only in {name}")
     axes.axhline(0.0, color="black", linewidth=0.7)
     height = float(both.max()) - bottom
-    axes.set_ylim(-1.2 * height, 1.2 * height)  # space for the names of both lists
+    axes.set_ylim(-1.2 * height, 1.2 * height)  # space for the names
     step = max(1, round(height / 4))
     ticks = np.arange(np.floor(both.max()), bottom + 0.3 * step, -step)
     axes.set_yticks(np.concatenate([-(ticks - bottom), ticks - bottom]), [f"{x:.0f}" for x in (*ticks, *ticks)])
@@ -115,7 +115,7 @@ def _draw_mirror(axes: Any, comparison: Comparison, names: tuple[str, str]) -> N
 
 
 def _sticks(axes: Any, lines: Catalogue, rows: Ints, drawn: tuple[float, float, str], label: str) -> None:
-    """Sticks from the middle, upwards or downwards by the sign; nothing, and no entry of the legend, for no line."""
+    """Draw sticks from the middle axis, upwards or downwards by sign; nothing, without a legend entry, for no lines."""
     sign, bottom, colour = drawn
     if not len(rows):
         return
@@ -127,7 +127,7 @@ def _sticks(axes: Any, lines: Catalogue, rows: Ints, drawn: tuple[float, float, 
 
 
 def _draw_differences(axes: Any, comparison: Comparison) -> None:
-    """Other minus reference of matched lines, with the errors of the reference where it was measured."""
+    """Draw the other list minus the reference for matched lines, with errors where the reference is measured."""
     axes.axhline(0.0, color=GREY, linewidth=0.7)
     off = comparison.differences("frequency_mhz")
     factor, unit = next((f, name) for most, f, name in _DIFFERENCES if np.abs(off).max(initial=0.0) <= most)
@@ -146,4 +146,4 @@ def _draw_differences(axes: Any, comparison: Comparison) -> None:
         axes.legend(frameon=False, fontsize=7)
     axes.set_ylabel(f"Difference ({unit})")
     if not len(off):
-        axes.text(0.5, 0.5, "no line is in both", transform=axes.transAxes, ha="center", va="center", color=GREY)
+        axes.text(0.5, 0.5, "no line in common", transform=axes.transAxes, ha="center", va="center", color=GREY)

@@ -1,4 +1,4 @@
-"""Rotational diagrams of several species, a panel each."""
+"""Rotational diagrams of several species, one panel for each."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PANEL_INCHES = (3.6, 3.0)
 def plot_diagrams(
     diagrams: SpeciesDiagrams, path: str | os.PathLike[str], provenance: Mapping[str, Any] | None = None
 ) -> None:
-    """Draw every diagram; ValueError where there is none, and for a suffix that is no picture."""
+    """Draw all diagrams; ValueError without any, and for another suffix."""
     checked_suffix(path)
     count = len(diagrams.diagrams)
     if not count:

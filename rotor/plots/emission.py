@@ -1,4 +1,4 @@
-"""A picture of what a telescope sees: brightness temperature of several molecules in colours of their own, and of all."""
+"""Picture of emission: brightness temperature of each molecule in its colour, and of all together."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from rotor.quantum.quanta import line_text
 from rotor.spectra.emission_request import EmissionAnswer
 from rotor.tops.top import Top
 
-LEAST_NAMED = 0.01  # of the brightest line; on a linear axis weaker lines are not seen
+LEAST_NAMED = 0.01  # relative to the brightest line; weaker lines are invisible on a linear axis
 MOST_TRIED = 100  # lines, from the brightest down, for which a name is tried
 
 
 def plot_emission(
     answer: EmissionAnswer, path: str | os.PathLike[str], *, provenance: Mapping[str, Any] | None = None, **options: Any
 ) -> None:
-    """Draw a spectrum of brightness temperature into a .png, .pdf or .svg file.
+    """Draw a spectrum of brightness temperature.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def plot_emission(
     Raises
     ------
     ValueError
-        A suffix that is no picture.
+        For a suffix other than .png, .pdf, .svg.
     """
     checked_suffix(path)
     save(emission_figure(answer, **options), path, options.get("title") or _title(answer), provenance or {})
@@ -58,17 +58,17 @@ def emission_figure(
     Parameters
     ----------
     answer : EmissionAnswer
-        Each of its molecules is a curve; where there are several, all together is a grey one behind them.
+        One curve for each molecule; several molecules also have a grey curve of their sum.
     title : str, optional
         Instead of the names and the source.
     unit : "MHz", "GHz", "THz" or "cm-1", optional
-        Of the frequency axis, GHz by default.
+        Unit of the frequency axis, by default GHz.
     range_mhz : (2,), optional
-        Frequencies shown, those of the request by default.
+        Range of frequencies; by default that of the request.
     log : bool, optional
-        Whether T_B is on a logarithmic axis.
+        Whether the T_B axis is logarithmic.
     vertical : (2,), optional
-        Lowest and highest T_B shown, in K.
+        Range of T_B in K.
     axes : matplotlib.axes.Axes, optional
         Drawn on instead of a new figure.
 
@@ -80,7 +80,7 @@ def emission_figure(
     Raises
     ------
     ValueError
-        A logarithmic axis from 0 or less.
+        For a logarithmic axis that starts at 0 or less.
     """
     mhz = UNITS[unit or "GHz"]
     first, last = range_mhz or answer.request.range_mhz
@@ -113,7 +113,7 @@ def emission_figure(
 
 
 def _name(axes: Any, answer: EmissionAnswer, mhz: float) -> None:
-    """Quantum numbers of the brightest lines, in the colour of their molecule where there are several."""
+    """Name the brightest lines by their quantum numbers, in the colour of their molecule if there are several."""
     lines, spectrum = answer.lines, answer.spectrum
     heights = np.interp(lines.observed_mhz, spectrum.frequency_mhz, spectrum.brightness_k)
     several = len(answer.request.molecules) > 1
@@ -133,19 +133,19 @@ def _name(axes: Any, answer: EmissionAnswer, mhz: float) -> None:
 
 
 def _line_name(answer: EmissionAnswer, row: int) -> str:
-    """A line as other pictures name it: sums with spins after both rotational levels, with their names."""
+    """Name of a line as in other pictures: rotational quantum numbers first, then those with spins."""
     lines = answer.lines
     names, values = (
         answer.emitted[int(lines.molecule[row])].quanta,
         (lines.upper[row].split(), lines.lower[row].split()),
     )
-    if any(len(each) != len(names) for each in values):
+    if any(len(numbers) != len(names) for numbers in values):
         return f"{lines.upper[row]} – {lines.lower[row]}"
     return line_text({name: np.array(pair) for name, *pair in zip(names, *values, strict=True)}, 0, 1)
 
 
 def _title(answer: EmissionAnswer) -> str:
-    """Excitation, width and velocity, each once where the molecules share it."""
+    """Excitation, width and velocity, with common values once."""
     sources = answer.request.sources
 
     def values(name: str) -> str:

@@ -22,7 +22,7 @@ _HEADINGS = {
 
 
 def fit_figure(fit: Fit, title: str = "") -> Any:
-    """A matplotlib figure of (obs - calc)/error of every line; lines that do not count are crosses."""
+    """A matplotlib figure of (obs - calc)/error of all lines; excluded lines are crosses."""
     halves = fit.lines.halves
     panels = [("Frequency (GHz)", fit.lines.frequency_mhz / 1e3)]
     panels += [
@@ -36,14 +36,14 @@ def fit_figure(fit: Fit, title: str = "") -> Any:
             axes = figure.add_subplot(len(panels), 1, place)
             _draw(axes, fit, x)
             axes.set_xlabel(heading)
-            if place > 1:  # quantum numbers: no marks between whole numbers
+            if place > 1:  # quantum numbers: ticks at whole numbers only
                 axes.xaxis.get_major_locator().set_params(integer=True)
         figure.axes[0].set_title(_title(fit, title).replace("$", r"\$"), loc="left")
     return figure
 
 
 def _heading(name: str, halves: Collection[str]) -> str:
-    """The name of an axis; files of SPFIT have half-integers of F rounded up."""
+    """Title of an axis; SPFIT files round half-integer F up."""
     return _HEADINGS[name] + (" (rounded up)" if name == "f" and name not in halves else "")
 
 
@@ -56,7 +56,7 @@ def _title(fit: Fit, title: str) -> str:
 def plot_fit(
     fit: Fit, path: str | os.PathLike[str], *, title: str = "", provenance: Mapping[str, Any] | None = None
 ) -> None:
-    """Draw `fit_figure` into a picture, with the provenance in its metadata.
+    """Draw `fit_figure`, with the provenance in its metadata.
 
     Parameters
     ----------
@@ -65,9 +65,9 @@ def plot_fit(
     path : path
         A .png, .pdf or .svg file.
     title : str, optional
-        Above the picture.
+        Title of the picture.
     provenance : mapping, optional
-        What the metadata shall say besides constants, rms and convergence.
+        Content of the metadata besides constants, rms and convergence.
 
     Raises
     ------

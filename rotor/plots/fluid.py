@@ -1,4 +1,4 @@
-"""A picture of a run of a fluid: temperatures and potential energy in time, and the pair distribution of the molecules."""
+"""Picture of a fluid run: temperatures and potential energy against time, and the pair distribution of the molecules."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def plot_fluid(
     view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw a run into a .png, .pdf or .svg file.
+    """Draw a run.
 
     Parameters
     ----------
@@ -35,21 +35,21 @@ def plot_fluid(
         As in `fluid_figure`.
     path : path
     view : View
-        Times (ps) and temperatures shown, and another title.
+        Range of times (ps) and temperatures, and another title.
     provenance : mapping, optional
         Written into the metadata of the file.
 
     Raises
     ------
     ValueError
-        A suffix that is no picture.
+        For a suffix other than .png, .pdf, .svg.
     """
     checked_suffix(path)
     title = title if view.title is None else view.title
     figure = fluid_figure(record, shells, molecules, title=title)
-    warm, deep = (panel for panel in figure.axes if panel.get_xlabel() == TIME)
-    show_part(warm, view)
-    show_part(deep, View(horizontal=view.horizontal))
+    temperature_axes, energy_axes = (panel for panel in figure.axes if panel.get_xlabel() == TIME)
+    show_part(temperature_axes, view)
+    show_part(energy_axes, View(horizontal=view.horizontal))
     save(figure, path, title, provenance or {})
 
 
@@ -60,9 +60,9 @@ def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules
     ----------
     record : FluidRecord
     shells : PairDistribution or None
-        g(r) of centres of mass; without it temperatures and energy alone.
+        g(r) of centres of mass; None draws temperatures and energy only.
     molecules : int
-        By which the energy is divided.
+        Number of molecules, which divides the energy.
     title : str
 
     Returns
@@ -73,20 +73,21 @@ def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules
     with styled():
         figure = new_figure((7.2, 4.2))
         if shells is None:
-            warm, deep = figure.subplots(2, 1, sharex=True)
+            temperature_axes, energy_axes = figure.subplots(2, 1, sharex=True)
         else:
             panels = figure.subplot_mosaic([["temperature", "g"], ["energy", "g"]])
-            warm, deep = panels["temperature"], panels["energy"]
+            temperature_axes, energy_axes = panels["temperature"], panels["energy"]
             _draw_shells(panels["g"], shells)
-        _draw_temperatures(warm, record)
-        deep.plot(record.time_ps, record.potential_ev * KJ_PER_MOL_EV / molecules, color=BLUE, linewidth=0.8)
-        deep.set(xlabel=TIME, ylabel="Potential energy (kJ/mol)")
+        _draw_temperatures(temperature_axes, record)
+        potential = record.potential_ev * KJ_PER_MOL_EV / molecules
+        energy_axes.plot(record.time_ps, potential, color=BLUE, linewidth=0.8)
+        energy_axes.set(xlabel=TIME, ylabel="Potential energy (kJ/mol)")
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
     return figure
 
 
 def _draw_temperatures(axes: Any, record: FluidRecord) -> None:
-    """Temperature of all degrees, of translation and of rotation where there is one."""
+    """Draw the temperature of all degrees of freedom, of translation, and of rotation if there is any."""
     curves = (
         ("translation", record.translation_k, BLUE),
         ("rotation", record.rotation_k, ORANGE),

@@ -1,4 +1,4 @@
-"""Pictures of a classical gas: equipartition degree by degree, correlation functions, and a band over its quantum lines."""
+"""Pictures of a classical gas: equipartition by degree, correlation functions, and a band over its quantum lines."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from rotor.units import MHZ_PER_CM
 
 
 def equipartition_figure(tests: Mapping[str, Equipartition], columns: int = 3) -> Any:
-    """A matplotlib figure: for each gas the mean of 2E/kT by degree with the spread that chance allows, ±1 and ±3 of it."""
+    """A matplotlib figure of the mean of 2E/kT by degree for each gas, with bands of 1 and 3 expected standard deviations."""
     figure, axes = _panels(len(tests), columns, 2.6)
     for panel, (name, test) in zip(axes, tests.items(), strict=False):
         _draw_test(panel, test, name)
@@ -25,7 +25,7 @@ def equipartition_figure(tests: Mapping[str, Equipartition], columns: int = 3) -
 
 
 def correlation_figure(curves: Mapping[str, Correlations], columns: int = 2) -> Any:
-    """A matplotlib figure of C1 and C2 against time in ps, one diagram for each gas, with three standard errors."""
+    """A matplotlib figure of C1 and C2 against time in ps, one panel for each gas, with bands of three standard errors."""
     figure, axes = _panels(len(curves), columns, 3.0)
     for panel, (name, curve) in zip(axes, curves.items(), strict=False):
         _draw_curves(panel, curve, name, None)
@@ -33,7 +33,7 @@ def correlation_figure(curves: Mapping[str, Correlations], columns: int = 2) -> 
 
 
 def band_figure(pairs: Sequence[tuple[str, Mapping[str, Spectrum], Spectrum]], columns: int = 2) -> Any:
-    """A matplotlib figure of classical bands over quantum ones: (title, classical ones by name, the quantum one) each."""
+    """A matplotlib figure of classical bands over quantum ones; each pair: (title, classical bands by name, quantum band)."""
     figure, axes = _panels(len(pairs), columns, 3.0)
     for panel, (title, classical, quantum) in zip(axes, pairs, strict=False):
         cm = quantum.frequency_mhz / MHZ_PER_CM
@@ -59,29 +59,29 @@ def plot_gas(
     view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw the test, and the correlation functions beside it where there are some, into a picture.
+    """Draw the test of equipartition and, if given, the correlation functions.
 
     Parameters
     ----------
     test : Equipartition
-        Of every degree of freedom.
+        Test of all degrees of freedom.
     curves : Correlations or None
         C1 and C2.
     path : path
         A .png, .pdf or .svg file.
     title : str, optional
-        Above the picture.
+        Title of the picture.
     plateau : float, optional
-        Where C1 ends, drawn as a line.
+        Final value of C1, drawn as a line.
     view : View
-        Times (ps) and correlations shown, and another title.
+        Range of times (ps) and correlations, and another title.
     provenance : mapping, optional
         Written into the metadata.
 
     Raises
     ------
     ValueError
-        For a suffix that is no picture.
+        For another suffix.
     """
     checked_suffix(path)
     figure, axes = _panels(1 if curves is None else 2, 2, SIZE_INCHES[1])
@@ -97,7 +97,7 @@ def plot_gas(
 
 
 def _panels(count: int, columns: int, height: float) -> tuple[Any, list[Any]]:
-    """A figure and its diagrams, in rows."""
+    """A figure and its panels, in rows."""
     if not count:
         raise ValueError("there is nothing to draw")
     across = min(columns, count)

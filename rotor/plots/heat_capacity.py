@@ -1,4 +1,4 @@
-"""Pictures of heat capacities: the quantum sum beside the classical limit, and published values as points."""
+"""Pictures of heat capacities: the quantum sum, the classical limit, and published values as points."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from rotor.thermodynamics import ThermoFunctions
 from rotor.version import version
 
 GREY = "#777777"
-LOG_FROM = 30.0  # of the last to the first temperature: beyond it the axis is logarithmic
+LOG_FROM = 30.0  # ratio of the last to the first temperature above which the axis is logarithmic
 CURVE_POINTS = 300
 
 
 @dataclass(frozen=True)
 class Points:
-    """Published values: what they are of, temperatures in K, and C_v/R without translation."""
+    """Published values: their label, temperatures in K, and C_v/R without translation."""
 
     label: str
     temperature_k: NDArray[np.float64]
@@ -31,7 +31,7 @@ class Points:
 
 @dataclass(frozen=True)
 class Panel:
-    """One diagram: functions by the name of their curve, and published points; a point takes the colour of its name."""
+    """One panel: functions by curve name, and published points, drawn in the colour of the curve with the same name."""
 
     title: str
     curves: Mapping[str, ThermoFunctions]
@@ -39,10 +39,10 @@ class Panel:
 
 
 def heat_capacity_figure(panels: Sequence[Panel], columns: int = 2, view: View = WHOLE) -> Any:
-    """A matplotlib figure of C_v/R of rotation, and of vibration where it is given, against temperature.
+    """A matplotlib figure of C_v/R of rotation, and of vibration if given, against temperature.
 
-    Full lines: the quantum sum; thick grey: the classical limit; dotted: that with its first corrections, of the first curve.
-    Where there are vibrational states a dashed line of the same colour adds them. The scale of a view is that of the temperatures.
+    Solid lines: quantum sums; thick grey: classical limit; dotted: classical limit with first corrections, for the first curve;
+    dashed: with vibrational states. The `log` of a view refers to the temperature axis.
     """
     if not panels or not all(panel.curves for panel in panels):
         raise ValueError("a picture of heat capacities needs a panel, and a curve in each")
@@ -69,18 +69,18 @@ def plot_heat_capacity(
     Parameters
     ----------
     panels : sequence of Panel
-        One diagram each.
+        One panel each.
     path : path
-        Its suffix chooses the format.
+        Its suffix selects the format.
     view : View
-        Temperatures (K) and C_v/R shown, and whether the temperatures are on a logarithmic axis.
+        Range of temperatures (K) and C_v/R, and whether the temperature axis is logarithmic.
     provenance : mapping, optional
-        What the metadata of the file shall say besides the version.
+        Content of the metadata besides program and version.
 
     Raises
     ------
     ValueError
-        For a suffix that is no picture, and for nothing to draw.
+        For another suffix, and for nothing to draw.
     """
     checked_suffix(path)
     figure = heat_capacity_figure(panels, view=view)
@@ -94,7 +94,7 @@ def plot_heat_capacity(
 
 
 def curve_temperatures(temperatures_k: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
-    """Temperatures from the lowest to the highest of those given, close enough for a smooth curve; (300,) or (1,)."""
+    """Temperatures between the lowest and highest given ones, dense enough for a smooth curve; (300,) or (1,)."""
     low, high = float(np.min(temperatures_k)), float(np.max(temperatures_k))
     if low == high:
         return np.array([low])
@@ -131,7 +131,7 @@ def _draw(axes: Any, panel: Panel) -> None:
 
 
 def _frame(axes: Any, view: View) -> None:
-    """The limits of a view; its scale is that of the temperatures."""
+    """Apply a view; its `log` refers to the temperature axis."""
     if view.log:
         _make_logarithmic(axes)
     elif view.log is not None:
@@ -144,12 +144,12 @@ def _frame(axes: Any, view: View) -> None:
 
 
 def _make_logarithmic(axes: Any) -> None:
-    """Logarithmic temperatures, written as 10, 20, 50, 100."""
+    """Make the temperature axis logarithmic, with ticks such as 10, 20, 50, 100."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     axes.set_xscale("log")
     lowest, highest = axes.dataLim.intervalx
-    few = highest <= 1e4 * lowest  # over more decades 2 and 5 have no space
+    few = highest <= 1e4 * lowest  # over more decades ticks at 2 and 5 would overlap
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
@@ -157,12 +157,12 @@ def _make_logarithmic(axes: Any) -> None:
 
 def _line(axes: Any, functions: ThermoFunctions, values: NDArray[np.float64], **style: Any) -> None:
     order = np.argsort(functions.temperature_k)
-    marker = "." if len(order) < 3 else None  # one temperature makes no line
+    marker = "." if len(order) < 3 else None  # too few points for a line
     axes.plot(functions.temperature_k[order], values[order], marker=marker, **style)
 
 
 def _highest(panel: Panel, classical: float) -> float:
-    """Upper end of the axis: above every curve and point, not above a correction that runs away."""
+    """Upper end of the axis: above all curves and points, ignoring a diverging correction."""
     values = [classical]
     for functions in panel.curves.values():
         vibration = 0.0 if functions.cv_vib_over_r is None else functions.cv_vib_over_r

@@ -1,4 +1,4 @@
-"""A term diagram: energy levels as steps above their K, each ladder of K in a column of its own."""
+"""Term diagram: energy levels as steps, with the ladder of each K in its column."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ from rotor.tops.top import Top
 UNITS = {"MHz": "energy_mhz", "cm-1": "energy_cm", "K": "energy_k"}
 SIZE_INCHES = (7.2, 5.4)
 HALF_WIDTH = 0.36  # of a step, in columns
-NARROW = 0.25  # where names have the number of the state too
+NARROW = 0.25  # the same if labels also have the number of the vibrational state
 MOST_LABELS = 160
 MOST_WEIGHTS = 4
 
 
 @dataclass(frozen=True)
 class _Species:
-    """Levels of one nuclear-spin weight: rows, colour and style of their steps, name in the legend."""
+    """Levels of one nuclear-spin weight: rows, colour and line style of their steps, name in the legend."""
 
     rows: NDArray[np.bool_]
     colour: str
@@ -60,30 +60,29 @@ def plot_levels(
     view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw a term diagram into a .png, .pdf or .svg file.
+    """Draw a term diagram.
 
     Parameters
     ----------
     table : SelectedLevels
-        The levels; those of an asymmetric top stand in columns of Ka (Kc where it is nearer to oblate), of a symmetric one in
-        columns of |K|, of all others in columns of J.
+        The levels, in columns of Ka (asymmetric top; Kc if nearer to oblate), of |K| (symmetric top), or of J (others).
     top : Top
         Its name and kind.
     path : path
-        Its suffix chooses the format.
+        Its suffix selects the format.
     unit : "MHz", "cm-1" or "K"
-        Of the energies, from the lowest level that exists.
+        Unit of the energies, which count from the lowest existing level.
     title : str, optional
         Instead of name and formula.
     view : View
-        Which columns and energies are shown, where they are given, and another title.
+        Range of columns and energies, and another title.
     provenance : mapping, optional
-        What the metadata of the file shall say besides the version.
+        Content of the metadata besides program and version.
 
     Raises
     ------
     ValueError
-        A suffix that is no picture, an unknown unit, or no levels.
+        For another suffix, an unknown unit, or no levels.
     """
     checked_suffix(path)
     title = title if view.title is None else view.title
@@ -105,15 +104,15 @@ def levels_figure(
     Parameters
     ----------
     table : SelectedLevels
-        What is drawn.
+        Levels to draw.
     top : Top, optional
-        Whose levels they are; without it an asymmetric top stands in columns of Ka.
+        Top of the levels; without it an asymmetric top has columns of Ka.
     unit : str, optional
-        Of the energies.
+        Unit of the energies.
     title : str, optional
         Instead of the name of the top.
     view : View
-        Which columns and energies are shown, where they are given.
+        Range of columns and energies.
     axes : matplotlib.axes.Axes, optional
         Drawn on instead of a new figure.
 
@@ -129,7 +128,7 @@ def levels_figure(
     """
     require_one_of("unit", unit, UNITS)
     if not len(table):
-        raise ValueError("there is no level to draw; widen the range of J or K, or raise the limit of energy")
+        raise ValueError("no level to draw; widen the range of J or K, or raise the limit of energy")
     name, column = ladders(table, top)
     table, column = _in_view(table, column, np.asarray(getattr(table, UNITS[unit])), view)
     energy = np.asarray(getattr(table, UNITS[unit]))
@@ -149,18 +148,18 @@ def levels_figure(
 
 
 def _in_view(table: SelectedLevels, column: Ints, energy: Floats, view: View) -> tuple[SelectedLevels, Ints]:
-    """The levels, and their columns, that a view shows."""
+    """The levels inside a view, and their columns."""
     shown = np.ones(len(column), dtype=bool)
     for values, limits in ((column, view.horizontal), (energy, view.vertical)):
         if limits is not None:
             shown &= (values >= limits[0]) & (values <= limits[1])
     if not shown.any():
-        raise ValueError("there is no level between the limits of the picture; widen them")
+        raise ValueError("no level inside the limits of the picture; widen them")
     return replace(table, rows=table.rows[shown]), column[shown]
 
 
 def ladders(table: SelectedLevels, top: Top | None) -> tuple[str, Ints]:
-    """The quantum number that the columns of a diagram stand for, as its heading, and its value for every level."""
+    """Heading and values of the quantum number of the columns."""
     quanta, rows = table.levels.quanta, table.rows
     if "k" in quanta:
         return "|K|", np.abs(quanta["k"][rows])
@@ -174,7 +173,7 @@ def ladders(table: SelectedLevels, top: Top | None) -> tuple[str, Ints]:
 
 
 def _species(table: SelectedLevels, top: Top | None) -> list[_Species]:
-    """Levels by the species of the nuclear spins, and those without a state of the spins."""
+    """Groups of levels by nuclear-spin species, and levels without a spin state."""
     weight = table.levels.weight_per_component[table.rows]
     missing = _Species(weight == 0, GREY, ":", "missing (spin weight 0)")
     rule = "" if top is None else top.spin_weights.rule
@@ -192,7 +191,7 @@ def _species(table: SelectedLevels, top: Top | None) -> list[_Species]:
 
 
 def _by_k(k: Ints, exists: NDArray[np.bool_], weights: SpinWeights) -> list[_Species]:
-    """Levels of a symmetric top by K; ortho and para where three nuclei of spin 1/2 are equivalent, with weights 2 : 1."""
+    """Groups of levels of a symmetric top by K; ortho and para for three equivalent nuclei of spin 1/2, with weights 2 : 1."""
     value = dict(zip(weights.classes, weights.values, strict=True))
     period = max(int(name) for name in value if name.isdecimal()) + 1
     zero = value.get("0", (value.get("0even", 0) + value.get("0odd", 0)) / 2)
@@ -208,14 +207,14 @@ def _by_k(k: Ints, exists: NDArray[np.bool_], weights: SpinWeights) -> list[_Spe
 
 
 def _is_ortho_and_para(weights: SpinWeights) -> bool:
-    """Whether half the classes of levels have one weight and half another: ortho has the larger, para the smaller one."""
+    """Whether the classes of levels have two weights, equally often: ortho has the larger one, para the smaller one."""
     values = [value for value in weights.values if value]
     shares = [values.count(value) for value in sorted(set(values))]
     return len(shares) == 2 and shares[0] == shares[1]
 
 
 def _draw(axes: Any, column: Ints, energy: Floats, species: list[_Species], half_width: float) -> None:
-    """Steps in the colour of their spin species; those of levels without a state of the nuclear spins dotted."""
+    """Draw steps in the colour of their spin species; levels without a spin state are dotted."""
     many = len(energy) > MOST_VECTOR_STICKS
     for kind in species:
         if kind.rows.any():
@@ -232,17 +231,17 @@ def _draw(axes: Any, column: Ints, energy: Floats, species: list[_Species], half
 
 
 def _label(figure: Any, axes: Any, table: SelectedLevels, column: Ints, energy: Floats, half_width: float) -> None:
-    """The quantum numbers of each level right of its step, from the lowest up, wherever no other label stands.
+    """Label levels with quantum numbers to the right of their steps, from the lowest up, where no other label is in the way.
 
-    States and spin components of one rotational level share a label where their steps overlap, with all values of v or F.
+    States and spin components of one rotational level share a label if their steps overlap; it lists all values of v or F.
     """
     if len(table) > 20 * MOST_LABELS:
         return
-    figure.canvas.draw()  # places the axes, so that sizes in pixels are known
+    figure.canvas.draw()  # computes the layout, so that pixel sizes are valid
     last: dict[int, float] = {}
     pixels = axes.transData.transform(np.stack([column, energy], axis=1))[:, 1]
-    height = 5.8 * figure.dpi / 72.0  # of a label: capitals of 6 points
-    labelled, alike = 0, _rotational_levels(table)
+    height = 5.8 * figure.dpi / 72.0  # of a label with letters of 6 points
+    labelled, level_of_row = 0, _rotational_levels(table)
     unnamed = np.ones(len(table), dtype=bool)
     for row in np.argsort(energy, kind="stable").tolist():
         ladder = int(column[row])
@@ -250,14 +249,14 @@ def _label(figure: Any, axes: Any, table: SelectedLevels, column: Ints, energy: 
             continue
         last[ladder] = float(pixels[row])
         labelled += 1
-        merged = np.flatnonzero(unnamed & (alike == alike[row]) & (np.abs(pixels - pixels[row]) < height))
+        merged = np.flatnonzero(unnamed & (level_of_row == level_of_row[row]) & (np.abs(pixels - pixels[row]) < height))
         unnamed[merged] = False
         text = merged_text(table.levels.quanta, table.rows[merged], table.levels.halves)
         axes.text(ladder + half_width + 0.03, energy[row], text, fontsize=6, color=GREY, va="center", clip_on=True)
 
 
 def _rotational_levels(table: SelectedLevels) -> Ints:
-    """A number for each level, shared by all states and spin components of one rotational level."""
+    """Number of the rotational level for each row, shared by all its vibrational states and spin components."""
     quanta = of_rotation(table.levels.quanta)
     numbers = np.stack([column[table.rows] for name, column in quanta.items() if name != "v"], axis=1)
     return np.asarray(np.unique(numbers, axis=0, return_inverse=True)[1]).ravel()

@@ -1,4 +1,4 @@
-"""Pictures of known constants over a spectrum: sticks mirrored below its peaks, and Loomis-Wood rows."""
+"""Pictures of predicted lines over a spectrum: sticks mirrored below its peaks, and Loomis-Wood rows."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from rotor.spectra.lines import Lines
 MOST_ROWS = 60
 WINDOW_MHZ = 5.0  # on either side of a line
 MOST_NAMES = 24
-LEAST_NAMED = 1e-2  # of the strongest line in view
-BESIDE = 500  # a peak stands at a line within this part of the width of the picture
-LEAST_SHOWN = 1e-3  # of the strongest line in the band
+LEAST_NAMED = 1e-2  # relative to the strongest line in view
+BESIDE = 500  # a peak belongs to a line nearer than the width of the picture divided by this
+LEAST_SHOWN = 1e-3  # relative to the strongest line in the band
 
 
 def plot_over(
@@ -33,14 +33,14 @@ def plot_over(
     view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw peaks with the sticks of lines mirrored below them; heights (lines,) in the units of the peaks."""
+    """Draw peaks with the lines mirrored below them; heights (lines,) in units of the peaks."""
     checked_suffix(path)
     title = view.title or f"{peaks.source or 'spectrum'} and {name_of_top(lines.top)}"
     save(over_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
 
 
 def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view: View = WHOLE) -> Any:
-    """A matplotlib figure: peaks above, lines below the axis."""
+    """A matplotlib figure of peaks above the axis and lines below."""
     with styled():
         figure = new_figure((9.0, 4.5))
         axes = figure.add_subplot()
@@ -82,7 +82,7 @@ def _named_lines(axes: Any, lines: Lines, heights: Floats, peaks: PeakList) -> l
 
 
 def series_order(lines: Lines, rows: Ints) -> Ints:
-    """Rows in the order of series: lines of like change of quantum numbers and like Ka (or K) behind each other, by rising J."""
+    """Rows ordered by series: equal changes of quantum numbers and equal Ka (or K) together, by rising J."""
     quanta = {
         name: (values[lines.upper[rows]], values[lines.lower[rows]]) for name, values in lines.levels.quanta.items()
     }
@@ -104,16 +104,16 @@ def plot_loomis_wood(
     view: View = WHOLE,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw the Loomis-Wood rows of the strongest lines."""
+    """Draw Loomis-Wood rows of the strongest lines."""
     checked_suffix(path)
     title = view.title or f"{peaks.source or 'spectrum'} about lines of {name_of_top(lines.top)}"
     save(loomis_wood_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
 
 
 def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view: View = WHOLE) -> Any:
-    """A matplotlib figure: one row for each of the strongest lines, with the peaks near it by their distance, series by series.
+    """A matplotlib figure with a row for each of the strongest lines that shows the peaks near it, ordered by series.
 
-    Peaks of a species whose constants are right stand below each other at 0; those of wrong constants wander from row to row.
+    With correct constants the peaks of a species align at 0; with wrong constants they drift from row to row.
     """
     with styled():
         rows = np.argsort(-heights, kind="stable")[:MOST_ROWS]

@@ -1,4 +1,4 @@
-"""Pages of panels: an observed spectrum with a model over it, modelled lines named, blends marked, unidentified lines shown."""
+"""Pages of panels: an observed spectrum with a model, names of modelled lines, marks for blends and unidentified lines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rotor.plots.names import SPACE, Peak, name_peaks
 from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, new_figure, save, styled
 
 PANELS = 6  # on a page
-CHANNELS = 1500  # in a panel, where their number is not given
+CHANNELS = 1500  # default number in a panel
 _MOST_NAMES = 14
 _GAP = 20.0  # channels
 PAGE_INCHES = (8.3, 11.7)
@@ -33,19 +33,19 @@ def plot_overlay(
     title: str = "",
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Draw an observed spectrum with a model over it; a .pdf has as many pages as it needs, .png and .svg have one long page.
+    """Draw an observed spectrum with a model; a .pdf has as many pages as needed, .png and .svg one long page.
 
     Parameters
     ----------
     spectrum : ObservedSpectrum
     components : sequence of Component
-        The model; none draws the spectrum alone.
+        The model; empty for the spectrum alone.
     path : path
     sight : Sight, optional
     unidentified_mhz : sequence of float, optional
-        Marked by triangles.
+        Marked with triangles.
     panels : int, optional
-        Into how many the range is cut; by default one for every 1500 channels.
+        Number of panels; by default one for every 1500 channels.
     title : str, optional
     provenance : mapping, optional
         Written into the metadata of the file.
@@ -53,7 +53,7 @@ def plot_overlay(
     Raises
     ------
     ValueError
-        A suffix that is no picture.
+        For another suffix.
     """
     suffix = checked_suffix(path)
     requested = panels or max(1, round(len(spectrum) / CHANNELS))
@@ -87,7 +87,7 @@ def overlay_figure(
     *,
     title: str = "",
 ) -> Any:
-    """A matplotlib figure of some of the `count` panels of a spectrum."""
+    """A matplotlib figure of the panels `page` out of `count` panels of a spectrum."""
     edges = panel_ranges(spectrum, count)
     brightness = modelled(spectrum, components, sight) if components else np.zeros(len(spectrum))
     lines = line_table(spectrum, components, sight).columns
@@ -111,7 +111,7 @@ def overlay_figure(
 
 
 def panel_ranges(spectrum: ObservedSpectrum, count: int) -> list[tuple[float, float]]:
-    """First and last frequency of some `count` panels: at least one for each stretch without a gap."""
+    """First and last frequency of about `count` panels, at least one for each stretch without a gap."""
     gaps = np.flatnonzero(np.diff(spectrum.frequency_mhz) > _GAP * spectrum.channel_mhz) + 1
     share = len(spectrum) / count
     out = []
@@ -148,7 +148,7 @@ def _panel(
 def _name(
     axes: Any, lines: Mapping[str, Any], names: Sequence[str], spectrum: ObservedSpectrum, brightness: Floats
 ) -> None:
-    """Names above modelled lines in the colour of their species; a star marks a blend."""
+    """Name modelled lines in the colour of their species; a star marks a blend."""
     first, last = (1e3 * edge for edge in axes.get_xlim())
     total, observed = (
         lines[name] if name in lines else lines[f"{name}_k"] for name in ("total", "observed")

@@ -1,4 +1,4 @@
-"""What all pictures share: style, colours, names of molecules, and files with their provenance in the metadata."""
+"""Common parts of all pictures: style, colours, names of molecules, and files with provenance in their metadata."""
 
 from __future__ import annotations
 
@@ -15,7 +15,12 @@ from rotor.formats.molecules.library import atoms_of, written_formula
 from rotor.tops.top import Top
 from rotor.version import version
 
-BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#555555"  # Okabe and Ito's palette, for the colour-blind
+BLUE, ORANGE, GREEN, GREY = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#555555",
+)  # palette of Okabe and Ito, safe for colour-blind readers
 PALETTE = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -36,28 +41,28 @@ STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 8.0,
     "svg.fonttype": "none",
-    "svg.hashsalt": "rotor",  # the same picture is the same file
+    "svg.hashsalt": "rotor",  # equal pictures give equal files
     "pdf.fonttype": 42,
 }
 _USERS: ContextVar[dict[Any, Any] | None] = ContextVar("settings of the user's style", default=None)
 SIZE_INCHES = (7.2, 3.8)
 DPI = 200
 SUFFIXES = (".png", ".pdf", ".svg")
-MOST_VECTOR_STICKS = 5_000  # more are drawn as pixels inside a PDF or SVG
+MOST_VECTOR_STICKS = 5_000  # more sticks are drawn as pixels inside a PDF or SVG
 
 
 def checked_suffix(path: str | os.PathLike[str]) -> str:
-    """The suffix of a path in lower case; ValueError unless it is that of a picture."""
+    """The suffix of a path in lower case; ValueError unless it is .png, .pdf or .svg."""
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        raise ValueError(f"{os.fspath(path)}: a picture is .png, .pdf or .svg; the suffix names the format")
+        raise ValueError(f"{os.fspath(path)}: a picture is a .png, .pdf or .svg file")
     return suffix
 
 
 def new_figure(size: tuple[float, float] = SIZE_INCHES) -> Any:
-    """An empty matplotlib figure with a canvas of its own, in inches; draw on it inside `styled()`.
+    """An empty matplotlib figure with its canvas; size in inches. Draw on it inside `styled()`.
 
-    A style of the user may set the size and the resolution (figure.figsize, figure.dpi).
+    The user's style may set size and resolution (figure.figsize, figure.dpi).
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -69,7 +74,7 @@ def new_figure(size: tuple[float, float] = SIZE_INCHES) -> Any:
 
 
 def styled() -> Any:
-    """A context in which matplotlib has the style of the package, and over it that of the user."""
+    """Context with the package's matplotlib style, overlaid by the user's style."""
     import matplotlib as mpl
 
     users = _USERS.get() or {}
@@ -81,7 +86,7 @@ def styled() -> Any:
 
 
 def style_settings(style: str | os.PathLike[str]) -> dict[Any, Any]:
-    """The settings of a matplotlib style by its name, or of an .mplstyle file; ValueError for another name or a faulty file.
+    """Settings of a matplotlib style, by name or from an .mplstyle file; ValueError for an unknown name or a faulty file.
 
     >>> style_settings("ggplot")["axes.facecolor"]
     '#E5E5E5'
@@ -92,13 +97,13 @@ def style_settings(style: str | os.PathLike[str]) -> dict[Any, Any]:
     if name in styles.library:
         return dict(styles.library[name])
     if not name.endswith(".mplstyle") or not Path(name).is_file():
-        known = ", ".join(name for name in styles.available if not name.startswith(("_", "seaborn")))
-        raise ValueError(f"style {name!r}: expected an .mplstyle file, or a style of matplotlib, such as {known}")
+        styles_text = ", ".join(name for name in styles.available if not name.startswith(("_", "seaborn")))
+        raise ValueError(f"style {name!r}: expected an .mplstyle file, or a style of matplotlib, such as {styles_text}")
     return _read_style(name)
 
 
 def _read_style(path: str) -> dict[Any, Any]:
-    """The settings of an .mplstyle file; matplotlib writes what is wrong with it to its log alone."""
+    """Settings of an .mplstyle file; faults are collected from matplotlib's log, the only place where it reports them."""
     import logging
 
     import matplotlib as mpl
@@ -121,7 +126,7 @@ def _read_style(path: str) -> dict[Any, Any]:
 
 @contextmanager
 def users_style(style: str | os.PathLike[str] | None) -> Iterator[None]:
-    """Inside, pictures have a style of the user over that of the package: a name of matplotlib or an .mplstyle file; None for none."""
+    """Context in which pictures have the user's style over that of the package; a matplotlib name, an .mplstyle file, or None."""
     token = _USERS.set(None if style is None else style_settings(style))
     try:
         yield
@@ -130,7 +135,7 @@ def users_style(style: str | os.PathLike[str] | None) -> Iterator[None]:
 
 
 def use_style() -> None:
-    """Give all further pictures of matplotlib the style of the package: colours, sizes of letters, axes without a frame.
+    """Give all further matplotlib pictures the package's style: colours, letter sizes, axes without a frame.
 
     >>> import matplotlib
     >>> with matplotlib.rc_context():
@@ -144,7 +149,7 @@ def use_style() -> None:
 
 
 def panel(axes: Any = None, size: tuple[float, float] = SIZE_INCHES) -> tuple[Any, Any]:
-    """A figure and the one panel that is drawn on: the axes of a user, or those of a new figure."""
+    """A figure and one panel: the user's axes, or those of a new figure."""
     if axes is not None:
         return axes.figure, axes
     figure = new_figure(size)
@@ -152,7 +157,7 @@ def panel(axes: Any = None, size: tuple[float, float] = SIZE_INCHES) -> tuple[An
 
 
 def legend_below(figure: Any, axes: Any, **options: Any) -> None:
-    """A legend below the only panel of a figure; inside the axes of a user, whose figure may have others."""
+    """Put a legend below the only panel of a figure, or inside the user's axes, whose figure may have others."""
     layout = figure.get_layout_engine() if hasattr(figure, "get_layout_engine") else None
     if len(figure.axes) == 1 and layout is not None:
         if "ncols" in options:  # as many as fit the width
@@ -163,45 +168,45 @@ def legend_below(figure: Any, axes: Any, **options: Any) -> None:
 
 
 def save(figure: Any, path: str | os.PathLike[str], title: str, facts: Mapping[str, Any]) -> None:
-    """Write a figure with its title and facts, as JSON, in the metadata; no date, so that like pictures are like files.
+    """Write a figure with title and facts (as JSON) in its metadata; without a date, so that equal pictures give equal files.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
-        What is written.
+        Figure to write.
     path : path
         A .png, .pdf or .svg file.
     title : str
-        Dollar signs of formulas are left out of the metadata.
+        Title; dollar signs of formulas are removed.
     facts : mapping
-        What the metadata says of the picture.
+        Content of the metadata.
 
     Raises
     ------
     ValueError
-        For a suffix that is no picture.
+        For another suffix.
     """
     save_described(figure, path, title, json.dumps(dict(facts), ensure_ascii=False, default=str))
 
 
 def save_described(figure: Any, path: str | os.PathLike[str], title: str, description: str) -> None:
-    """Write a figure with its title and a text of what it shows, by the keys that each format has.
+    """Write a figure with title and description under the metadata keys of its format.
 
     Parameters
     ----------
     figure : matplotlib.figure.Figure
-        What is written.
+        Figure to write.
     path : path
         A .png, .pdf or .svg file.
     title : str
-        Dollar signs of formulas are left out of the metadata.
+        Title; dollar signs of formulas are removed.
     description : str
-        What the metadata says of the picture.
+        Content of the metadata.
 
     Raises
     ------
     ValueError
-        For a suffix that is no picture.
+        For another suffix.
     """
     suffix, plain, program = checked_suffix(path), title.replace("$", ""), f"rotor {version()}"
     if suffix == ".png":
@@ -244,7 +249,7 @@ def _widest(text: Any, separator: str = "\n") -> float:
 
 
 def joined(*facts: Mapping[str, Any] | None) -> str:
-    """Facts as one text, later ones instead of earlier ones of the same name.
+    """Facts as one text; later facts replace earlier ones with the same name.
 
     >>> joined({"command": "a", "jmax": 1}, {"jmax": 2}, None)
     'command: a; jmax: 2'
@@ -254,7 +259,7 @@ def joined(*facts: Mapping[str, Any] | None) -> str:
 
 
 def formula_text(formula: str) -> str:
-    """A formula with subscripts and isotope numbers in matplotlib's mathtext.
+    """A formula in matplotlib's mathtext, with subscripts and isotope numbers.
 
     >>> formula_text("C[13C]H6O"), formula_text("H3O+")
     ('C$^{13}$CH$_{6}$O', 'H$_{3}$O$^{+}$')
@@ -266,7 +271,7 @@ def formula_text(formula: str) -> str:
 
 
 def name_of_top(top: Top) -> str:
-    """Name and formula of a top for the head of a picture; the formula as the library writes it, else in Hill's order.
+    """Name and formula of a top for a picture's title; the formula as in the library, else in Hill order.
 
     >>> from rotor.formats.read_write import read
     >>> name_of_top(read("HC3N")), name_of_top(Top.from_constants("B=1 GHz", name="SO2"))
@@ -277,12 +282,12 @@ def name_of_top(top: Top) -> str:
     formula = top.molecule.formula
     written, name = written_formula(top.name, formula), top.name.removesuffix(f" ({formula})")
     if _COMPOSED.fullmatch(name) and atoms_of(name) == atoms_of(formula):
-        return name_text(name)  # it says all that the formula does
+        return name_text(name)  # the name is the formula
     return ", ".join(dict.fromkeys(filter(None, (name_text(name), formula_text(written))))) or f"{top.kind} top"
 
 
 def name_text(name: str) -> str:
-    """A name for matplotlib: with subscripts where it is a formula, else as it is.
+    """A name for matplotlib, with subscripts if it is a formula.
 
     >>> name_text("SO2"), name_text("water"), name_text("c064502.cat")
     ('SO$_{2}$', 'water', 'c064502.cat')

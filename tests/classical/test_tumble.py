@@ -266,7 +266,7 @@ def test_mp4_without_ffmpeg_is_refused(call, tmp_path):
     with matplotlib.rc_context({"animation.ffmpeg_path": "no-such-program"}):
         code, out, err = call("tumble", "water", "--gif", "a.mp4", "--csv", "a.csv")
     assert code == 2
-    assert err.startswith("error: --gif: a.mp4: an mp4 is made by ffmpeg, which is not installed here")
+    assert err.startswith("error: --gif: a.mp4: an mp4 needs ffmpeg, which is not installed")
     assert err.count("\n") == 1
     assert out == ""
     assert not list(tmp_path.iterdir())

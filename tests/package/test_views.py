@@ -103,7 +103,7 @@ def test_scales(call, folder, figures, command, axis, scale):
         (("stark", "OCS", *OCS, "--plot", "a.png", "--plot-range", "5:3"), "--plot-range: '5:3': the range must rise"),
         (("levels", "CO", "--plot", "a.png", "--plot-vertical", "1:2GHz"), "--plot-vertical: '1:2GHz': expected plain"),
         (("thermo", "CO", "--plot", "a.png", "--plot-scale", "square"), "--plot-scale: 'square': expected one of"),
-        (("levels", "CO", "--plot", "a.png", "--plot-range", "50:60"), "there is no level between the limits"),
+        (("levels", "CO", "--plot", "a.png", "--plot-range", "50:60"), "no level inside the limits of the picture"),
         (("stark", "OCS", *OCS, "--plot", "a.png", "--plot-range", "1:2"), "the map has 0 of its fields from 1 to 2"),
         (("raman", "N2", "--plot", "a.png", "--plot-range", "1:2"), "there is no line between 1 and 2 cm-1"),
         (
