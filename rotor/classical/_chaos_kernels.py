@@ -1,7 +1,7 @@
-"""Compiled orbits and tangent vectors of flows that are quadratic, dy/dt = c + A y + Q(y, y), by DOP853.
+"""Compiled orbits and tangent vectors of quadratic flows, dy/dt = c + A y + Q(y, y), by DOP853.
 
-Bodies with linear drag or feedback, constant body torques and rotors inside are of this kind. Tangent vectors are the
-columns of a matrix beside the state; the mean of the trace is integrated along with them.
+Bodies with linear drag or feedback, constant body torques and internal rotors have such flows. Tangent vectors are the
+columns of a matrix next to the state; the mean of the trace is integrated with them.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def _slopes(form: Any, table: Floats, out: Floats) -> None:
 
 @njit(cache=True)
 def _stepped(form: Any, tableau: Any, table: Floats, h: float, k: Floats, work: Floats) -> float:
-    """One step of length h in place if its error estimate, which is returned, is at most 1."""
+    """Try a step of length h; it is made in place if the returned error estimate is at most 1."""
     a, b, e3, e5, tolerance = tableau
     for stage in range(STAGES):
         work[:] = table
@@ -93,7 +93,7 @@ def _orthogonal(table: Floats, grown: Floats) -> None:
 def follow(
     form: Any, tableau: Any, table: Floats, interval: float, intervals: int, first: float, grown: Floats
 ) -> tuple[float, int]:
-    """Advance by `intervals` intervals, orthogonalising after each; the next step, 0 where none serves, and how many were made."""
+    """Advance by `intervals` intervals, orthogonalising after each; return the next step (0 if none suffices) and the number of steps."""
     k, work = np.zeros((STAGES, *table.shape)), np.empty_like(table)
     step, steps = first, 0
     for _ in range(intervals):

@@ -1,7 +1,7 @@
 """Compiled forms of the plain functions that several kernels of classical motion share.
 
-The source of each is the plain function named; nothing is written a second time. Kernels are cached on disk by the date
-of their own file: after a change of a plain function remove the caches (CONTRIBUTING.md says how).
+Each is compiled from the plain function of the same name, so that no formula is written twice. Kernels are cached on disk by the
+date of their file only: after a change of a plain function remove the caches (see CONTRIBUTING.md).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Ordinary bodies by name, made of uniform parts: a book, a phone, a racket, a wing nut.
 
-Sizes and masses are round numbers chosen here for an ordinary body of its kind; they were not measured. The moments of parts
-and their sum are those of `rotor.geometry.inertia`.
+Sizes and masses are typical round numbers, not measurements. The moments of the parts and their sum come from
+`rotor.geometry.inertia`.
 """
 
 from __future__ import annotations
@@ -81,13 +81,13 @@ BODIES: dict[str, NamedBody] = {
 
 
 def named_body(name: str) -> NamedBody:
-    """A body by its name, in any case, with or without the blank; ValueError for another name.
+    """A body by its name, ignoring case and blanks; ValueError for other names.
 
     >>> named_body("Wing-Nut").name
     'wing nut'
     """
     key = "".join(letter for letter in name.casefold() if letter.isalnum())
-    for known, body in BODIES.items():
-        if known.replace(" ", "") == key:
+    for body_name, body in BODIES.items():
+        if body_name.replace(" ", "") == key:
             return body
     raise ValueError(f"{name!r}: expected one of {', '.join(BODIES)}")

@@ -1,6 +1,6 @@
-"""A request for the motion of one body under effects, and what answers it: torques, drag, drives, gyrostats, gravity, contact.
+"""Request and answer for the motion of a body under effects: torques, drag, drives, gyrostats, gravity, contact.
 
-The free body has an exact motion of its own (`rotor.classical.tumble`); here the equations are stepped.
+The equations are integrated by steps; free bodies have an exact motion (`rotor.classical.tumble`).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ BODY_EFFECTS = Choices("effect", named_effects, "EFFECT")
 
 @dataclass(frozen=True)
 class DrivenRequest:
-    """A motion under effects to compute; every field is checked when the request is made.
+    """A motion under effects to compute; all fields are checked when the request is made.
 
     moments: (3,), principal moments. times: (n,), the start first. effects: that act. angular_velocity: (3,) in body axes at the
     start; angular_momentum: instead, with what the effects add to it. attitude: quaternion, body to space, at the start.
@@ -72,7 +72,7 @@ class DrivenRequest:
         checked_momentum(self.momentum, moments)
 
     def _check_step(self) -> None:
-        """Refuse effects that a splitting does not hold, and steps of no length or order."""
+        """Refuse effects that a splitting cannot treat, and invalid steps or orders."""
         system = system_of(self.moments, self.effects)
         if self.step is not None and (system.needs_velocity or system.added):
             raise ValueError(
@@ -83,7 +83,7 @@ class DrivenRequest:
 
     @property
     def method(self) -> Method:
-        """What steps the motion."""
+        """The integrator of the motion."""
         if self.step is None:
             return LieRungeKutta(self.tolerance)
         from rotor.classical.integrators.splitting import SymmetricTopSplitting
@@ -128,23 +128,23 @@ class DrivenAnswer:
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the attitude can be trusted, in rad, at the worst of the times; a finer motion is made for it where that is short."""
+        """Error budget of the attitude, in rad, at the worst of the times; a short motion is repeated with finer steps for it."""
         request = self.request
         compiled = system_of(request.moments, request.effects).compiled is not None
         tolerance = None if request.step is not None else request.tolerance
         return driven_budget(self.motion, truncation_of_steps(self.motion, compiled, tolerance, self._finer))
 
     def _finer(self, setting: float) -> Motion:
-        """The motion to another tolerance; of fixed steps, with its step divided by a number."""
+        """The motion with another tolerance, or with the fixed step divided by `setting`."""
         step = self.request.step
         if step is None:
             return motion_of(replace(self.request, tolerance=setting))
         return motion_of(replace(self.request, step=step / setting))
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table.
+        """Facts of the answer except its table.
 
-        energy_drift: largest change of the energy over the largest kinetic one, where every effect conserves it; else None.
+        energy_drift: largest change of the energy over the largest kinetic energy if all effects conserve energy, otherwise None.
         """
         energy = self.motion.energy
         conserved = all(effect.conserves_energy for effect in self.request.effects)
@@ -168,11 +168,11 @@ class DrivenAnswer:
 def answer_driven(request: DrivenRequest) -> DrivenAnswer:
     """The motion of a request.
 
-    Raises ValueError for a method that cannot serve an effect, and for a motion that does not stay finite.
+    Raises ValueError for a method that cannot treat an effect, and for a motion that does not stay finite.
 
     >>> from rotor.classical.effects.drag import LinearDrag
-    >>> asked = DrivenRequest((1.0, 1.0, 1.0), (0.0, 1.0), (LinearDrag([1, 1, 1]),), angular_velocity=(0.0, 0.0, 1.0))
-    >>> round(float(answer_driven(asked).table.columns["w3"][-1]), 9)  # exp(-1)
+    >>> request = DrivenRequest((1.0, 1.0, 1.0), (0.0, 1.0), (LinearDrag([1, 1, 1]),), angular_velocity=(0.0, 0.0, 1.0))
+    >>> round(float(answer_driven(request).table.columns["w3"][-1]), 9)  # exp(-1)
     0.367879441
     """
     return DrivenAnswer(request, motion_of(request))

@@ -1,7 +1,7 @@
 """The interface of a classical effect: a torque, an inner angular momentum, added inertia, or moments that change in time.
 
-An effect is one object in one file of `rotor.classical.effects`. Integrators take a list of effects and compute only
-what is in it.
+Each effect is a class in its own file of `rotor.classical.effects`. Integrators accept a list of effects and compute only
+these.
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ class ClassicalEffect:
 
         dL/dt = L x ω + Σ torques,   L = (I(t) + A) ω + h,   h = Σ inner momenta,   A = Σ added inertia.
 
-    An effect is one or more of the four kinds below; this base only names what each says of itself: `conserves_energy`
-    means ½ (L - h)·ω + potential energy, `conserves_momentum` means L seen from space; `depends_on_time` says whether the
-    time itself enters, as in a drive.
+    An effect belongs to one or more of the four kinds below. Attributes of this base: `conserves_energy` refers to
+    ½ (L - h)·ω + potential energy, `conserves_momentum` to L in space; `depends_on_time` is an explicit time dependence, as in a drive.
     """
 
     name: ClassVar[str] = ""  # in scenes and on the command line; its declared fields are its parameters there
@@ -35,7 +34,7 @@ class ClassicalEffect:
 
 
 class Torque(ClassicalEffect, ABC):
-    """A torque. `needs_velocity` says that it depends on ω: then no splitting into drifts and kicks serves."""
+    """A torque. `needs_velocity`: it depends on ω, which excludes splittings into drifts and kicks."""
 
     needs_velocity: ClassVar[bool] = False
 
@@ -48,11 +47,11 @@ class Torque(ClassicalEffect, ABC):
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
         """Torque on the body in body axes (..., 3) from attitude (..., 4) and angular velocity in body axes (..., 3).
 
-        Where `needs_velocity` is False, `omega` is not looked at.
+        `omega` is ignored unless `needs_velocity` is True.
         """
 
     def potential_energy(self, time: float, attitude: Floats) -> Floats | float:
-        """Energy (...,) whose change with attitude is the torque; zero for a torque that has none."""
+        """Potential energy (...,) of the torque as a function of the attitude; zero for a torque without potential."""
         return 0.0
 
     def compiled_form(self) -> TorqueForm | None:
@@ -68,14 +67,14 @@ class InnerMomentum(ClassicalEffect, ABC):
         """h in body axes (3,) at `time`."""
 
     def compiled_form(self) -> Floats | None:
-        """h (3,) where it never changes, for compiled integrators; else None."""
+        """h (3,) for compiled integrators if it is constant, otherwise None."""
         return None
 
 
 class AddedInertia(ClassicalEffect, ABC):
-    """Inertia that comes with the motion from outside: a contact that the body rolls on, a fluid that is pushed aside.
+    """Added inertia from outside: a rolling contact, or displaced fluid.
 
-    L then includes A ω. No splitting into drifts and kicks serves; `LieRungeKutta` does. Constant inertia along the principal
+    L then includes A ω. Splittings into drifts and kicks do not apply; use `LieRungeKutta`. Constant inertia along the principal
     axes needs no effect: add it to the moments.
     """
 
@@ -90,11 +89,11 @@ class AddedInertia(ClassicalEffect, ABC):
 
 
 class InertiaChange(ClassicalEffect, ABC):
-    """Moments that change in time while the principal axes stay."""
+    """Moments that change in time about fixed principal axes."""
 
     @abstractmethod
     def moments(self, time: float) -> Floats:
-        """Principal moments (..., 3) at `time`, in place of those the motion was started with."""
+        """Principal moments (..., 3) at `time`; they replace the initial ones."""
 
 
 def vector_field(name: str, help: str, default: Any = REQUIRED) -> Any:
@@ -118,9 +117,9 @@ def frame_field() -> Any:
 
 
 def named_effects() -> dict[str, type[ClassicalEffect]]:
-    """Every effect that has a name, by it: those of `rotor.classical.effects`, and those of modules that are imported already.
+    """All named effects: those of `rotor.classical.effects`, and those of modules imported so far.
 
-    A class without a name in its own body, such as a user's variant of a named effect, does not take the place of that effect.
+    A subclass that only inherits a name, such as a user's variant of an effect, does not replace that effect.
     """
     for path in sorted((Path(__file__).parent / "effects").glob("[a-z]*.py")):
         import_module(f"rotor.classical.effects.{path.stem}")

@@ -24,12 +24,12 @@ from rotor.geometry.inertia import kinetic_energy_by_axis
 from rotor.geometry.quaternions import cross
 from rotor.geometry.rotations import multiply, rotate
 
-LINEAR_MISMATCH = 1e-12  # the two moments of a linear rotor are the same number but for round-off
+LINEAR_MISMATCH = 1e-12  # relative difference of the two moments of a linear rotor: round-off
 
 
 @dataclass(frozen=True)
 class Invariants:
-    """What torque-free motion conserves.
+    """Conserved quantities of torque-free motion.
 
     energy: (...), ½ Σ L_i²/I_i.  momentum: (...), |L|.  space_momentum: (..., 3), L seen from space.
     """
@@ -40,7 +40,7 @@ class Invariants:
 
 
 def gyroscopic_term(momentum: Any, omega: Any) -> Any:
-    """L x ω by components, three floats or arrays each: what turns L in the body where there is no torque.
+    """L x ω by components, three floats or arrays each: dL/dt in the body without torque.
 
     >>> gyroscopic_term((0.0, 2.0, 3.0), (0.0, 1.0, 1.0))
     (-1.0, 0.0, 0.0)
@@ -101,7 +101,7 @@ def checked_momentum(momentum: ArrayLike, moments: Floats) -> Floats:
 
 
 def inverse_moments(moments: ArrayLike) -> Floats:
-    """1/I_i, and 0 for the axis of a linear rotor, which never turns about itself.
+    """1/I_i, and 0 for the axis of a linear rotor, about which it does not rotate.
 
     >>> inverse_moments([0.0, 2.0, 2.0])
     array([0. , 0.5, 0.5])
@@ -152,7 +152,7 @@ def energy(momentum: ArrayLike, moments: ArrayLike) -> Floats:
 
 
 def invariants(momentum: ArrayLike, attitude: ArrayLike, moments: ArrayLike) -> Invariants:
-    """Energy, |L| and L in space of a motion: the numbers a free motion may not change.
+    """Energy, |L| and L in space of a motion, which a free motion conserves.
 
     >>> invariants([1.0, 2.0, 2.0], [1.0, 0.0, 0.0, 0.0], [1.0, 2.0, 4.0]).momentum
     np.float64(3.0)

@@ -7,11 +7,11 @@
 | rounding | of a length once in τ, and of each step; central differences of a Jacobian that is not exact |
 | statistics | standard error of the mean over segments |
 
-t0 and t1 are the times since the tangent vectors were any at which the average begins and ends. In a basis of two vectors whose lengths
-grow with λ and λ - g, that which began along the second, sheared by s, has the length s (e^λt - e^(λ-g)t)/g: it grows faster than λ by
-g/(e^gt - 1) ≤ 1/t, and that is what the first line sums; the 2 is for bodies whose lengths oscillate besides. A vector that begins nearly
-along the wrong one differs by more, and so do then the segments: the bound is that of both, with twice the standard error. Gaps are reduced
-by three standard errors. λ1 is the largest exponent, or 0.
+t0 and t1 are the begin and end of the average, counted from the arbitrary initial tangent vectors. Consider two vectors whose lengths
+grow with λ and λ - g. A vector initially along the second, sheared by s, has the length s (e^λt - e^(λ-g)t)/g. It grows faster than λ by
+g/(e^gt - 1) ≤ 1/t, which the first line integrates; the factor 2 allows for bodies whose lengths also oscillate. A vector that starts
+nearly along the wrong direction deviates more, but then the segments deviate too: the bound includes twice the standard error. Gaps are
+reduced by three standard errors. λ1 is the largest exponent, or 0.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ CONFIDENT = 2.0  # standard errors that an accuracy allows for
 
 @dataclass(frozen=True)
 class Growth:
-    """What tangent vectors grew by: rates (segments, m), mean trace of the Jacobian (segments,), steps per time.
+    """Growth of the tangent vectors: rates (segments, m), mean trace of the Jacobian (segments,), steps per time.
 
-    exact_slopes: whether the Jacobian is exact, not from differences. whole: whether all exponents of the flow were followed.
+    exact_slopes: whether the Jacobian is exact, not from differences. whole: whether all exponents of the flow were computed.
     """
 
     rates: Floats
@@ -49,7 +49,7 @@ class Growth:
 
 @dataclass(frozen=True)
 class Settings:
-    """Times before and in which vectors were measured, the whole time, that between orthogonalisations, and the tolerance of a step."""
+    """Alignment time, measuring time, total time, time between orthogonalisations, and tolerance of a step."""
 
     before: float
     measured: float
@@ -59,7 +59,7 @@ class Settings:
 
     @property
     def bias(self) -> float:
-        """ln(t2/t1)/(t2 - t1) of vectors that have grown in proportion to time since before the measurement."""
+        """Bias ln(t2/t1)/(t2 - t1) from vectors that grow in proportion to time."""
         return float(np.log1p(self.measured / self.before) / self.measured)
 
 
@@ -69,7 +69,7 @@ class Exponents:
 
     values: (m,), means over segments of orbit. errors: (m,), the standard error of the mean and `bias`, added in squares.
     divergence: mean trace of the Jacobian, which the sum of a full spectrum equals. time: total time averaged over.
-    bias: what a growth in proportion to time, which is no exponent, would add to a value (see the head of `rotor.classical.lyapunov`).
+    bias: contribution of a linear growth in time, which is not an exponent (see the head of `rotor.classical.lyapunov`).
     rounding, truncation: (m,), bounds. spread: (m,), the standard error of the mean alone.
     """
 
@@ -89,7 +89,7 @@ class Exponents:
 
     @property
     def reached(self) -> float:
-        """What an accuracy is compared with: bounds and twice the standard error, of the least certain exponent."""
+        """The error to compare with an accuracy: bounds and twice the standard error of the least certain exponent."""
         return float(np.max(self.rounding + self.truncation + CONFIDENT * self.spread))
 
     @property
@@ -140,7 +140,7 @@ def exponents_of(growth: Growth, settings: Settings) -> Exponents:
 
 
 def _finite_time(values: Floats, spread: Floats, settings: Settings, whole: bool) -> Floats:
-    """What a finite time makes of exponents by the gap to the nearest other one; of one that was not followed there is none."""
+    """Error of exponents from a finite time, by the gap to the nearest other exponent; without a gap for one that was not computed."""
     gaps = np.maximum(-np.diff(values) - 3.0 * np.hypot(spread[1:], spread[:-1]), 0.0)
     nearest = np.minimum(np.append(gaps, np.inf if whole else 0.0), np.append(np.inf, gaps))
     nearest = np.clip(nearest * settings.before, 1e-12, 1e3) / settings.before  # from ln(t1/t0) to twelve digits, to 0
@@ -151,8 +151,8 @@ def _finite_time(values: Floats, spread: Floats, settings: Settings, whole: bool
 def kaplan_yorke(exponents: ArrayLike) -> float:
     """Dimension j + Σ_{i<=j} λ_i / |λ_{j+1}|, j the largest number of exponents whose sum is not negative.
 
-    (J. L. Kaplan and J. A. Yorke, Lect. Notes Math. 730, 204 (1979).) A spectrum whose sum is not negative fills its
-    space; one whose first exponent is negative ends in a point.
+    (J. L. Kaplan and J. A. Yorke, Lect. Notes Math. 730, 204 (1979).) It is the dimension of the space if the sum of all exponents
+    is not negative, and 0 if the first exponent is negative.
 
     >>> kaplan_yorke([0.5, 0.0, -2.0])
     2.25

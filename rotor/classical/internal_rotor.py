@@ -1,4 +1,4 @@
-"""A body in which a symmetric top turns against a periodic potential: the classical motion over the barrier of an internal rotation.
+"""A body with a symmetric internal top in a periodic potential: the classical motion of a hindered internal rotation.
 
 With the moments I of the whole (the top locked), the top's moment I_t about its axis λ, its angle α in the body and V(α),
 
@@ -9,8 +9,8 @@ A symmetric top leaves I constant. Eliminating ω and α' with J = I - I_t λλ�
     H = ½ (L - pλ)·J⁻¹(L - pλ) + p²/2I_t + V(α),
     dL/dt = L x ω,    dp/dt = -V'(α),    dα/dt = p/I_t - λ·ω,    ω = J⁻¹(L - pλ):
 
-Kelvin's gyrostat (`rotor.classical.effects.gyrostat`) whose rotor has a torque. Without V, p is constant; behind a high barrier the body is
-rigid with the moments I. At L = 0 it is a pendulum with 1/I_red = 1/I_t + λ·J⁻¹λ, the F = ħ²/2I_red of the quantum mechanics.
+Kelvin's gyrostat (`rotor.classical.effects.gyrostat`) with a torque on its rotor. Without V, p is constant; for a high barrier the body is
+rigid with the moments I. At L = 0 it is a pendulum with 1/I_red = 1/I_t + λ·J⁻¹λ, which gives the quantum-mechanical F = ħ²/2I_red.
 
 A step splits H into flows that are exact: V kicks p; -p b·L, b = J⁻¹λ, turns L and the body about b at the rate -p |b|, and α with it;
 ½ L·J⁻¹L is the free body, stepped by Euler's core. Their symmetric composition is symplectic, of order 2, and conserves L in space.
@@ -34,15 +34,15 @@ from rotor.geometry.rotations import IDENTITY, conjugate, exp, from_matrix, mult
 
 @dataclass(frozen=True, eq=False)
 class TurningTop:
-    """A body with a top that turns in it, in any coherent units.
+    """A body with an internal top, in any coherent units.
 
     Parameters
     ----------
     moments : (3,) array
         Principal moments of the whole with the top locked.
     axis : (3,) array
-        λ along the principal axes, of any length.
-    own : float
+        Direction λ in the principal axes, of any length.
+    top_moment : float
         I_t.
     barriers, sines : mapping of int to float
         V_n and W_n of V = Σ ½ V_n (1 - cos nα) + Σ ½ W_n sin nα, energies.
@@ -56,7 +56,7 @@ class TurningTop:
 
     moments: ArrayLike
     axis: ArrayLike
-    own: float
+    top_moment: float
     barriers: Mapping[int, float] = field(default_factory=dict)
     sines: Mapping[int, float] = field(default_factory=dict)
 
@@ -72,23 +72,23 @@ class TurningTop:
             object.__setattr__(self, name, MappingProxyType(terms))
         object.__setattr__(self, "moments", moments)
         object.__setattr__(self, "axis", axis / length)
-        if not self.own > 0 or not self.rest_moments[0] > 0:
+        if not self.top_moment > 0 or not self.rest_moments[0] > 0:
             raise ValueError(
-                f"moment of a top {self.own:g}: expected a number above 0 that leaves the rest of the body moments above 0"
+                f"moment of a top {self.top_moment:g}: expected a number above 0 that leaves the rest of the body moments above 0"
             )
 
     @cached_property
     def _rest(self) -> tuple[Floats, Floats]:
         """Principal moments of J, and its axes as columns along those of the whole; a proper rotation."""
         axis = np.asarray(self.axis, dtype=float)
-        whole = np.diag(np.asarray(self.moments)) - self.own * np.outer(axis, axis)
+        whole = np.diag(np.asarray(self.moments)) - self.top_moment * np.outer(axis, axis)
         moments, axes = np.linalg.eigh(whole)
         axes[:, 2] *= np.sign(np.linalg.det(axes))
         return moments, axes
 
     @property
     def rest_moments(self) -> Floats:
-        """Principal moments (3,) of the body without the axial moment of its top, rising."""
+        """Principal moments (3,) of the body without the axial moment of its top, in increasing order."""
         return self._rest[0]
 
     @property
@@ -104,7 +104,7 @@ class TurningTop:
     @cached_property
     def reduced_moment(self) -> float:
         """I_red of 1/I_red = 1/I_t + λ·J⁻¹λ."""
-        return float(1 / (1 / self.own + np.sum(self._axis**2 / self.rest_moments)))
+        return float(1 / (1 / self.top_moment + np.sum(self._axis**2 / self.rest_moments)))
 
     def potential(self, angle: ArrayLike) -> Floats:
         """V at angles."""
@@ -127,12 +127,14 @@ class TurningTop:
     def energy(self, momentum: ArrayLike, p: ArrayLike, angle: ArrayLike) -> Floats:
         """H (n,) of momenta (n, 3) along the principal axes of the whole, p (n,) and angles (n,)."""
         torsion, relative, velocity = self._relative(momentum, p)
-        return np.asarray(kinetic_energy(relative, velocity) + torsion**2 / (2 * self.own) + self.potential(angle))
+        return np.asarray(
+            kinetic_energy(relative, velocity) + torsion**2 / (2 * self.top_moment) + self.potential(angle)
+        )
 
     def angle_rate(self, momentum: ArrayLike, p: ArrayLike) -> Floats:
         """α' (n,) of momenta (n, 3) along the principal axes of the whole."""
         torsion, _, velocity = self._relative(momentum, p)
-        return np.asarray(torsion / self.own - velocity @ self._axis)
+        return np.asarray(torsion / self.top_moment - velocity @ self._axis)
 
     def angular_velocity(self, momentum: ArrayLike, p: ArrayLike) -> Floats:
         """ω (n, 3) of the body, along the principal axes of the whole, of momenta along these."""
@@ -146,7 +148,7 @@ class TurningTop:
 
     def thermal(self, kt: float, count: int, *, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
         """L (n, 3), p (n,) and α (n,) of a gas at kT: L - pλ and p are Gaussian, α is drawn from exp(-V/kT) on a grid of 4096 angles."""
-        p = rng.normal(scale=np.sqrt(self.own * kt), size=count)
+        p = rng.normal(scale=np.sqrt(self.top_moment * kt), size=count)
         relative = rng.normal(size=(count, 3)) * np.sqrt(self.rest_moments * kt)
         angles = 2 * np.pi * np.arange(4096) / 4096
         weight = np.exp(-self.potential(angles) / kt)
@@ -185,7 +187,7 @@ def turning_motion(
     step: float,
     attitude: ArrayLike = IDENTITY,
 ) -> TurningMotion:
-    """The motion of bodies with a turning top.
+    """The motion of bodies with an internal top.
 
     Parameters
     ----------

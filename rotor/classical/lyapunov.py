@@ -1,14 +1,13 @@
 """Chaos of driven and damped bodies: Lyapunov exponents, Kaplan-Yorke dimension, Poincaré sections.
 
-Exponents are those of the linearised flow along an orbit: one tangent vector for each exponent is carried along, made
-orthogonal again at short intervals, and the logarithms of what they grew by are averaged (G. Benettin, L. Galgani,
-A. Giorgilli, J.-M. Strelcyn, Meccanica 15, 9 (1980)). The full sum equals the mean divergence of the flow, which is
-integrated beside it and is the check that every result carries.
+Exponents are those of the linearised flow along an orbit: a tangent vector for each exponent is propagated and reorthogonalised at
+short intervals, and the logarithms of the growth factors are averaged (G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn,
+Meccanica 15, 9 (1980)). The sum of all exponents equals the mean divergence of the flow, which is integrated too and checks each result.
 
-A free top has no positive exponent: its tumbling is periodic in the body. Its tangent vectors grow all the same, in proportion
-to time, because neighbouring orbits have other periods. Over a finite time that reads as an exponent: a length that grows from
-t1 to t2 in proportion to t gives ln(t2/t1)/(t2 - t1), which vanishes as ln t/t. No finite calculation can tell that apart from
-a small exponent, so this bias is part of every error.
+A free top has no positive exponent: its tumbling is periodic in the body. Its tangent vectors nevertheless grow in proportion to time,
+because neighbouring orbits have different periods. A length that grows from t1 to t2 in proportion to t appears as an exponent
+ln(t2/t1)/(t2 - t1), which vanishes as ln t/t. No finite calculation can distinguish this from a small exponent, so this bias is
+included in all errors.
 """
 
 from __future__ import annotations
@@ -32,9 +31,9 @@ DOUBLINGS = 10  # of the time, for an accuracy
 
 @dataclass(frozen=True)
 class Flow:
-    """dy/dt = rate(t, y) for states y (k, d), and its Jacobian (k, d, d), by central differences where none is given.
+    """dy/dt = rate(t, y) for states y (k, d), and its Jacobian (k, d, d), by default from central differences.
 
-    `start` is one state (d,); `timed` says whether the rate depends on the time itself, as under a periodic drive.
+    `start`: initial state (d,); `timed`: whether the rate depends explicitly on time, as with a periodic drive.
     """
 
     rate: Callable[[float, Floats], Floats]
@@ -69,15 +68,15 @@ def body_flow(
     momentum0 : (3,) array
         Angular momentum in body axes at the start.
     effects : sequence of ClassicalEffect
-        As of `rotor.classical.integrators.method.integrate`.
+        As for `rotor.classical.integrators.method.integrate`.
     attitude0 : (4,) array
-        Body to space at the start.
+        Initial attitude, body to space.
 
     Returns
     -------
     Flow
-        Of y = L (3,), or (L, q) (7,) where a torque depends on the attitude; the quaternion's length then adds one exponent that
-        is zero.
+        The flow of y = L (3,), or of (L, q) (7,) if a torque depends on the attitude; the length of the quaternion then adds a zero
+        exponent.
 
     Examples
     --------
@@ -119,16 +118,16 @@ def lyapunov_exponents(
     Parameters
     ----------
     flow : Flow
-        What is followed. A flow that is found to be quadratic (`quadratic_form`) is followed by a compiled loop, about a
-        hundred times faster; of others the segments are followed side by side, which costs hardly more than one.
+        The flow. A quadratic flow (`quadratic_form`) is integrated by a compiled loop, about a hundred times faster; for others
+        all segments are integrated together, which costs hardly more than one.
     time : float
-        Length of orbit that is averaged over, after `transient`.
+        Length of the orbit that is averaged over, after `transient`.
     count : int, optional
-        How many exponents; all by default.
+        Number of exponents. Default: all.
     transient : float
-        Time from the start of the orbit that is left out.
+        Initial time that is left out.
     segments : int
-        Into how many parts of equal length the orbit is cut; the standard error is that of their mean.
+        Number of segments of equal length; the standard error is that of their mean.
     interval : float
         Time between two orthogonalisations.
     tolerance : float
@@ -144,12 +143,12 @@ def lyapunov_exponents(
     Raises
     ------
     ValueError
-        A count, time or number of segments that cannot be; an orbit that grows without bound; an accuracy that is not reached.
+        An invalid count, time or number of segments; an orbit that grows without bound; an accuracy that is not reached.
 
     Notes
     -----
-    Neglected: the memory of the alignment over a fifth of a segment, exp(-gap x aligning time); the error of the orbit itself,
-    which follows a shadow of the one asked for with the same exponents. Where two attractors exist the start chooses.
+    Neglected: incomplete alignment of the vectors after a fifth of a segment, exp(-gap x aligning time); the error of the orbit, which
+    shadows a true orbit with the same exponents. If there are two attractors, the start decides.
     Included in the errors: the bias of vectors that grow in proportion to time.
 
     >>> saddle = Flow(lambda t, y: y * np.array([1.0, -2.0]), np.array([0.0, 0.0]))
@@ -166,19 +165,19 @@ def lyapunov_exponents(
     for doubled in range(DOUBLINGS + 1):
         plan = _Plan(transient, 2.0**doubled * time / segments, segments, interval, tolerance)
         grown = _along(flow, form, count, plan) if form else _side_by_side(flow, count, plan)
-        found = exponents_of(grown, plan.settings(together=form is not None))
-        if accuracy is None or found.reached <= accuracy:
-            return found
+        exponents = exponents_of(grown, plan.settings(together=form is not None))
+        if accuracy is None or exponents.reached <= accuracy:
+            return exponents
     raise ValueError(
-        f"accuracy: {accuracy:g} per time cannot be given: the error after a time of {found.time:g} is {found.reached:.2g} "
-        f"({found.budget.line()}); ask for less, or give a longer time or a smaller tolerance"
+        f"accuracy: {accuracy:g} per time cannot be given: the error after a time of {exponents.time:g} is {exponents.reached:.2g} "
+        f"({exponents.budget.line()}); ask for less, or give a longer time or a smaller tolerance"
     )
 
 
 def quadratic_form(flow: Flow) -> tuple[Floats, Floats, Floats] | None:
-    """c (d,), A (d, d) and symmetric Q (d, d, d) with rate = c + A y + Q(y, y), or None where the rate is not that.
+    """c (d,), A (d, d) and symmetric Q (d, d, d) with rate = c + A y + Q(y, y); None if the rate is not quadratic.
 
-    Read off values at 0, ±e_i and e_i + e_j, and held against the rate at 16 random states to 1e-12 of its size.
+    Determined from values at 0, ±e_i and e_i + e_j, and compared with the rate at 16 random states within a relative error of 1e-12.
 
     >>> quadratic_form(Flow(lambda t, y: y * y - y, np.array([1.0])))[2].tolist()
     [[[1.0]]]
@@ -232,14 +231,14 @@ def poincare_section(
     Parameters
     ----------
     flow : Flow
-        The orbit is that of flow.start, from time 0.
+        The orbit starts at flow.start, at time 0.
     surface : callable
-        surface(t, y) = 0 is crossed from below. For a periodic drive take sin(angular_frequency t / 2 + phase), which gives
-        the stroboscopic map of every second period.
+        surface(t, y) = 0 is crossed from below. For a periodic drive, sin(angular_frequency t / 2 + phase) gives the
+        stroboscopic map of every second period.
     time : float
         Length of the orbit.
     transient : float
-        Crossings before it are left out.
+        Crossings before this time are left out.
     tolerance : float
         Of the integration (DOP853), relative and absolute.
 
@@ -291,19 +290,19 @@ class _Plan:
         return ALIGNING * self.length
 
     def settings(self, together: bool) -> Settings:
-        """What the errors follow from. together: whether the segments follow one another, with tangent vectors that go on."""
+        """Settings for the errors. together: whether the segments are consecutive, with continued tangent vectors."""
         before = self.aligning + (self.transient if together else 0.0)
         measured = self.length * (self.segments if together else 1)
         return Settings(before, measured, self.length * self.segments, self.intervals(self.length)[1], self.tolerance)
 
     def intervals(self, part: float) -> tuple[int, float]:
-        """How many intervals, of what length, make up `part`."""
+        """Number and length of the intervals in `part`."""
         number = max(1, round(part / self.interval))
         return number, part / number
 
 
 def _along(flow: Flow, form: tuple[Floats, Floats, Floats], count: int, plan: _Plan) -> Growth:
-    """Of segments one after the other, compiled."""
+    """Growth in consecutive segments, by the compiled loop."""
     from scipy.integrate import DOP853
 
     from rotor.classical._chaos_kernels import follow
@@ -330,7 +329,7 @@ def _along(flow: Flow, form: tuple[Floats, Floats, Floats], count: int, plan: _P
 
 
 def _side_by_side(flow: Flow, count: int, plan: _Plan) -> Growth:
-    """Rates of segments side by side, each from its own point of one orbit."""
+    """Growth in segments that are integrated together, from different points of an orbit."""
     d = flow.start.size
     starts = plan.transient + plan.length * np.arange(plan.segments)
     points = orbit(flow, starts, plan.tolerance)
@@ -348,7 +347,7 @@ def _checked_step(step: float) -> float:
 
 @dataclass(frozen=True)
 class _Tracker:
-    """States (k, d) with tangent vectors (k, d, m), each state at its own time clock + offset."""
+    """States (k, d) with tangent vectors (k, d, m); each state is at the time clock + offset."""
 
     flow: Flow
     offsets: Floats
@@ -399,7 +398,7 @@ class _Tracker:
         return end[: k * d].reshape(k, d), end[k * d : -k].reshape(k, d, m), end[-k:], solution.nfev // STAGES
 
     def _rate_and_slopes(self, time: float, y: Floats) -> tuple[Floats, Floats]:
-        """Rates and Jacobians of all states, each taken at its own time where the flow depends on time."""
+        """Rates and Jacobians of all states, each at its time if the flow depends on time."""
         if not self.flow.timed:
             return self.flow.rate(time, y), self.flow.slopes(time, y)
         pairs = [(t, row[None]) for t, row in zip(time + self.offsets, y, strict=True)]

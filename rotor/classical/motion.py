@@ -1,4 +1,4 @@
-"""A motion as a table: time, angular momentum, attitude and energy, and how well it keeps what it should."""
+"""A motion as a table: time, angular momentum, attitude and energy, and the drift of its conserved quantities."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class MotionTable(Table):
 
 @dataclass(frozen=True)
 class InvariantDrift:
-    """Largest relative departure from the start of energy, of |L|, and of L in space (its length over |L|)."""
+    """Largest relative deviation from the start of energy, |L|, and L in space (its length over |L|)."""
 
     energy: float
     momentum: float
@@ -75,7 +75,7 @@ def sampled(motion: FreeMotion, times: ArrayLike) -> MotionTable:
 
 
 def invariant_drift(motion: MotionTable, start: FreeMotion) -> InvariantDrift:
-    """How far the rows are from what the start demands; for the exact motion this is round-off, 1e-15 or so."""
+    """Largest deviation of the rows from the conserved quantities of the start; round-off (about 1e-15) for the exact motion."""
     now = invariants(motion.momentum, motion.attitude, start.moments)
     then = invariants(start.momentum0, start.attitude0, start.moments)
     apart = np.linalg.norm(now.space_momentum - then.space_momentum, axis=-1)

@@ -1,7 +1,7 @@
-"""How many steps a driven motion will take, by those of its first part.
+"""Estimate of the number of steps of a driven motion, from its first part.
 
-Where the second half of that part takes clearly more steps than the first, as of a body that is spun up, they are taken to grow on in
-proportion to the time. Motions of few steps are made and counted.
+If the second half of that part takes clearly more steps than the first, as for a body that is spun up, the rate is extrapolated linearly
+in time. Motions with few steps are computed and counted.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ENOUGH_STEPS, CLEARLY = (
 
 
 def beginning(request: DrivenRequest, share: float, *more: float) -> DrivenRequest:
-    """The request for the first part of its time alone; steps end at the times asked for, so these stay. more: further shares of it."""
+    """The request for the first part of its time; its output times are retained, because steps end there. more: further shares."""
     first, last = request.times[0], request.times[-1]
     end = first + share * (last - first)
     inner = {t for t in request.times if abs(t - first) < abs(end - first)}
@@ -43,7 +43,7 @@ def is_compiled(request: DrivenRequest) -> bool:
 
 
 def some_steps(request: DrivenRequest) -> tuple[int, int]:
-    """How many steps are timed first, and how many times as many after it."""
+    """Number of steps of the first timed part, and factor for the second."""
     first_steps = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
     return first_steps, MORE_COMPILED if is_compiled(request) else MORE_PLAIN
 
@@ -56,10 +56,11 @@ def steps_of(request: DrivenRequest, share: float) -> int:
 
 
 def first_share(request: DrivenRequest) -> float:
-    """The share of the time of a motion by which the rest is judged: a twentieth, or less where that takes many steps already.
+    """The share of the time from which the rest is estimated: a twentieth, or less if that already takes many steps.
 
-    A body that is thin about the axis about which it turns takes 1e13 steps in a time in which others take ten, under drag about it
-    too: parts grow from about a radian, or the time in which a component of L changes by its size, until one takes enough steps.
+    A body with a very small moment about its rotation axis can take 1e13 steps in a time in which others take ten. Therefore parts of
+    increasing length are tried, from about a radian (or the time in which a component of L changes by its size), until one takes
+    enough steps.
     """
     span, enough, fastest = abs(request.times[-1] - request.times[0]), 5 * ENOUGH_STEPS, _fastest_rate(request)
     share = min(1 / BEGINNINGS, 1.0 / (fastest * span) if fastest > 0.0 else SHORTEST_SHARE)
@@ -69,7 +70,7 @@ def first_share(request: DrivenRequest) -> float:
 
 
 def _fastest_rate(request: DrivenRequest) -> float:
-    """The largest angular velocity about an axis at the start, or rate at which a torque changes a component of L there."""
+    """The largest initial angular velocity about an axis, or relative rate of change of a component of L by a torque."""
     system = system_of(np.array([request.moments]), request.effects)
     momentum, attitude, time = np.array([request.momentum]), np.array([request.attitude]), request.times[0]
     with np.errstate(over="ignore", invalid="ignore"):
@@ -83,7 +84,7 @@ def _fastest_rate(request: DrivenRequest) -> float:
 
 
 def expected_steps(request: DrivenRequest) -> int:
-    """How many steps a motion will take: counted where they are few, else by its first part; see the head of this module."""
+    """Expected number of steps of a motion: counted if few, otherwise estimated from its first part; see the head of this module."""
     part, (first_steps, more) = first_share(request), some_steps(request)
     whole = steps_of(request, part)
     if whole / part < first_steps * more:

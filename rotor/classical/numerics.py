@@ -1,4 +1,4 @@
-"""Accuracy and plan of the motion of one body: exact where it is free, else the steps, their tolerance and their number."""
+"""Accuracy and plan of the motion of a body: exact for free motion, otherwise the tolerance and number of steps."""
 
 from __future__ import annotations
 
@@ -27,21 +27,22 @@ ORDERS = (2, 4, 6, 8)
 
 
 def choose(scene: Any, request: Any, allowed: float) -> Choice:
-    """The settings of a motion: nothing of a free one, else the tolerance."""
+    """Choose the tolerance of a driven motion; a free motion needs no settings."""
     free = isinstance(request, TumbleRequest)
     return Choice(request, NOTHING_CHEAPER) if free else choose_tolerance(request, allowed)
 
 
 def error_of_motion(answer: Any) -> float:
-    """Round-off of a free motion; the error of steps was found when they were chosen."""
+    """Error of a motion: round-off if free; the error of steps is known from their choice."""
     return float(answer.errors.rounding.value or 0.0) if isinstance(answer, TumbleAnswer) else 0.0
 
 
-def choose_growth(scene: Any, request: Any, asked: float) -> Choice:
-    """Nothing: the rate at which a free body leaves its unstable axis is a closed form."""
+def choose_growth(scene: Any, request: Any, allowed: float) -> Choice:
+    """No settings to choose: the growth rate at the unstable axis of a free body is a closed form."""
     if not isinstance(request, TumbleRequest):
         raise ValueError(
-            f"accuracy: {asked:g} %: is of the growth rate of a free motion; a motion under effects has an accuracy of the attitude, in rad"
+            f"accuracy: {allowed:g} %: is of the growth rate of a free motion; a motion under effects has an accuracy of the "
+            "attitude, in rad"
         )
     return Choice(request, NOTHING_CHEAPER)
 
@@ -68,7 +69,7 @@ def sweeps_of_tumble(request: Any) -> Sweeps:
 
 
 def _refusal(request: Any) -> str | None:
-    """Why no splitting serves these effects; None where one does."""
+    """Why no splitting applies to these effects; None if one does."""
     first, second = request.times[:2]
     try:
         answer_driven(replace(request, times=(first, second), step=(second - first) / 4))
@@ -86,7 +87,7 @@ def _splitting(request: Any, order: int, finest: Any, measure: Measure, against:
 
 
 def step_error(request: Any, steps: int) -> LeftOut:
-    """The largest error of an attitude in radians at the times of a request whose motion has so many steps."""
+    """The largest error of the attitude in radians at the times of a request, for this number of steps."""
     if steps <= (MOST_STEPS if is_compiled(request) else MOST_CALLED):
         term = answer_driven(request).errors.truncation
         return LeftOut(NAME, term.value, "rad", f"{term.source}; chaos makes it grow")
@@ -159,7 +160,7 @@ def _stepping(request: DrivenRequest, steps: int) -> str:
 
 
 def _seconds_of_steps(request: DrivenRequest, steps: int) -> float:
-    """Processor time of a driven motion: its first steps are made one by one and the further ones compiled, so two parts are timed."""
+    """Processor time of a driven motion, from two timed parts: the first steps run in Python, the others compiled."""
     first_steps, more = some_steps(request)
     if steps < more * first_steps:
         return timed(lambda: steps_of(request, 1.0))

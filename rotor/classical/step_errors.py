@@ -1,11 +1,11 @@
 """Errors of the steps of a driven motion: against finer steps, where that costs little.
 
-The motion is made a second time with finer steps, see `error_by_finer`, or with a quarter of a fixed step; the largest difference of the
+The motion is repeated with finer steps, see `error_by_finer`, or with a quarter of a fixed step; the largest difference of the
 attitudes is the error. Beyond `MOST_STEPS` only the local errors are known, steps times tolerance (E. Hairer, S. P. Nørsett, G. Wanner,
-Solving Ordinary Differential Equations I, section II.4): 8 to 1000 times the error of regular motions, no bound of chaotic ones.
+Solving Ordinary Differential Equations I, section II.4): 8 to 1000 times the error of regular motions, but no bound for chaotic ones.
 
-Rounding: a step turns the attitude by some units in the last place, at most `EVALUATED`, and changes L by as much of |L| at random, so that
-after n steps the rate of turning is off by √n, and the angle turned, φ, by √n φ units. Finer motions see the same with other steps.
+Rounding: a step changes the attitude by some units in the last place, at most `EVALUATED`, and L by the same fraction of |L| at random.
+After n steps the relative error of the rotation rate is √n units, and that of the angle φ is √n φ units.
 """
 
 from __future__ import annotations
@@ -17,10 +17,15 @@ from collections.abc import Callable, Sequence
 from rotor.classical.integrators.method import Motion
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 
-MOST_STEPS, MOST_CALLED = 20_000, 500  # of motions that are made for an estimate: compiled, and called step by step
+MOST_STEPS, MOST_CALLED = (
+    20_000,
+    500,
+)  # most steps of a motion that is repeated for an estimate: compiled, and step by step
 FINEST = 1e-14  # a tolerance
 MORE_STEPS, USUAL_STEPS = 1.5, 2.4  # of a finer motion, times those of the coarse one: 10^(2/8) = 1.8 is usual
-OF_REFERENCE = 1.25  # a reference a hundred times finer has a fifth of the error at most: of 1,000 motions one had 13 %
+OF_REFERENCE = (
+    1.25  # a reference a hundred times finer has at most a fifth of the error (largest of 1,000 motions: 13 %)
+)
 DENSE = 4  # steps between two times, below which these set the length of many steps
 OF_QUARTER = (
     1.3  # of steps a quarter as long: 1/(1 - 4^-p) for order p, 1.07 of order 2, with a margin where steps are long
@@ -28,7 +33,7 @@ OF_QUARTER = (
 QUARTERS, TRIPLED = (
     [4.0**k for k in range(1, 40)],
     3,
-)  # a step longer than the times are apart is not shorter when a quarter of it is
+)  # a quarter of a step longer than the spacing of the times may give the same steps
 EVALUATED = 8 * sys.float_info.epsilon  # of a step
 OF_REMEDY = "an accuracy, which is compared with a finer motion,"
 
@@ -43,13 +48,12 @@ def finer_tolerances(tolerance: float) -> list[float]:
 
 
 def error_by_finer(coarse: Motion, finer: Sequence[float], at: Callable[[float], Motion]) -> tuple[float, bool]:
-    """The largest error of an attitude in radians by motions of finer tolerances, and whether one of them took clearly more steps.
+    """The largest error of the attitude in radians from motions with finer tolerances, and whether one of them took clearly more steps.
 
-    Steps also end at the times asked for, and where these are dense, several tolerances give the same steps, whose difference of 0 says
-    nothing: so the first counts that takes half as many more. A wobble smaller than the tolerance is wrong in all motions that
-    do not see it: where the number of steps does not go as usual, or times are dense, the next finer motion counts too. Where none
-    takes so many, the number of steps of the finest times its tolerance is added. The finer motion has an error of its own: differences
-    are taken 1.25 times.
+    Steps also end at the output times. If these are dense, several tolerances give the same steps and a meaningless difference of 0;
+    therefore the first motion with at least 1.5 times as many steps is compared. Several tolerances may miss a wobble smaller than them:
+    if the number of steps does not scale as usual, or times are dense, the next finer motion counts too. If no motion takes enough steps,
+    the number of steps of the finest times its tolerance is added. Differences are multiplied by 1.25 for the error of the finer motion.
     """
     for place, tolerance in enumerate(finer):
         more = at(tolerance).steps / coarse.steps
@@ -69,12 +73,12 @@ def apart(motion: Motion, other: Motion) -> float:
 
 
 def rounding_of_steps(motion: Motion) -> float:
-    """Rounding of the attitude of a stepped motion, rad."""
+    """Rounding error of the attitude of a stepped motion, rad."""
     from rotor.geometry.rotations import distance
 
     turned = float(
         distance(motion.attitude[1:], motion.attitude[:-1]).sum()
-    )  # less than the whole between distant times
+    )  # a lower bound if the times are far apart
     return EVALUATED * (motion.steps + math.sqrt(motion.steps) * max(turned, 0.1 * motion.steps))
 
 
@@ -100,16 +104,16 @@ def truncation_of_steps(
     ----------
     motion : Motion
     compiled : bool
-        Whether its steps are: then more of them are made a second time.
+        Whether its steps are compiled: then longer motions are repeated.
     tolerance : float or None
-        Of a step; None of steps of fixed length.
+        Tolerance of a step; None for fixed steps.
     at : callable
-        The same motion to another tolerance; of fixed steps, with its step divided by a number.
+        The motion for another tolerance, or with the fixed step divided by a number.
 
     Returns
     -------
     ErrorTerm
-        Not estimated where the motion is too long for a second one.
+        Not estimated if the motion is too long to be repeated.
     """
     if motion.steps > (MOST_STEPS if compiled else MOST_CALLED):
         return ErrorTerm(None, f"{motion.steps} steps are not made a second time", OF_REMEDY)

@@ -1,6 +1,6 @@
-"""Euler's equations with the effects they are given: what every integrator steps.
+"""Euler's equations with effects, as used by all integrators.
 
-The list of effects is sorted once, by kind; a kind that is absent is an empty tuple and costs nothing later.
+The effects are sorted by kind once; an absent kind is an empty tuple and costs nothing.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class System:
 
     @property
     def needs_velocity(self) -> bool:
-        """Whether a torque depends on ω, so that no splitting into drifts and kicks exists."""
+        """Whether a torque depends on ω, which excludes splittings into drifts and kicks."""
         return any(effect.needs_velocity for effect in self.torques)
 
     @property
@@ -48,14 +48,14 @@ class System:
 
     @cached_property
     def compiled(self) -> SystemForm | None:
-        """All effects but those that add inertia, for compiled integrators; None where one effect has to be called at every step."""
+        """All effects except added inertia, for compiled integrators; None if an effect has no compiled form."""
         if self.inertia or (self.added and self.rolling is None):
             return None
         return system_form([torque for torque in self.torques if not isinstance(torque, AddedInertia)], self.inner)
 
     @cached_property
     def rolling(self) -> Floats | None:
-        """Parameters of bodies that roll, for compiled integrators; None where nothing does, or another effect adds inertia."""
+        """Parameters of rolling contacts, for compiled integrators; None without rolling, or if another effect adds inertia."""
         return rolling_forms(self.added) if self.added else None
 
     def inverse(self, time: float) -> Floats:
@@ -73,7 +73,7 @@ class System:
         return np.ascontiguousarray(np.broadcast_to(self.inertia.moments(time), self.start_moments.shape))
 
     def inner_momentum(self, time: float) -> Floats | float:
-        """Sum h (3,) of the inner momenta, 0.0 where there is none."""
+        """Sum h (3,) of the inner momenta; 0.0 without any."""
         return sum((effect.inner_momentum(time) for effect in self.inner), start=0.0)
 
     def omega(self, time: float, momentum: Floats, attitude: Floats) -> Floats:
@@ -150,7 +150,7 @@ def momentum_of(
     attitude: ArrayLike = IDENTITY,
     time: float = 0.0,
 ) -> Floats:
-    """The angular momentum L = (I + A) ω + h (..., 3) with which a body under effects turns at ω.
+    """The angular momentum L = (I + A) ω + h (..., 3) of a body under effects with angular velocity ω.
 
     Parameters
     ----------
@@ -159,11 +159,11 @@ def momentum_of(
     moments : (..., 3) array
         Principal moments, those of `integrate`.
     effects : sequence of ClassicalEffect
-        As of `integrate`; inner momenta h, added inertia A and a change of inertia enter.
+        As for `integrate`; inner momenta h, added inertia A and a change of inertia enter.
     attitude : (..., 4) array
         Body to space.
     time : float
-        At which effects that depend on time are taken.
+        Time at which effects are evaluated.
 
     Returns
     -------
@@ -192,10 +192,10 @@ def _diagonal(values: Floats) -> Floats:
 
 
 def acting_inverse(moments: Floats) -> Floats:
-    """1/I_i for stepping; a linear rotor's zero moment is replaced by the other one.
+    """1/I_i for integrators; the zero moment of a linear rotor is replaced by the other one.
 
-    Without momentum about its own axis a linear rotor moves exactly as a sphere of that moment: L stands still in the
-    body, and the body turns about it.
+    Without momentum about its axis a linear rotor moves exactly like a sphere of that moment: L is constant in the body, and the body
+    rotates about it.
     """
     largest = np.max(moments, axis=-1, keepdims=True)
     return np.ascontiguousarray(1.0 / np.where(moments == 0.0, largest, moments))

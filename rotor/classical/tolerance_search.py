@@ -3,10 +3,9 @@
 The error of a tolerance t is the largest difference of an attitude, at all times of the request, from motions of t/100, t/10⁴, ..., see
 `rotor.classical.step_errors.error_by_finer`.
 
-The search makes about five motions. It makes only the first part of a long motion, to the accuracy divided by the expected growth of the
-error: as the square of the time, as phases do whose rate drifts, or exponentially where the second half of that part shows it. The run
-then takes that tolerance and one finer motion beside it, which gives the stated error; if that exceeds the accuracy, a finer tolerance
-follows.
+The search computes about five motions. For a long motion it computes only the first part, to the accuracy divided by the expected growth
+of the error: quadratic in time, as for phases with drifting rates, or exponential if the second half of that part shows it. The run uses
+this tolerance and a finer motion for the stated error; if that exceeds the accuracy, a finer tolerance is tried.
 """
 
 from __future__ import annotations
@@ -34,29 +33,29 @@ CHAOTIC = 4.0  # a power that is seen beyond which the growth is taken as expone
 
 @dataclass(frozen=True)
 class _Motions:
-    """The motions of one request by the decade of their tolerance, each made once."""
+    """The motions of a request by the decade of their tolerance, each computed once."""
 
     request: DrivenRequest
-    made: dict[int, Motion] = field(default_factory=dict)
+    computed: dict[int, Motion] = field(default_factory=dict)
 
     def at(self, decade: int) -> Motion:
-        """The motion with a tolerance of 10^-decade; between two that are alike all are."""
+        """The motion with a tolerance of 10^-decade; between two decades with equal numbers of steps all motions are the same."""
         from rotor.classical.driven import answer_driven
 
-        if decade not in self.made:
-            looser = [each for each in self.made if each < decade]
-            finer = [each for each in self.made if each > decade]
-            alike = looser and finer and self.made[max(looser)].steps == self.made[min(finer)].steps
+        if decade not in self.computed:
+            looser = [each for each in self.computed if each < decade]
+            finer = [each for each in self.computed if each > decade]
+            alike = looser and finer and self.computed[max(looser)].steps == self.computed[min(finer)].steps
             request = replace(self.request, tolerance=tolerance_of(decade))
-            self.made[decade] = self.made[max(looser)] if alike else answer_driven(request).motion
-        return self.made[decade]
+            self.computed[decade] = self.computed[max(looser)] if alike else answer_driven(request).motion
+        return self.computed[decade]
 
     def error(self, decade: int) -> float:
-        """The largest error of an attitude in radians, of the steps (`error_by_finer`) and of rounding."""
+        """The largest error of the attitude in radians, from steps (`error_by_finer`) and rounding."""
         finer = [*range(decade + FINER, FINEST_REFERENCE, FINER), FINEST_REFERENCE]
         decades = {tolerance_of(each): each for each in finer}
-        of_steps = error_by_finer(self.at(decade), list(decades), lambda tolerance: self.at(decades[tolerance]))[0]
-        return of_steps + rounding_of_steps(self.at(decade))
+        step_error = error_by_finer(self.at(decade), list(decades), lambda tolerance: self.at(decades[tolerance]))[0]
+        return step_error + rounding_of_steps(self.at(decade))
 
 
 def tolerance_of(decade: int) -> float:
@@ -69,15 +68,15 @@ def tolerance_of(decade: int) -> float:
 
 
 def likely_decade(allowed: float) -> int:
-    """A decade of tolerances amid those that a search for an accuracy tries."""
+    """A typical decade of tolerances for an accuracy, with which the search starts."""
     return min(max(round(-math.log10(allowed)), LOOSEST) + FINER, FINEST)
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A tolerance that is known before a run.
+    """A tolerance chosen before a run.
 
-    decade: of it. how: in words. error, steps: of the whole motion, None where a part alone was made.
+    decade: of the tolerance. how: in words. error, steps: of the whole motion; None if only a part was computed.
     """
 
     decade: int
@@ -92,9 +91,10 @@ class Planned:
 
 
 def planned_tolerance(request: DrivenRequest, allowed: float) -> Planned:
-    """The loosest tolerance, in decades, that reaches an accuracy in radians, by the whole motion or, of a long one, by its first part.
+    """The loosest tolerance, in decades, that reaches an accuracy in radians, from the whole motion or the first part of a long one.
 
-    A plan and a run choose the same. Raises ValueError where a knob is given too, and where double precision does not reach it.
+    A plan and a run choose the same tolerance. Raises ValueError if a tolerance or step is given too, and if double precision does not
+    suffice.
     """
     from rotor.classical.driven import DEFAULT_TOLERANCE
 
@@ -115,7 +115,7 @@ def _words(decade: int) -> str:
 
 
 def _is_long(request: DrivenRequest, allowed: float) -> bool:
-    """Whether a motion takes so many steps that a search by whole motions would not be short, by those of its beginning."""
+    """Whether a motion takes too many steps for a search by whole motions, estimated from its beginning."""
     steps = _likely_steps(request, allowed)
     return steps > (LONG_STEPS if is_compiled(request) else LONG_PLAIN_STEPS)
 
@@ -125,7 +125,7 @@ def _likely_steps(request: DrivenRequest, allowed: float) -> int:
 
 
 def _refuse_endless(request: DrivenRequest, allowed: float) -> None:
-    """Refuse a motion of more steps than can be made."""
+    """Refuse a motion with too many steps."""
     steps = _likely_steps(request, allowed)
     if steps > MOST_STEPS:
         raise ValueError(
@@ -135,7 +135,7 @@ def _refuse_endless(request: DrivenRequest, allowed: float) -> None:
 
 
 def _decade_of_beginning(request: DrivenRequest, allowed: float) -> tuple[int, str]:
-    """The decade that the first part of a motion asks for, and how it was found."""
+    """The decade determined from the first part of a motion, and a text that describes the choice."""
     from rotor.geometry.rotations import distance
 
     motions = _Motions(beginning(request, 1 / BEGINNINGS, 0.5))
@@ -147,7 +147,7 @@ def _decade_of_beginning(request: DrivenRequest, allowed: float) -> tuple[int, s
     needed = math.log10(allowed) - grown
     try:
         decade = _loosest(motions, 10.0**needed)[0] if needed > -FINEST_REFERENCE else FINEST
-    except ValueError:  # the part cannot be that exact
+    except ValueError:  # double precision does not suffice for the part
         decade = FINEST
     kind = "exponentially" if grown > REGULAR * math.log10(BEGINNINGS) else "as the square of the time at the most"
     return decade, f"{_words(decade)}, {part.format(kind)}"
@@ -158,7 +158,7 @@ def _span(motions: _Motions) -> float:
 
 
 def _growth(middle: float, end: float) -> float:
-    """How much larger an error is at the end of a motion than at that of its first part, by its values in the middle and there.
+    """Expected growth of an error from the end of the first part to that of the motion, from two values in the part.
 
     >>> _growth(1e-9, 4e-9), _growth(0.0, 0.0)  # as the square, 20² times
     (400.0, 400.0)
@@ -169,9 +169,9 @@ def _growth(middle: float, end: float) -> float:
 
 
 def choose_tolerance(request: DrivenRequest, allowed: float) -> Choice:
-    """The request with the tolerance that a plan names, or a finer one where that misses, and the error that is found with it.
+    """The request with the tolerance of the plan, or a finer one if that does not suffice, and its error.
 
-    Raises ValueError where a knob is given too, and where double precision does not reach it.
+    Raises ValueError if a tolerance or step is given too, and if double precision does not suffice.
     """
     planned = planned_tolerance(request, allowed)
     if planned.error is not None:
@@ -188,7 +188,7 @@ def choose_tolerance(request: DrivenRequest, allowed: float) -> Choice:
 
 
 def _loosest(motions: _Motions, allowed: float, misses: int = LOOSEST - 1) -> tuple[int, float]:
-    """The lowest decade whose error is what was asked for at the most, and that error; the one below it, or `misses`, has more."""
+    """The lowest decade whose error is at most `allowed`, and that error; the decade below it, or `misses`, has a larger error."""
     decade = min(max(round(-math.log10(allowed)), misses + 1), FINEST)
     errors: dict[int, float] = {}
     reaches = FINEST + 1
@@ -196,7 +196,7 @@ def _loosest(motions: _Motions, allowed: float, misses: int = LOOSEST - 1) -> tu
         error = errors[decade] = motions.error(decade)
         apart = max(
             math.floor(abs(math.log10(max(error, 1e-30) / allowed))), 1
-        )  # decades, if the error goes with the tolerance
+        )  # decades, if the error is proportional to the tolerance
         if error <= allowed:
             reaches, decade = decade, max(decade - apart, misses + 1)
         else:

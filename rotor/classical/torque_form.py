@@ -1,4 +1,4 @@
-"""What compiled integrators know of effects: a code and parameters for each torque that they evaluate themselves.
+"""Compiled forms of effects: a code and parameters for each torque that compiled integrators evaluate.
 
 | code | torque in body axes | parameters |
 |---|---|---|
@@ -10,8 +10,8 @@
 | `QUADRATIC` | -c \\|ω\\| ω | c |
 | `ROLLING` | that of `effects/rolling.py`, with its inertia | m, m g, μ of space, c, S² by rows |
 
-R takes body axes to space. An effect says its form in `compiled_form`; its `torque` is the plain form of the same, and one
-without a compiled form is called at every step. The kernels are `integrators/_torque_kernels.py`.
+R takes body axes to space. An effect returns its form from `compiled_form`; its `torque` is the plain form. Effects without a compiled
+form are called at each step. The kernels are in `integrators/_torque_kernels.py`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats
 
 BODY_FIXED, SPACE_FIXED, LEVER, INDUCED, LINEAR, QUADRATIC, ROLLING = range(7)
-WIDTH = 12  # parameters of the longest form but that of rolling, which has arrays of its own
+WIDTH = 12  # parameters of the longest form, except rolling, which has separate arrays
 
 
 class TorqueForm(NamedTuple):
@@ -37,7 +37,7 @@ class TorqueForm(NamedTuple):
 
 
 class SystemForm(NamedTuple):
-    """All that acts on a body: codes (k,), parameters (k, WIDTH), and the sum h (3,) of inner momenta."""
+    """The effects on a body: codes (k,), parameters (k, WIDTH), and the sum h (3,) of inner momenta."""
 
     codes: NDArray[np.int64]
     parameters: Floats
@@ -54,14 +54,14 @@ def torque_form(code: int, *parts: ArrayLike) -> TorqueForm:
 
 
 def kernels_are_compiled() -> bool:
-    """False where NUMBA_DISABLE_JIT asks for plain Python, in which the loop of a kernel is slower than numpy."""
+    """False if NUMBA_DISABLE_JIT selects plain Python, in which the loop of a kernel is slower than numpy."""
     return os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
 def own_form(effect: Any, plain: str) -> Any:
-    """The compiled form of an effect whose class states it beside its plain method of the name given; else None.
+    """The compiled form of an effect if its class defines both this form and the plain method `plain`; otherwise None.
 
-    A class that overrides the plain method alone would inherit a form of another torque: its form is None.
+    A class that overrides only the plain method would inherit the form of another torque.
     """
     for kind in type(effect).__mro__:
         if plain in vars(kind):
@@ -70,7 +70,7 @@ def own_form(effect: Any, plain: str) -> Any:
 
 
 def rolling_forms(added: Iterable[Any]) -> Floats | None:
-    """Parameters (k, 17) of bodies that roll, from effects that add inertia; None where one of them adds another one."""
+    """Parameters (k, 17) of rolling contacts from effects that add inertia; None if one of them is not rolling."""
     effects = list(added)
     forms = [(own_form(effect, "inertia"), own_form(effect, "torque")) for effect in effects]
     if any(form is None or form.code != ROLLING for pair in forms for form in pair):
@@ -79,7 +79,7 @@ def rolling_forms(added: Iterable[Any]) -> Floats | None:
 
 
 def system_form(torques: Iterable[Any], inner: Iterable[Any]) -> SystemForm | None:
-    """The forms of torques and inner momenta together, None where one of them has none."""
+    """The combined form of torques and inner momenta; None if one of them has no compiled form."""
     forms, momenta = [own_form(t, "torque") for t in torques], [own_form(h, "inner_momentum") for h in inner]
     if any(form is None for form in (*forms, *momenta)):
         return None

@@ -1,7 +1,7 @@
-"""A request for the free rotation of one rigid body, and what answers it: the exact motion, its table, its stability.
+"""Request and answer for the free rotation of a rigid body: the exact motion, its table, its stability.
 
-Moments and angular momentum are the exact data of the motion. A body known by its angular velocity starts at
-`TumbleRequest.of_angular_velocity`; a molecule at `rotor.thermodynamics.thermal_tumble`.
+Moments and angular momentum are the exact data of the motion. For a given angular velocity use
+`TumbleRequest.of_angular_velocity`, for a molecule `rotor.thermodynamics.thermal_tumble`.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from rotor.requests.budget import ErrorBudget
 from rotor.table import TextOf
 
 PERIODS, TURNS, POINTS = 2, 10, 201
-LARGEST = 1e100  # of moments, their inverses and angular momenta: L²/I stays a number
+LARGEST = 1e100  # limit of moments, their inverses and angular momenta; avoids overflow of L²/I
 Three = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Units:
-    """Names of the units of an answer, and their size: a number of the motion times the factor is the number given.
+    """Names of the units of an answer, and factors from the units of the motion.
 
-    Without names all numbers are in one coherent set. moment: the unit of the moments, which are never converted.
+    Without names all numbers are in one coherent set. moment: the unit of the moments, which are not converted.
     """
 
     time: str = ""
@@ -50,11 +50,11 @@ SI = Units("s", "kg m²/s", "J", moment="kg m²")
 
 @dataclass(frozen=True)
 class TumbleRequest:
-    """A free rotation to compute; every field is checked when the request is made.
+    """A free rotation to compute; all fields are checked when the request is made.
 
     moments: (3,), principal moments of inertia in any order. angular_momentum: (3,) at time 0 in the principal axes, in the
     unit that `units` names. times: (n,) in the unit that `units` names; None: two periods of the motion. axes: names of the
-    principal axes. source: how the angular momentum was chosen. named: an ordinary body that has these moments.
+    principal axes. source: how the angular momentum was chosen. named: the ordinary body with these moments.
     """
 
     moments: Three
@@ -81,7 +81,7 @@ class TumbleRequest:
 
     @classmethod
     def of_angular_velocity(cls, moments: ArrayLike, omega: ArrayLike, **others: Any) -> TumbleRequest:
-        """The request for a body that starts with an angular velocity ω in rad per unit of time: L_i = I_i ω_i.
+        """The request for a body with initial angular velocity ω in rad per unit of time: L_i = I_i ω_i.
 
         others: further fields of the request; moments and ω are in one coherent set, such as kg m² and rad/s.
 
@@ -105,7 +105,7 @@ class TumbleRequest:
 
     @property
     def kind(self) -> str:
-        """Kind of body by exact equality of the moments given."""
+        """Kind of body from exact equality of the moments."""
         low, middle, high = sorted(self.moments)
         if low == 0.0:
             return "linear"
@@ -118,7 +118,7 @@ class TumbleRequest:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What is unusual about the body."""
+        """Notes on unusual properties of the body."""
         if self.named is not None:
             return ()
         low, middle, high = sorted(self.moments)
@@ -131,10 +131,10 @@ class TumbleRequest:
 
 @dataclass(frozen=True, repr=False)
 class TumbleAnswer(TextOf):
-    """The exact motion that a request asked for.
+    """The exact motion of a request.
 
-    motion: in the coherent set of the moments. table: the motion at the times asked for, in the units of the request.
-    drift: of what the motion conserves, over the table.
+    motion: in the coherent set of the moments. table: the motion at the requested times, in the units of the request.
+    drift: drift of the conserved quantities over the table.
     """
 
     shown = "table"
@@ -147,12 +147,12 @@ class TumbleAnswer(TextOf):
 
     @cached_property
     def stability(self) -> Stability:
-        """What can be said without integrating: which axes are stable, and how fast a small push grows."""
+        """Closed-form stability: kinds of the axes, and growth rate of deviations."""
         return stability(self.request.body, self.request.momentum)
 
     @property
     def motion_kind(self) -> str:
-        """steady, separatrix, or about which axis L goes round."""
+        """steady, separatrix, or the axis that L circles."""
         if self.motion.steady:
             return "steady"
         if self.motion.separatrix:
@@ -161,7 +161,7 @@ class TumbleAnswer(TextOf):
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the attitude can be trusted, in rad at the last time, for moments and momentum that are exact."""
+        """Error budget of the attitude, in rad at the last time, for exact moments and momentum."""
         from rotor.classical.free.budget import attitude_budget
 
         factors = (self.request.units.time_factor, self.request.units.momentum_factor)
@@ -205,7 +205,7 @@ class TumbleAnswer(TextOf):
 
 
 def answer_tumble(request: TumbleRequest) -> TumbleAnswer:
-    """The exact free rotation of a request, at its times or at some that show it.
+    """The exact free rotation of a request, at its times or at suitable default times.
 
     >>> answer = answer_tumble(TumbleRequest((0.6, 0.8, 1.0), (1.8, 0.4, -0.9)))
     >>> answer.motion_kind, round(float(answer.table.times[-1]), 6), answer.times_source
@@ -222,7 +222,7 @@ def answer_tumble(request: TumbleRequest) -> TumbleAnswer:
 
 
 def _chosen_times(motion: FreeMotion, units: Units) -> tuple[Floats, str]:
-    """Times in the unit of the answer that show a motion, and the sentence that says so."""
+    """Default times of a motion in the unit of the answer, and a sentence that describes them."""
     if math.isfinite(motion.period):
         span, source = PERIODS * float(motion.period), f"{PERIODS} periods, {POINTS} points"
     else:

@@ -19,8 +19,8 @@ def lagrange(body, momentum, p, angle, times):
     """L, α and α' from d/dt (∂T/∂ω, ∂T/∂α') with the 4 x 4 matrix of T, in body axes."""
     inertia = np.zeros((4, 4))
     inertia[:3, :3] = np.diag(body.moments)
-    inertia[:3, 3] = inertia[3, :3] = body.own * np.asarray(body.axis)
-    inertia[3, 3] = body.own
+    inertia[:3, 3] = inertia[3, :3] = body.top_moment * np.asarray(body.axis)
+    inertia[3, 3] = body.top_moment
 
     def rate(_, y):
         velocity = np.linalg.solve(inertia, y[:4])
@@ -57,7 +57,7 @@ def test_energy_stays_within_the_step_and_momentum_in_space():
 
 
 def test_without_a_barrier_it_is_the_gyrostat():
-    free = TurningTop(BODY.moments, BODY.axis, BODY.own)
+    free = TurningTop(BODY.moments, BODY.axis, BODY.top_moment)
     times = np.linspace(0, 10, 6)
     motion = turning_motion(free, *START, times, 0.01)
     assert np.ptp(motion.p) == 0
@@ -84,8 +84,8 @@ def test_behind_a_high_barrier_the_body_is_rigid():
     rigid = integrate(LieRungeKutta(1e-12), BODY.moments, momentum, times).momentum
     errors = []
     for barrier in (1e3, 1.6e4):
-        stiff = TurningTop(BODY.moments, BODY.axis, BODY.own, {3: barrier})
-        p = stiff.own * float(stiff.axis @ (momentum / stiff.moments))  # α' = 0
+        stiff = TurningTop(BODY.moments, BODY.axis, BODY.top_moment, {3: barrier})
+        p = stiff.top_moment * float(stiff.axis @ (momentum / stiff.moments))  # α' = 0
         motion = turning_motion(stiff, momentum, p, 0.0, times, 0.3 / np.sqrt(barrier))
         errors.append(np.abs(motion.momentum[:, 0] - rigid).max())
     assert errors[0] < 0.05
@@ -93,7 +93,7 @@ def test_behind_a_high_barrier_the_body_is_rigid():
 
 
 def test_without_rotation_it_is_a_pendulum():
-    body = TurningTop(BODY.moments, BODY.axis, BODY.own, {3: 6.0})
+    body = TurningTop(BODY.moments, BODY.axis, BODY.top_moment, {3: 6.0})
     amplitude = 0.9  # of 3α, radian
     times = np.linspace(0, 12, 601)
     motion = turning_motion(body, np.zeros(3), 0.0, amplitude / 3, times, 0.02)
@@ -124,11 +124,11 @@ def test_equipartition_in_a_gas_stays():
     ("change", "text"),
     [
         ({"axis": [0, 0, 0]}, "axis of a top"),
-        ({"own": 9.0}, "leaves the rest"),
+        ({"top_moment": 9.0}, "leaves the rest"),
         ({"barriers": {0: 1.0}}, "counted from"),
     ],
 )
 def test_bodies_that_cannot_be_are_refused(change, text):
-    settings = {"moments": [8.0, 40.0, 44.0], "axis": [1.0, 0, 0], "own": 3.0, "barriers": {3: 1.0}} | change
+    settings = {"moments": [8.0, 40.0, 44.0], "axis": [1.0, 0, 0], "top_moment": 3.0, "barriers": {3: 1.0}} | change
     with pytest.raises(ValueError, match=text):
         TurningTop(**settings)

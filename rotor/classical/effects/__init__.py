@@ -1,1 +1,1 @@
-"""Effects on a classical rigid body, one a file."""
+"""Effects on a classical rigid body, one per file."""

@@ -18,10 +18,10 @@ from rotor.requests.readers import Array
 
 @dataclass(frozen=True)
 class ChangingInertia(InertiaChange):
-    """Principal moments (..., 3) as a function of time, about axes that stay where they are in the body.
+    """Principal moments (..., 3) as a function of time, about axes fixed in the body.
 
-    The moving masses carry no angular momentum relative to the body (they move along radii, or in mirror pairs); where
-    they do, add it as an inner momentum. The work that moves them changes the energy; L does not change.
+    The moving masses are assumed to carry no angular momentum relative to the body (they move along radii, or in mirror pairs);
+    otherwise add it as an inner momentum. The work that moves them changes the energy; L does not change.
 
     >>> skater = ChangingInertia(lambda time: [4.0, 4.0, 2.0 / (1.0 + time)])
     >>> skater.moments(1.0)
@@ -38,7 +38,7 @@ class ChangingInertia(InertiaChange):
             raise ValueError("changing inertia needs a function of time that returns three moments")
 
     def moments(self, time: float) -> Floats:
-        """The moments of this moment in time, checked; a moment of zero is refused, for it has no inverse."""
+        """The moments at `time`, checked; a moment of zero is refused because it has no inverse."""
         moments = checked_moments(np.asarray(self.history(time), dtype=np.float64))
         if np.any(moments == 0.0):
             raise ValueError(f"changing inertia at time {time:g}: moments {moments.tolist()} must all be positive")
@@ -47,7 +47,7 @@ class ChangingInertia(InertiaChange):
 
 @dataclass(frozen=True)
 class MomentsByTime(InertiaChange):
-    """Principal moments (n, 3) at rising times (n,), straight between them and constant before and after.
+    """Principal moments (n, 3) at increasing times (n,), interpolated linearly and constant before and after.
 
     >>> MomentsByTime([0.0, 2.0], [[4.0, 4.0, 4.0], [4.0, 4.0, 2.0]]).moments(1.0)
     array([4., 4., 3.])
@@ -70,6 +70,6 @@ class MomentsByTime(InertiaChange):
         object.__setattr__(self, "rows", rows)
 
     def moments(self, time: float) -> Floats:
-        """The moments of this moment in time."""
+        """The moments at `time`."""
         rows = np.asarray(self.rows)
         return np.array([np.interp(time, np.asarray(self.times), rows[:, axis]) for axis in range(3)])

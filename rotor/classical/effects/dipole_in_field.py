@@ -1,4 +1,4 @@
-"""A dipole in a uniform field: a permanent one, one that the field induces, and both under pulses."""
+"""Permanent and induced dipoles in a uniform field, constant or pulsed."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ class PermanentDipole(Torque):
 class InducedDipole(Torque):
     """Torque (αE) x E and energy -½ E·αE of a polarizability α (3, 3), symmetric, in body axes, or its diagonal (3,).
 
-    The field (3,) is uniform and constant in space. For a laser pulse give the field whose square is the mean of E²,
-    the peak amplitude over √2: orientation follows the envelope, not the carrier.
+    The field (3,) is uniform and constant in space. For a laser pulse give the rms field, the peak amplitude over √2: the
+    orientation follows the envelope, not the carrier.
 
     >>> rod = InducedDipole([0, 0, 2.0], field=[0, 0, 3.0])
     >>> float(rod.potential_energy(0.0, np.array([1.0, 0, 0, 0])))

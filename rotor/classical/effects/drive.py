@@ -37,11 +37,11 @@ class PeriodicDrive(Torque):
 
     @property
     def needs_attitude(self) -> bool:
-        """Only where the torque is fixed in space."""
+        """True only if the torque is fixed in space."""
         return self.frame == "space"
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
-        """The amplitude times the cosine of this moment, seen from the body."""
+        """The amplitude times the cosine at `time`, in body axes."""
         now = np.asarray(self.amplitude) * math.cos(self.angular_frequency * time + self.phase)
         return in_body(now, self.frame, attitude)
 

@@ -1,4 +1,4 @@
-"""Gravity on a body that turns about a fixed point: pendulum, heavy top."""
+"""Gravity on a body with a fixed point: pendulum, heavy top."""
 
 from __future__ import annotations
 

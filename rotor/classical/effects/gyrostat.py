@@ -17,10 +17,10 @@ from rotor.classical.effects.torques import checked_vector
 class SpinningRotor(InnerMomentum):
     """Constant angular momentum h (3,) in body axes, carried by symmetric rotors relative to the body.
 
-    L is that of body and rotors together and the moments are those of the whole with the rotors locked, so
-    ω_i = (L_i - h_i)/I_i (Wittenburg, Dynamics of Multibody Systems: Kelvin's gyrostat). A motor holds h
-    constant; a rotor that turns freely about its axis conserves its absolute momentum instead: then give the moments without
-    the rotor's axial one, and h is that momentum. The energy leaves out that of the rotor relative to the body.
+    L is that of body and rotors together, and the moments are those of the whole with locked rotors, so that
+    ω_i = (L_i - h_i)/I_i (Wittenburg, Dynamics of Multibody Systems: Kelvin's gyrostat). A motor holds h constant. A freely turning
+    rotor conserves its absolute axial momentum instead: then give the moments without the rotor's axial moment, and this momentum as h.
+    The energy does not include that of the rotor relative to the body.
 
     >>> SpinningRotor([0.0, 0.0, 0.7]).inner_momentum(0.0)
     array([0. , 0. , 0.7])

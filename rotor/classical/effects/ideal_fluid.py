@@ -1,9 +1,9 @@
-"""A body in an ideal fluid at rest at infinity: the moments and masses that the fluid adds, and the torque of an impulse.
+"""A body in an ideal fluid at rest at infinity: added moments and masses, and the torque of an impulse.
 
 Kirchhoff's equations are M' = M x ω + p x u and p' = p x ω in body axes, with M = (I + K) ω and p = (m + m_f) u along axes
-of symmetry: the fluid adds moments K and masses. p, the impulse of body and fluid, is constant in space; so the first
-equation is Euler's with the moments I + K and the torque p x u, which depends on the attitude alone and has the potential
-½ p·u. Without an impulse what is left is a free top (H. Lamb, Hydrodynamics, sections 114, 115 and 124).
+of symmetry: the fluid adds moments K and masses m_f. The impulse p of body and fluid is constant in space, so that the first equation
+is Euler's with the moments I + K and the torque p x u, which depends only on the attitude and has the potential ½ p·u. Without an
+impulse the motion is that of a free top (H. Lamb, Hydrodynamics, sections 114, 115 and 124).
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ class FluidImpulse(Torque):
 
 
 def added_moments(semiaxes: ArrayLike, density: float) -> Floats:
-    """Moments K (3,) that a fluid of a density adds to an ellipsoid,
+    """Moments K (3,) added to an ellipsoid by a fluid of this density,
 
         K1 = (m_f/5) (b² - c²)² (γ - β) / (2 (b² - c²) + (b² + c²)(β - γ)), cyclic,   m_f the mass of fluid displaced
 
-    (Lamb, section 115). Nothing for a sphere; 16/45 density r⁵ for a thin disc that turns about a diameter.
+    (Lamb, section 115). 0 for a sphere; 16/45 density r⁵ for a thin disc rotating about a diameter.
 
     >>> added_moments([2.0, 1.0, 1.0], 1.0)[0]  # nothing about an axis of revolution
     np.float64(0.0)
@@ -81,7 +81,7 @@ def added_moments(semiaxes: ArrayLike, density: float) -> Floats:
 
 
 def added_masses(semiaxes: ArrayLike, density: float) -> Floats:
-    """Masses m_f α/(2 - α) (3,) that a fluid of a density adds to an ellipsoid moving along its axes (Lamb, section 114).
+    """Masses m_f α/(2 - α) (3,) added by a fluid of this density to an ellipsoid moving along its axes (Lamb, section 114).
 
     >>> added_masses([1.0, 1.0, 1.0], 3.0 / (2.0 * np.pi)).round(12).tolist()  # half of the fluid displaced by a sphere
     [1.0, 1.0, 1.0]

@@ -8,7 +8,7 @@ E. J. Routh, Dynamics of a System of Rigid Bodies, elementary part, chapter IV)
 
 Euler's equations with an added inertia and a torque. For an ellipsoid of semi-axes S about its centre c,
 x = c + S²μ/√(μᵀS²μ). These are the equations of T. R. Kane and D. A. Levinson, Int. J. Non-Linear Mech. 17, 175 (1982),
-written for L. The energy ½ L·ω + m g (x·μ) is conserved. Neglected: slipping, drilling friction, a contact that is lost.
+written for L. The energy ½ L·ω + m g (x·μ) is conserved. Neglected: slipping, spinning friction, loss of contact.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Torques that are given: constant ones and ones that follow a function of time, fixed in the body or in space."""
+"""Prescribed torques: constant, or a function of time, fixed in the body or in space."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def checked_vector(vector: ArrayLike, what: str) -> Floats:
 class ConstantTorque(Torque):
     """A torque (3,) that is constant in body axes (a thruster) or in space.
 
-    A constant torque in space is not the gradient of a potential: turning about it by 2π gives work.
+    A constant torque in space has no potential: a rotation about it by 2π does work.
 
     >>> ConstantTorque([0.0, 0.0, 0.5]).torque(0.0, np.array([1.0, 0, 0, 0]), np.zeros(3))
     array([0. , 0. , 0.5])
@@ -81,7 +81,7 @@ class ConstantTorque(Torque):
         return self.frame == "space"
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
-        """The constant vector, seen from the body."""
+        """The constant vector in body axes."""
         return in_body(self.vector, self.frame, attitude)
 
     def compiled_form(self) -> TorqueForm:
@@ -114,7 +114,7 @@ class TimedTorque(Torque):
         return self.frame == "space"
 
     def torque(self, time: float, attitude: Floats, omega: Floats) -> Floats:
-        """The vector of this moment, seen from the body."""
+        """The vector at `time`, in body axes."""
         return in_body(checked_vector(self.history(time), f"the torque at time {time:g}"), self.frame, attitude)
 
 

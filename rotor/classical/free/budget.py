@@ -1,12 +1,12 @@
 """Error budget of the attitude of a free body (`rotor.requests.budget`).
 
-Rounding: moments, momentum and times are exact data, and phases are held in two doubles, so that an attitude is off by some units in
-the last place at any time, and by `DOUBLED` of the angle turned. Times and momenta that come in other units are rounded when they are
-converted, by one unit in the last place of the angle turned at the fastest rate that |L| allows.
+Rounding: moments, momentum and times are exact data, and phases are stored in two doubles. The error of an attitude is some units in
+the last place at any time, plus `DOUBLED` times the angle turned. If times and momenta are converted from other units, their rounding
+adds one unit in the last place of the angle turned at the fastest rate that |L| allows.
 
-Data: digits of moments and momentum beyond the last one shift the period T of the momentum in the body. Near the separatrix T is close to
-(4/σ) ln(4/k'), k'² = 1 - k², σ the rate of growth, so that k'² = 16 exp(-σT/2), and a k'² that is off by some ε, the relative error of
-the data, makes δT = 2ε/(σ k'²). The phase of the flips is then off by 2π t δT/T².
+Data: rounded digits of moments and momentum shift the period T of the momentum in the body. Near the separatrix T is close to
+(4/σ) ln(4/k') with k'² = 1 - k² and the growth rate σ, so that k'² = 16 exp(-σT/2). An error ε of k'², the relative error of the data,
+gives δT = 2ε/(σ k'²), and an error of the phase of the flips of 2π t δT/T².
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 EPS = sys.float_info.epsilon
 EVALUATED = 32 * EPS  # theta functions, and products of three quaternions
 DOUBLED = 64 * EPS**2  # of a phase in two doubles
-LAST_DIGITS = 4 * EPS  # of k'², where six numbers have each one unit in the last place
+LAST_DIGITS = 4 * EPS  # error of k'² if six numbers each have an error of one unit in the last place
 GIVEN = "moments and angular momentum have no stated uncertainty"
 
 
@@ -36,11 +36,11 @@ def attitude_budget(motion: FreeMotion, last: float, growth_rate: float, convert
     ----------
     motion : FreeMotion
     last : float
-        The latest time, of either sign, in the unit of the motion.
+        The time farthest from 0, in the unit of the motion.
     growth_rate : float
-        Of a small departure from the unstable axis; 0 where there is none.
+        Growth rate of a small deviation from the unstable axis; 0 without such an axis.
     converted : bool
-        Whether times and momenta came in other units.
+        Whether times and momenta were converted from other units.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def attitude_budget(motion: FreeMotion, last: float, growth_rate: float, convert
 
 
 def attitude_rounding(turned: float, converted: bool) -> float:
-    """Rounding of an attitude in rad after an angle; converted: whether times and momenta came in other units."""
+    """Rounding error of an attitude in rad after an angle; converted: whether times and momenta were converted from other units."""
     return EVALUATED + (DOUBLED + (2 * EPS if converted else 0.0)) * turned
 
 
@@ -73,7 +73,7 @@ def _fastest(motion: FreeMotion) -> float:
 
 
 def _data(motion: FreeMotion, last: float, growth_rate: float) -> ErrorTerm:
-    """Not estimated, and whether the last digits of the data leave the phase of the flips unknown."""
+    """The term of the data: not estimated, with a note if their last digits leave the phase of the flips unknown."""
     shift = flip_phase_error(float(motion.period), last, growth_rate)
     if shift < 1.0:
         return ErrorTerm(None, GIVEN)
@@ -84,7 +84,7 @@ def _data(motion: FreeMotion, last: float, growth_rate: float) -> ErrorTerm:
 
 
 def flip_phase_error(period: float, last: float, growth_rate: float) -> float:
-    """By how much the last digits of moments and momentum may move the phase of the flips at a time, in rad.
+    """Error of the phase of the flips at a time, in rad, from the last digits of moments and momentum.
 
     >>> flip_phase_error(113.0, 1e13, 0.584) > 1e6, flip_phase_error(6.9, 1e3, 0.66) < 1e-9
     (True, True)

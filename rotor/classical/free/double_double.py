@@ -1,7 +1,7 @@
-"""Numbers of 32 digits as unevaluated sums of two doubles, and the exact sum of many: for phases that last.
+"""Numbers of 32 digits as unevaluated sums of two doubles, and exact sums of many doubles, for phases at long times.
 
-A phase that is to be known to 1e-15 rad after 1e10 turns needs its rate to 26 digits. `DoubleDouble` carries about 31,
-on whole arrays at once; it has what the constants of a free motion need (+ - * / and square root), nothing else.
+A phase accurate to 1e-15 rad after 1e10 turns requires its rate to 26 digits. `DoubleDouble` has about 31, for whole arrays; it
+provides only the operations for the constants of a free motion (+ - * / and square root).
 Algorithms: T. J. Dekker, Numer. Math. 18, 224 (1971); M. Joldes, J.-M. Muller, V. Popescu, ACM Trans. Math. Softw. 44,
 15 (2017), relative errors of a few 2^-106; T. Ogita, S. M. Rump, S. Oishi, SIAM J. Sci. Comput. 26, 1955 (2005).
 """
@@ -116,7 +116,7 @@ def products(*factors: DoubleDouble) -> list[Floats]:
 def exact_sum(terms: list[Floats], passes: int = 4) -> DoubleDouble:
     """Σ terms to 31 digits of the *result*, however much cancels (up to about `passes` times 16 digits).
 
-    Each pass leaves the exact sum as it is and moves it towards the last term (VecSum of Ogita, Rump and Oishi).
+    Each pass preserves the exact sum and concentrates it in the last term (VecSum of Ogita, Rump and Oishi).
     """
     vector = [np.asarray(term, dtype=np.float64) for term in terms]
     for _ in range(passes):

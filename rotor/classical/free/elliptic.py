@@ -1,6 +1,6 @@
 """Elliptic integrals to 31 digits: complete ones by the arithmetic-geometric mean, the first kind by duplication.
 
-Everything takes the complementary parameter mc = k'² = 1 - k², never k², so that nothing is lost where k is near 1.
+All functions use the complementary parameter mc = k'² = 1 - k² instead of k², to avoid cancellation for k near 1.
 """
 
 from __future__ import annotations

@@ -16,20 +16,20 @@ from rotor.classical.free.theta import SEPARATRIX, STEADY, Rows, moving_rows, st
 from rotor.geometry.rotations import IDENTITY, conjugate, multiply, normalised
 
 SMALLEST_MOMENT = (
-    1e-100  # of the largest: phases about the axis of a smaller one, not zero, would not fit into two doubles
+    1e-100  # of the largest moment: phases about the axis of a smaller nonzero moment would not fit into two doubles
 )
 SMALLEST_PART = 1e-120  # of |L|: a smaller component, not zero, would underflow when squared
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FreeMotion:
-    """A torque-free motion of one body or of many, ready to be asked for any time.
+    """The torque-free motion of one or many bodies, to be evaluated at any time.
 
     moments, momentum0, attitude0: (..., 3), (..., 3), (..., 4), body axes in the order given; the state at t = 0.
-    period: (...), of the momentum in the body; infinite where it stands still and on the separatrix.
-    turning_rate: (...), mean rate, rad per time, at which the body turns about L in space. After one period the body
+    period: (...), of the momentum in the body; infinite if it is constant, and on the separatrix.
+    turning_rate: (...), mean rate, rad per time, of the rotation of the body about L in space. After one period the body
     has turned about L by this rate times the period, up to whole turns.
-    steady, separatrix: (...), whether the momentum stands still in the body, or runs into the unstable axis.
+    steady, separatrix: (...), whether the momentum is constant in the body, or approaches the unstable axis.
     rows: the constants for the compiled evaluation.
     """
 
@@ -53,7 +53,7 @@ class FreeMotion:
 
     @property
     def centre_axis(self) -> NDArray[np.int64]:
-        """The axis (0, 1 or 2, in the order of the moments) that L goes round in the body; without meaning if steady.
+        """The axis (0, 1 or 2, in the order of the moments) that L circles in the body; without meaning if steady.
 
         >>> int(free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]).centre_axis)
         0
@@ -88,10 +88,10 @@ class FreeMotion:
 def free_motion(moments: ArrayLike, momentum0: ArrayLike, attitude0: ArrayLike = IDENTITY) -> FreeMotion:
     """The torque-free motion from principal moments (..., 3), body momentum (..., 3) and attitude (..., 4) at t = 0.
 
-    Moments and momentum are the exact data of the motion (not ω: forming I ω rounds, which costs 1e-16 of the angle
-    turned). Any coherent units, axes in any order; shapes broadcast. Spherical, symmetric, asymmetric and linear
-    bodies, rest, spin about an axis and the separatrix itself are all exact members of one family. The constants cost
-    some 9 ms for one body (up to 15 on a busy machine) and 8 to 18 µs each for many, every later evaluation about 0.12 µs.
+    Moments and momentum are the exact data of the motion (not ω: rounding of I ω costs 1e-16 of the angle turned). Any coherent
+    units, axes in any order; shapes broadcast. Spherical, symmetric, asymmetric and linear bodies, rest, rotation about an axis and the
+    separatrix are all treated exactly. The constants take some 9 ms for a single body and 8 to 18 µs per body for many, an evaluation
+    about 0.12 µs.
 
     >>> float(free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9]).period)  # 4K/λ
     6.862616178058115
@@ -115,7 +115,7 @@ def free_motion(moments: ArrayLike, momentum0: ArrayLike, attitude0: ArrayLike =
 
 
 def _rows(moments: Floats, momentum: Floats) -> Rows:
-    """Rows of all bodies, in units that make the largest moment and momentum about 1 (powers of two: exact)."""
+    """Rows of all bodies, scaled exactly (by powers of two) so that the largest moment and momentum are about 1."""
     unit_i = _power_of_two(np.max(moments, axis=-1))
     unit_m = _power_of_two(np.max(np.abs(momentum), axis=-1))
     moments, momentum = moments / unit_i[:, None], momentum / unit_m[:, None]
@@ -137,7 +137,7 @@ def _rows(moments: Floats, momentum: Floats) -> Rows:
 
 
 def _merged(first: NDArray[np.bool_], yes: Rows, no: Rows) -> Rows:
-    """One table from the rows where `first` holds and the others."""
+    """A table with rows of `yes` where `first` holds, otherwise of `no`."""
     columns = []
     for a, b in zip(yes, no, strict=True):
         column = np.empty((len(first), *a.shape[1:]), dtype=b.dtype)
@@ -172,7 +172,7 @@ def _check_moments(moments: Floats, unit: Floats) -> None:
 
 
 def _starting_at(rows: Rows, attitude0: Floats) -> Rows:
-    """The rows with the constant left quaternion that makes the attitude at t = 0 the one given."""
+    """The rows with the constant left quaternion for the given attitude at t = 0."""
     from rotor.classical.free._kernels import evaluate
 
     n = len(rows.kind)

@@ -1,8 +1,8 @@
 """Polhodes: the curves on which L moves in the body, drawn on the unit sphere of its directions.
 
-A polhode is where the sphere |L| = const meets the ellipsoid Σ L_i²/I_i = 2E (Landau and Lifshitz, Mechanics, section
-37). With the unit vector s = L/|L| it is the curve of one level, Σ s_i²/I_i = 2E/L². Eliminating the component along
-the axis a that it goes round leaves an ellipse in the other two,
+A polhode is the intersection of the sphere |L| = const with the ellipsoid Σ L_i²/I_i = 2E (Landau and Lifshitz, Mechanics, section
+37). With the unit vector s = L/|L| it is the curve of a level, Σ s_i²/I_i = 2E/L². Eliminating the component along the axis a that it
+circles gives an ellipse in the other two,
 
     s_b² (1/I_b - 1/I_a) + s_c² (1/I_c - 1/I_a) = level - 1/I_a .
 """
@@ -28,7 +28,7 @@ def level(moments: ArrayLike, momentum: ArrayLike) -> Floats:
 
 
 def centre_axis(moments: ArrayLike, level: float) -> int:
-    """The axis that the polhode of a level goes round: of the largest moment below the separatrix, else of the smallest.
+    """The axis that the polhode of a level circles: that of the largest moment below the separatrix, otherwise of the smallest.
 
     >>> centre_axis([1.0, 2.0, 4.0], 0.4), centre_axis([1.0, 2.0, 4.0], 0.6)
     (2, 0)
@@ -40,10 +40,10 @@ def centre_axis(moments: ArrayLike, level: float) -> int:
 
 
 def polhode(moments: ArrayLike, level: float, points: int = 361) -> Floats:
-    """Both branches of the polhode of one level as closed curves (2, points, 3) on the unit sphere.
+    """Both branches of the polhode of a level as closed curves (2, points, 3) on the unit sphere.
 
-    On the separatrix, level = 1/I2, they are the four half circles through the intermediate axis, two by two. Raises
-    ValueError for a level that no L of this body has, and for a body whose L stands still wherever it points.
+    On the separatrix, level = 1/I2, they are pairs of half circles through the intermediate axis. Raises ValueError for an impossible
+    level, and for a spherical top, whose L is constant in the body.
 
     >>> polhode([1.0, 2.0, 4.0], 0.3)[0, 0].round(4).tolist()  # (0.3 - 1/4)/(1 - 1/4) = s1²
     [0.2582, 0.0, 0.9661]
@@ -68,8 +68,8 @@ def polhode(moments: ArrayLike, level: float, points: int = 361) -> Floats:
 def separatrix(moments: ArrayLike, points: int = 361) -> Floats:
     """The two great circles (2, points, 3) of the separatrix: through the intermediate axis, level 1/I2.
 
-    s3/s1 = ± √((1/I1 - 1/I2)/(1/I2 - 1/I3)), axes in order of their moments. Raises ValueError where two moments are
-    equal: what would be the separatrix is then a circle, or a sphere, of points at rest.
+    s3/s1 = ± √((1/I1 - 1/I2)/(1/I2 - 1/I3)), axes in order of their moments. Raises ValueError if two moments are
+    equal: there is no separatrix, but a circle, or a sphere, of stationary points.
 
     >>> separatrix([1.0, 2.0, 4.0])[0, 90].round(4).tolist()  # s3²/s1² = (1/2)/(1/4)
     [0.5774, 0.0, 0.8165]
@@ -89,7 +89,7 @@ def separatrix(moments: ArrayLike, points: int = 361) -> Floats:
 
 
 def even_levels(moments: ArrayLike, per_side: int) -> Floats:
-    """Levels of polhodes that look evenly spaced: `per_side` about each axis that has them, the axes themselves left out.
+    """Levels of evenly spaced polhodes: `per_side` about each axis that polhodes circle, without the axes themselves.
 
     They cross the great circle from the axis of largest moment to that of the smallest at equal angles on either side
     of the separatrix.

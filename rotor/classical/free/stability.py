@@ -1,9 +1,9 @@
-"""Closed forms of free rotation: which axes are stable, how fast the others are left, how long a tumble takes.
+"""Closed forms of free rotation: stability of the axes, growth rate of deviations, tumbling period.
 
-A body of three unequal moments turns steadily about its axes of largest and smallest moment and leaves the one between
-(Landau and Lifshitz, Mechanics, section 37). That growth is not chaos: torque-free motion has two invariants, energy
-and |L|, on a phase space that leaves one angle free, so every free tumble is periodic (in the body) and its largest
-long-time Lyapunov exponent is zero. The growth rate is the exponent of one unstable point, not of the motion.
+A body with three unequal moments rotates stably about its axes of largest and smallest moment, but not about the intermediate axis
+(Landau and Lifshitz, Mechanics, section 37). This growth is not chaos: torque-free motion conserves energy and |L|, so that it is
+periodic in the body and its largest Lyapunov exponent is zero. The growth rate is that of deviations from the unstable fixed point,
+not of the motion.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class FixedAxis:
     """Steady rotation about a principal axis.
 
     axis: 0, 1 or 2, in the order of the moments given.
-    kind: "stable", "unstable", "neutral" (a neighbour has the same moment: a small push drifts, it neither grows nor
-    returns) or "none" (the axis of a linear rotor, about which it cannot turn).
+    kind: "stable", "unstable", "neutral" (another axis has the same moment: a deviation drifts, without growth or oscillation) or "none"
+    (the axis of a linear rotor, about which it cannot rotate).
     rate: of the small oscillation (stable) or of growth (unstable), rad or 1 per time; zero for the other kinds.
     """
 
@@ -39,7 +39,7 @@ class FixedAxis:
 
 @dataclass(frozen=True)
 class Stability:
-    """What can be said of a free rotation without integrating it; see the functions of the same names."""
+    """Closed-form properties of a free rotation; see the functions of the same names."""
 
     axes: tuple[FixedAxis, FixedAxis, FixedAxis]
     separatrix_ratio: float
@@ -50,7 +50,7 @@ class Stability:
 
 
 def axis_rate_squared(moments: ArrayLike, axis: int, momentum: ArrayLike) -> Floats:
-    """Square of the rate at which a small departure from rotation about `axis` oscillates; negative where it grows.
+    """Squared angular frequency of a small deviation from rotation about `axis`; negative if it grows.
 
     rate² = (L/I_a)² (I_a - I_b)(I_a - I_c) / (I_b I_c), L = |angular momentum| (...), moments (..., 3).
     The moments must not be zero.
@@ -64,7 +64,7 @@ def axis_rate_squared(moments: ArrayLike, axis: int, momentum: ArrayLike) -> Flo
 
 
 def growth_rate(moments: ArrayLike, momentum: ArrayLike) -> Floats:
-    """Rate at which rotation about the intermediate axis is left, (L/I2) √((I3 - I2)(I2 - I1)/(I1 I3)), per time.
+    """Growth rate of deviations from rotation about the intermediate axis, (L/I2) √((I3 - I2)(I2 - I1)/(I1 I3)), per time.
 
     Zero for symmetric and spherical tops, which have no such axis.
 
@@ -109,7 +109,7 @@ def precession_rates(moments: ArrayLike, momentum: ArrayLike) -> tuple[Floats, F
 
 
 def tumbling_period(moments: ArrayLike, momentum: ArrayLike) -> Floats:
-    """Period 4K/λ of L in the body, (...), from moments and momentum (..., 3); infinite where L stands still.
+    """Period 4K/λ of L in the body, (...), from moments and momentum (..., 3); infinite if L is constant.
 
     λ² = D1 (I3 - I2)/(I1 I2 I3) and mc = D2 (I3 - I1)/(D1 (I3 - I2)) for motion about axis 3, D_i = L² - 2E I_i; the
     same with 1 and 3 exchanged about axis 1 (Landau and Lifshitz, equations 37.8 to 37.12). The body flips every half
@@ -153,7 +153,7 @@ def fixed_axes(moments: ArrayLike, momentum: float) -> tuple[FixedAxis, FixedAxi
 
 
 def stability(moments: ArrayLike, momentum: ArrayLike) -> Stability:
-    """Everything above for one body and one angular momentum (3,) in its principal axes.
+    """All properties of this module for a body with angular momentum (3,) in its principal axes.
 
     Quantities that do not exist (a sphere's separatrix) are nan.
 
@@ -182,7 +182,7 @@ def _fixed_axis(moments: Floats, axis: int, momentum: float) -> FixedAxis:
 
 
 def _speed_and_modulus(moments: ArrayLike, momentum: ArrayLike) -> tuple[Floats, Floats]:
-    """λ and mc = k'² of the motion; λ = 0 where L stands still, mc = 0 on the separatrix."""
+    """λ and mc = k'² of the motion; λ = 0 if L is constant, mc = 0 on the separatrix."""
     moments = _massive(moments)
     momentum = checked_momentum(momentum, moments)
     moments, momentum = np.broadcast_arrays(moments, momentum)

@@ -17,8 +17,8 @@ With z = πu/2K, q = exp(-πK'/K) and θ functions of the nome q²,
     Ω = mean of (2T + G L3/J3)/(G + L3) = G/J3 - (D3/J3) (G/B3²) RJ(0, mc, 1, G²/B3²)/(3K)
       = G/J1 + (1/J1 - 1/J3) [G n RJ(0, mc, 1, 1-n)/(3K) - (π/2K) B3/√(1-n)],   1 - n = J2 (J3 - J1)/(J1 (J3 - J2)).
 
-The first form of Ω serves for |n| > 1, the second for |n| <= 1: then neither cancels, however small a moment is.
-Where mc is small the same functions are used after Jacobi's imaginary transformation, which turns z into
+The first form of Ω is used for |n| > 1, the second for |n| <= 1, to avoid cancellation even for a very small moment.
+For small mc the same functions are used after Jacobi's imaginary transformation, which turns z into
 v = πu/(2K'), q into q' = exp(-πK/K'), and adds the phase 2φz/π, φ = πF(y, k')/(4K'); with q' = 0 it is the
 separatrix itself.
 """
@@ -37,20 +37,20 @@ from rotor.classical.free.elliptic import carlson_rf, complete
 from rotor.geometry.rotations import from_matrix
 
 STEADY, CIRCULATING, NEAR_SEPARATRIX, SEPARATRIX = 0.0, 1.0, 2.0, 3.0
-TRANSFORM_BELOW = 0.2  # mc under which q' is the smaller nome for both kinds of series: q, q' stay below 0.1
+TRANSFORM_BELOW = 0.2  # mc below which the transformed series is used; both nomes q, q' then stay below 0.1
 
 
 class Rows(NamedTuple):
-    """What the compiled evaluation needs of n bodies, one row each.
+    """Constants of n bodies for the compiled evaluation, one row each.
 
     kind: (n,), one of the four numbers above.
     rates: (n, 6), hi and lo of: half periods per time, their start, half turns about L per time. On the separatrix
     the first two are λ and u0 themselves.
     shift: (n, 2), πK/K' and 2φ of the transformed series.
     series: (n, 22), amplitudes and coefficients of the series (`_series`, `_transformed_series`).
-    axes, signs: (n, 3), to which body axis each component of the frame belongs, and its sign.
+    axes, signs: (n, 3), body axis and sign of each component of the frame.
     left, right: (n, 4), the constant quaternions around (α, β).
-    momentum0: (n, 3), which a steady motion keeps.
+    momentum0: (n, 3), the constant momentum of a steady motion.
     """
 
     kind: Floats
@@ -68,7 +68,7 @@ class Rows(NamedTuple):
 class Frame:
     """Body axes in the order (first, second, third) with their signs, and moments and momentum seen in them.
 
-    d2: D2 J1 J3, the same number with axes 1 and 3 exchanged; zero on the separatrix.
+    d2: D2 J1 J3, invariant under exchange of axes 1 and 3; zero on the separatrix.
     """
 
     axes: NDArray[np.int64]
@@ -101,14 +101,14 @@ class Constants:
 
 
 def frame_of(moments: Floats, momentum: Floats) -> Frame:
-    """Which axis L circles, by the exact sign of D2, and everything seen with that axis third and L3 > 0."""
+    """The frame with the axis that L circles third (from the exact sign of D2) and L3 > 0."""
     order = np.argsort(moments, axis=-1, kind="stable")
     d2 = _d2_j1_j3(_columns(moments, order), _columns(momentum, order))
     axes = np.where((d2.hi < 0.0)[:, None], order[:, ::-1], order)
     third = np.where(np.take_along_axis(momentum, axes[:, 2:], axis=-1)[:, 0] < 0.0, -1.0, 1.0)
     cyclic = (axes[:, 1] - axes[:, 0]) % 3 == 1
     first = np.where(cyclic, third, -third)
-    # on the separatrix cn and dn keep one sign for ever, so L1 has to be positive too: turn by π about the third axis
+    # on the separatrix cn and dn do not change sign, so L1 must be positive too: rotate by π about the third axis
     back = (d2.hi == 0.0) & (np.take_along_axis(momentum, axes[:, :1], axis=-1)[:, 0] * first < 0.0)
     flip = np.where(back, -1.0, 1.0)
     signs = np.stack([first * flip, flip, third], axis=-1)
@@ -117,7 +117,7 @@ def frame_of(moments: Floats, momentum: Floats) -> Frame:
 
 
 def constants_of(frame: Frame) -> Constants:
-    """Amplitudes, moduli, phase rates and the initial phase, to about 30 digits where phases grow from them."""
+    """Amplitudes, moduli, phase rates and the initial phase; about 30 digits for those that determine phases."""
     j1, j2, j3 = (DoubleDouble.of(j) for j in frame.moments)
     j21, j31, j32 = (DoubleDouble.difference(frame.moments[a], frame.moments[b]) for a, b in ((1, 0), (2, 0), (2, 1)))
     s1, s2, s3 = (DoubleDouble.product(m, m) for m in frame.momentum)
@@ -146,7 +146,7 @@ def constants_of(frame: Frame) -> Constants:
 
 
 def moving_rows(moments: Floats, momentum: Floats) -> Rows:
-    """Rows of bodies (n, 3) whose momentum moves in the body; `left` is still the identity."""
+    """Rows of bodies (n, 3) whose momentum moves in the body; `left` is set to the identity."""
     frame = frame_of(moments, momentum)
     c = constants_of(frame)
     near = c.mc < TRANSFORM_BELOW
@@ -175,7 +175,7 @@ def moving_rows(moments: Floats, momentum: Floats) -> Rows:
 
 
 def steady_rows(moments: Floats, momentum: Floats) -> Rows:
-    """Rows of bodies (n, 3) whose momentum stays in the body: they turn about L at the rate 2T/|L|."""
+    """Rows of bodies (n, 3) with constant momentum in the body: they rotate about L at the rate 2T/|L|."""
     from rotor.geometry._kernels import upright
 
     squares = [DoubleDouble.product(m, m) for m in momentum.T]
@@ -208,7 +208,7 @@ def _d2_j1_j3(moments: tuple[Floats, Floats, Floats], momentum: tuple[Floats, Fl
 
 
 def _first_integral(frame: Frame, cn2: DoubleDouble, sn2: DoubleDouble, mc: DoubleDouble) -> DoubleDouble:
-    """F of the initial amplitude, |F| <= K, from cn² and sn²: no angle is ever formed, whose cosine would be lost."""
+    """F of the initial amplitude, |F| <= K, from cn² and sn²; without forming an angle, whose cosine would lose digits."""
     value = sn2.sqrt() * carlson_rf(cn2, cn2 + mc * sn2, DoubleDouble.of(np.ones_like(mc.hi)))
     return choose(frame.momentum[1] < 0.0, -value, value)
 
@@ -235,7 +235,7 @@ def _series(b: tuple[Floats, Floats, Floats], q: Floats, x: Floats, two_eta: Flo
     θ4(w) = 1 + Σ (-1)^n [a_n cos 2nz + i b_n sin 2nz]: 10-12 a, 13-15 b, n = 1, 2, 3;
     θ1(w) ~ Σ (-1)^n [c_n sin kz - i d_n cos kz], k = 2n + 1: 16-18 c, 19-21 d, n = 0, 1, 2.
     x = √q e^η and Y = e^-2η keep every product finite when the top becomes symmetric: q -> 0, η -> infinity.
-    What is left out is below 1e-20 for q < 0.1.
+    Neglected terms are below 1e-20 for q < 0.1.
     """
     theta2, theta3 = 1 + q**2 + q**6 + q**12, 1 + 2 * (q + q**4 + q**9 + q**16)
     theta4 = 1 - 2 * (q - q**4 + q**9 - q**16)

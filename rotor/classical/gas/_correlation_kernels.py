@@ -1,7 +1,7 @@
-"""Compiled sums behind correlation functions of a free gas: exact attitudes, one body after another, never stored.
+"""Compiled sums of correlation functions of a free gas from exact attitudes, which are not stored.
 
-Measured (`benchmarks/bench_gas.py`): 0.09 µs for one body at one time, nearly all of it the attitude; a step of 128 bodies
-side by side 0.006 µs for each. The plain forms stand in `tests/classical/test_ensembles.py`.
+Measured (`benchmarks/bench_gas.py`): 0.09 µs per body and time, nearly all for the attitude; 0.006 µs per body for a step of a block of
+128 bodies. The plain forms are in `tests/classical/test_ensembles.py`.
 """
 
 from __future__ import annotations
@@ -79,9 +79,9 @@ def add_stepped(
 ) -> None:
     """The four sums of `add_bodies` for bodies (n, 3) that start upright, `steps` steps of `_kernels.py` between two times.
 
-    rates (3,), turn (4,): those of `_kernels.py`; vector, axes: in its frame, turned by `turn`. A block is followed through all
-    times before the next one. Behind its six runs stand q from the frame of L to space, and cosine and sine of half the turn
-    about L between two times; with both in one array the loops vectorise.
+    rates (3,), turn (4,): those of `_kernels.py`; vector, axes: in its frame, rotated by `turn`. A block is propagated through all
+    times before the next one. Its six runs are followed by q from the frame of L to space, and by cosine and sine of half the rotation
+    about L between two times; with all in one array the loops vectorise.
     """
     row = np.zeros(12 * LANES)
     for block in range(-(-len(momentum) // LANES)):

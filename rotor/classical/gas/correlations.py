@@ -1,4 +1,4 @@
-"""What is known of a free gas without moving it: short times, whole curves of simple tops, and long times.
+"""Closed forms of correlation functions of a free gas: short times, whole curves of simple tops, and long times.
 
 Short times (R. G. Gordon, J. Chem. Phys. 40, 1973 (1964); 41, 1819 (1964)), e a unit vector and β a tensor in principal axes:
 
@@ -9,9 +9,9 @@ Whole curves (A. G. St. Pierre and W. A. Steele, Phys. Rev. 184, 172 (1969)), τ
 
     linear       C1 = F(τ) = 1 - √2 τ D(τ/√2) = M(1, ½, -τ²/2),    C2 = ¼ + ¾ F(2τ)
     spherical    C_l = [1 + 2 Σ_m g(mτ)]/(2l+1), m = 1 ... l,     g(x) = (1 - x²) exp(-x²/2)
-    symmetric    the axis of the figure precesses about L: one integral over the angle between them, `symmetric_curves`.
+    symmetric    the figure axis precesses about L: an integral over the angle between them, `symmetric_curves`.
 
-Long times: a free body turns about L for ever, so the part of u along L, averaged over the polhode, never decays,
+Long times: a free body rotates about L, so the component of u along L, averaged over the polhode, does not decay,
 
     C1(∞) = Σ_i e_i² <(mean of L_i/|L| over a polhode)²>:   ⅓ for a sphere, 0 for a linear molecule and along the
     intermediate axis, and for the axis that L circles B3/|L| · π/2K with the constants in the head of `theta.py`.
@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.euler import checked_moments, gyroscopic_rate, inverse_moments
 
-NODES = 96  # of Gauss and Legendre's quadrature
+NODES = 96  # Gauss-Legendre points
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def short_time(
     vector : (3,) array
         In principal axes, of any length.
     tensor : (3, 3) array, optional
-        Symmetric, in principal axes; by default that of the vector itself, u uᵀ.
+        Symmetric, in principal axes; default: u uᵀ of the vector.
 
     Returns
     -------
@@ -128,7 +128,7 @@ def symmetric_curves(times: ArrayLike, moment: float, moment_of_axis: float, kt:
 
     Notes
     -----
-    The axis precesses about L at |L|/moment, at an angle of cosine μ. Of weight a^(-3/2), a(μ) = (1 - μ²)/I + μ²/I_z,
+    The axis precesses about L at |L|/moment, at an angle of cosine μ. With weight a^(-3/2), a(μ) = (1 - μ²)/I + μ²/I_z,
 
         C1 = <μ² + (1 - μ²) g(s)>,    C2 = <P2(μ)² + 3 μ² (1 - μ²) g(s) + ¾ (1 - μ²)² g(2s)>,    s = t √(kT/a)/I ,
 
@@ -170,7 +170,7 @@ def plateau(moments: ArrayLike, vector: ArrayLike) -> float:
 
 
 def _limit_along_third(moments: Floats) -> float:
-    """<(mean of L3/|L|)²> over all L that circle axis 3, moments in rising or falling order.
+    """<(mean of L3/|L|)²> over all L that circle axis 3, moments in increasing or decreasing order.
 
     With L2/|L| = s and the angle φ in the plane of axes 1 and 3 they fill 0 < φ < atan √(I1 (I3-I2)/(I3 (I2-I1))); 1/K²
     vanishes at that edge like a logarithm, so points crowd there.

@@ -1,13 +1,13 @@
-"""A gas of free rigid molecules in thermal equilibrium: sampled exactly, moved exactly, and its correlation functions.
+"""A gas of free rigid molecules in thermal equilibrium: exact sampling, exact motion, and correlation functions.
 
-Sampled: L_i normal with variance I_i kT (`thermal_momentum.py` says why), orientations uniform, velocities normal with variance kT/m.
-Moved: by the exact free motion at any time. Correlations: with u a vector fixed in the molecule and β a traceless tensor,
+Sampling: L_i normal with variance I_i kT (see `thermal_momentum.py`), orientations uniform, velocities normal with variance kT/m.
+Motion: the exact free motion at any time. Correlations: with a vector u and a traceless tensor β fixed in the molecule,
 
     C1(t) = <u(0)·u(t)>/<u²>,       C2(t) = <β(0):β(t)>/<β:β> ,
 
 the correlation functions behind rotational absorption and Raman scattering (R. G. Gordon, J. Chem. Phys. 43, 1307 (1965);
-Adv. Magn. Reson. 3, 1 (1968)). For a linear molecule C2 is the mean of the second Legendre polynomial. Neglected: all that
-molecules do to each other, centrifugal distortion, and quantum mechanics. Closed forms stand in `correlations.py`.
+Adv. Magn. Reson. 3, 1 (1968)). For a linear molecule C2 is the mean of the second Legendre polynomial. Neglected: forces between
+molecules, centrifugal distortion, and quantum effects. Closed forms are in `correlations.py`.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from rotor.statistics.degrees_of_freedom import rotating_axes
 from rotor.statistics.equipartition import KineticDegrees, kinetic_degrees
 from rotor.table import Table
 
-PIECE = 10_000  # molecules that are drawn and moved together
+PIECE = 10_000  # molecules sampled and propagated together
 
 
 @dataclass(frozen=True, repr=False)
 class Ensemble:
-    """n molecules of one kind at one moment.
+    """n molecules of a kind at a time.
 
     moments: (3,). kt: energy. momentum: (n, 3), L in principal axes. attitude: (n, 4), body to space. mass: of one molecule,
     None where it is not known. velocity: (n, 3), of the centres of mass, None without a mass.
@@ -63,7 +63,7 @@ class Ensemble:
         return kinetic_degrees(masses=masses, velocities=self.velocity, moments=moments, momenta=self.momentum)
 
     def moved(self, time: float) -> Ensemble:
-        """These molecules a time later, by the exact free motion; an atom only flies on."""
+        """The molecules after a time, by the exact free motion; atoms only translate."""
         if not rotating_axes(self.moments).any():
             return self
         momentum, attitude = np.empty_like(self.momentum), np.empty_like(self.attitude)
@@ -76,10 +76,10 @@ class Ensemble:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Correlations(Table):
-    """C1 and C2 at n times with the standard errors of their means; c1 or c2 is None where it was not asked for.
+    """C1 and C2 at n times with the standard errors of their means; c1 or c2 is None if not requested.
 
-    times, c1, c1_error, c2, c2_error: (n,). molecules: how many were averaged over; the errors at different times are those
-    of the same molecules and thus not independent.
+    times, c1, c1_error, c2, c2_error: (n,). molecules: sample size; errors at different times belong to the same molecules and are
+    not independent.
     """
 
     times: Floats
@@ -94,19 +94,19 @@ class Correlations(Table):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """How many molecules were averaged over, and the number of times."""
+        """Numbers of molecules and times."""
         return {"molecules": self.molecules, "rows": len(self)}
 
     @property
     def columns(self) -> dict[str, Floats]:
-        """t, c1, c1_error, c2, c2_error, as far as they are there."""
+        """t, c1, c1_error, c2, c2_error, as far as computed."""
         named = {"t": self.times, "c1": self.c1, "c1_error": self.c1_error, "c2": self.c2, "c2_error": self.c2_error}
         return {name: column for name, column in named.items() if column is not None}
 
 
 @dataclass(frozen=True)
 class Probe:
-    """What is fixed in the molecule: a unit vector (3,), and principal axes (rows) and values of a tensor of unit size."""
+    """Properties fixed in the molecule: a unit vector (3,), and principal axes (rows) and values of a tensor of unit size."""
 
     vector: Floats
     axes: Floats
@@ -166,7 +166,7 @@ def thermal_momenta(moments: ArrayLike, kt: float, size: int, *, rng: np.random.
 def thermal_ensemble(
     moments: ArrayLike, kt: float, size: int, *, rng: np.random.Generator, mass: float | None = None
 ) -> Ensemble:
-    """`size` molecules in thermal equilibrium: momenta, orientations, and velocities where there is a mass.
+    """`size` molecules in thermal equilibrium: momenta, orientations, and with a mass also velocities.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def free_gas_correlations(
     executor: ThreadPoolExecutor | None = None,
     progress: Callable[[int], object] | None = None,
 ) -> Correlations:
-    """C1 of a vector and C2 of a tensor in a free gas, by the exact motion of every molecule.
+    """C1 of a vector and C2 of a tensor in a free gas, from the exact motion of all molecules.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def free_gas_correlations(
     tensor : (3, 3) array, optional
         Symmetric, in principal axes; only its anisotropic part counts. A vector, a tensor or both are given.
     molecules : int
-        How many; the statistical error falls with the square root.
+        Sample size; the statistical error decreases with its square root.
     rng : numpy.random.Generator
         Source of the random numbers.
     executor : ThreadPoolExecutor, optional
@@ -252,10 +252,9 @@ def free_gas_correlations(
 
     Notes
     -----
-    Only the rotation between time 0 and t matters, so all molecules start upright. They come in pieces of 10,000, each with
-    random numbers of its own (`rng.spawn`): memory stays bounded, and the answer does not depend on the threads. 0.09 µs per
-    molecule and time on one core, and 13 µs per molecule. Neglected: what molecules do to each other, centrifugal distortion,
-    quantum mechanics.
+    Only the rotation between time 0 and t matters, so all molecules start with the same attitude. They are sampled in batches of 10,000,
+    each with separate random numbers (`rng.spawn`): memory is bounded, and the result does not depend on the threads. Time: 0.09 µs per
+    molecule and time on one core, and 13 µs per molecule. Neglected: forces between molecules, centrifugal distortion, quantum effects.
 
     >>> gas = free_gas_correlations([0, 1, 1], 1.0, [0.0, 1.0], vector=[1, 0, 0], molecules=2000, rng=np.random.default_rng(5))
     >>> [round(float(x), 2) for x in gas.c1]  # 1 - √2 D(1/√2) = 0.275
@@ -293,9 +292,9 @@ def stepped_gas_correlations(
     Parameters
     ----------
     moments, kt, vector, tensor, molecules, rng, executor, progress
-        As of `free_gas_correlations`.
+        As for `free_gas_correlations`.
     interval : float
-        Between two times.
+        Between successive times.
     count : int
         Number of times.
     steps : int
@@ -309,7 +308,7 @@ def stepped_gas_correlations(
     Raises
     ------
     ValueError
-        As `free_gas_correlations`; a step that turns a molecule by more than ½ rad.
+        As `free_gas_correlations`; for a step that rotates a molecule by more than ½ rad.
 
     Notes
     -----
@@ -344,7 +343,7 @@ def _averaged(
     executor: ThreadPoolExecutor | None,
     progress: Callable[[int], object] | None,
 ) -> Correlations:
-    """Means and standard errors over all pieces, summed in their order, whichever thread made them."""
+    """Means and standard errors over all batches, summed in their order independently of the threads."""
     if molecules < 2:
         raise ValueError(f"{molecules} molecules: expected two or more, for a mean with an error")
     sizes = [min(PIECE, molecules - start) for start in range(0, molecules, PIECE)]

@@ -42,8 +42,8 @@ def mean_thermal_momentum(moments: ArrayLike, kt: ArrayLike) -> Floats:
 def off_intermediate_axis(moments: ArrayLike, momentum: float, tilt_rad: float) -> Floats:
     """L (3,) of one body, of length `momentum`, tipped by `tilt_rad` off its axis of intermediate moment.
 
-    It is tipped half way between the other two axes; in a linear rotor, which has no L along its own, to the third.
-    Where two moments coincide, the second after a stable sort counts as intermediate.
+    The tilt is halfway between the other two axes; for a linear rotor, which has no L along its axis, towards the third.
+    If two moments are equal, the second after a stable sort counts as intermediate.
 
     >>> off_intermediate_axis([3.0, 1.0, 2.0], 10.0, math.radians(0.5)).round(4)
     array([0.0617, 0.0617, 9.9996])

@@ -1,1 +1,1 @@
-"""Integrators of rigid-body motion, one method a file."""
+"""Integrators of rigid-body motion, one method per file."""

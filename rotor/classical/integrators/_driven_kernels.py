@@ -15,7 +15,7 @@ from rotor.arrays import Floats
 from rotor.classical.integrators._step_kernels import kick_body, symmetric_drift, turn_body
 from rotor.classical.integrators._torque_kernels import torque_at
 
-NO_OMEGA = (np.nan, np.nan, np.nan)  # torques that look at it are refused before
+NO_OMEGA = (np.nan, np.nan, np.nan)  # torques that depend on ω are refused before
 
 
 @njit(cache=True, nogil=True)
@@ -30,11 +30,11 @@ def kicked(
     state: Any,
     place: Any,
 ) -> None:
-    """Steps of equal length, counts (t - 1,) between neighbouring times, into path (t, n, 7): those of one place.
+    """Steps of equal length, counts (t - 1,) between successive times, written to path (t, n, 7), for the range `place`.
 
     form: codes, parameters, inner momentum. inverse, axes (n, 3): inverse moments; (outer, inner, sphere) of `strang.py`.
-    state: rows (n, 7), what rounding has left out of them (n, 7), torques (n, 3); changed in place, so that another call goes on from
-    it. place: intervals from the first to before the last, steps of each from the first to before the last, at most those it has.
+    state: rows (n, 7), their rounding compensation (n, 7), torques (n, 3); changed in place, so that another call can continue.
+    place: range of intervals, and range of steps in each, limited to the existing steps.
     """
     codes, parameters, inner = form
     rows, carry, torques = state
@@ -62,6 +62,6 @@ def kicked(
                     time += h
                     torque = torque_at(codes, parameters, time, (row[3], row[4], row[5], row[6]), NO_OMEGA)
                     kick_body(row, lost, torque, half)
-            for i in range(7):  # component by component: assigning slices takes seconds to compile
+            for i in range(7):  # by components: slice assignments take seconds to compile
                 path[k + 1, body, i] = row[i]
         torques[body, 0], torques[body, 1], torques[body, 2] = torque

@@ -1,9 +1,9 @@
-"""Compiled steps of very many bodies under torques of attitude and time: blocks of 128 side by side, as in `_kernels.py`.
+"""Compiled steps of very many bodies under torques of attitude and time, in blocks of 128 as in `_kernels.py`.
 
 A block is `RUNS` runs of 128 numbers in one array: L and the quaternion, in a frame whose axes are (outer, inner, sphere) of
-`strang.py`; the rates of the three flows; the torque; and the square of half the widest turn so far. In a field L is not
-constant in space, so that the sphere's flow, a turn about L, is made in each step; its sine and cosine are polynomials of the
-angle's square.
+`strang.py`; the rates of the three flows; the torque; and the square of half the largest rotation so far. In a field L is not
+constant in space, so that the sphere's flow, a rotation about L, is applied in each step; its sine and cosine are polynomials of the
+squared angle.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Compiled free steps of very many tops: blocks of 128 bodies side by side, written so that they vectorise.
+"""Compiled free steps of very many tops, in blocks of 128 bodies for vectorisation.
 
-A block is six runs of 128 numbers in one array: the quaternion w, x, y, z that takes the body to a frame whose third
-axis is L, and the rates of two turns. The offsets between the runs are constants of the program, so the compiler sees
-that they do not overlap and handles four or eight bodies with one instruction; sine and cosine are polynomials for the
-same reason. A step is some sixty multiplications and additions; L itself is written nowhere, it is R^T (0, 0, |L|).
+A block has six runs of 128 numbers in one array: the quaternion w, x, y, z from the body to a frame whose third axis is L, and the rates
+of two rotations. The offsets between the runs are compile-time constants, so that the compiler can prove that they do not overlap and
+treats four or eight bodies per instruction; sine and cosine are polynomials for the same reason. A step takes some sixty multiplications
+and additions; L is not stored, since it is R^T (0, 0, |L|).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rotor.geometry._kernels import conjugate, half_third_row, matrix, product, 
 ONE = (1.0,)  # fractions of a step of order 2
 LANES = 128
 RUNS = 6
-FINITE = {"contract", "nnan", "ninf", "nsz"}  # products with the zeros of a quaternion are left out
+FINITE = {"contract", "nnan", "ninf", "nsz"}  # products with zeros of a quaternion are optimised away
 WIDEST_TURN = 0.5  # rad per step: half of it is the largest argument of the polynomials below
 
 

@@ -1,7 +1,7 @@
 """Compiled steps of the Lie-group Runge-Kutta method for bodies under the torques of `rotor.classical.torque_form`.
 
 The plain form is `lie_runge_kutta.py`; the order of operations within sums differs, so that both agree to round-off. All bodies of
-a call share the step. What a stage does is inlined: called, it took a third longer, the loop over the stages being in one body.
+a call share the step. The stages are inlined: function calls took a third longer.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def _error(slopes: Floats, h: float, third: Floats, fifth: Floats, state: Floats
             three += (scale * e3) ** 2
         both = math.sqrt(five + 0.01 * three)
         error = abs(h) * five / both if both > 0.0 else 0.0 * both
-        if not error <= worst:  # a number that is none is the worst
+        if not error <= worst:  # nan counts as the worst
             worst = error
     return worst
 
@@ -105,7 +105,7 @@ def _stepped(
 ) -> float:
     """One step: work[1] (n, 6) is then the change of L in space and u, and the error estimate is returned.
 
-    rolling: None where nothing rolls; the branch is taken when this is compiled.
+    rolling: None without rolling; the branch is chosen at compile time.
     """
     a, b, c, third, fifth = tableau
     slopes, change = work
@@ -132,7 +132,7 @@ def _accept(state: Floats, change: Floats) -> None:
 
 @njit(cache=True, fastmath={"contract"})
 def _next_factor(error: float, control: Any) -> Any:
-    """By how much to change the step; control: tolerance, SHRINK, GROW, SAFETY, order."""
+    """Factor for the next step; control: tolerance, SHRINK, GROW, SAFETY, order."""
     _, shrink, grow, safety, order = control
     if error == 0.0:
         return grow
@@ -144,10 +144,10 @@ def _next_factor(error: float, control: Any) -> Any:
 def to_time(
     form: Any, rolling: Any, inverse: Floats, tableau: Any, control: Any, span: Any, state: Floats, step: float
 ) -> Any:
-    """Carry state (n, 7), L in space and attitude, from span[0] to span[1]; the next step, the count, the time reached, success.
+    """Propagate state (n, 7), L in space and attitude, from span[0] to span[1]; return next step, step count, time reached, success.
 
-    span[2]: the smallest step; False where none is short enough. span[3]: the most steps; the time is short of span[1] after them.
-    control[0]: tolerance, 0 for a step that never changes.
+    span[2]: the smallest step; success is False if no step is short enough. span[3]: the largest number of steps, after which the time
+    may be less than span[1]. control[0]: tolerance, 0 for a fixed step.
     """
     time, end, smallest, most = span
     work = np.zeros((STAGES, state.shape[0], 6)), np.zeros((state.shape[0], 6))
@@ -182,10 +182,10 @@ def to_times(
     state: Floats,
     place: Any,
 ) -> Any:
-    """Fill rows of path (t, n, 7), L in body axes and attitude, while there are steps left; state (n, 7): L in space and attitude.
+    """Fill rows of path (t, n, 7), L in body axes and attitude, while steps are left; state (n, 7): L in space and attitude.
 
-    times: (times (t,), the smallest step of each interval (t - 1,)). place: (interval, time in it, next step, most steps). Returns the
-    place without the last of them, the count of steps, and False where no step is short enough.
+    times: (times (t,), the smallest step of each interval (t - 1,)). place: (interval, time in it, next step, most steps). Returns
+    `place` without its last entry, the count of steps, and False if no step is short enough.
     """
     grid, smallest = times
     row, time, step, most = place

@@ -1,11 +1,10 @@
 """Compiled steps of the geometric integrators on rows (L1, L2, L3, qw, qx, qy, qz), with compensated sums.
 
-Rounding must not pile up in one direction, or energy, |L| and |q| drift in proportion to the number of steps. Three
-things keep it from that. A rotation is applied as its increment, and what rounding loses of each sum is carried into
-the next one (Kahan 1965, with Knuth's exact sum). The sine and 1 - cosine of a turn belong together to beyond double
-precision (`_versed`), so that even the same turn made 10⁸ times neither stretches nor shrinks. The turn of the
-Moser-Veselov map is the root of its equation to beyond double precision (`_refined`), and the moments of the map lie on
-a grid on which their differences are exact.
+Rounding errors must not accumulate in one direction, or energy, |L| and |q| drift in proportion to the number of steps. Three measures
+prevent this. A rotation is applied as an increment, and the rounding error of each sum is added to the next one (Kahan 1965, with
+Knuth's exact sum). The sine and 1 - cosine of a rotation are consistent beyond double precision (`_versed`), so that even 10⁸ equal
+rotations do not change lengths. The rotation of the Moser-Veselov map solves its equation beyond double precision (`_refined`), and
+the moments of the map are on a grid on which their differences are exact.
 """
 
 from __future__ import annotations
@@ -198,11 +197,11 @@ def _near_root(m: Any, j: Any, d: Any, guess: Any) -> Any:
 
 @njit(cache=True, inline="always")
 def _refined(m: Any, lost: Any, j: Any, d: Any, near: Any) -> Any:
-    """The root near `near` as x + low, to some 1e-24 of itself.
+    """The root near `near` as x + low, with a relative error of about 1e-24.
 
-    A root that is only rounded leaves 4e-19 of the energy behind in each step, in one direction. So x is cut to 26 bits,
-    where its residual f is known to 24 digits, and the rest r solves a r + |r|² m + d (r2 r3, r3 r1, r1 r2) = -f, a the
-    slopes at x: the equation is quadratic, there are no further terms.
+    A root rounded to double precision changes the energy by 4e-19 per step, in one direction. Therefore x is truncated to 26 bits, for
+    which the residual f is known to 24 digits, and the remainder r solves a r + |r|² m + d (r2 r3, r3 r1, r1 r2) = -f with the slopes a
+    at x. This is exact, since the equation is quadratic.
     """
     x = (halves(near[0])[0], halves(near[1])[0], halves(near[2])[0])
     a, f = _slopes(m, j, d, x), _residual(m, lost, j, d, x)
@@ -232,21 +231,21 @@ def _cayley(row: Any, lost: Any, x: Any) -> None:
 
 @njit(cache=True, inline="always")
 def _nudge(row: Any, lost: Any, x: Any, low: Any) -> None:
-    """What x + low turns beyond x: (1, x + low) is (1, x) (1, e) at another length, e = (low - x × low)/(1 + |x|²)."""
+    """The additional rotation of x + low relative to x: (1, x + low) ∝ (1, x) (1, e) with e = (low - x × low)/(1 + |x|²)."""
     scale = 1.0 / (1.0 + (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]))
     t = cross(x, low)
     e = (scale * (low[0] - t[0]), scale * (low[1] - t[1]), scale * (low[2] - t[2]))
-    of_momentum = cross((row[0], row[1], row[2]), e)
-    of_attitude = product((row[3], row[4], row[5], row[6]), (0.0, e[0], e[1], e[2]))
+    momentum_change = cross((row[0], row[1], row[2]), e)
+    attitude_change = product((row[3], row[4], row[5], row[6]), (0.0, e[0], e[1], e[2]))
     for i in range(3):
-        lost[i] += 2.0 * of_momentum[i]
+        lost[i] += 2.0 * momentum_change[i]
     for i in range(4):
-        lost[3 + i] += of_attitude[i]
+        lost[3 + i] += attitude_change[i]
 
 
 @njit(cache=True, nogil=True)
 def moser_veselov(state: Floats, carry: Floats, scaled: Floats, steps: int) -> int:
-    """Steps of the discrete Moser-Veselov map with moments `scaled` = 2J/h (n, 3); the body that failed, or -1."""
+    """Steps of the discrete Moser-Veselov map with moments `scaled` = 2J/h (n, 3); return the index of a failed body, or -1."""
     for body in range(state.shape[0]):
         row, lost = state[body], carry[body]
         j1, j2, j3 = scaled[body, 0], scaled[body, 1], scaled[body, 2]

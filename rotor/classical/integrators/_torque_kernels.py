@@ -36,13 +36,13 @@ def scaled(factor: Any, v: Any) -> Any:
 
 @njit(cache=True, inline="always")
 def swing(p: Any, k: int, time: float) -> Any:
-    """cos(Ω t + φ) of torque k; 1 without a call for the vector that is constant."""
+    """cos(Ω t + φ) of torque k; 1, without evaluating the cosine, for a constant vector."""
     return math.cos(p[k, 3] * time + p[k, 4]) if p[k, 3] != 0.0 or p[k, 4] != 0.0 else 1.0
 
 
 @njit(cache=True, inline="always")
 def torque_at(codes: Any, p: Floats, time: float, q: Any, omega: Any) -> Any:
-    """Sum of the torques in body axes on a body of attitude q that turns at omega (looked at by drag alone).
+    """Sum of the torques in body axes on a body with attitude q and angular velocity omega (used by drag only).
 
     codes (k,) and p (k, WIDTH), their parameters; elements by index, since a view of a row costs as much as a torque.
     """

@@ -1,20 +1,18 @@
-"""Free steps of very many independent tops, 10⁵ to 10⁶ at once: throughput before everything else.
+"""Free steps of very many independent tops, 10⁵ to 10⁶ at once, optimised for throughput.
 
 With the axes numbered so that I3 is the intermediate moment, the energy is that of a sphere and two remainders,
 
     H = L²/2I3 + ½ (1/I1 - 1/I3) L1² + ½ (1/I2 - 1/I3) L2².
 
-|L|² commutes with every function of L, so the sphere's flow, a steady turn of the body at |L|/I3 about L in space,
-commutes with those of the remainders, turns at (1/I_i - 1/I3) L_i about the body's axes: all steps of it are made at
-once, exactly. What is left of a step (Strang 1968) is half a turn about axis 1, one about axis 2, half a turn about
-axis 1, neighbouring halves merged: two turns a step. Axis 1 is that of the larger remainder: the error is then
-h²(2 r1 r2² + r1² r2)/24 in magnitude, r the rates of the remainders, thirty times less in the median than that of turns
-about three axes, and zero for spheres, symmetric tops and linear rotors. These are the steps of order 2 of
-`SymmetricTopSplitting`, without compensated sums. L is not stepped: in space it stays as it is, and the body sees it
-through the attitude, so L in space is conserved by construction; |L| in the body is as good as |q|², which is never
-renormalised and wanders by rounding, about 1e-16 √steps; rates rounded to double cost up to 2e-16 of the angle turned, far
-below the error of the step. The energy stays bounded. Where the exact state at a few times
-is needed, `free.free_motion` is cheaper still.
+|L|² commutes with all functions of L. The sphere's flow, a steady rotation of the body at |L|/I3 about L in space, therefore commutes
+with the flows of the remainders, rotations at (1/I_i - 1/I3) L_i about the body's axes, and is applied once, exactly, for all steps. The
+rest of a step (Strang 1968) is half a rotation about axis 1, one about axis 2, half a rotation about axis 1; neighbouring halves are
+merged, which gives two rotations per step. Axis 1 has the larger remainder: the error h²(2 r1 r2² + r1² r2)/24, with r the rates of the
+remainders, is thirty times smaller in the median than for rotations about three axes, and zero for spherical and symmetric tops and
+linear rotors. These are the steps of order 2 of `SymmetricTopSplitting`, without compensated sums. L in space is conserved by
+construction: it is not stepped, and L in the body follows from the attitude. |L| in the body is as accurate as |q|², which is not
+renormalised and changes by rounding, about 1e-16 √steps. Rates rounded to double precision cost up to 2e-16 of the angle turned, far
+below the error of the step. The energy error stays bounded. For the exact state at a few times, `free.free_motion` is faster.
 
 Sources: the split into flows of rotations is that of `splitting.py`; that |L|² is a Casimir of the bracket of Euler's
 equations: J. E. Marsden and T. S. Ratiu, Introduction to Mechanics and Symmetry, chapter 15.
@@ -55,7 +53,7 @@ def propagate(
     attitude : (n, 4) or (4,) array
         Body to space.
     step : float
-        May be negative. The two turns of a step, (1/I_i - 1/I3) |L| step, may not be wider than ½ rad for any body.
+        May be negative. The two rotations of a step, (1/I_i - 1/I3) |L| step, must not exceed ½ rad for any body.
     steps : int
         Number of steps.
     executor : ThreadPoolExecutor, optional
@@ -108,7 +106,7 @@ def over_blocks(kernel: Any, blocks: int, arguments: tuple[Any, ...], executor: 
     blocks : int
         Number of blocks.
     arguments : tuple
-        What the kernel takes after the range of blocks; it changes arrays in place.
+        Arguments of the kernel after the range of blocks; it changes arrays in place.
     executor : ThreadPoolExecutor or None
         None: no threads.
     """

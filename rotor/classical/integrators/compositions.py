@@ -1,8 +1,8 @@
-"""Compositions: a symmetric step of order 2 repeated with the right fractions becomes a step of higher order.
+"""Compositions: a sequence of symmetric steps of order 2 with suitable fractions is a step of higher order.
 
-Fractions γ of the step with Σγ = 1, symmetric in order; order 4 asks Σγ³ = 0, order 6 also Σγ⁵ = 0 and one more
-condition (Hairer, Lubich, Wanner, Geometric Numerical Integration, section V.3). What the step of order 2 conserves, and
-its reversibility, holds for the composition too.
+The fractions γ of the step are symmetric with Σγ = 1; order 4 requires Σγ³ = 0, order 6 also Σγ⁵ = 0 and another condition (Hairer,
+Lubich, Wanner, Geometric Numerical Integration, section V.3). The composition inherits the conserved quantities and the reversibility of
+the step.
 """
 
 from __future__ import annotations

@@ -72,16 +72,16 @@ class LieRungeKutta(Method):
         momentum, attitude : (n, 3) array, (n, 4) array
             The start of n bodies, at times[0]; momentum in the body.
         times : (t,) array
-            Rising or falling.
+            Increasing or decreasing.
 
         Returns
         -------
         momenta : (t, n, 3) array
-            In the bodies.
+            In body axes.
         attitudes : (t, n, 4) array
             Unit quaternions.
         steps : int
-            How many steps were taken.
+            Number of steps.
         """
         space, q, taken = rotate(attitude, momentum), np.array(attitude), 0
         path = np.empty((len(times), len(q), 7))

@@ -75,7 +75,7 @@ class Method(ABC):
         momentum, attitude : (n, 3) array, (n, 4) array
             The start, at times[0].
         times : (t,) array
-            Rising or falling.
+            Increasing or decreasing.
 
         Returns
         -------
@@ -171,7 +171,7 @@ class KickDrift(Method):
         moments : (n, 3) array
             Principal moments during the drift.
         state, carry : (n, 7) array
-            Momentum and attitude, and what rounding has left out of them.
+            Momentum and attitude, and their rounding compensation.
         step : float
             Length of a step.
         steps : int
@@ -190,16 +190,16 @@ class KickDrift(Method):
         momentum, attitude : (n, 3) array, (n, 4) array
             The start of n bodies, at times[0]; momentum in the body.
         times : (t,) array
-            Rising or falling.
+            Increasing or decreasing.
 
         Returns
         -------
         momenta : (t, n, 3) array
-            In the bodies.
+            In body axes.
         attitudes : (t, n, 4) array
             Unit quaternions.
         steps : int
-            How many steps were taken.
+            Number of steps.
 
         Raises
         ------
@@ -236,7 +236,7 @@ class KickDrift(Method):
         system : System
             Moments and effects.
         times : (t,) array
-            Rising or falling.
+            Increasing or decreasing.
         counts : (t - 1,) array
             Steps between neighbouring times.
         path : (t, n, 7) array

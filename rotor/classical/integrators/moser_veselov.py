@@ -2,11 +2,10 @@
 
 Order: 2, 4, 6, 8 by series in the step, or exact: see `exact_modified_moments`. Conserves, for free motion: |L|, L in
 space, the energy, time reversal and the Poisson structure of L, to round-off (the map of (L, q) is not symplectic).
-Cost: 3 or 4 Newton sweeps of a 3x3 system without trigonometry, about 0.15 µs a step of one body on one core; between
-kicks of torques the moments are prepared anew in each drift. It needs step x |ω| below about 1, and does not serve
-bodies that are nearly linear; both are refused when Newton fails. The root is found to beyond double precision: only
-rounded, it would leave 4e-19 of the energy behind in each step, in one direction, 4e-11 after 10⁸ steps. What is left is
-rounding without direction, 4e-17 √steps.
+Cost: 3 or 4 Newton iterations of a 3x3 system without trigonometry, about 0.15 µs per step and body on one core; between
+kicks of torques the moments are recomputed in each drift. The method requires step x |ω| below about 1, and bodies that are not nearly
+linear; otherwise Newton's iteration fails and the step is refused. The root is computed beyond double precision: a rounded root would
+change the energy by 4e-19 per step in one direction, 4e-11 after 10⁸ steps. The remaining error is random rounding, 4e-17 √steps.
 
 With x the root of J x = (1 + |x|²) (h/2) L + ((J2 - J3) x2 x3, (J3 - J1) x3 x1, (J1 - J2) x1 x2), the body turns by the
 quaternion (1, x)/√(1 + |x|²) while L stays where it is in space. With 1/J_i = S/I_i + D, S and D functions of the step
@@ -39,8 +38,8 @@ EXACT = 0  # the `order` that means exact_modified_moments
 class MoserVeselov(KickDrift):
     """Preprocessed discrete Moser-Veselov steps of order 2, 4, 6 or 8, or order 0: exact for free motion.
 
-    `kick_order` is that of the composition with torques, changing moments and inner momenta; the drifts between kicks
-    then have order `order`, or 8 where that is 0, and the lower of the two holds.
+    `kick_order` is the order of the composition with torques, changing moments and inner momenta. The drifts between kicks
+    then have order `order` (8 if that is 0); the lower of both orders applies.
 
     >>> from rotor.classical.integrators.method import integrate
     >>> motion = integrate(MoserVeselov(step=0.25, order=0), [0.6, 0.8, 1.0], [1.8, 0.4, -0.9], [0.0, 10.0])
@@ -70,7 +69,7 @@ class MoserVeselov(KickDrift):
         moments : (n, 3) array
             Principal moments during the drift.
         state, carry : (n, 7) array
-            Momentum and attitude, and what rounding has left out of them; both change in place.
+            Momentum and attitude, and their rounding compensation; both change in place.
         step : float
             Length of a step.
         steps : int
@@ -81,7 +80,7 @@ class MoserVeselov(KickDrift):
         Raises
         ------
         ValueError
-            Where a step is too long for the motion or the body too nearly linear.
+            If a step is too long for the motion or the body is too nearly linear.
         """
         from rotor.classical.integrators._step_kernels import moser_veselov
 
@@ -104,7 +103,7 @@ class MoserVeselov(KickDrift):
 
 
 def modified_moments(moments: Floats, momentum: Floats, step: float, order: int) -> Floats:
-    """Moments for which the map has the order asked for at the invariants of the motion.
+    """Moments for which the map has this order at the invariants of the motion.
 
     Parameters
     ----------
@@ -123,9 +122,9 @@ def modified_moments(moments: Floats, momentum: Floats, step: float, order: int)
     """
     n, h = 0.5 * step**2 * np.sum(momentum**2, axis=-1), step**2 * kinetic_energy(momentum, momentum / moments)
     s, d = np.ones_like(n), np.zeros_like(n)
-    for (a, b), (of_s, of_d) in _series(moments).items():
+    for (a, b), (s_coefficient, d_coefficient) in _series(moments).items():
         if a + b < order / 2:
-            s, d = s + of_s * n**a * h**b, d + of_d * n**a * h**b
+            s, d = s + s_coefficient * n**a * h**b, d + d_coefficient * n**a * h**b
     return np.asarray(1.0 / (s[:, None] / moments + d[:, None]))
 
 
@@ -162,9 +161,9 @@ def _on_grid(scaled: Floats) -> Floats:
 
 
 def _least_squares(matrix: Floats, expected: Floats) -> Floats:
-    """Solutions (n, 2) of small systems, S and D not being separate in a sphere or a turn about one axis.
+    """Least-squares solutions (n, 2) of small systems; S and D are not independent for a sphere or a rotation about one axis.
 
-    By projection on the left singular vectors: the pseudo-inverse, multiplied out, would lose the digits of the condition number.
+    By projection on the left singular vectors, since the explicit pseudo-inverse would lose the digits of the condition number.
     """
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
     along = np.einsum("nij,ni->nj", left, expected)

@@ -24,7 +24,7 @@ from rotor.classical.system import System, acting_inverse
 from rotor.classical.torque_form import kernels_are_compiled
 
 _BASE = np.ones(1)
-WORTH_LOADING = 4000  # drifts: a tenth of a second step by step, as long as loading the compiled form of all of them
+WORTH_LOADING = 4000  # drifts that take 0.1 s step by step, as long as loading the compiled form
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class RotationSplitting(Composed):
         moments : (n, 3) array
             Principal moments during the drift.
         state, carry : (n, 7) array
-            Momentum and attitude, and what rounding has left out of them; both change in place.
+            Momentum and attitude, and their rounding compensation; both change in place.
         step : float
             Length of a step.
         steps : int
@@ -70,11 +70,11 @@ class RotationSplitting(Composed):
 
 @dataclass(frozen=True)
 class SymmetricTopSplitting(Composed):
-    """The sphere of the intermediate moment, and a turn for what each of the other two axes has beyond it.
+    """The sphere of the intermediate moment, and a rotation for the remainder of each of the other two axes.
 
     H = L²/2I_m + ½ (1/I_a - 1/I_m) L_a² + ½ (1/I_b - 1/I_m) L_b²; the sphere's flow commutes with the others (see
-    `strang.py`), so that with the larger remainder it is a symmetric top, solved exactly, and the smaller is alone in the
-    error. Exact for spheres, linear rotors and symmetric tops.
+    `strang.py`). Together with the larger remainder it is a symmetric top, solved exactly, so that only the smaller remainder causes an
+    error. Exact for spherical tops, linear rotors and symmetric tops.
 
     >>> from rotor.classical.integrators.method import integrate
     >>> motion = integrate(SymmetricTopSplitting(step=1.0), [2.0, 2.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0])
@@ -83,14 +83,14 @@ class SymmetricTopSplitting(Composed):
     """
 
     def follow_compiled(self, system: System, times: Floats, counts: NDArray[np.int64], path: Floats) -> bool:
-        """All steps of all bodies in one compiled call, where every effect has a compiled form and there are steps enough.
+        """All steps of all bodies in a compiled call, if all effects have a compiled form and the steps are many enough.
 
         Parameters
         ----------
         system : System
             Moments and effects.
         times : (t,) array
-            Rising or falling.
+            Increasing or decreasing.
         counts : (t - 1,) array
             Steps between neighbouring times.
         path : (t, n, 7) array
@@ -121,7 +121,7 @@ class SymmetricTopSplitting(Composed):
         moments : (n, 3) array
             Principal moments during the drift.
         state, carry : (n, 7) array
-            Momentum and attitude, and what rounding has left out of them; both change in place.
+            Momentum and attitude, and their rounding compensation; both change in place.
         step : float
             Length of a step.
         steps : int
@@ -138,7 +138,7 @@ class SymmetricTopSplitting(Composed):
 
 
 def _places(counts: NDArray[np.int64], most: int) -> Iterator[tuple[int, int, int, int]]:
-    """Intervals from the first to before the last, and steps of each likewise, of calls of at most about `most` steps."""
+    """Ranges of intervals, and of steps in each, for calls of at most about `most` steps."""
     if not counts.size:
         return
     several = max(1, most // int(counts.max()))  # intervals of a call

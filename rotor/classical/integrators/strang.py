@@ -1,16 +1,16 @@
-"""The splitting step: the symmetric-top splitting written once, for one body at a time and for blocks of bodies.
+"""The step of the symmetric-top splitting, shared by the kernels for single bodies and for blocks of bodies.
 
 With the moment I_s of a sphere taken out, the energy of a free top is
 
     H = L²/2I_s + ½ (1/I_a - 1/I_s) L_a² + ½ (1/I_b - 1/I_s) L_b² .
 
-|L|² commutes with every function of L, so that the sphere's flow commutes with those of the remainders and is made for all
-steps at once: a steady turn about L in space at |L|/I_s. The flow of a remainder turns the body about its axis at the rate
-(1/I_a - 1/I_s) L_a, and L_a stays what it is meanwhile. A step is half an outer turn (axis a), an inner turn (axis b), half
-an outer turn (G. Strang, SIAM J. Numer. Anal. 5, 506 (1968)); neighbouring halves are one turn.
+|L|² commutes with all functions of L, so that the sphere's flow commutes with those of the remainders and is applied once for all
+steps: a steady rotation about L in space at |L|/I_s. The flow of a remainder rotates the body about its axis at the rate
+(1/I_a - 1/I_s) L_a, with L_a constant. A step is half an outer turn (axis a), an inner turn (axis b), half an outer turn (G. Strang,
+SIAM J. Numer. Anal. 5, 506 (1968)); neighbouring halves are merged.
 
-These are plain functions of numbers; kernels compile them (`rotor.classical._kernels`). What a turn does to a state differs:
-one body carries compensated sums, a block of bodies is vectorised.
+These are plain functions of numbers; kernels compile them (`rotor.classical._kernels`). The implementation of a turn differs: single
+bodies use compensated sums, blocks of bodies are vectorised.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ def symmetric_steps(turns: Any, state: Any, fractions: Any, step: Any, steps: An
     Parameters
     ----------
     turns : function
-        `turns(state, inner, outer)` makes the inner turn for the time `inner`, then the outer one for the time `outer`,
+        `turns(state, inner, outer)` applies the inner turn for the time `inner`, then the outer one for the time `outer`,
         in place.
     state
         Passed on to `turns`.
     fractions : sequence of float
-        Of a composition (`compositions.py`), (1.0,) for a step of order 2.
+        Fractions of a composition (`compositions.py`); (1.0,) for a step of order 2.
     step, steps : float, int
         Length and number of the steps.
 
