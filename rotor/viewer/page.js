@@ -78,10 +78,10 @@ function fits(line, word, known) { // Ka=0, J">5, dJ=1: of the upper level, the 
   return { "=": value === than, "<": value < than, ">": value > than, "<=": value <= than, ">=": value >= than }[part[4]];
 }
 function inSeries(line, series) { // whether a line stands n steps from the first line of a series
-  const { upper, lower, step } = series ?? {}, at = step?.findIndex((one) => one !== 0) ?? -1;
+  const { upper, lower, step } = series ?? {}, at = step?.findIndex((change) => change !== 0) ?? -1;
   if (at < 0 || line.species !== series.species) return false;
   const n = (line.upper[at] - upper[at]) / step[at];
-  return Number.isInteger(n) && step.every((one, i) => line.upper[i] - upper[i] === n * one && line.lower[i] - lower[i] === n * one);
+  return Number.isInteger(n) && step.every((change, i) => line.upper[i] - upper[i] === n * change && line.lower[i] - lower[i] === n * change);
 }
 
 // --- Transports: call(message) gives an answer; onsession is called with the session after each change
@@ -99,7 +99,7 @@ export class SocketTransport {
     });
   }
   lost() {
-    for (const one of this.waiting.values()) one.fail(new Error("the connection with the server was lost"));
+    for (const request of this.waiting.values()) request.fail(new Error("the connection with the server was lost"));
     this.waiting.clear();
     this.onstatus("The server does not answer; every finished action is saved. Trying again…");
     setTimeout(() => this.open().then(() => this.call({ do: "hello" })).then((answer) => this.onsession(answer.session)).catch(() => {}),
@@ -107,9 +107,9 @@ export class SocketTransport {
   }
   receive(content) {
     if (content.session) return this.onsession(content.session);
-    const one = this.waiting.get(content.re);
+    const request = this.waiting.get(content.re);
     this.waiting.delete(content.re);
-    if (one) content.error ? one.fail(new Error(content.error)) : one.done(content);
+    if (request) content.error ? request.fail(new Error(content.error)) : request.done(content);
   }
   call(message) {
     return new Promise((done, fail) => {
@@ -290,7 +290,7 @@ class SpectrumWindow extends Plot {
     this.zero = new Bokeh.Span({ location: 0, dimension: "width", line_width: 1 });
     this.cursor = new Bokeh.Span({ location: 0, dimension: "height", line_width: 1, line_dash: [4, 4], visible: false });
     this.chosen = new Bokeh.BoxAnnotation({ left: 0, right: 0, fill_alpha: 0.15, visible: false });
-    for (const one of [this.zero, this.cursor, this.chosen]) f.add_layout(one);
+    for (const mark of [this.zero, this.cursor, this.chosen]) f.add_layout(mark);
     this.onpan = (a, b) => this.go(a, b);
     this.onselect = (a, b) => app.fitPeak(a, b, this);
     this.onfocus = () => app.activate(this);
@@ -336,21 +336,21 @@ class SpectrumWindow extends Plot {
     if (!isFinite(low)) { low = 0; high = 1; }
     const tall = Math.max(high - Math.min(low, 0), 1e-30), mirrored = this.mirrored = !app.settings.overlaid && Object.keys(sticks).length > 0;
     let strongest = 0;
-    for (const one of Object.values(sticks)) one.x.forEach((at,
-      i) => { if (at >= this.first && at <= this.last && one.height[i] > strongest) strongest = one.height[i]; });
+    for (const predicted of Object.values(sticks)) predicted.x.forEach((at,
+      i) => { if (at >= this.first && at <= this.last && predicted.height[i] > strongest) strongest = predicted.height[i]; });
     const unit = (tall * 0.95) / (app.autoscale ? strongest || 1 : 1);
     const columns = { x: [], y0: [], y1: [], color: [] };
-    const least = Object.values(sticks).reduce((sum, one) => sum + one.x.length, 0) < 200 ? 0.012 * tall : 0;
+    const least = Object.values(sticks).reduce((sum, predicted) => sum + predicted.x.length, 0) < 200 ? 0.012 * tall : 0;
       // a weak line is seen where there are few
     this.lines = [];
     const foot = mirrored ? Math.min(low, 0) - 0.04 * tall : 0;
     this.foot = foot;
-    for (const [number, one] of Object.entries(sticks)) {
+    for (const [number, predicted] of Object.entries(sticks)) {
       const color = colors[(app.species[number]?.colour ?? 0) % colors.length];
-      one.x.forEach((at, i) => {
+      predicted.x.forEach((at, i) => {
         columns.x.push(at); columns.y0.push(foot); columns.color.push(color);
-        columns.y1.push(mirrored ? foot - Math.max(one.height[i] * unit, least) : foot + one.height[i] * unit);
-        this.lines.push({ species: Number(number), upper: one.upper[i], lower: one.lower[i], frequency_mhz: at, height: one.height[i] });
+        columns.y1.push(mirrored ? foot - Math.max(predicted.height[i] * unit, least) : foot + predicted.height[i] * unit);
+        this.lines.push({ species: Number(number), upper: predicted.upper[i], lower: predicted.lower[i], frequency_mhz: at, height: predicted.height[i] });
       });
     }
     this.sticks.data = columns;
@@ -402,9 +402,9 @@ class ResidualPlot extends Plot {
       { source: this.bars, line_color: { field: "color" }, line_alpha: 0.6 });
     f.scatter({ field: "x" }, { field: "y" }, { source: this.points, marker: { field: "marker" }, size: 8, line_color: { field: "color" },
       fill_color: { field: "fill" } });
-    this.onclick = (at) => { const one = this.nearest(at); if (one) app.selectLine(one.number, true); };
-    this.ontip = (at) => { const one = this.nearest(at);
-      return one ? `${app.name(one.line)}  ${one.facts.label}\nobs − calc ${fixed(1e3 * one.facts.difference_mhz, 2)} kHz` : null; };
+    this.onclick = (at) => { const point = this.nearest(at); if (point) app.selectLine(point.number, true); };
+    this.ontip = (at) => { const point = this.nearest(at);
+      return point ? `${app.name(point.line)}  ${point.facts.label}\nobs − calc ${fixed(1e3 * point.facts.difference_mhz, 2)} kHz` : null; };
   }
   theme() { super.theme(); const pen = PEN[this.app.theme]; this.zero.line_color = pen.ink; this.shown.fill_color = pen.select;
     this.shown.line_color = pen.select; this.draw(); }
@@ -512,13 +512,13 @@ class LoomisWood extends Plot {
   draw() {
     const app = this.app, xs = [], ys = [], texts = { x: [], y: [], text: [] }, marks = { x: [], y: [], color: [], marker: [] };
     const colors = PALETTE[app.theme], series = app.settings.series;
-    const every = Math.ceil((12 * this.rows.length) / (this.box.height || 300)); // so that labels do not overlap
+    const stride = Math.ceil((12 * this.rows.length) / (this.box.height || 300)); // so that labels do not overlap
     this.rows.forEach((row, i) => {
       let low = Infinity, high = -Infinity;
       for (const value of row.y) { if (value < low) low = value; if (value > high) high = value; }
       const unit = (0.85 * this.scale) / (high - low || 1);
       xs.push(row.x); ys.push(row.y.map((value) => Math.min((value - low) * unit, 1.4) - i - 0.7));
-      if (i % every === 0) texts.x.push(-0.99 * this.half), texts.y.push(-i - 0.56), texts.text.push(row.upper.length ? app.text({ ...row, species: series?.species }) : `${row.n}:  ${row.centre_mhz.toFixed(3)}`);
+      if (i % stride === 0) texts.x.push(-0.99 * this.half), texts.y.push(-i - 0.56), texts.text.push(row.upper.length ? app.text({ ...row, species: series?.species }) : `${row.n}:  ${row.centre_mhz.toFixed(3)}`);
       if (row.at != null && Math.abs(row.at) < this.half) { marks.x.push(row.at); marks.y.push(-i - 0.8);
         marks.color.push(colors[(app.species[series?.species]?.colour ?? 0) % colors.length]);
         marks.marker.push(row.rejected ? "x" : "triangle"); }
@@ -578,7 +578,7 @@ export class App {
     this.refresh();
   }
   refresh() {
-    for (const one of this.windows) one.load();
+    for (const w of this.windows) w.load();
     this.residuals?.draw();
     if (this.pane === "wood") this.wood?.load();
     this.panels(); this.bar();
@@ -679,16 +679,16 @@ export class App {
     const { first, last } = this.active;
     await this.addWindow(first, last);
   }
-  activate(one) {
-    this.active = one;
-    for (const other of this.windows) other.place.classList.toggle("active", other === one && this.windows.length > 1);
-    this.placed(one);
+  activate(spectrum) {
+    this.active = spectrum;
+    for (const other of this.windows) other.place.classList.toggle("active", other === spectrum && this.windows.length > 1);
+    this.placed(spectrum);
   }
-  placed(one) {
-    if (one !== this.active) return;
+  placed(spectrum) {
+    if (spectrum !== this.active) return;
     this.residuals?.link();
     const out = this.root.querySelector(".place");
-    if (out) out.textContent = `${one.first.toFixed(3)} to ${one.last.toFixed(3)} MHz`;
+    if (out) out.textContent = `${spectrum.first.toFixed(3)} to ${spectrum.last.toFixed(3)} MHz`;
   }
   bar() {
     const { undo, redo } = this.session;
@@ -717,8 +717,8 @@ export class App {
     this.say(on ? "Drag over a peak to fit it" : "Drag moves the spectrum"); }
   zoom(factor) { const w = this.active, middle = (w.first + w.last) / 2, half = ((w.last - w.first) / 2) * factor;
     w.go(middle - half, middle + half); }
-  show(frequency, one, span = null) {
-    const w = one ?? this.active, wide = span ?? Math.min(w.last - w.first, Math.max(60 * this.info.channel_mhz, frequency * 2e-4));
+  show(frequency, spectrum, span = null) {
+    const w = spectrum ?? this.active, wide = span ?? Math.min(w.last - w.first, Math.max(60 * this.info.channel_mhz, frequency * 2e-4));
     w.cursor.location = frequency; w.cursor.visible = true;
     w.go(frequency - wide / 2, frequency + wide / 2);
   }
@@ -743,13 +743,13 @@ export class App {
 
   // Assigning
 
-  async fitPeak(first, last, one, row = null) {
-    this.active = one; one.chosen.left = first; one.chosen.right = last; one.chosen.visible = true;
+  async fitPeak(first, last, spectrum, row = null) {
+    this.active = spectrum; spectrum.chosen.left = first; spectrum.chosen.right = last; spectrum.chosen.visible = true;
     let answer;
-    try { answer = await this.transport.call({ do: "peak", first_mhz: first, last_mhz: last, reach_mhz: (one.last - one.first) / 8 }); }
+    try { answer = await this.transport.call({ do: "peak", first_mhz: first, last_mhz: last, reach_mhz: (spectrum.last - spectrum.first) / 8 }); }
     catch (error) { this.say(error.message, true); return null; }
     const middle = answer.peak?.frequency_mhz ?? (first + last) / 2;
-    if (answer.peak) { one.cursor.location = middle; one.cursor.visible = true; this.measured = [...this.measured, middle].slice(-3); }
+    if (answer.peak) { spectrum.cursor.location = middle; spectrum.cursor.visible = true; this.measured = [...this.measured, middle].slice(-3); }
     const series = this.settings.series;
     const inside = (c) => c.frequency_mhz >= first && c.frequency_mhz <= last;
     if (row?.upper.length && !answer.candidates.some((c) => this.same(c,
@@ -766,10 +766,10 @@ export class App {
     return this.offered;
   }
   same(a, b) { return a.species === b.species && String(a.upper) === String(b.upper) && String(a.lower) === String(b.lower); }
-  offer(line, one) { // a predicted line: the peak about it is fitted, and the line marked
+  offer(line, spectrum) { // a predicted line: the peak about it is fitted, and the line marked
     this.wish = line;
-    const reach = Math.max(8 * this.info.channel_mhz, (one.last - one.first) / 40);
-    return this.fitPeak(line.frequency_mhz - reach, line.frequency_mhz + reach, one);
+    const reach = Math.max(8 * this.info.channel_mhz, (spectrum.last - spectrum.first) / 40);
+    return this.fitPeak(line.frequency_mhz - reach, line.frequency_mhz + reach, spectrum);
   }
   fitMiddle() {
     const w = this.active, { row: at, rows, half } = this.wood, row = this.pane === "wood" && at != null ? rows[at] : null;
@@ -799,15 +799,15 @@ export class App {
     const w = this.active,
       middle = w.cursor.visible && w.cursor.location > w.first && w.cursor.location < w.last ? w.cursor.location : (w.first + w.last) / 2,
       tiny = 1e-6;
-    const ahead = list.filter((one) => direction * (one.frequency_mhz - middle) > tiny);
+    const ahead = list.filter((candidate) => direction * (candidate.frequency_mhz - middle) > tiny);
     if (!ahead.length) { this.say("No line further on in this window", true); return null; }
-    const next = ahead.reduce((best, one) => (direction * (one.frequency_mhz - best.frequency_mhz) < 0 ? one : best));
+    const next = ahead.reduce((best, candidate) => (direction * (candidate.frequency_mhz - best.frequency_mhz) < 0 ? candidate : best));
     this.show(next.frequency_mhz, w, w.last - w.first);
     return next;
   }
   stepPredicted(direction) {
     const w = this.active, tallest = Math.max(...(w.lines ?? []).map((line) => line.height), 0);
-    const line = this.step(direction, (w.lines ?? []).filter((one) => one.height > 0.01 * tallest));
+    const line = this.step(direction, (w.lines ?? []).filter((candidate) => candidate.height > 0.01 * tallest));
     if (line) { this.wish = line;
       this.say(`${this.name(line)} ${this.text(line)}, ${line.frequency_mhz.toFixed(4)} MHz; f fits the peak there`); }
   }
@@ -826,9 +826,9 @@ export class App {
     const answer = await this.do({ do: "refit" });
     if (!answer) return;
     await frame();
-    const fitted = Object.values(this.species).filter((one) => one.fit);
+    const fitted = Object.values(this.species).filter((species) => species.fit);
     this.say(fitted.map(({ name, fit }) => `${name}: ${fit.lines} lines, rms ${fixed(1e3 * fit.rms_mhz, 2)} kHz, weighted ${fixed(fit.weighted_rms, 2)}`).join("; "));
-    const wrong = fitted.find((one) => one.fit.suspect?.length);
+    const wrong = fitted.find((species) => species.fit.suspect?.length);
     if (wrong) { this.selectLine(wrong.fit.suspect[0], true); this.say(this.suspicion(wrong.fit), true); }
   }
   suspicion({ suspect, weighted_rms: poor, rms_without: good }) { // the line that a poor fit is better off without
@@ -849,7 +849,7 @@ export class App {
     const canvases = [this.active, this.pane === "wood" ? this.wood : this.residuals].map((plot) => plot.view.export().canvas);
     const out = h("canvas", { width: Math.max(...canvases.map((c) => c.width)), height: canvases.reduce((sum, c) => sum + c.height, 0) });
     let top = 0;
-    for (const one of canvases) { out.getContext("2d").drawImage(one, 0, top); top += one.height; }
+    for (const canvas of canvases) { out.getContext("2d").drawImage(canvas, 0, top); top += canvas.height; }
     out.toBlob((blob) => this.download("view.png", blob));
   }
   download(name, blob) { const link = h("a", { href: URL.createObjectURL(blob), download: name }); link.click();
@@ -902,7 +902,7 @@ export class App {
     const of = this.pickOf in this.species ? this.pickOf : shown[0] ?? Object.keys(this.species)[0], { names, halves } = this.known(of);
     const select = h("select", { "aria-label": "Species of the level", "data-field": "pickOf",
       onchange: (event) => { this.pickOf = event.target.value; this.panels(); } },
-      Object.entries(this.species).map(([n, one]) => h("option", { value: n, selected: n === of }, one.name)));
+      Object.entries(this.species).map(([n, species]) => h("option", { value: n, selected: n === of }, species.name)));
     const start = o.candidates.find((c) => String(c.species) === of)?.upper ?? names.map(() => 0);
     const words = this.level?.of === of ? this.level.words : names.map((name, i) => quantum(start[i], name, halves));
     const pick = async () => {
@@ -934,19 +934,19 @@ export class App {
         h("button", { title: "the lines of this level that the dipole allows, strongest first" }, "Show")));
   }
   fitSummary() {
-    return Object.entries(this.species).map(([number, one]) => h("section", {}, h("h3", {}, this.swatch(number), one.name), one.fit
-      ? [h("p", {}, `${one.fit.lines} lines, rms ${fixed(1e3 * one.fit.rms_mhz, 2)} kHz, weighted rms ${fixed(one.fit.weighted_rms, 2)}`),
-        one.fit.open.length ? h("p", { class: "wrong" }, `not determined: ${one.fit.open.join(", ")}`) : null,
-        one.fit.suspect?.length && this.suspicion(one.fit) ? h("p", { class: "wrong" }, this.suspicion(one.fit), " ",
-          h("button", { type: "button", onclick: () => this.selectLine(one.fit.suspect[0], true) }, "Show it")) : null]
+    return Object.entries(this.species).map(([number, species]) => h("section", {}, h("h3", {}, this.swatch(number), species.name), species.fit
+      ? [h("p", {}, `${species.fit.lines} lines, rms ${fixed(1e3 * species.fit.rms_mhz, 2)} kHz, weighted rms ${fixed(species.fit.weighted_rms, 2)}`),
+        species.fit.open.length ? h("p", { class: "wrong" }, `not determined: ${species.fit.open.join(", ")}`) : null,
+        species.fit.suspect?.length && this.suspicion(species.fit) ? h("p", { class: "wrong" }, this.suspicion(species.fit), " ",
+          h("button", { type: "button", onclick: () => this.selectLine(species.fit.suspect[0], true) }, "Show it")) : null]
       : h("p", {}, `Lines assigned: ${Object.values(this.lines).filter((line) => line.species === Number(number)).length}, not fitted`)));
   }
   panelLines() {
-    const every = Object.entries(this.lines).sort((a, b) => a[1].frequency_mhz - b[1].frequency_mhz),
+    const all = Object.entries(this.lines).sort((a, b) => a[1].frequency_mhz - b[1].frequency_mhz),
       words = this.filter.toLowerCase().split(/\s+/).filter(Boolean);
     const text = (number,
       line) => `${this.name(line)} ${this.facts[number]?.label ?? ""} ${line.frequency_mhz.toFixed(3)} ${line.comment} ${line.rejected ? "rejected" : ""} ${this.off(number) > 3 ? "far" : ""}`.toLowerCase();
-    const shown = every.filter(([number, line]) => words.every((word) => (word === "series" ? inSeries(line, this.settings.series)
+    const shown = all.filter(([number, line]) => words.every((word) => (word === "series" ? inSeries(line, this.settings.series)
       : fits(line, word, this.known(line.species)) ?? text(number, line).includes(word))));
     const search = h("input", { type: "search", "data-field": "filter", value: this.filter,
       placeholder: "filter: Ka=0 dJ=1 J>5, series, far, rejected, name", "aria-label": "Filter",
@@ -964,7 +964,7 @@ export class App {
         value: this.settings.least_error_mhz, onchange: (event) => this.do({ do: "settings",
         least_error_mhz: Number(event.target.value) }) })));
     const blends = {};
-    for (const [, line] of every) blends[line.blend] = (blends[line.blend] ?? 0) + 1;
+    for (const [, line] of all) blends[line.blend] = (blends[line.blend] ?? 0) + 1;
     const rows = shown.slice(0, 500).map(([number, line]) => h("tr",
       { class: [this.picked.has(number) ? "marked" : "", line.rejected ? "rejected" : "", this.off(number) > 3 ? "far" : ""].join(" "),
       onclick: (event) => { if (event.target.type !== "checkbox") this.selectLine(number, true); } },
@@ -977,7 +977,7 @@ export class App {
         h("td", { class: "number" }, fixed(1e3 * this.facts[number]?.difference_mhz, 1)),
         h("td", { class: "number" }, fixed(1e3 * line.error_mhz, 1))));
     return [search, h("p", { class: "quiet" },
-      `${shown.length} of ${every.length} lines${shown.length > 500 ? ", the first 500 shown" : ""}`), tools,
+      `${shown.length} of ${all.length} lines${shown.length > 500 ? ", the first 500 shown" : ""}`), tools,
       h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, ""), h("th", {}, "line"), h("th", { class: "number" }, "MHz"),
         h("th", { class: "number" }, "o−c (kHz)"), h("th", { class: "number" }, "σ (kHz)"))), h("tbody", {}, rows))].filter(Boolean);
   }
@@ -1004,7 +1004,7 @@ export class App {
       const content = message(next);
       if (final) { this.preview = null; this.sliding = false; this.do({ ...content, species: Number(number) }); return; }
       this.preview = { species: Number(number), ...content }; this.sliding = true;
-      for (const one of this.windows) one.load();
+      for (const w of this.windows) w.load();
       if (this.pane === "wood") this.wood.load();
     };
     const box = h("input", { type: "number", step: "any", value: value.toFixed(digits), "data-field": `${number}.${name}`,
@@ -1017,21 +1017,21 @@ export class App {
   }
   panelConstants() {
     const live = this.transport.live;
-    const parts = Object.entries(this.species).map(([number, one]) => this.speciesPart(number, one));
+    const parts = Object.entries(this.species).map(([number, species]) => this.speciesPart(number, species));
     const emission = h("label", {}, h("input", { type: "checkbox", "data-field": "emission", checked: this.settings.emission,
       onchange: (event) => this.do({ do: "settings", emission: event.target.checked }) }),
       "emission model over the spectrum (column, velocity, width)");
     return [...parts, live && this.adder(), live && this.searcher(), live && h("p", {}, emission)].filter(Boolean);
   }
-  speciesPart(number, one) {
+  speciesPart(number, species) {
     const reach = this.spans[number] ?? 1e-3, lines = Object.values(this.lines).filter((line) => line.species === Number(number)).length;
-    const rows = Object.entries(one.constants).map(([name, value]) => {
-      const error = one.errors[name], digits = digitsOf(error, value), before = one.fit?.before?.[name],
+    const rows = Object.entries(species.constants).map(([name, value]) => {
+      const error = species.errors[name], digits = digitsOf(error, value), before = species.fit?.before?.[name],
         moved = before == null ? null : value - before;
-      const span = reach * (Math.abs(value) || Math.abs(Object.values(one.constants)[0]) * 1e-6);
+      const span = reach * (Math.abs(value) || Math.abs(Object.values(species.constants)[0]) * 1e-6);
       const free = h("input", { type: "checkbox", "data-field": `${number}.${name}.free`, "aria-label": `${name} free`,
-        checked: one.free.includes(name), onchange: (event) => this.do({ do: "free", species: Number(number),
-        free: event.target.checked ? [...one.free, name] : one.free.filter((other) => other !== name) }) });
+        checked: species.free.includes(name), onchange: (event) => this.do({ do: "free", species: Number(number),
+        free: event.target.checked ? [...species.free, name] : species.free.filter((other) => other !== name) }) });
       const [box, range] = this.slider(number, name, value, span, (next) => ({ do: "constants", constants: { [name]: next } }), digits);
       return [h("tr", {}, h("td", {}, free), h("th", { scope: "row" }, name), h("td", {}, box),
         h("td", { class: "number" }, error ? `± ${short(error)}` : "")),
@@ -1041,39 +1041,39 @@ export class App {
     });
     const small = (name, value, span, message, digits, unit) => { const [box, range] = this.slider(number, name, value, span, message,
       digits); return h("div", { class: "knob" }, h("label", {}, name, " ", box, ` ${unit}`), range); };
-    const dipole = one.dipole_abc_debye ?? [0, 0, 0], axes = ["μa", "μb", "μc"];
+    const dipole = species.dipole_abc_debye ?? [0, 0, 0], axes = ["μa", "μb", "μc"];
     const add = h("input", { placeholder: "add: DeltaJ, …", "aria-label": "Constant to add", "data-field": `${number}.add`,
       style: "width:9em" });
-    return h("details", { open: true, class: "species" }, h("summary", {}, this.swatch(number), one.name,
-      h("span", { class: "quiet" }, ` ${lines} lines${one.fit ? `, rms ${fixed(1e3 * one.fit.rms_mhz, 1)} kHz` : ""}`)),
-      h("div", { class: "row" }, h("label", {}, h("input", { type: "checkbox", "data-field": `${number}.visible`, checked: one.visible,
+    return h("details", { open: true, class: "species" }, h("summary", {}, this.swatch(number), species.name,
+      h("span", { class: "quiet" }, ` ${lines} lines${species.fit ? `, rms ${fixed(1e3 * species.fit.rms_mhz, 1)} kHz` : ""}`)),
+      h("div", { class: "row" }, h("label", {}, h("input", { type: "checkbox", "data-field": `${number}.visible`, checked: species.visible,
         onchange: (event) => this.do({ do: "species", species: Number(number), visible: event.target.checked }) }), "shown"),
         h("label", {}, "colour ", h("select", { "data-field": `${number}.colour`,
           onchange: (event) => this.do({ do: "species", species: Number(number), colour: Number(event.target.value) }) },
           ["blue", "orange", "green", "purple", "ochre", "teal",
-          "grey"].map((name, i) => h("option", { value: i, selected: i === one.colour }, name)))),
+          "grey"].map((name, i) => h("option", { value: i, selected: i === species.colour }, name)))),
         h("label", {}, "slider ± ", h("select", { "data-field": `${number}.reach`,
           onchange: (event) => { this.spans[number] = Number(event.target.value); this.panels(); } },
           [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1].map((r) => h("option", { value: r, selected: r === reach },
           `${Number((r * 100).toPrecision(1))} %`)))),
         h("label", { title: "lines split by nuclear spins, where the source has their constants" },
-          h("input", { type: "checkbox", "data-field": `${number}.hyperfine`, checked: one.hyperfine,
+          h("input", { type: "checkbox", "data-field": `${number}.hyperfine`, checked: species.hyperfine,
           onchange: (event) => { const box = event.target; this.do({ do: "species", species: Number(number),
-          hyperfine: box.checked }).then((answer) => { if (!answer) box.checked = one.hyperfine; }); } }), "spins"),
+          hyperfine: box.checked }).then((answer) => { if (!answer) box.checked = species.hyperfine; }); } }), "spins"),
         h("button", { type: "button", onclick: () => this.do({ do: "remove_species", species: Number(number) }) }, "Remove")),
       h("table", { class: "constants" }, h("thead", {}, h("tr", {}, h("th", { class: "narrow" }, "free"), h("th", { class: "name" }, ""),
         h("th", {}, "MHz"), h("th", { class: "number" }, "error, moved"))), h("tbody", {}, rows)),
       h("form", { class: "row", onsubmit: (event) => { event.preventDefault();
-        if (add.value.trim()) this.do({ do: "free", species: Number(number), free: [...one.free, add.value.trim()] }); } }, add,
+        if (add.value.trim()) this.do({ do: "free", species: Number(number), free: [...species.free, add.value.trim()] }); } }, add,
         h("button", {}, "Free it")),
-      small("T", one.temperature_k, one.temperature_k * 0.9, (next) => ({ do: "species", temperature_k: Math.max(next, 0.1) }), 1, "K"),
-      small("height", one.scale, one.scale * 0.95, (next) => ({ do: "species", scale: Math.max(next, 1e-3) }), 2, ""),
+      small("T", species.temperature_k, species.temperature_k * 0.9, (next) => ({ do: "species", temperature_k: Math.max(next, 0.1) }), 1, "K"),
+      small("height", species.scale, species.scale * 0.95, (next) => ({ do: "species", scale: Math.max(next, 1e-3) }), 2, ""),
       dipole.map((value, i) => small(axes[i], value, Math.max(Math.abs(value), 0.5),
         (next) => ({ do: "species", dipole_abc_debye: dipole.map((old, k) => (k === i ? next : old)) }), 3, "D")),
-      this.settings.emission && [small("lg N", Math.log10(one.column_per_cm2), 2,
+      this.settings.emission && [small("lg N", Math.log10(species.column_per_cm2), 2,
         (next) => ({ do: "species", column_per_cm2: 10 ** next }), 2, "cm⁻²"),
-        small("velocity", one.velocity_km_s, 20, (next) => ({ do: "species", velocity_km_s: next }), 2, "km/s"),
-        small("width", one.fwhm_km_s, one.fwhm_km_s * 0.9, (next) => ({ do: "species", fwhm_km_s: Math.max(next, 0.01) }), 2, "km/s")]);
+        small("velocity", species.velocity_km_s, 20, (next) => ({ do: "species", velocity_km_s: next }), 2, "km/s"),
+        small("width", species.fwhm_km_s, species.fwhm_km_s * 0.9, (next) => ({ do: "species", fwhm_km_s: Math.max(next, 0.01) }), 2, "km/s")]);
   }
   panelSeries() {
     const now = this.settings.series, first = Object.keys(this.species)[0], number = String(now?.species ?? first ?? "");
@@ -1086,7 +1086,7 @@ export class App {
     const field = (key, label, value) => h("label", { class: "wide" }, label,
       h("input", { "data-field": `series.${key}`, value: shown(value, key === "step"), placeholder: head }));
     const species = h("select", { "aria-label": "Species", "data-field": "series.species" },
-      Object.entries(this.species).map(([n, one]) => h("option", { value: n, selected: n === number }, one.name)));
+      Object.entries(this.species).map(([n, species]) => h("option", { value: n, selected: n === number }, species.name)));
     const from = c && String(c.species) === number ? c : now?.upper?.length ? now : null;
     const upper = field("upper", "upper level", from?.upper), lower = field("lower", "lower level", from?.lower),
       step = field("step", "step of each row", now?.step?.length ? now.step : guess);
@@ -1101,7 +1101,7 @@ export class App {
       h("label", { class: "wide" }, "species", species), upper, lower, step, h("button", { class: "main" }, "Show rows")),
       h("h3", {}, "From two or three lines, extrapolated"), h("form",
         { onsubmit: guarded(() => { const f = frequencies.value.trim().split(/[\s,]+/).map(Number);
-        if (f.length < 2 || f.some((one) => !isFinite(one))) throw new Error("two or three frequencies in MHz are needed");
+        if (f.length < 2 || f.some((value) => !isFinite(value))) throw new Error("two or three frequencies in MHz are needed");
         show({ frequencies_mhz: f }); }) }, h("label", { class: "wide" }, "frequencies", frequencies), h("button", {}, "Show rows")),
       h("p", { class: "quiet" },
         "Shift and drag over a peak of a row fits it and offers the line of the row. The last fitted peaks stand in the field.")];
@@ -1120,14 +1120,14 @@ export class App {
       levels.length ? null : h("p", {}, "No line assigned."),
       levels.length ? h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "level"), h("th", { class: "number" }, "E/hc (cm⁻¹)"),
         h("th", { class: "number" }, "lines"))), h("tbody", {},
-        levels.map((one) => h("tr", {}, h("td", {}, one.label), h("td", { class: "number" }, fixed(one.energy_cm, 6)),
-        h("td", { class: "number" }, one.lines))))) : null,
+        levels.map((level) => h("tr", {}, h("td", {}, level.label), h("td", { class: "number" }, fixed(level.energy_cm, 6)),
+        h("td", { class: "number" }, level.lines))))) : null,
       differences.length ? [h("h3", {}, "Combination differences"),
         h("table", {}, h("thead", {}, h("tr", {}, h("th", {}, "levels (by)"), h("th", { class: "number" }, "observed (MHz)"),
         h("th", { class: "number" }, "o−c (kHz)"))), h("tbody", {},
-        differences.map((one) => h("tr", {}, h("td", {}, `${one.levels.join(" − ")} (${one.by})`),
-        h("td", { class: "number" }, fixed(one.observed_mhz, 4)),
-        h("td", { class: "number" }, fixed(1e3 * one.difference_mhz, 1))))))] : null));
+        differences.map((difference) => h("tr", {}, h("td", {}, `${difference.levels.join(" − ")} (${difference.by})`),
+        h("td", { class: "number" }, fixed(difference.observed_mhz, 4)),
+        h("td", { class: "number" }, fixed(1e3 * difference.difference_mhz, 1))))))] : null));
   }
 
   // Keys
@@ -1150,10 +1150,10 @@ export class App {
         a: () => this.choose(!this.choosing), x: () => this.reject(), Delete: () => this.remove(),
       r: () => this.refit(), u: () => this.do({ do: "undo" }), y: () => this.do({ do: "redo" }), w: () => this.twoWindows(),
         m: () => this.do({ do: "settings", overlaid: !this.settings.overlaid }),
-      s: () => { this.autoscale = !this.autoscale; for (const one of this.windows) one.draw(); },
+      s: () => { this.autoscale = !this.autoscale; for (const w of this.windows) w.draw(); },
         l: () => this.showPane(this.pane === "wood" ? "residuals" : "wood"), t: () => this.turn(), "?": () => this.help(),
       PageDown: () => this.pane === "wood" && this.wood.next(1), PageUp: () => this.pane === "wood" && this.wood.next(-1),
-      Escape: () => { this.offered = null; for (const one of this.windows) { one.chosen.visible = false; one.cursor.visible = false;
+      Escape: () => { this.offered = null; for (const w of this.windows) { w.chosen.visible = false; w.cursor.visible = false;
         } this.choose(false); this.panels(); },
     };
     TABS.forEach((name, i) => { keys[String(i + 1)] = () => this.showTab(name); });
