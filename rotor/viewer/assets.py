@@ -1,4 +1,4 @@
-"""The files of the page: our module, its style, and BokehJS as the Python package of Bokeh ships it."""
+"""Files of the page: its module and style, and BokehJS from the Python package of Bokeh."""
 
 from __future__ import annotations
 

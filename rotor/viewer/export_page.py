@@ -1,4 +1,4 @@
-"""One page with its data inside, which opens without a server and without a network: spectrum, sticks, lines, fits, rows."""
+"""A page that contains its data (spectrum, sticks, lines, fits, rows) and opens without a server or a network."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ROW_PIXELS = 300
 
 
 def export_page(service: Service, half_width_mhz: float | None = None) -> str:
-    """The page of a session as one text."""
+    """The page of a session as HTML text."""
     data = msgspec.json.encode(page_data(service, half_width_mhz)).decode()
     safe = data.replace("<", "\\u003c")  # so that no text of the data ends the element
     style = f"<style>\n{page_file('page.css')}\n</style>"
@@ -33,12 +33,12 @@ def export_page(service: Service, half_width_mhz: float | None = None) -> str:
 
 
 def _embedded(script: str) -> str:
-    """A script as the content of an element, whose end it must not name."""
+    """A script that can stand inside a script element."""
     return script.replace("</script", "<\\/script")
 
 
 def page_data(service: Service, half_width_mhz: float | None = None) -> dict[str, Any]:
-    """What the exported page has inside, by the names of the messages that it answers."""
+    """Data of the exported page, by the messages that they answer."""
     x, y = service.pyramid.frequency_mhz, service.pyramid.intensity
     hello = service.answer({"do": "hello"})["ok"]
     if len(x) > MOST_POINTS:
@@ -70,7 +70,7 @@ def _sticks(service: Service, number: int) -> dict[str, Any]:
 
 
 def _axis(x: Floats) -> dict[str, Any]:
-    """A frequency axis: equal steps by three numbers, others by their distances from the first."""
+    """A frequency axis: three numbers for equal steps, otherwise the distances from the first frequency."""
     steps = np.diff(x)
     if len(x) > 2 and np.ptp(steps) < 1e-6 * abs(float(steps.mean())):
         return {"start": float(x[0]), "scale": float((x[-1] - x[0]) / (len(x) - 1)), "steps": len(x)}
@@ -79,7 +79,7 @@ def _axis(x: Floats) -> dict[str, Any]:
 
 
 def _packed(values: Floats, plain: bool = False) -> dict[str, Any]:
-    """Numbers as 32-bit floats in base64."""
+    """Numbers as base64 text of 32-bit floats. plain: without start and scale."""
     text = base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode()
     return {"base64": text} if plain else {"start": 0.0, "scale": 1.0, "base64": text}
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def exported(what: str, model: Model, lines: Mapping[int, Line]) -> tuple[str, str]:
-    """Name and text of a file. ValueError for what no file is written of, and as the fit gives it."""
+    """Name and text of an exported file; ValueError for an unknown kind, for no lines, and from the fit."""
     if what not in WRITERS:
         raise ValueError(f"export {what!r}: expected one of {', '.join(WRITERS)}")
     if not lines and what != "toml":
@@ -59,7 +59,7 @@ def _par(variances: bool) -> Callable[[Model, Mapping[int, Line], str], str]:
 
 
 def _toml(model: Model, lines: Mapping[int, Line], stem: str) -> str:
-    """The molecule file: of a fit with errors and correlations, else the constants as they are."""
+    """The molecule file; after a fit, with errors and correlations."""
     from rotor.fitting.top_constants import TopConstants
     from rotor.formats.fit_request import write_fitted_toml
     from rotor.formats.molecules.molecule_file import MoleculeFile
@@ -113,7 +113,7 @@ def _report(model: Model, lines: Mapping[int, Line], stem: str) -> str:
 
 
 def _written(name: str, write: Callable[[Path], object]) -> str:
-    """The text that a writer of paths writes."""
+    """The text that a writer of files writes."""
     with tempfile.TemporaryDirectory(prefix="rotor-view-") as folder:
         path = Path(folder) / name
         write(path)

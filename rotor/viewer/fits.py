@@ -1,4 +1,4 @@
-"""Assigned lines of a session as the fit takes them, the fit, and what the page shows of it: levels, combination differences."""
+"""Fits of the assigned lines of a species, search for wrong lines, levels and combination differences."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TRIED = 3  # measured frequencies that are left out, one at a time
 
 
 def assignments_of(model: Model, lines: Mapping[int, Line]) -> Assignments:
-    """The lines of a species, rejected ones marked as excluded; ValueError for labels of another length."""
+    """Lines of a species for a fit, with rejected lines excluded; ValueError for labels of a wrong length."""
     names = model.quanta
     for number, line in lines.items():
         if not len(line.upper) == len(line.lower) == len(names):
@@ -35,7 +35,7 @@ def assignments_of(model: Model, lines: Mapping[int, Line]) -> Assignments:
                 f"line {number}: {len(line.upper)} and {len(line.lower)} quantum numbers; {model.record.name} has {', '.join(names)}"
             )
     records = list(lines.values())
-    made = assignments(
+    assigned = assignments(
         names,
         [line.upper for line in records],
         [line.lower for line in records],
@@ -49,11 +49,11 @@ def assignments_of(model: Model, lines: Mapping[int, Line]) -> Assignments:
         halves=model.halves,
     )
     rejected = np.array([line.rejected for line in records], dtype=bool)
-    return replace(made, excluded=rejected) if rejected.any() else made
+    return replace(assigned, excluded=rejected) if rejected.any() else assigned
 
 
 def lines_from(assigned: Assignments, species: int, blend_from: int, default_error_mhz: float = 0.0) -> list[Line]:
-    """Records of assigned lines, their blends numbered from `blend_from` on; lines without an error get the default one."""
+    """Records of assigned lines; blends are numbered from `blend_from`, lines without an error get the default error."""
     excluded = assigned.is_excluded.tolist()
     comments = assigned.comments or ("",) * len(assigned)
     return [
@@ -83,7 +83,7 @@ def fit_of(model: Model, lines: Mapping[int, Line]) -> Fit:
 
 
 def fit_problem(model: Model, lines: Mapping[int, Line]) -> tuple[Assignments, FitLines]:
-    """The lines of a species as a fit takes them, and the fit as a function of lines."""
+    """Lines of a species for a fit, and the fit as a function of lines."""
     name, free = model.record.name, list(model.record.free)
     if not lines:
         raise ValueError(f"{name}: no line is assigned to it; assign lines first")
@@ -112,8 +112,8 @@ def probably_wrong(fit: Fit, numbers: Sequence[int], refit: FitLines) -> WrongLi
     if not fit.weighted_rms > POOR or fit.degrees_of_freedom < 2:
         return WrongLines()
     count = len(fit.groups)
-    left = 1 - fit.statistics.leverages[:count]
-    falls = np.where(left > 1e-9, fit.residuals[:count] ** 2 / np.maximum(left, 1e-9), 0.0)
+    remaining = 1 - fit.statistics.leverages[:count]
+    falls = np.where(remaining > 1e-9, fit.residuals[:count] ** 2 / np.maximum(remaining, 1e-9), 0.0)
     wrong, smallest = WrongLines(), BETTER * fit.weighted_rms
     for place in np.argsort(-falls)[:TRIED].tolist():
         members = fit.lines.blend == fit.lines.blend[fit.groups[place]]
@@ -155,7 +155,7 @@ def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
 def levels_of(model: Model, lines: Mapping[int, Line], levels: Any) -> dict[str, Any]:
     """Energies of the levels of assigned lines, and combination differences.
 
-    Two lines to one level measure the difference of their other levels: ν₁ - ν₂ = E₂ - E₁ of the lower ones. levels: solved, with
+    Two lines with a common upper level measure the difference of their lower levels: ν₁ - ν₂ = E₂ - E₁. levels: solved levels,
     energies in MHz.
     """
     from rotor.units import MHZ_PER_CM
@@ -183,8 +183,8 @@ def levels_of(model: Model, lines: Mapping[int, Line], levels: Any) -> dict[str,
 
 
 def _differences(assigned: Assignments, upper: Any, lower: Any, labels: Any, energy: Any) -> list[dict[str, Any]]:
-    """Pairs of unblended lines with a level in common: measured and calculated values."""
-    out = list[dict[str, Any]]()
+    """Combination differences from pairs of unblended lines with a common level: measured and calculated."""
+    rows = list[dict[str, Any]]()
     counts, single = ~assigned.is_excluded, ~assigned.blended
     for shared, other, sign in ((upper, lower, -1.0), (lower, upper, 1.0)):
         groups: dict[int, list[int]] = {}
@@ -192,17 +192,17 @@ def _differences(assigned: Assignments, upper: Any, lower: Any, labels: Any, ene
             groups.setdefault(int(shared[i]), []).append(i)
         for level, members in groups.items():
             for i, j in combinations(members, 2):
-                if len(out) >= MOST_DIFFERENCES or other[i] == other[j]:
+                if len(rows) >= MOST_DIFFERENCES or other[i] == other[j]:
                     continue
-                seen = sign * (assigned.frequency_mhz[i] - assigned.frequency_mhz[j])
-                known = energy[other[i]] - energy[other[j]]
-                out.append(
+                observed = sign * (assigned.frequency_mhz[i] - assigned.frequency_mhz[j])
+                calculated = energy[other[i]] - energy[other[j]]
+                rows.append(
                     {
                         "levels": [assigned.label_text(labels[other[k]].tolist()) for k in (i, j)],
                         "by": assigned.label_text(labels[level].tolist()),
-                        "observed_mhz": float(seen),
+                        "observed_mhz": float(observed),
                         "error_mhz": float(np.hypot(assigned.error_mhz[i], assigned.error_mhz[j])),
-                        "difference_mhz": float(seen - known) if math.isfinite(known) else None,
+                        "difference_mhz": float(observed - calculated) if math.isfinite(calculated) else None,
                     }
                 )
-    return out
+    return rows

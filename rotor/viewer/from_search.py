@@ -1,4 +1,4 @@
-"""Species and lines from `rotor assign`: the whole spectrum searched for unknown molecules, its answer as records of a session."""
+"""Search of a spectrum for unknown molecules by `rotor assign`; species and lines as records of a session."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ USUAL_SECONDS, MOST_SECONDS = 20.0, 600.0
 
 
 def search(spectrum: ObservedSpectrum, message: Mapping[str, Any], peaks: PeakList | None = None) -> Any:
-    """The answer of `rotor assign` to the peaks of a spectrum. Message: species (1 to 5), seconds, temperature_k."""
+    """Run `rotor assign` on the peaks of a spectrum. The message has species (1 to 5), seconds, temperature_k."""
     count = int(number_of(message, "species", above=0, default=1))
     seconds = min(number_of(message, "seconds", above=0, default=USUAL_SECONDS), MOST_SECONDS)
     temperature = number_of(message, "temperature_k", above=0) if message.get("temperature_k") is not None else None
@@ -31,7 +31,7 @@ def search(spectrum: ObservedSpectrum, message: Mapping[str, Any], peaks: PeakLi
 
 
 def records_of(answer: Any, state: State) -> tuple[str, dict[str, Record | None], list[str]]:
-    """Label, records and remarks of an answer of `rotor assign`; ValueError where it has no species."""
+    """Label, records and remarks from an answer of `rotor assign`; ValueError for an answer without species."""
     if not answer.species:
         raise ValueError("rotor assign: no species stands above chance in this spectrum; nothing is assigned")
     changes: dict[str, Record | None] = {}

@@ -1,11 +1,11 @@
-"""Refits of a session. Species whose lines share a measured frequency are fitted together, the others each by itself.
+"""Refits of a session. Species whose lines share a measured frequency are fitted together, other species separately.
 
 A blend of lines i of any species is one measured frequency ν with the error σ, and its weighted residual is
 
     r = (ν - Σ w_i ν_i) / σ,        Σ w_i = 1,
 
-where ν_i is calculated from the constants of the line's species. Σ r² is made least for the constants of all species at once: the
-residual of a blend depends on all of them, every other residual on one. Files of one species take the rest of such a blend out,
+where ν_i is calculated from the constants of the line's species. Σ r² is minimised over the constants of all species at once: the
+residual of a blend depends on several species, other residuals on a single species. Files of a species subtract the rest of a blend,
 (ν - Σ_others w_j ν_j) / w with the error σ / w, w = Σ w_i of its lines: r stays the same, and so does the minimum.
 """
 
@@ -36,7 +36,7 @@ ModelOf = Callable[[Species], Model]
 
 
 def shared_blends(state: State) -> dict[int, set[int]]:
-    """Measured frequencies that count for several species: the species by the number of the blend."""
+    """Species of each blend that has lines of several species, by the number of the blend."""
     species: dict[int, set[int]] = {}
     for line in state.lines.values():
         if not line.rejected:
@@ -45,7 +45,7 @@ def shared_blends(state: State) -> dict[int, set[int]]:
 
 
 def together(state: State, number: int) -> tuple[int, ...]:
-    """The species that are fitted with one: those that share a blend with it, with these, and so on; itself among them."""
+    """The species that are fitted together with a species: it and all species that blends connect with it."""
     links, group = list(shared_blends(state).values()), {number}
     while more := [link for link in links if link & group and not link <= group]:
         group |= set().union(*more)
@@ -53,13 +53,13 @@ def together(state: State, number: int) -> tuple[int, ...]:
 
 
 def refits(state: State, numbers: Collection[int], model: ModelOf) -> tuple[dict[int, Species], list[str]]:
-    """The records of species after refits, each group of `together` once, and why others could not be refitted."""
+    """Records of species after refits, and messages of the fits that failed."""
     records: dict[int, Species] = {}
     failures: list[str] = []
-    left = set(numbers)
-    while left:
-        group = together(state, min(left))
-        left -= set(group)
+    waiting = set(numbers)
+    while waiting:
+        group = together(state, min(waiting))
+        waiting -= set(group)
         try:
             if len(group) == 1:
                 records[group[0]] = refitted(model(state.species[group[0]]), state.lines_of(group[0]))
@@ -72,7 +72,7 @@ def refits(state: State, numbers: Collection[int], model: ModelOf) -> tuple[dict
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A species within a joint fit. labels: how many quantum numbers a level has. lines: by number."""
+    """A species within a joint fit. labels: count of the quantum numbers of a level. lines: by number."""
 
     number: int
     model: Model
@@ -86,7 +86,7 @@ class Part:
 
 
 class JointLevels(LevelModel):
-    """Levels of several species: labels end in the number of the species, constants stand one species after the other."""
+    """Levels of several species: labels end in the number of the species, constants are ordered by species."""
 
     def __init__(self, parts: Sequence[Part], labels: Ints) -> None:
         self.names = tuple(name for part in parts for name in _prefixed(part, part.free.constant_names))
@@ -101,7 +101,7 @@ class JointLevels(LevelModel):
         self.count = len(labels)
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
-        """Energies and derivatives; those by the constants of other species are 0."""
+        """Energies and derivatives; derivatives by the constants of other species are 0."""
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
         for model, rows, end in zip(self.models, self.rows, self.ends, strict=True):
             columns = slice(end - len(model.names), end)
@@ -109,11 +109,11 @@ class JointLevels(LevelModel):
         return energies, slopes
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        out = np.ones(self.count)
+        values = np.ones(self.count)
         for model, rows, end in zip(self.models, self.rows, self.ends, strict=True):
             columns = slice(end - len(model.names), end)
-            out[rows] = model.overlaps(before_mhz[columns], after_mhz[columns])
-        return out
+            values[rows] = model.overlaps(before_mhz[columns], after_mhz[columns])
+        return values
 
 
 def refitted_together(models: Mapping[int, Model], state: State) -> dict[int, Species]:
@@ -146,7 +146,7 @@ def refitted_together(models: Mapping[int, Model], state: State) -> dict[int, Sp
 
 
 def _part(number: int, model: Model, lines: Mapping[int, Line]) -> Part:
-    """A species as the fit takes it; free constants that the lines know by their squares alone start beside 0."""
+    """A species for the joint fit; free constants that act by their squares alone start beside 0."""
     free = list(model.record.free)
     begin = with_names(model.constants, free)
     if not free:
@@ -163,7 +163,7 @@ def _prefixed(part: Part, names: Sequence[str]) -> tuple[str, ...]:
 
 
 def _joined_parameters(parts: Sequence[Part]) -> Parameters:
-    """The free constants of all species, one species after the other."""
+    """The free constants of all species, ordered by species."""
     constants, free = ([len(getattr(part.free, name)) for part in parts] for name in ("constant_names", "names"))
     matrix = np.zeros((sum(constants), sum(free)))
     row = column = 0
@@ -181,7 +181,7 @@ def _joined_parameters(parts: Sequence[Part]) -> Parameters:
 
 
 def _joined_lines(parts: Sequence[Part], source: str) -> Assignments:
-    """The lines of all species; a label is filled with zeros to one length and ends in the number of the species."""
+    """The lines of all species; labels are filled with zeros to equal length and end in the number of the species."""
     longest = max(part.labels for part in parts)
     owners = [(part, line) for part in parts for line in part.lines.values()]
 
@@ -203,7 +203,7 @@ def _joined_lines(parts: Sequence[Part], source: str) -> Assignments:
 
 
 def _record(part: Part, fit: Fit, columns: slice, names: str, wrong: WrongLines) -> Species:
-    """A species after the fit: its constants with their errors, and how the fit describes its lines."""
+    """The record of a species after the fit: constants, errors and the summary of the fit."""
     free, record = part.free, part.model.record
     values = dict(zip(free.constant_names, free.constants_of(fit.values[columns]).tolist(), strict=True))
     covariance = fit.statistics.covariance[columns, columns]
@@ -225,7 +225,7 @@ def _record(part: Part, fit: Fit, columns: slice, names: str, wrong: WrongLines)
 
 
 def _summary(part: Part, fit: Fit, names: str) -> FitSummary:
-    """The fit as far as the lines of a species and what they leave open go."""
+    """Summary of the fit for the lines of a species."""
     lines, prefix = fit.lines, f"{part.number}:"
     used = fit.used & (lines.upper[:, -1] == part.number)
     measured = np.isin(lines.blend[fit.groups], lines.blend[used])
@@ -248,9 +248,9 @@ def _rms(values: Floats) -> float | None:
 
 
 def residuals_of(models: Mapping[int, Model], state: State) -> dict[int, dict[str, Any]]:
-    """For each line of a session its label, what is calculated (MHz; of a blend the mean), and observed minus calculated.
+    """Label, calculated frequency (MHz; the mean for a blend) and observed minus calculated for each line of a session.
 
-    A rejected line stands against its own calculated frequency, and has no part in the mean of a blend.
+    A rejected line is compared with its calculated frequency alone and does not enter the mean of a blend.
     """
     labels: dict[int, str] = {}
     calculated: dict[int, float] = {}
@@ -264,33 +264,33 @@ def residuals_of(models: Mapping[int, Model], state: State) -> dict[int, dict[st
     for members in _blends(state).values():
         mean = sum(share * calculated[n] for n, share in members.items())
         means |= dict.fromkeys(members, mean)
-    out, session_lines = dict[int, dict[str, Any]](), state.lines
+    rows, session_lines = dict[int, dict[str, Any]](), state.lines
     for n, mean in means.items():
-        there = math.isfinite(mean)
-        out[n] = {
+        exists = math.isfinite(mean)
+        rows[n] = {
             "label": labels[n],
-            "calculated_mhz": mean if there else None,
-            "difference_mhz": session_lines[n].frequency_mhz - mean if there else None,
+            "calculated_mhz": mean if exists else None,
+            "difference_mhz": session_lines[n].frequency_mhz - mean if exists else None,
         }
-    return out
+    return rows
 
 
 def _blends(state: State) -> dict[int, dict[int, float]]:
-    """Blends of several lines that count: the share of each line, by the numbers of blends and lines."""
+    """Shares of the lines of each blend, by the numbers of blends and lines; rejected lines are left out."""
     blends: dict[int, dict[int, float]] = {}
     for n, line in state.lines.items():
         if not line.rejected:
             blends.setdefault(line.blend, {})[n] = max(line.weight, 0.0)
-    out = {}
+    shares = {}
     for blend, weights in blends.items():
         if len(weights) > 1:
             total = sum(weights.values())
-            out[blend] = {n: weight / total if total > 0 else 1 / len(weights) for n, weight in weights.items()}
-    return out
+            shares[blend] = {n: weight / total if total > 0 else 1 / len(weights) for n, weight in weights.items()}
+    return shares
 
 
 def lines_alone(number: int, models: Mapping[int, Model], state: State) -> dict[int, Line]:
-    """The lines of a species for files of one species: what lines of other species add to a blend is taken out, and a comment says so."""
+    """Lines of a species for its files; contributions of other species to a blend are subtracted, with a comment."""
     lines, shared = state.lines_of(number), shared_blends(state)
     blends, session_lines = _blends(state), state.lines
     for n, line in list(lines.items()):

@@ -1,4 +1,4 @@
-"""Loomis-Wood rows: pieces of a spectrum about the expected lines of a series, one below the other.
+"""Loomis-Wood rows: sections of a spectrum about the expected lines of a series, drawn below each other.
 
 A series is a line of a species with a step of its quantum numbers, whose frequencies the model predicts, or two or more frequencies that
 are extrapolated: ν_n is the polynomial through the last three of them (F. W. Loomis and R. W. Wood, Phys. Rev. 32, 223 (1928), for the
@@ -21,7 +21,7 @@ MOST_ROWS = 200
 
 @dataclass(frozen=True, eq=False)
 class Centres:
-    """Expected frequencies (n,) of a series with the number of each row, and labels (n, k) where it has any."""
+    """Expected frequencies (n,) of a series, numbers of the rows, and labels (n, k); k is 0 for extrapolated series."""
 
     number: Ints
     frequency_mhz: Floats
@@ -29,7 +29,7 @@ class Centres:
     lower: Ints
 
     def where(self, chosen: Ints) -> Centres:
-        """Some of them."""
+        """The rows with these indices."""
         return Centres(self.number[chosen], self.frequency_mhz[chosen], self.upper[chosen], self.lower[chosen])
 
 
@@ -39,17 +39,17 @@ def centres_of(series: Series, band_mhz: tuple[float, float], predicted: Predict
     Raises ValueError for a series without a step, with labels that do not fit, and of fewer than two frequencies.
     """
     if series.frequencies_mhz:
-        made = _extrapolated(series.frequencies_mhz)
+        rows = _extrapolated(series.frequencies_mhz)
     elif predicted is None:
         raise ValueError("series: choose a species and a line of it, or two frequencies")
     else:
-        made = _modelled(series, predicted)
-    inside = np.isfinite(made.frequency_mhz) & (made.frequency_mhz > band_mhz[0]) & (made.frequency_mhz < band_mhz[1])
-    return made.where(np.flatnonzero(inside)[:MOST_ROWS])
+        rows = _modelled(series, predicted)
+    inside = np.isfinite(rows.frequency_mhz) & (rows.frequency_mhz > band_mhz[0]) & (rows.frequency_mhz < band_mhz[1])
+    return rows.where(np.flatnonzero(inside)[:MOST_ROWS])
 
 
 def _extrapolated(frequencies: tuple[float, ...]) -> Centres:
-    """The polynomial through the last two or three frequencies, at all numbers on both sides."""
+    """The polynomial through the last two or three frequencies, extrapolated to both sides."""
     if len(frequencies) < 2:
         raise ValueError("series: one frequency; two or more are needed to extrapolate")
     points = frequencies[-3:]
@@ -68,7 +68,7 @@ def _extrapolated(frequencies: tuple[float, ...]) -> Centres:
 
 
 def _modelled(series: Series, predicted: Predicted) -> Centres:
-    """The labels of a series and what the model predicts for them."""
+    """Labels of a series and their predicted frequencies."""
     model: Model = predicted.model
     count = len(model.quanta)
     if not (len(series.upper) == len(series.lower) == len(series.step) == count) or not any(series.step):
@@ -80,14 +80,14 @@ def _modelled(series: Series, predicted: Predicted) -> Centres:
     upper, lower = np.array(series.upper) + steps, np.array(series.lower) + steps
     levels = predicted.lines.levels
     rows = [rows_of_labels(model, levels, side) for side in (upper, lower)]
-    there = (rows[0] >= 0) & (rows[1] >= 0)
+    exists = (rows[0] >= 0) & (rows[1] >= 0)
     energy = levels.energy_mhz
-    frequency = np.where(there, energy[rows[0]] - energy[rows[1]], np.nan)
-    return Centres(number[there], frequency[there], upper[there], lower[there])
+    frequency = np.where(exists, energy[rows[0]] - energy[rows[1]], np.nan)
+    return Centres(number[exists], frequency[exists], upper[exists], lower[exists])
 
 
 def rows_of_labels(model: Model, levels: object, labels: Ints) -> Ints:
-    """Rows of levels by their labels, -1 for those that there are not."""
+    """Rows of levels by their labels; -1 for labels without a level."""
     from rotor.quantum.quanta import SPECIES_NUMBERS
 
     letters = {number: letter for letter, number in SPECIES_NUMBERS.items()}
@@ -99,11 +99,11 @@ def rows_of_labels(model: Model, levels: object, labels: Ints) -> Ints:
 
 
 def rows_of(centres: Centres, spectrum: Pyramid, half_width_mhz: float, pixels: int) -> list[tuple[Floats, Floats]]:
-    """For each centre the points to draw: distance from it (MHz) and intensity."""
+    """Points to draw for each row: distance from the centre (MHz) and intensity."""
     if not half_width_mhz > 0:
         raise ValueError(f"half width of the rows: {half_width_mhz:g} MHz; expected more than 0")
-    out = []
+    points = []
     for centre in centres.frequency_mhz.tolist():
         x, y = spectrum.window(centre - half_width_mhz, centre + half_width_mhz, pixels)
-        out.append((x - centre, y))
-    return out
+        points.append((x - centre, y))
+    return points

@@ -1,4 +1,4 @@
-"""Messages of a page: their numbers, names and labels, checked, and the context in which an action is carried out."""
+"""Checked values of the messages of a page, and the context of an action."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_QUANTA = 10  # quantum numbers of a level
 
 @dataclass(frozen=True)
 class Context:
-    """Spectrum, predictions, and the list that takes remarks for the user. peaks: a list of peaks in place of the spectrum."""
+    """Spectrum, predictions and remarks for the user. peaks: a list of peaks in place of a spectrum."""
 
     spectrum: ObservedSpectrum
     predictions: Predictions
@@ -31,7 +31,7 @@ Action = Callable[[State, Message, Context], Change]
 
 
 def number_of(message: Message, key: str, *, above: float | None = None, default: float | None = None) -> float:
-    """A finite number of a message; ValueError with its name for anything else."""
+    """A finite number of a message; ValueError with its name for any other value."""
     value = message.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise ValueError(f"{key}: {value!r}: expected a finite number")

@@ -1,4 +1,4 @@
-"""From what a user gives (a spectrum or a session, molecules, assigned lines) to a session that is served or shown."""
+"""Opening of a session from a spectrum or a session file, molecules and assigned lines."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ALIKE = 0.1  # relative difference of neighbouring steps of a spectrum; those of
 
 
 def open_spectrum(path: Path, reading: SpectrumFile | None = None) -> ObservedSpectrum:
-    """The spectrum of a file: .npy with two columns or rows, FITS, or text. reading: its units and noise, where they are stated."""
+    """The spectrum of a file: .npy with two columns or rows, FITS, or text. reading: units and noise that the user states."""
     from rotor.formats.spectra.axis import ReadChoices
     from rotor.formats.spectra.read import read_spectrum
 
@@ -46,7 +46,7 @@ def open_spectrum(path: Path, reading: SpectrumFile | None = None) -> ObservedSp
 
 
 def peaks_of_list(path: Path, spectrum: ObservedSpectrum) -> PeakList | None:
-    """The peaks of a file that is a list of them; None for a spectrum, most of whose steps are like the step before."""
+    """The peaks of a list of peaks; None for a spectrum, whose neighbouring steps are mostly alike."""
     steps = np.diff(spectrum.frequency_mhz)
     alike = np.abs(np.diff(steps)) <= ALIKE * steps[1:]
     if len(steps) < 2 or alike.mean() > 0.5 or first_bytes(path, 9) == b"SIMPLE  =":
@@ -69,7 +69,7 @@ def open_session(
     save: bool = True,
     note: Note = lambda _: None,
 ) -> Service:
-    """The session of a spectrum, resumed where it was saved before, with molecules and lines put in.
+    """The session of a spectrum with molecules and lines; a saved session is resumed.
 
     Parameters
     ----------
@@ -106,33 +106,33 @@ def open_session(
     if is_session(path) and not path.is_file():
         raise ValueError(f"{path}: no such session; give the spectrum to begin one")
     resumed = file.is_file() and (save or is_session(path))
-    made = read_session(file) if resumed else Session(SpectrumFile("", "", 0), file if save else None)
+    opened = read_session(file) if resumed else Session(SpectrumFile("", "", 0), file if save else None)
     if save:
-        made.hold()
+        opened.hold()
     try:
-        where = file.parent / made.spectrum.path if is_session(path) else path
+        where = file.parent / opened.spectrum.path if is_session(path) else path
         stated = msgspec.structs.replace(
-            made.spectrum,
-            axis_unit=axis_unit or made.spectrum.axis_unit,
-            unit=unit or made.spectrum.unit,
-            noise=made.spectrum.noise if noise is None else noise,
+            opened.spectrum,
+            axis_unit=axis_unit or opened.spectrum.axis_unit,
+            unit=unit or opened.spectrum.unit,
+            noise=opened.spectrum.noise if noise is None else noise,
         )
         spectrum = open_spectrum(where, stated)
-        _bind(made, stated, where, file.parent, len(spectrum), resumed)
-        service = Service(made, spectrum, peaks_of_list(where, spectrum))
+        _bind(opened, stated, where, file.parent, len(spectrum), resumed)
+        service = Service(opened, spectrum, peaks_of_list(where, spectrum))
         _fill(service, molecules, lines, temperature_k, note)
         service.facts()  # every molecule of the session can be read
-        made.save()
+        opened.save()
     except BaseException:
-        made.release()
+        opened.release()
         raise
-    for text in made.warnings:
+    for text in opened.warnings:
         note(text)
     return service
 
 
 def _bind(session: Session, stated: SpectrumFile, path: Path, folder: Path, points: int, resumed: bool) -> None:
-    """Tie the session to its spectrum; a warning where it is another than the session was saved with."""
+    """Note the spectrum in the session; a changed spectrum gives a warning."""
     session.spectrum = msgspec.structs.replace(stated, sha256=session.spectrum.sha256)
     if resumed:
         check_spectrum(session, path, points, folder)
@@ -141,7 +141,7 @@ def _bind(session: Session, stated: SpectrumFile, path: Path, folder: Path, poin
 
 
 def _session_beside(path: Path) -> Path:
-    """spectrum.view.json of spectrum.csv."""
+    """The session file beside a spectrum: spectrum.view.json for spectrum.csv."""
     name = path.name
     for suffix in (".gz", path.with_suffix("").suffix if name.endswith(".gz") else path.suffix):
         name = name.removesuffix(suffix) or name
@@ -149,7 +149,7 @@ def _session_beside(path: Path) -> Path:
 
 
 def _fill(service: Service, molecules: Sequence[str], lines: str | None, temperature_k: float, note: Note) -> None:
-    """Add the missing molecules, and assigned lines."""
+    """Add assigned lines and the molecules that the session lacks."""
     session = service.session
     for source in molecules:
         if any(species.source == service.predictions.stored(source) for species in session.state.species.values()):

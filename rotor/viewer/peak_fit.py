@@ -1,4 +1,4 @@
-"""One peak of a spectrum: a Gaussian on a sloping baseline, fitted to the channels of a range.
+"""Fit of a peak of a spectrum: a Gaussian on a sloping baseline, fitted to the channels of a range.
 
     y(ν) = b₀ + b₁ (ν - ν_m) + h exp(-u²),    u = 2 √(ln 2) (ν - ν₀)/w,    w the full width at half maximum
 
@@ -26,7 +26,7 @@ NAMES = ("baseline", "slope", "height", "frequency", "width")
 
 @dataclass(frozen=True)
 class Peak:
-    """A peak: centre, width (full, half maximum) and height with standard errors; None for what a list of peaks does not state.
+    """A peak: centre, full width at half maximum and height with standard errors; None for values that a list of peaks lacks.
 
     baseline: below it. rms: of the residuals of the fit over the noise.
     """
@@ -84,7 +84,7 @@ def fit_peak(spectrum: ObservedSpectrum, first_mhz: float, last_mhz: float) -> P
 
 
 def _start(x: Floats, y: Floats, middle: float, span: float) -> Floats:
-    """First values: the largest departure from the line through both ends, and its width at half height."""
+    """Initial parameters: the largest deviation from the line through both ends, and its width at half height."""
     ends = max(1, len(x) // 8)
     left, right = float(np.median(y[:ends])), float(np.median(y[-ends:]))
     slope = (right - left) / span

@@ -1,7 +1,7 @@
-"""Predicted lines of the species of a session: from the records to tops, line lists, and what of them stands in a window.
+"""Predicted lines of the species of a session: tops, models and line lists from the records.
 
-Line lists are computed by `rotor.spectra.lines` and remembered by what they depend on, so that a pan costs a search in sorted frequencies
-and a moved constant one line list.
+Line lists are computed by `rotor.spectra.lines` and cached: a pan is a search in sorted frequencies, a moved constant takes a new line
+list.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 MOST_J = 250  # of levels, so that a page does not wait for minutes
-REMEMBERED = 12  # line lists
+REMEMBERED = 12  # cached line lists
 WEAKEST = 1e-8  # of the strongest line, below which a line is not shown
-ASSUMED_DEBYE = 1.0  # of a molecule whose dipole is not known: along every axis that symmetry allows
+ASSUMED_DEBYE = 1.0  # dipole component along each axis that symmetry allows, where the dipole is unknown
 
 
 def constant_set(top: Top, hyperfine: bool) -> ConstantSet:
-    """The constants of a top as a fit takes them."""
+    """The constants of a top for a fit."""
     further = top.states is not None or top.internal_rotation is not None
     return TopConstants(top, hyperfine) if hyperfine or further else top.constants
 
@@ -56,7 +56,7 @@ _ISOTOPES = re.compile(r"\s*,((?:\s*[A-Za-z0-9]+\s*=\s*\d+[A-Z][a-z]?\s*,?)+)$")
 
 
 def without_isotopes(source: str) -> tuple[str, str]:
-    """A source and the isotopes behind it: "OCS" and "S=34S" of "OCS, S=34S"; no isotopes of a file whose name ends so."""
+    """Source and isotopes of a text: "OCS" and "S=34S" of "OCS, S=34S"; the name of a file has no isotopes."""
     match = _ISOTOPES.search(source)
     if match is None or _is_file(Path(source)) or not source[: match.start()]:
         return source, ""
@@ -64,7 +64,7 @@ def without_isotopes(source: str) -> tuple[str, str]:
 
 
 def top_of_source(source: str) -> Top:
-    """The top of a name, a file, a text such as SMILES:C=O, or constants such as "B=6081 MHz"; of an isotopologue by "OCS, S=34S".
+    """The top of a name, a file, SMILES:..., constants such as "B=6081 MHz", or an isotopologue such as "OCS, S=34S".
 
     Raises ValueError for what is no molecule.
     """
@@ -80,7 +80,7 @@ def top_of_source(source: str) -> Top:
 
 
 def with_assumed_dipole(top: Top) -> tuple[Top, str]:
-    """The top with a dipole, an estimate or 1 D along each allowed axis where none is known, and the remark that says so."""
+    """The top with a dipole, and a remark where it is estimated, or assumed as 1 D along each allowed axis."""
     if top.dipole_abc_debye is not None:
         return top, ""
     from rotor.verbs.molecule import MoleculeInput, Reading, with_some_dipole
@@ -118,7 +118,7 @@ def species_of_source(
 
 
 def with_hyperfine(record: Species, on: bool, base: Callable[[str], Top] = top_of_source) -> Species:
-    """The record with its constants of spins, or without; ValueError where the source has none."""
+    """The record with or without its spin constants; ValueError for a source without spin constants."""
     if on == record.hyperfine:
         return record
     top = base(record.source) if record.source else None
@@ -133,9 +133,9 @@ def with_hyperfine(record: Species, on: bool, base: Callable[[str], Top] = top_o
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A species ready for predictions and fits: its record, its top with the record's constants and dipole, and the constants by name.
+    """A species for predictions and fits: its record, the top with the record's constants and dipole, the constants by name.
 
-    file: that it comes from, or its name.
+    file: source of the species, a path or a name.
     """
 
     record: Species
@@ -150,7 +150,7 @@ class Model:
 
     @property
     def halves(self) -> frozenset[str]:
-        """Those that are half-integers, stored as twice their value."""
+        """Names of the half-integer quantum numbers, which are stored doubled."""
         return self.constants.halves if isinstance(self.constants, TopConstants) else frozenset()
 
     @property
@@ -162,20 +162,20 @@ class Model:
         """Frequencies (n,) of lines by their labels (n, k); nan for a level that does not exist."""
         labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
         energies = np.full(len(labels), np.nan)
-        there = np.ones(len(labels), dtype=bool)
-        while there.any():
+        exists = np.ones(len(labels), dtype=bool)
+        while exists.any():
             try:
-                made = model_of(self.constants, labels[there])
+                levels = model_of(self.constants, labels[exists])
             except MissingLevelsError as error:
-                there[np.flatnonzero(there)[error.places]] = False
+                exists[np.flatnonzero(exists)[error.places]] = False
                 continue
-            energies[there] = made.levels(np.array(list(self.constants.values.values())))[0]
+            energies[exists] = levels.levels(np.array(list(self.constants.values.values())))[0]
             break
         places = places.reshape(-1)
         return np.asarray(energies[places[: len(upper)]] - energies[places[len(upper) :]])
 
     def labels(self, levels: Any, rows: NDArray[Any]) -> Ints:
-        """Labels (n, k) of rows of levels in the order of `quanta`, species as numbers."""
+        """Labels (n, k) of rows of levels in the order of `quanta`; symmetry species as numbers."""
         columns = [levels.quanta[name][rows] for name in self.quanta]
         return np.stack(
             [np.array([SPECIES_NUMBERS[x] for x in column]) if column.dtype.kind in "US" else column for column in columns],
@@ -184,7 +184,7 @@ class Model:
 
 
 def model_of_species(record: Species, base: Callable[[str], Top] = top_of_source) -> Model:
-    """The model of a record. base: the top of a source, where it is remembered."""
+    """The model of a record. base: gives the top of a source."""
     if not record.source:
         settings: dict[str, Any] = {
             "reduction": record.reduction or None,
@@ -216,23 +216,23 @@ class Predicted:
 
     @property
     def strongest(self) -> float:
-        """Of the intensities; 0 without lines."""
+        """The largest intensity; 0 without lines."""
         return float(self.intensity.max(initial=0.0))
 
-    def between(self, first_mhz: float, last_mhz: float, most: int) -> Ints:
-        """Rows in a range; where there are more than `most`, the strongest in each of so many parts of it."""
+    def between(self, first_mhz: float, last_mhz: float, limit: int) -> Ints:
+        """Rows in a range; of more than `limit` rows, the strongest in each of `limit` equal parts of the range."""
         a, b = np.searchsorted(self.lines.frequency_mhz, (first_mhz, last_mhz))
         rows = np.arange(a, b)
-        if len(rows) <= most:
+        if len(rows) <= limit:
             return rows
-        part = ((self.lines.frequency_mhz[a:b] - first_mhz) * (most / (last_mhz - first_mhz))).astype(np.int64)
+        part = ((self.lines.frequency_mhz[a:b] - first_mhz) * (limit / (last_mhz - first_mhz))).astype(np.int64)
         order = np.lexsort((self.intensity[a:b], part))
         last = np.append(np.diff(part[order]) != 0, True)
         return np.asarray(rows[np.sort(order[last])])
 
 
 class Predictions:
-    """Line lists of species in the band of a spectrum, remembered while their constants stay."""
+    """Line lists of species in the band of a spectrum, cached by their constants."""
 
     def __init__(self, band_mhz: tuple[float, float], folder: Path | None = None) -> None:
         self.band_mhz = band_mhz
@@ -250,7 +250,7 @@ class Predictions:
         return self._tops[source]
 
     def stored(self, source: str) -> str:
-        """How the session names a source: a file below its folder by its relative path, other files by their whole path."""
+        """A source as the session file names it: relative paths below its folder, else absolute paths."""
         source, isotopes = without_isotopes(source)
         behind, path = f", {isotopes}" if isotopes else "", Path(source)
         if not _is_file(path):
@@ -259,7 +259,7 @@ class Predictions:
         return (where.relative_to(self.folder) if where.is_relative_to(self.folder) else where).as_posix() + behind
 
     def located(self, source: str) -> str:
-        """The source as it is read: a file of the session's folder by its whole path."""
+        """A source for the reader: absolute paths for files of the session's folder."""
         source, isotopes = without_isotopes(source)
         behind = f", {isotopes}" if isotopes else ""
         return (str(self.folder / source) if _is_file(self.folder / source) else source) + behind
@@ -275,7 +275,7 @@ class Predictions:
     def lines(self, record: Species) -> Predicted:
         """The predicted lines of a record in the band.
 
-        The highest J is that of the constants with which the species came, so that it does not change while constants move.
+        The highest J follows from the constants with which the species was added, so that it stays while constants move.
         """
         model = self.model(record)
         known = _remembered(self._lists, _key(record), lambda: self._predicted(model))
@@ -326,14 +326,14 @@ def _is_file(path: Path) -> bool:
 
 
 def _key(record: Species, temperature: bool = True) -> bytes:
-    """What a line list depends on."""
+    """Key of a line list: all that it depends on."""
     number = record.temperature_k if temperature else 0.0
     content = (record.source, record.name, record.constants, record.dipole_abc_debye, record.hyperfine, number)
     return msgspec.json.encode(content)
 
 
 def _remembered(memory: OrderedDict[bytes, T], key: bytes, make: Callable[[], T]) -> T:
-    """The value of a key, computed at its first use; the oldest one leaves."""
+    """The cached value of a key, computed at its first use; the value that was not used for longest is removed."""
     if key not in memory:
         memory[key] = make()
         if len(memory) > REMEMBERED:
@@ -343,9 +343,9 @@ def _remembered(memory: OrderedDict[bytes, T], key: bytes, make: Callable[[], T]
 
 
 def changed(record: Species, constants: Mapping[str, float]) -> Species:
-    """The record with other constants, which lose their errors; ValueError for a value that is no number."""
-    bad = next((name for name, value in constants.items() if not math.isfinite(value)), None)
-    if bad is not None:
-        raise ValueError(f"{bad}: {constants[bad]}: expected a finite number (MHz)")
+    """The record with changed constants, which have no errors; ValueError for a value that is not finite."""
+    for name, value in constants.items():
+        if not math.isfinite(value):
+            raise ValueError(f"{name}: {value}: expected a finite number (MHz)")
     errors = {name: error for name, error in record.errors.items() if name not in constants}
     return msgspec.structs.replace(record, constants={**record.constants, **constants}, errors=errors)

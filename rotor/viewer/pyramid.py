@@ -1,7 +1,7 @@
-"""A spectrum of any length drawn as seen: the smallest and largest value of each pixel's channels, from a min/max pyramid.
+"""Points to draw of a spectrum of any length: minimum and maximum of the channels of each pixel, from a min/max pyramid.
 
-Level k has the extremes of blocks of 8^k channels. A window is answered from the coarsest level with four blocks or more a pixel, so that
-the work is that of the pixels, not of the channels; no extreme is lost, and none is moved by more than a quarter of a pixel.
+Level k has the extremes of blocks of 8^k channels. A window is drawn from the coarsest level with at least four blocks per pixel. The
+time depends on the pixels, not on the channels; all extremes are drawn, and they move by at most a quarter of a pixel.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ class Pyramid:
     highs: tuple[Floats, ...]
 
     def window(self, first_mhz: float, last_mhz: float, pixels: int) -> tuple[Floats, Floats]:
-        """Points (m,), (m,) to draw: the channels themselves up to two a pixel, else two points a pixel, lowest and highest.
+        """Points (m,), (m,) to draw: the channels, or minimum and maximum of each pixel for more than two channels per pixel.
 
-        One channel on each side belongs to it, so that the line reaches the edges.
+        A further channel on each side makes the line reach the edges.
         """
         x = self.frequency_mhz
         a = max(int(np.searchsorted(x, first_mhz)) - 1, 0)
@@ -45,7 +45,7 @@ class Pyramid:
         return np.repeat(middles, 2), np.stack([low, high], axis=1).reshape(-1)
 
     def _extremes(self, starts: ArrayLike, stops: ArrayLike, channels: float) -> tuple[Floats, Floats]:
-        """Smallest and largest value of ranges of channels, of about so many channels each, widened to whole blocks."""
+        """Minimum and maximum of ranges of channels, widened to whole blocks. channels: average length of a range."""
         level, size = 0, 1
         while level < len(self.lows) and channels >= BLOCKS_A_PIXEL * size * FACTOR:
             level, size = level + 1, size * FACTOR

@@ -1,7 +1,7 @@
-"""What a session consists of: species, assigned lines and settings, as records that do not change.
+"""Records of a session (species, assigned lines, settings), which are immutable.
 
-A state maps keys such as `species/1`, `line/12` and `settings` to records. An action gives a new state; what it changed is a `Step` of
-records before and after, from which undo and redo follow. docs/view.md has the JSON of the session file.
+A state maps keys such as `species/1`, `line/12` and `settings` to records. An action gives a new state and a `Step`: the changed records
+before and after it, for undo and redo. docs/view.md describes the JSON of the session file.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ COLOURS = 7  # of the page's palette
 
 
 class SpectrumFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The observed spectrum: its file, counted from the folder of the session file, and what identifies its content.
+    """The file of the observed spectrum: path from the folder of the session file, hash and number of points.
 
-    axis_unit, unit, noise: as stated by the user, where the file does not.
+    axis_unit, unit, noise: stated by the user for files that lack them.
     """
 
     path: str
@@ -30,10 +30,9 @@ class SpectrumFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class FitSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The last fit of a species. before: constants (MHz) from which it started. open: what the lines do not determine.
+    """The last fit of a species. before: initial constants (MHz). open: combinations of constants that the lines do not determine.
 
-    suspect: numbers of the lines of one measured frequency without which the weighted rms falls to `rms_without`, where that says
-    that they are assigned wrongly.
+    suspect: numbers of lines that are probably assigned wrongly; without them the weighted rms is `rms_without`.
     """
 
     converged: bool
@@ -51,7 +50,7 @@ class FitSummary(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class Species(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="species"):
     """A molecule whose lines are predicted.
 
-    source: as it was given (a name, a file); empty for constants alone, with `reduction` and `representation`. constants, errors (MHz).
+    source: a name, a file or SMILES:...; empty for constants alone, with `reduction` and `representation`. constants, errors (MHz).
     free: constants that a refit varies. scale: of the sticks. column_per_cm2, velocity_km_s, fwhm_km_s: of the emission model.
     """
 
@@ -77,7 +76,7 @@ class Species(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="spec
 class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="line"):
     """An assigned line. species: number of its species. upper, lower: quantum numbers, half-integers doubled.
 
-    Lines of one `blend` number are one measured frequency. width_mhz: full width at half maximum of the fitted peak.
+    Lines with the same `blend` number belong to a single measured frequency. width_mhz: full width at half maximum of the fitted peak.
     """
 
     species: int
@@ -94,7 +93,7 @@ class Line(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="line"):
 
 
 class Series(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The series of the Loomis-Wood rows: a line of a species and the step of its quantum numbers, or two frequencies to extrapolate."""
+    """The series of the Loomis-Wood rows: a line of a species and the step of its quantum numbers, or frequencies to extrapolate."""
 
     species: int | None = None
     upper: tuple[int, ...] = ()
@@ -104,9 +103,9 @@ class Series(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="settings"):
-    """What the page shows and how lines are assigned. emission: species as modelled emission over the spectrum.
+    """Settings of the page and of assignments. emission: draw the modelled emission of the species over the spectrum.
     default_error_mhz: of lines that come without an error; least_error_mhz: of lines assigned to a peak.
-    auto_refit: whether assignments that change are followed by a fit."""
+    auto_refit: fit after each change of the assignments."""
 
     series: Series | None = None
     default_error_mhz: float = 0.01
@@ -122,7 +121,7 @@ Changes = Mapping[str, Record | None]
 
 
 class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One action: what it is called, and the records that it changed, before and after; None for a missing record."""
+    """An action: its label, and the changed records before and after it; None for a missing record."""
 
     label: str
     before: dict[str, Record | None]
@@ -130,7 +129,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class State:
-    """All records of a session by their keys; it does not change."""
+    """All records of a session by their keys; immutable."""
 
     __slots__ = ("records",)
 
@@ -144,7 +143,7 @@ class State:
 
     @property
     def settings(self) -> Settings:
-        """What the page shows."""
+        """Settings of the session, or the default settings."""
         settings = self.records.get("settings")
         return settings if isinstance(settings, Settings) else Settings()
 
@@ -165,11 +164,11 @@ class State:
         return {number: line for number, line in self.lines.items() if line.species == species}
 
     def free_number(self, kind: str) -> int:
-        """A number that no record of a kind has."""
+        """The number of a new record of a kind."""
         return max((int(key.partition("/")[2]) for key in self.records if key.startswith(f"{kind}/")), default=0) + 1
 
     def with_changes(self, changes: Changes) -> State:
-        """The state with records put in, and those that are None taken out."""
+        """The state with changed records; None removes a record."""
         records = dict(self.records)
         for key, record in changes.items():
             if record is None:
@@ -179,7 +178,7 @@ class State:
         return State(records)
 
     def step(self, label: str, changes: Changes) -> Step:
-        """The step that leads from this state to the one with the changes; records that stay as they are take no part."""
+        """The step from this state to the state with the changes, without records that stay equal."""
         moved = {key: record for key, record in changes.items() if self.records.get(key) != record}
         return Step(label, {key: self.records.get(key) for key in moved}, moved)
 
@@ -188,10 +187,10 @@ class State:
 
 
 def species_key(number: int) -> str:
-    """`species/1`."""
+    """Key of a species, such as `species/1`."""
     return f"species/{number}"
 
 
 def line_key(number: int) -> str:
-    """`line/1`."""
+    """Key of a line, such as `line/1`."""
     return f"line/{number}"

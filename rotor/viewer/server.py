@@ -1,7 +1,7 @@
-"""The server of `rotor view`: this machine alone, a random token in the address, a fixed set of files, one websocket a page.
+"""The server of `rotor view`, for this machine alone: a random token in the address, four files, a websocket for each page.
 
-Refused: a request without the token, with a Host header that is not 127.0.0.1 or localhost with this port, and with an Origin that is not
-this server's. No path names a file of the disk. Messages are bounded.
+Requests are refused without the token, with a Host header other than 127.0.0.1 or localhost with this port, and with the Origin of another
+server. No path names a file of the disk. Messages are bounded.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ HEADERS = {
 
 
 class Guard:
-    """Who may speak with the server. port: of its address."""
+    """Check of the requests to the server. port: of its address."""
 
     def __init__(self, port: int, token: str) -> None:
         self.hosts = {f"{name}:{port}" for name in (HOST, "localhost")}
@@ -50,7 +50,7 @@ class Guard:
         self.token = token
 
     def refusal(self, headers: Any, token: str, *, from_page: bool) -> str:
-        """Why a request is refused; empty where it is not. from_page: whether it must state its origin."""
+        """Reason for which a request is refused; empty for a permitted request. from_page: whether it must state its origin."""
         hosts, origins = headers.getlist("host"), headers.getlist("origin")
         if len(hosts) != 1 or hosts[0] not in self.hosts:
             return "the Host header is not this server"
@@ -73,14 +73,14 @@ def application(service: Service, guard: Guard) -> Starlette:
     bodies, pages = page_bodies(), Pages(service)
 
     async def serve(request: Any) -> Response:
-        """One of the files; every refusal looks the same."""
+        """Serve a file; all refusals look the same."""
         known = bodies.get(request.path_params.get("name", ""))
         if guard.refusal(request.headers, request.path_params["token"], from_page=False) or known is None:
             return PlainTextResponse("not found", status_code=404, headers=HEADERS)
         return Response(known[1], media_type=known[0], headers=HEADERS)
 
     async def talk(websocket: WebSocket) -> None:
-        """The messages of one page."""
+        """Answer the messages of a page."""
         if guard.refusal(websocket.headers, websocket.path_params["token"], from_page=True) or pages.full:
             await websocket.close(1008)
             return
@@ -101,7 +101,7 @@ def application(service: Service, guard: Guard) -> Starlette:
 
 
 def page_bodies() -> dict[str, tuple[str, bytes]]:
-    """Kind and content of the four files by their names; the page itself has none."""
+    """Kind and content of the four files by name; the page has the empty name."""
     shell = page(
         '<link rel="stylesheet" href="page.css">',
         '<script async src="bokeh.js"></script>\n<script type="module" src="page.js"></script>',
@@ -126,7 +126,7 @@ class Pages:
 
     @property
     def full(self) -> bool:
-        """Whether no further page is served."""
+        """Whether the largest number of pages is open."""
         return len(self.open) >= MOST_PAGES
 
     async def serve(self, websocket: Any) -> None:
@@ -165,13 +165,13 @@ class Pages:
             await self._reply(websocket, message)
 
     async def _reply(self, websocket: Any, message: Any) -> None:
-        """Answer one message; pages hear of the change before its answer."""
+        """Answer a message; the change is sent to all pages before the answer."""
         answer = await asyncio.to_thread(self.service.answer, message)
         await self._announce()
         await self._send(websocket, {"re": message.get("id") if isinstance(message, dict) else None, **answer})
 
     async def _announce(self) -> None:
-        """Send the session to every page where it has changed."""
+        """Send a changed session to all pages."""
         if self.service.session.revision == self.sent:
             return
         self.sent = self.service.session.revision
@@ -217,7 +217,7 @@ class ViewServer:
 
     @property
     def address(self) -> str:
-        """Where the page is."""
+        """The address of the page."""
         return f"http://{HOST}:{self.port}/{self.token}/"
 
     def run(self, started: Callable[[str], None]) -> None:
@@ -234,5 +234,5 @@ class ViewServer:
         return thread
 
     def stop(self) -> None:
-        """End the serving."""
+        """Stop the server."""
         self.server.should_exit = True

@@ -1,4 +1,4 @@
-"""One session served: messages of pages are answered, actions are carried out as steps, changes are announced to every page.
+"""A session with its spectrum: answers to the messages of pages; actions are steps that can be undone.
 
 The server, the widget of notebooks and the tests use the same `Service.answer`. docs/view.md lists the messages.
 """
@@ -39,7 +39,7 @@ Answer = dict[str, Any]
 
 
 class Service:
-    """A session with its spectrum. answer: of one message. Threads may call it; one message is answered at a time."""
+    """A session with its spectrum. `answer` may be called by several threads; messages are answered in turn."""
 
     def __init__(self, session: Session, spectrum: ObservedSpectrum, peaks: PeakList | None = None) -> None:
         self.session = session
@@ -64,7 +64,7 @@ class Service:
         }
 
     def answer(self, message: Any) -> Answer:
-        """The answer to a message: `ok` with its content, or `error` with one line; `notes` where there is more to know."""
+        """The answer to a message: `ok` with its content, or `error` with a line of text; `notes` has remarks."""
         if not isinstance(message, dict) or not isinstance(message.get("do"), str):
             return {"error": 'expected a message {"do": NAME, ...}'}
         try:
@@ -76,11 +76,11 @@ class Service:
             return {"error": " ".join(str(error).split())}
         except OSError as error:
             return {"error": f"{error.filename or 'session'}: {error.strerror}"}
-        except (ArithmeticError, LookupError, TypeError, AttributeError) as error:  # a message that nothing foresees
+        except (ArithmeticError, LookupError, TypeError, AttributeError) as error:  # an unforeseen message
             return {"error": f"{message['do']}: {type(error).__name__}: {error}"}
 
     def _search(self, message: Mapping[str, Any]) -> Answer:
-        """Species and lines by `rotor assign`; other messages are answered while it searches."""
+        """Add species and lines by `rotor assign`; other messages are answered during the search."""
         from rotor.viewer.from_search import records_of, search
 
         answer = search(self.spectrum, message, self.peaks)
@@ -107,7 +107,7 @@ class Service:
         return Context(self.spectrum, self.predictions, [], self.peaks)
 
     def _refits(self, changes: Mapping[str, Record | None], context: Context) -> dict[str, Record | None]:
-        """Species whose lines or free constants change, refitted; a note says why one is not."""
+        """Refit the species whose lines or free constants change; notes name the fits that fail."""
         after = self.session.state.with_changes(changes)
         before = self.session.state.records
         touched = set[int]()
@@ -122,7 +122,7 @@ class Service:
         return {species_key(number): record for number, record in records.items()}
 
     def read_lines(self, path: str, species: int) -> list[str]:
-        """Put the assigned lines of a file into the session; remarks of the reader."""
+        """Add the assigned lines of a file to the session; returns the remarks of the reader."""
         with self._lock:
             context = self._context()
             self.session.apply(*import_lines(self.session.state, species, path, context))
@@ -131,7 +131,7 @@ class Service:
     # Queries
 
     def facts(self) -> Answer:
-        """Everything of the session but the spectrum, with what is calculated for each line."""
+        """The session without its spectrum, with the residual of each line and the quantum numbers of each species."""
         with self._lock:
             out = facts(self.session)
             out["lines"] = {str(number): row for number, row in self._line_facts().items()}
@@ -142,7 +142,7 @@ class Service:
             return out
 
     def _line_facts(self) -> dict[int, dict[str, Any]]:
-        """Residuals of all lines, once a revision."""
+        """Residuals of all lines, computed once for each revision."""
         if self._residuals is None or self._residuals[0] != self.session.revision:
             self._residuals = (self.session.revision, residuals_of(self._models(), self.session.state))
         return self._residuals[1]
@@ -167,11 +167,11 @@ class Service:
 
     @property
     def channel_mhz(self) -> float:
-        """Width of a channel; of a list of peaks their usual error."""
+        """Width of a channel; the median error for a list of peaks."""
         return self.spectrum.channel_mhz if self.peaks is None else float(np.median(self.peaks.uncertainty_mhz))
 
     def _previewed(self, message: Mapping[str, Any]) -> dict[int, Species]:
-        """The species, one with constants that are being moved."""
+        """The species; the species whose slider moves has the previewed values."""
         species = self.session.state.species
         preview = message.get("preview")
         if preview is None:
@@ -189,7 +189,7 @@ class Service:
         return {**species, number: record}
 
     def _window(self, message: Mapping[str, Any]) -> Answer:
-        """Spectrum and sticks of a range: points, and for each species frequencies, heights (of the strongest line: 1) and labels."""
+        """Points of the spectrum in a range; frequencies, heights (strongest line: 1) and labels of each species."""
         first, last = number_of(message, "first_mhz"), number_of(message, "last_mhz")
         if not first < last:
             raise ValueError(f"window: {first:g} to {last:g} MHz: expected a range that rises")
@@ -203,9 +203,9 @@ class Service:
             answer["model"] = self._emission(species, first, last, pixels)
         return answer
 
-    def sticks(self, predicted: Predicted, first: float, last: float, most: int = MOST_STICKS) -> Answer:
-        """Frequencies, heights and labels of the lines of a species in a range, as the page draws them."""
-        rows = predicted.between(first, last, most)
+    def sticks(self, predicted: Predicted, first: float, last: float, limit: int = MOST_STICKS) -> Answer:
+        """Frequencies, heights and labels of the drawn lines of a species in a range."""
+        rows = predicted.between(first, last, limit)
         lines, strongest = predicted.lines, predicted.strongest or 1.0
         chosen = lines.where(rows)
         labels = [predicted.model.labels(lines.levels, side) for side in (chosen.upper, chosen.lower)]
@@ -217,7 +217,7 @@ class Service:
         }
 
     def _emission(self, species: Mapping[int, Species], first: float, last: float, pixels: int) -> Answer:
-        """The brightness of all species together, as an observed spectrum would have it (K)."""
+        """Brightness (K) of the modelled emission of all species."""
         from rotor.observed.model import Component, Sight, model
 
         components = [
@@ -231,8 +231,8 @@ class Service:
             for record in species.values()
         ]
         grid = np.linspace(max(first, self.band_mhz[0]), min(last, self.band_mhz[1]), 2 * pixels)
-        seen = model(components, grid, Sight(self.session.state.settings.background_k))
-        return {"x": _numbers(grid, 10), "y": _numbers(seen.brightness_k)}
+        modelled = model(components, grid, Sight(self.session.state.settings.background_k))
+        return {"x": _numbers(grid, 10), "y": _numbers(modelled.brightness_k)}
 
     def _loomis_wood(self, message: Mapping[str, Any]) -> Answer:
         """The rows of the chosen series: centres, labels, points, and the line assigned in each."""
@@ -271,7 +271,7 @@ class Service:
         return {"rows": rows, "total": len(centres.number)}
 
     def _peak(self, message: Mapping[str, Any]) -> Answer:
-        """The peak in a range, and the predicted lines that it may be: those in the range and near it, strongest first."""
+        """The peak in a range, and the predicted lines in and near the range, strongest first."""
         first, last = number_of(message, "first_mhz"), number_of(message, "last_mhz")
         if not first < last:
             raise ValueError(f"peak: {first:g} to {last:g} MHz: expected a range that rises")
@@ -313,7 +313,7 @@ class Service:
         ]
 
     def _pick(self, message: Mapping[str, Any]) -> Answer:
-        """The allowed lines of a level in the band, by its quantum numbers; the strongest first."""
+        """The allowed lines of a level in the band, strongest first."""
         number, record = species_of(self.session.state, message)
         label = message.get("level")
         predicted = self.predictions.lines(record)
@@ -326,9 +326,9 @@ class Service:
             raise ValueError(
                 f"level {' '.join(map(str, label))}: there is no such level ({names}) up to J = {predicted.lines.jmax}"
             )
-        here = np.flatnonzero((predicted.lines.upper == row) | (predicted.lines.lower == row))
-        here = here[np.argsort(-predicted.intensity[here])][:MOST_PICKED]
-        return {"candidates": self._candidates(number, predicted, here, 0.0)}
+        rows = np.flatnonzero((predicted.lines.upper == row) | (predicted.lines.lower == row))
+        rows = rows[np.argsort(-predicted.intensity[rows])][:MOST_PICKED]
+        return {"candidates": self._candidates(number, predicted, rows, 0.0)}
 
     def _levels(self, message: Mapping[str, Any]) -> Answer:
         number, record = species_of(self.session.state, message)
@@ -347,7 +347,7 @@ class Service:
 
 
 def _numbers(values: Floats, digits: int = 6) -> list[float]:
-    """Numbers for JSON, rounded to significant digits of the largest, so that messages are short."""
+    """Numbers for JSON, rounded to the significant digits of the largest number for short messages."""
     largest = float(np.abs(values).max(initial=0.0))
     if not largest > 0 or not math.isfinite(largest):
         return np.asarray(values, dtype=np.float64).tolist()  # type: ignore[no-any-return]

@@ -1,7 +1,7 @@
-"""A session: the state of a page with everything that undo and redo need, in one JSON file that is written after each action.
+"""A session: state and journal for undo and redo, in a JSON file that is written after each action.
 
-The file is written beside and renamed, so that a process that is killed leaves the session as of its last finished action. A second
-program on the same session is refused; several pages of one server share the session.
+The file is written beside and renamed: a killed process leaves the session of its last finished action. A second program on the same
+session is refused; the pages of a server share the session.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ def sha256_of(path: str | os.PathLike[str]) -> str:
 
 
 class Session:
-    """The state of a session and its journal. path: of the file; None for a session that is not saved.
+    """State and journal of a session. path: of its file; None for a session that is not saved.
 
-    warnings: what must be known of how it was resumed. Listeners are called after each change.
+    warnings: remarks about the resumed session. Listeners are called after each change.
     """
 
     def __init__(self, spectrum: SpectrumFile, path: Path | None = None, state: State | None = None) -> None:
@@ -62,7 +62,7 @@ class Session:
         self._lock = ExitStack()
 
     def apply(self, label: str, changes: Changes) -> bool:
-        """Carry out an action as one step; False where it changes nothing."""
+        """Carry out an action as a step; False for an action that changes nothing."""
         step = self.state.step(label, changes)
         if not step.after:
             return False
@@ -70,7 +70,7 @@ class Session:
         return True
 
     def undo(self) -> str:
-        """Take the last action back; its label. ValueError where there is none."""
+        """Take back the last action and return its label; ValueError without an action."""
         if not self.done:
             raise ValueError("undo: there is no action to take back")
         *done, step = self.done
@@ -78,7 +78,7 @@ class Session:
         return step.label
 
     def redo(self) -> str:
-        """Carry out again what was taken back last; its label. ValueError where there is nothing."""
+        """Repeat the action that was taken back last and return its label; ValueError without such an action."""
         if not self.undone:
             raise ValueError("redo: no action was taken back")
         *undone, step = self.undone
@@ -86,7 +86,7 @@ class Session:
         return step.label
 
     def _move(self, changes: Changes, done: list[Step], undone: list[Step]) -> None:
-        """The new state, first on disk, then here, so that a page never shows what a resumed session lacks."""
+        """Write the new state, then adopt it: a page shows only what a resumed session has."""
         state = self.state.with_changes(changes)
         self._write(state, done, undone, self.revision + 1)
         self.state, self.done, self.undone, self.revision = state, done, undone, self.revision + 1
@@ -105,17 +105,17 @@ class Session:
             handle.write(msgspec.json.encode(content) + b"\n")
 
     def hold(self) -> None:
-        """Refuse other programs on this session until `release`; ValueError where another one has it."""
+        """Lock the session until `release`; ValueError for a session that another program has locked."""
         if self.path is not None:
             self._lock.enter_context(locked_file(self.path))
 
     def release(self) -> None:
-        """Let other programs have the session."""
+        """Unlock the session."""
         self._lock.close()
 
 
 def spectrum_file(path: Path, points: int, folder: Path, stated: SpectrumFile | None = None) -> SpectrumFile:
-    """How a session in a folder refers to a spectrum: below the folder by its relative path. stated: its units and noise."""
+    """Reference of a session to a spectrum: relative path below the folder, else absolute. stated: units and noise."""
     where, base = path.resolve(), folder.resolve()
     shown = where.relative_to(base) if where.is_relative_to(base) else where
     begin = stated or SpectrumFile("", "", 0)
@@ -123,14 +123,14 @@ def spectrum_file(path: Path, points: int, folder: Path, stated: SpectrumFile | 
 
 
 def is_session(path: str | os.PathLike[str]) -> bool:
-    """Whether a file's name is that of a session."""
+    """Whether the name of a file is the name of a session."""
     return os.fspath(path).endswith(SUFFIX)
 
 
 def read_session(path: Path) -> Session:
-    """The session of a file, as it was saved last.
+    """The saved session of a file.
 
-    Raises ValueError with the place for what is no session, one of a later version, and records that cannot be.
+    Raises ValueError with the place for other files, sessions of a later version, and invalid records.
     """
     try:
         content = msgspec.json.decode(path.read_bytes(), type=SessionFile)
@@ -148,7 +148,7 @@ def read_session(path: Path) -> Session:
 
 
 def check_spectrum(session: Session, path: Path, points: int, folder: Path) -> None:
-    """Say in the session's warnings where the spectrum is another than the one it was saved with, and refer to the new one."""
+    """Refer to the present spectrum, with a warning if it has changed since the session was saved."""
     before, now = session.spectrum, spectrum_file(path, points, folder, session.spectrum)
     if before.sha256 != now.sha256:
         session.warnings += (
@@ -159,7 +159,7 @@ def check_spectrum(session: Session, path: Path, points: int, folder: Path) -> N
 
 
 def facts(session: Session) -> dict[str, Any]:
-    """The session as a page gets it: records, and what can be undone."""
+    """The session for a page: records, warnings, labels of the steps that can be undone and repeated."""
     return {
         "revision": session.revision,
         "spectrum": msgspec.to_builtins(session.spectrum),

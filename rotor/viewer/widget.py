@@ -1,4 +1,4 @@
-"""The page of `rotor view` in notebooks (JupyterLab, VS Code, marimo): the same module and messages, carried by anywidget."""
+"""The page of `rotor view` as a widget of notebooks (JupyterLab, VS Code, marimo), by anywidget."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def view(
 
 
 class SessionFace:
-    """What Python does with the session of a page."""
+    """The session of a page from Python."""
 
     service: Service
     send: Callable[[Any], object]
@@ -81,7 +81,7 @@ class SessionFace:
         return self.service.session
 
     def do(self, name: str, **message: Any) -> Any:
-        """An action or a query by its name (docs/view.md), carried out from Python; every page shows the change.
+        """Carry out an action or a query by its name (docs/view.md); all pages show the change.
 
         Raises ValueError with the text that a page would show.
         """
@@ -92,7 +92,7 @@ class SessionFace:
         return answer["ok"]
 
     def export(self, path: str | os.PathLike[str]) -> None:
-        """Write the page with its data as one file."""
+        """Write the page with its data as a file."""
         from rotor.formats.atomic_write import open_atomic
         from rotor.viewer.export_page import export_page
 
@@ -128,7 +128,7 @@ def widget_class() -> type:
             self.on_msg(self._received)
 
         def close(self) -> None:
-            """End the widget and let other programs have the session."""
+            """Close the widget and unlock the session."""
             self.service.session.release()
             super().close()
 
