@@ -1,6 +1,6 @@
-"""The widget of `rotor view` in an executed notebook, and in JupyterLab in Chromium.
+"""The widget of `rotor view` in an executed notebook, and in JupyterLab and marimo in Chromium.
 
-The page of JupyterLab is tested where JupyterLab, Playwright and Chromium are installed.
+JupyterLab and marimo are tested where they, Playwright and Chromium are installed.
 """
 
 from __future__ import annotations
@@ -108,6 +108,65 @@ def test_the_widget_works_in_jupyterlab(tmp_path, environment):
                 page.locator(f".rotor-view {part}").bounding_box() for part in ("thead th >> nth=2", "td >> nth=2")
             )
             assert head["x"] == pytest.approx(body["x"], abs=1)  # not styled as tables of outputs are
+            page.click(".rotor-view >> text=Undo")
+            page.wait_for_selector(".rotor-view >> text=0 of 0 lines", timeout=30_000)
+            browser.close()
+        assert read_session(tmp_path / "spectrum.view.json").state.lines == {}
+    finally:
+        server.terminate()
+        server.wait(30)
+
+
+MARIMO = f"""import marimo
+
+app = marimo.App()
+
+
+@app.cell
+def _():
+    import rotor
+
+    widget = rotor.view("spectrum.csv", {NAME!r}, temperature_k={KELVIN})
+    widget
+    return (widget,)
+
+
+@app.cell
+def _(widget):
+    target = {{"species": 1, "upper": [3, 0, 3], "lower": [2, 0, 2]}}
+    widget.do("assign", frequency_mhz=16030.188, error_mhz=0.002, to=[target])["label"]
+    return
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("marimo") is None, reason="needs marimo: pip install marimo")
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
+def test_the_widget_works_in_marimo(tmp_path, environment):
+    """The widget shows the line that the second cell assigns, and its button takes it back."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (extra test)")
+    write_case(tmp_path)
+    (tmp_path / "session.py").write_text(MARIMO, encoding="utf-8")
+    root = hasattr(os, "geteuid") and os.geteuid() == 0
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    words = [sys.executable, "-m", "marimo", "run", "session.py", "--headless", "--no-token", "--host", "127.0.0.1"]
+    log = tmp_path / "marimo.log"
+    with open(log, "w") as handle:
+        server = subprocess.Popen([*words, "--port", f"{port}"], cwd=tmp_path, stdout=handle, stderr=subprocess.STDOUT)
+    try:
+        for _ in range(300):
+            with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=5):
+                break
+            time.sleep(0.1)
+        with playwright.sync_playwright() as started:
+            browser = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"] if root else [])
+            page = browser.new_page(viewport={"width": 1500, "height": 1000})
+            page.goto(f"http://127.0.0.1:{port}/")
+            page.wait_for_selector(".rotor-view[data-ready=yes]", timeout=90_000)
+            page.click(".rotor-view #tab-Lines")
+            page.wait_for_selector(".rotor-view >> text=3 0 3 ← 2 0 2", timeout=30_000)
             page.click(".rotor-view >> text=Undo")
             page.wait_for_selector(".rotor-view >> text=0 of 0 lines", timeout=30_000)
             browser.close()
