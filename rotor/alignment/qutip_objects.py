@@ -85,22 +85,22 @@ def block_objects(
     jmax: int | None = None,
     cosines: Sequence[str] = ("cos2theta",),
 ) -> BlockObjects:
-    """The block number `block` of those with |M| = `m` that the pulses leave apart, as objects of QuTiP.
+    """A symmetry block (number `block` of those with |M| = `m`) that the pulses do not couple to others, as QuTiP objects.
 
     Parameters
     ----------
     top : Top
-        With what the pulses act on.
+        With the property that the pulses act on.
     pulses : sequence of Pulse
-        One after another.
+        In order of time.
     m : int, optional
         |M| of the block.
     block : int, optional
         Its number among those of this |M|, from 0.
     jmax : int, optional
-        Highest J; by default what the pulses need from J = 0 on.
+        Highest J. Default: as needed for these pulses from J = 0.
     cosines : sequence of str, optional
-        Names of the observables to make.
+        Names of the observables.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def block_objects(
     windows = timeline(pulses)
     channels: list[Channel] = []
     for channel in (each for window in windows for each in window.channels):
-        if not any(_same(known, channel) for known in channels):
+        if not any(_same(listed, channel) for listed in channels):
             channels.append(channel)
     contractions = [Contraction(acted_on(top, each.acts_on), each.space) for each in channels]
     space = field_space(
@@ -147,7 +147,7 @@ def block_objects(
 def solve_windows(
     objects: BlockObjects, ket: Any, times_ps: ArrayLike, *, options: dict[str, Any] | None = None
 ) -> dict[str, Floats]:
-    """Cosines of a pure state, the pulses by `qutip.sesolve`, all else by exact phases.
+    """Cosines of a pure state: `qutip.sesolve` during the pulses, exact phases otherwise.
 
     Parameters
     ----------
@@ -156,9 +156,9 @@ def solve_windows(
     ket : qutip.Qobj
         The state before the first pulse.
     times_ps : (t,) array
-        Rising.
+        Increasing.
     options : dict, optional
-        Of sesolve, in place of `BEST_OPTIONS`; max_step is always set.
+        Options of sesolve, instead of `BEST_OPTIONS`; max_step is always set.
 
     Returns
     -------
@@ -217,7 +217,7 @@ def _fill_free(
     between: tuple[float, float],
     out: dict[str, Floats],
 ) -> None:
-    """Expectation values of a state known at `now` at the times from `between[0]` to `between[1]`."""
+    """Write expectation values at the times from `between[0]` to `between[1]`, for free evolution of a state at time `now`."""
     here = np.flatnonzero((times >= between[0]) & (times <= between[1]))
     states = np.exp(-1j * np.multiply.outer(energies, times[here] - now)) * ket.full()
     for name, operator in objects.cosines.items():
@@ -227,10 +227,10 @@ def _fill_free(
 
 @dataclass(frozen=True)
 class LinearObjects:
-    """All |J M⟩ of a linear top up to J max, J by J and M rising, as Qobj with dims [[n], [n]].
+    """All |J M⟩ of a linear top up to J max, in order of J and M, as Qobj with dims [[n], [n]].
 
-    free: energies in rad/ps. cosine, cosine_squared: of the angle with Z. turns: D^1_p0, p = -1, 0, 1, which isotropic collisions
-    that change J and M by one act with.
+    free: energies in rad/ps. cosine, cosine_squared: of the angle with Z. turns: D^1_p0, p = -1, 0, 1, the operators of isotropic
+    collisions that change J and M by at most 1.
     """
 
     free: Any
@@ -241,7 +241,7 @@ class LinearObjects:
     m: Ints
 
     def thermal(self, temperature_k: float) -> Any:
-        """The density matrix at a temperature (spin weights left out)."""
+        """The density matrix at a temperature, without spin weights."""
         import qutip
 
         kelvin = self.free.diag().real / RAD_PER_PS_MHZ / 20836.619123327576
@@ -249,14 +249,14 @@ class LinearObjects:
         return qutip.qdiags(population / population.sum(), 0)
 
     def collisions(self, rate_per_ps: float) -> list[Any]:
-        """Collapse operators √γ D^1_p0 for `qutip.mesolve`: γ is the rate at which collisions turn the axis."""
+        """Collapse operators √γ D^1_p0 for `qutip.mesolve`, with the collision rate γ."""
         if not (np.isfinite(rate_per_ps) and rate_per_ps >= 0):
             raise ValueError(f"rate {rate_per_ps} per ps: a finite number of 0 or more is expected")
         return [np.sqrt(rate_per_ps) * turn for turn in self.turns]
 
 
 def linear_objects(top: Top, jmax: int) -> LinearObjects:
-    """A linear top up to `jmax` for density matrices; (J max + 1)² states, so that J max of 15 is about what mesolve can carry.
+    """A linear top up to `jmax` for density matrices; it has (J max + 1)² states, so that mesolve is limited to J max of about 15.
 
     >>> from rotor.tops.top import Top
     >>> linear_objects(Top.from_constants("B=6000 MHz"), 1).free.dims

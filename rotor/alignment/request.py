@@ -1,4 +1,4 @@
-"""A request for the alignment of a gas by pulses, and what answers it."""
+"""Request and answer for the alignment of a gas by pulses."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ from rotor.units import MOST_POINTS
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-LONGEST_PS = 100.0  # after the pulses, of a top without revivals, where no last time is given
+LONGEST_PS = 100.0  # default time after the pulses for a top without revivals
 DEFAULT_POINTS = 2001
 PULSES = Choices("shape", lambda: SHAPES)
-FARTHEST_PS = 1e9  # a phase of 2π 1 THz times it has an error of 1e-6
+FARTHEST_PS = 1e9  # a phase of 2π 1 THz times this time has an error of 1e-6
 
 
 TOLERANCES = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
@@ -47,7 +47,7 @@ def cosine_error(trace: AlignmentTrace, reference: AlignmentTrace) -> float:
 TOLERANCE = Knob(
     TOLERANCES, lambda request: max(1e-2 * min(*TOLERANCES, request.tolerance), FINEST_TOLERANCE),
     (Measure("cosine", "", lambda answer, reference: cosine_error(answer.trace, reference.trace)),), "a tolerance of {:g}",
-    FINEST_TOLERANCE,  # a J max that serves one tolerance is too small for a finer one
+    FINEST_TOLERANCE,  # a given J max may be too small for a finer tolerance
     change=lambda request, name, value: replace(request, jmax=None, **{name: value}),
     prepare=lambda request: replace(request, classical_molecules=0),
 )  # fmt: skip
@@ -55,12 +55,12 @@ TOLERANCE = Knob(
 
 @dataclass(frozen=True)
 class AlignRequest:
-    """Cosines against time to compute; every field is checked when the request is made.
+    """Cosines as functions of time to compute; all fields are checked when the request is made.
 
-    top: with what the pulses act on. pulses: one or more. temperature_k: of the gas, 0 for its lowest level. state: one level
-    instead, by quantum numbers; m: its |M|, None for all. from_ps, until_ps: first and last time; None: where the pulses begin, and one
-    revival after they end. points: how many times. observables: names of cosines. tolerance: of them. jmax: None: what the
-    tolerance needs. classical_molecules: of a classical gas beside the quantum one, 0 for none; seed: of its start.
+    top: with the property that the pulses act on. pulses: at least one. temperature_k: of the gas, 0 for its lowest level. state: a
+    single level instead, by quantum numbers; m: its |M|, None for all. from_ps, until_ps: first and last time; None: begin of the pulses,
+    and one revival after their end. points: number of times. observables: names of cosines. tolerance: of the cosines. jmax: None: as
+    needed for the tolerance. classical_molecules: size of an additional classical gas, 0 for none; seed: of its start.
     """
 
     top: Top
@@ -141,25 +141,25 @@ class AlignRequest:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AlignmentTable(Table):
-    """Quantum cosines against time, and those of a classical gas in columns with the suffix _classical."""
+    """Quantum cosines as functions of time, and those of a classical gas in columns with the suffix _classical."""
 
     trace: AlignmentTrace
     classical: Mapping[str, Floats]
 
     @property
     def columns(self) -> dict[str, Floats]:
-        """t_ps, every cosine, and those of the classical gas."""
+        """t_ps, the cosines, and those of the classical gas."""
         return {**self.trace.columns, **{f"{name}_classical": values for name, values in self.classical.items()}}
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """That of the quantum calculation."""
+        """The provenance of the quantum calculation."""
         return self.trace.provenance
 
 
 @dataclass(frozen=True, repr=False)
 class AlignAnswer(TextOf):
-    """The cosines that a request asked for."""
+    """The cosines of a request."""
 
     shown = "table"
 
@@ -174,7 +174,7 @@ class AlignAnswer(TextOf):
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the cosines can be trusted."""
+        """Error budget of the cosines."""
         from rotor.alignment.budgets import cosines_budget
 
         trace = self.trace
@@ -182,7 +182,7 @@ class AlignAnswer(TextOf):
         return cosines_budget(trace, every_limit(trace.top, max(trace.ensemble.jmax, 1), effects))
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/verbs."""
+        """Facts of the answer except its table, by the keys of docs/verbs."""
         trace, cosines = self.trace, {name: values for name, values in self.table.columns.items() if name != "t_ps"}
         return {
             **top_facts(trace.top),
@@ -211,7 +211,7 @@ def _extremes(name: str, times: Floats, values: Floats) -> dict[str, Any]:
 
 
 def answer_align(request: AlignRequest, executor: Executor | None = None) -> AlignAnswer:
-    """The cosines of a request. executor: blocks of states are spread over it.
+    """Compute the cosines of a request. executor: runs blocks of states in parallel.
 
     >>> from rotor.alignment.pulse import GaussianPulse
     >>> from rotor.tops.top import Top

@@ -333,12 +333,12 @@ def best_scales(
             while p < len(peaks) and peaks[p] <= g[n] + 3 * s[n] and count < len(tried):
                 scale = log_peaks[p] - e[n]
                 p += 1
-                known = False
+                is_repeated = False
                 for m in range(count):
                     if abs(tried[m] - scale) < 0.25 * spread:
-                        known = True
+                        is_repeated = True
                         break
-                if known:
+                if is_repeated:
                     continue
                 tried[count] = scale
                 count += 1
@@ -403,14 +403,14 @@ def quick_ratios(
         constants[:3] = tops[t]
         count = lines_in_band(levels, theta, jj, upper, lower, strength, constants, windows, energy, row, f, s_nu)
         mixed = kinds[t] == MIXED
-        of_type = np.arange(count) if mixed else np.flatnonzero(kind[row[:count]] == kinds[t])
-        if len(of_type) == 0:
+        candidates = np.arange(count) if mixed else np.flatnonzero(kind[row[:count]] == kinds[t])
+        if len(candidates) == 0:
             continue
-        strength_at, below = np.log(s_nu[of_type]), energy[lower[row[of_type]]] / MHZ_PER_K
+        strength_at, below = np.log(s_nu[candidates]), energy[lower[row[candidates]]] / MHZ_PER_K
         for temperature in temperatures:
             expected = strength_at - below / temperature
-            strongest = _apart(_highest(expected, 2 * most), f[of_type], most, apart)
-            chosen = of_type[strongest]
+            strongest = _apart(_highest(expected, 2 * most), f[candidates], most, apart)
+            chosen = candidates[strongest]
             ratios, _ = best_scales(
                 f[chosen], expected[strongest], kind[row[chosen]], np.full(len(chosen), max(sigma_mhz, softness * tops[t, 1])),
                 peaks, log_peaks, log_density, log_threshold, spread, detected, most, 8,

@@ -169,7 +169,7 @@ class TumbleAnswer(TextOf):
         return attitude_budget(self.motion, last, self.stability.growth_rate, converted=factors != (1.0, 1.0))
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/verbs."""
+        """Facts of the answer except its table, by the keys of docs/verbs."""
         request, units = self.request, self.request.units
         return {
             **request.about(),

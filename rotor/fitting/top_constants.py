@@ -64,12 +64,12 @@ class TopConstants:
 
     @property
     def reduction(self) -> str | None:
-        """Of the top's own constants, and of those of its states."""
+        """Reduction of the constants of all states."""
         return self.top.constants.reduction
 
     @property
     def representation(self) -> str | None:
-        """Of the top's own constants, and of those of its states."""
+        """Representation of the constants of all states."""
         return self.top.constants.representation
 
     @cached_property

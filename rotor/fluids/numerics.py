@@ -145,9 +145,9 @@ def sweeps_of_fluid(request: FluidRequest) -> Sweeps:
     """Sweeps of the step (energy and positions over a short time), of the cutoff and of Ewald's tolerance (forces)."""
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: the knobs of the engine rotor alone are swept")
-    made = with_box(request)
+    ready = with_box(request)
     return Sweeps(
-        (_step(made), _cutoff(made), *_ewald(made)), ("conditions.steps: the error of a mean is in its report",)
+        (_step(ready), _cutoff(ready), *_ewald(ready)), ("conditions.steps: the error of a mean is in its report",)
     )
 
 

@@ -46,11 +46,11 @@ def lengths_budget(method: str, values: Sequence[Value], fitted: FittedStructure
     -------
     ErrorBudget
     """
-    known = [value.error for value in values if value.unit == "Å" and math.isfinite(value.error)]
+    length_errors = [value.error for value in values if value.unit == "Å" and math.isfinite(value.error)]
     quantity = f"bond lengths ({method})"
-    if not known:
+    if not length_errors:
         return ErrorBudget(quantity, "Å", *(NO_LENGTH,) * 5)
-    sigma = max(known)
+    sigma = max(length_errors)
     return ErrorBudget(
         of=quantity,
         unit="Å",

@@ -133,13 +133,13 @@ class GasAnswer(TextOf):
 
     @cached_property
     def errors(self) -> ErrorBudget:
-        """How far the temperature, or C1 and C2, can be trusted."""
+        """Error budget of the temperature, or of C1 and C2."""
         from rotor.thermodynamics.gas_budget import gas_budget
 
         return gas_budget(self)
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/verbs."""
+        """Facts of the answer except its table, by the keys of docs/verbs."""
         request, test = self.request, self.test
         degrees = count_degrees([request.top.moments_u_angstrom2])
         half_kt = 0.5 * test.kt * units.CM_PER_EV

@@ -171,7 +171,7 @@ def _mean_potential(body: TurningTop, kt: float) -> float:
 
 
 def _wells_below(angle: Floats, maxima: Floats) -> Floats:
-    """How many maxima lie between 0 and each angle, unwrapped."""
+    """Number of maxima between 0 and each unwrapped angle."""
     turns = np.floor(angle / (2 * np.pi))
     return np.asarray(turns * len(maxima) + np.searchsorted(maxima, angle - 2 * np.pi * turns))
 

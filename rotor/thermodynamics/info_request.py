@@ -125,7 +125,7 @@ class InfoAnswer:
         return constants_budget([self.request.top])
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the top, by the keys of docs/verbs."""
+        """Facts of the top, by the keys of docs/verbs."""
         facts = {
             **top_facts(self.request.top),
             **self.sizes,

@@ -167,7 +167,7 @@ class ThermoAnswer(TextOf):
         )
 
     def facts(self) -> dict[str, Any]:
-        """Everything about the answer but its table, by the keys of docs/verbs."""
+        """Facts of the answer except its table, by the keys of docs/verbs."""
         functions = self.functions
         top, limit = functions.top, classical_limit(functions.top)
         gas, vibrations = functions.gas, functions.vibrations

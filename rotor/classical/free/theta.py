@@ -79,7 +79,7 @@ class Frame:
 
     @property
     def separatrix(self) -> NDArray[np.bool_]:
-        """Where D2 is exactly zero."""
+        """Which bodies are exactly on the separatrix: D2 = 0."""
         return np.asarray(self.d2.hi == 0.0)
 
 

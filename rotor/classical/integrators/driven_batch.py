@@ -1,10 +1,9 @@
-"""Steps of very many bodies in the same fields, 10⁵ to 10⁶ at once: throughput before everything else.
+"""Steps of very many bodies in the same fields, 10⁵ to 10⁶ at once, optimised for throughput.
 
-The steps are those of order 2 of `SymmetricTopSplitting` between kicks of the torques, without compensated sums and with the two
-half kicks of neighbouring steps as one: half a kick, a drift (the sphere's turn about L and two turns about body axes,
-`strang.py`), half a kick. L and attitude are stepped in the body; |q| and, without torques, |L| wander by rounding, about
-1e-16 √steps. Torques of attitude and time serve: fields, gravity, constant torques and drives. Drag, rotors inside the body and
-torques that are functions of yours need `integrate`.
+The steps are those of order 2 of `SymmetricTopSplitting`, without compensated sums: half a kick by the torques, a drift (the sphere's
+turn about L and two turns about body axes, `strang.py`), half a kick; neighbouring half kicks are merged. L and attitude are
+stepped in the body; |q| and, without torques, |L| change by rounding, about 1e-16 √steps. Torques may depend on attitude and time:
+fields, gravity, constant torques and drives. Drag, internal rotors and torques given by Python functions need `integrate`.
 """
 
 from __future__ import annotations

@@ -194,7 +194,7 @@ def _error(slopes: Floats, h: float, third: Floats, fifth: Floats) -> float:
 
 
 def _factor(error: float) -> float:
-    """By how much to change the step for an error estimate, of order 8, in units of the tolerance."""
+    """Factor of the next step for an error estimate, of order 8, in units of the tolerance."""
     if error == 0.0:
         return GROW
     return float(np.clip(SAFETY * error ** (-1.0 / 8.0), SHRINK, GROW)) if np.isfinite(error) else SHRINK

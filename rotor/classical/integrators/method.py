@@ -33,7 +33,7 @@ STEPS_OF_A_CALL = 1_000_000  # of order 2 of one body: some tenths of a second, 
 
 
 def steps_of_a_call(work: int) -> int:
-    """How many steps a compiled call takes, each of which is `work` steps of order 2 of one body."""
+    """Number of steps in a compiled call, if each is `work` steps of order 2 of a single body."""
     return max(1, STEPS_OF_A_CALL // max(work, 1))
 
 

@@ -102,7 +102,7 @@ class Assembly:
 
     @cached_property
     def atom_sites(self) -> Integers:
-        """Where the real atoms stand among the sites."""
+        """The indices of the real atoms among the sites."""
         steps = np.arange(self.first_atom[-1]) - np.repeat(self.first_atom[:-1], np.diff(self.first_atom))
         return np.asarray(steps + np.repeat(self.first_site[:-1], np.diff(self.first_atom)))
 
