@@ -200,8 +200,8 @@ class Constants:
         ----------
         text : str
             Names and values.
+        reduction, representation, kind : str, optional
             "A" or "S"; axes at x, y, z ("Ir", ...); kind of top. By default inferred from names and values.
-            "A" or "S"; which axes are x, y, z ("Ir", ...); kind of top. By default what the names and values say.
 
         Returns
         -------

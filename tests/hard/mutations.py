@@ -31,7 +31,7 @@ class Mutation:
 WHOLE_MATRIX = """
     from scipy.linalg import block_diag, eigh
 
-    of_k, parts = np.zeros((2 * j + 1, 2 * j + 1)), [block_bands(of_j, block) for block in whole]
+    of_k, parts = np.zeros((2 * j + 1, 2 * j + 1)), [block_bands(matrix, block) for block in whole]
     for block, start in zip(whole, np.cumsum([0] + [b.size for b in whole]), strict=False):
         for row, k in enumerate(block.k):
             of_k[start + row, j + k] += np.sqrt(0.5) if k else 1.0
@@ -99,8 +99,8 @@ MUTATIONS = (
     ),
     Mutation(
         7, "rotor/quantum/wang/rotation.py",
-        "        out.append((block, scalar, block_bands(of_j, block)))",
-        "        bands = block_bands(of_j, block)\n        bands[0] += scalar\n        out.append((block, 0.0, bands))",
+        "        out.append((block, scalar, block_bands(matrix, block)))",
+        "        bands = block_bands(matrix, block)\n        bands[0] += scalar\n        out.append((block, 0.0, bands))",
         "tests/quantum/test_safeguards.py::test_the_scalar_part_stays_out_of_the_matrix",
     ),
     Mutation(
@@ -114,8 +114,8 @@ MUTATIONS = (
     ),
     Mutation(
         10, "rotor/quantum/wang/spherical_top.py",
-        "    of_a, of_e = states[:, characters > 0.25], states[:, characters < 0.25]  # 1 and -½",
-        "    of_a, of_e = np.split(np.linalg.eigh(matrix)[1], [(characters > 0.25).sum()], axis=1)",
+        "    a_states, e_states = states[:, characters > 0.25], states[:, characters < 0.25]  # 1 and -½",
+        "    a_states, e_states = np.split(np.linalg.eigh(matrix)[1], [(characters > 0.25).sum()], axis=1)",
         "tests/tops/test_clusters.py::test_eigenvalues_and_irreps_of_the_full_matrix",
     ),
     Mutation(
