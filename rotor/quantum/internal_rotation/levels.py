@@ -20,6 +20,7 @@ from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_to
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.operators.rotation import body_tensor
+from rotor.quantum.solvers.dominated import SHARE
 from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
 from rotor.tops.internal_rotation import InternalRotationConstants, species_of_tops
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 TurningTops = RamModel | SeveralTops
 FEW = 1 << 14  # up to so many elements a dense matrix is faster than a sparse one
+MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a whole for a sum
 REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
 
 
@@ -199,8 +201,12 @@ def energies_alone(
         # low levels need all torsional functions, so the highest one of K = 0 is the least limit
         highest = float(blocks.functions.torsion.energies[jmax].max())
         linear = blocks.summed(model.coefficients, max(below_mhz, highest))
-        solved = linear.block >= 0
-        energies.append(linear.energies([1.0])[solved])
+        populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
+        if constants.tops > 2 and populated > SHARE * constants.functions:
+            _refuse_long_sums((2 * jmax + 1) * constants.functions)
+        each = linear.solve_dominated([1.0], linear.labels["t"] < populated).energies
+        solved = ~np.isnan(each)
+        energies.append(each[solved])
         labels = {key: column[solved] for key, column in linear.labels.items()}
         k = labels["K"]
         ka = np.abs(k)
@@ -217,6 +223,15 @@ def energies_alone(
         pieces.append(columns)
     quanta = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     return _table(top, effects, jmax, quanta, np.concatenate(energies), ())
+
+
+def _refuse_long_sums(size: int) -> None:
+    """ValueError for blocks of three tops that take minutes, where the populated torsional states are no small share of all."""
+    if size > MOST_SUMMED:
+        raise ValueError(
+            f"internal rotation of three tops: sums over levels at this temperature need all states of blocks of {size} functions; "
+            "give the partition function (--q), a lower temperature, or fewer functions"
+        )
 
 
 def _table(

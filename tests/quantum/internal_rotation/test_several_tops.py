@@ -9,6 +9,7 @@ import pytest
 import rotor
 from rotor import units
 from rotor.quantum.internal_rotation.frames import axis_of_angles
+from rotor.quantum.internal_rotation.levels import energies_alone
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.several_tops import InternalTop, SeveralTops, several_tops
 
@@ -312,3 +313,28 @@ def test_three_tops_of_which_two_are_exchanged_are_refused(tmp_path):
     path.write_text(text.replace("vt_max", THIRD_TOP.replace("1.45", "1.57079633") + "vt_max"))
     with pytest.raises(ValueError, match="C2 about b exchanges tops 1 and 2; spin weights"):
         rotor.api.solve_levels(rotor.read(path), 1)
+
+
+def test_sums_need_the_lowest_products_alone(tmp_path):
+    """Levels below a limit between the first and the second torsional state are those of all products."""
+    path = tmp_path / "dimethyl.toml"
+    path.write_text(FILE)
+    top = rotor.read(path)
+    every = energies_alone(top, top.internal_rotation, (), 8, 8)
+    ground = every.energy_mhz.min()
+    limit = ground + 60.0 * CM  # v_t = 1 begins 100 cm-1 or more above
+    low = energies_alone(top, top.internal_rotation, (), 8, 8, limit)
+    expected, found = (np.sort(levels.energy_mhz[levels.energy_mhz < limit]) for levels in (every, low))
+    assert len(low) < len(every) / 5
+    assert len(found) == len(expected) == 5 * 17
+    assert (
+        np.abs(found - expected).max() < 0.05
+    )  # MHz: functions far above the limit are left out; the solver adds 1e-7
+
+
+def test_long_sums_of_three_tops_are_refused(tmp_path):
+    path = tmp_path / "three.toml"
+    path.write_text(FILE.replace("vt_max", THIRD_TOP + "vt_max"))
+    top = rotor.read(path)
+    with pytest.raises(ValueError, match="blocks of 2460 functions; give the partition function"):
+        energies_alone(top, top.internal_rotation, (), 20, 20)
