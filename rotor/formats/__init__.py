@@ -1,6 +1,6 @@
-"""File formats of the field, one file a format; a folder where a format has several files.
+"""File formats of the field: one module for each format, or a folder for a format with several files.
 
-`read` and `write` are loaded when first used: what needs one format alone does not load them all.
+`read` and `write` are loaded at first use, so that a single format does not load all others.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -1,4 +1,4 @@
-"""Measured lines of catalogues (.cat) as assigned lines: of one state without spins, or with all quantum numbers."""
+"""Measured lines of catalogues (.cat) as assigned lines: without states and spins, or with all quantum numbers."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.table import counted
 
-_WITH_STATES = 10  # QNFMT // 100 from which a vibrational quantum number is among those of a state
+_WITH_STATES = 10  # QNFMT // 100 is at least this if a state has a vibrational quantum number
 
 
 def _measured(path: str | os.PathLike[str]) -> Catalogue:
+    """The measured lines of a catalogue file."""
     from rotor.formats.spcat.text.cat import read_cat
 
     catalogue = read_cat(path)
@@ -24,7 +25,7 @@ def _measured(path: str | os.PathLike[str]) -> Catalogue:
 
 
 def _columns(lines: Catalogue, width: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Frequency, error, the first quantum numbers of both states, and intensities beside the strongest."""
+    """Frequency, error, the first quantum numbers of both states, and intensities relative to the strongest line."""
     from rotor.formats.spcat.compare import in_mhz
 
     upper, lower = (np.abs(side[:, :width].astype(np.int64)) for side in (lines.quanta_upper, lines.quanta_lower))
@@ -33,7 +34,7 @@ def _columns(lines: Catalogue, width: int) -> tuple[np.ndarray, np.ndarray, np.n
 
 
 def catalogue_lines(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
-    """The measured lines of a catalogue without the numbers of states and spins, components of spins put together; and remarks."""
+    """The measured lines of a catalogue without quantum numbers of states and spins, with hyperfine components merged; and notes."""
     measured, width = _measured(path), len(names)
     beyond = np.concatenate([measured.quanta_upper[:, width:], measured.quanta_lower[:, width:]], axis=1)
     split = (measured.qnfmt // 100 < _WITH_STATES) & (measured.qnfmt % 10 > width)
@@ -60,7 +61,7 @@ def catalogue_lines(path: str | os.PathLike[str], names: Sequence[str]) -> tuple
 
 
 def whole_catalogue_lines(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
-    """The measured lines of a catalogue that has all of the quantum numbers, v and F among them."""
+    """The measured lines of a catalogue with all quantum numbers, v and F included; and notes."""
     measured, width = _measured(path), len(names)
     whole = (measured.qnfmt % 10 == width) & ((measured.qnfmt // 1000 % 2 == 1) == ("v" in names))
     notes = [] if whole.all() else [f"{int((~whole).sum())} measured lines without {', '.join(names)} are left aside"]
@@ -78,9 +79,9 @@ def whole_catalogue_lines(path: str | os.PathLike[str], names: Sequence[str]) ->
 def _centres(
     upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray, error: np.ndarray, weight: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Position of the first component of each rotational line, and all frequencies and errors with the line's in their place.
+    """Places of the first component of each rotational line, and frequencies and errors with those of the unsplit lines there.
 
-    The mean by intensity over all components is the line without spins, to first order; the error is the smallest of them.
+    To first order the intensity-weighted mean of all components is the line without spins; its error is the smallest of the components.
     """
     _, first, line = np.unique(np.concatenate([upper, lower], axis=1), axis=0, return_index=True, return_inverse=True)
     line = line.reshape(-1)
@@ -91,7 +92,7 @@ def _centres(
 
 
 def _first_of_each(upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Positions of lines without the repetitions of a K doublet, which has one label and one frequency."""
+    """Places of lines without repetitions by K doublets, whose components have equal label and frequency."""
     keys = [(*u, *low, f) for u, low, f in zip(upper.tolist(), lower.tolist(), frequency.tolist(), strict=True)]
     seen = {key: i for i, key in reversed([*enumerate(keys)])}
     return np.array(sorted(seen.values()), dtype=np.int64)

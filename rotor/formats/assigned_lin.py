@@ -1,7 +1,7 @@
 """Assigned lines in the order of a .lin file, where neighbours of one frequency and error are a blend.
 
-The lines of a blend stand together there, and the width of a blend as one more line behind them. Lines of one frequency that are no
-blend need another line between them; see `rotor.formats.spcat.text.lin.LineList.blends` for the rule.
+The lines of a blend are neighbours in the file, followed by a line for the width of the blend. Separate lines of equal frequency
+need another line between them; `rotor.formats.spcat.text.lin.LineList.blends` has the rule.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from rotor.units import MHZ_PER_CM
 
 @dataclass(frozen=True)
 class _Blend:
-    """A blend by its number, with frequency and error in the units of the file, how many lines it has, and whether it has a width."""
+    """A blend: its number, frequency and error in the units of the file, number of lines, and whether it has a width."""
 
     number: int
     frequency: float
@@ -29,7 +29,7 @@ class _Blend:
     wide: bool
 
     def runs_into(self, second: _Blend) -> bool:
-        """Whether a blend behind this one is read as part of it, or as its width; twice the limits, for round-off in the text."""
+        """Whether a blend that follows this one would be read as part of it or as its width; limits are doubled for round-off."""
         if self.wide or abs(self.frequency - second.frequency) > 2e-14 * abs(second.frequency) + 2e-8:
             return False
         as_width = self.count > 1 and second.error * self.error > 2 * self.error**2
@@ -37,8 +37,9 @@ class _Blend:
 
 
 def as_lin(lines: Assignments) -> LineList:
-    """The lines as a .lin file has them, excluded ones behind a blank line; half-integers are rounded up, wavenumbers have a negative
-    error."""
+    """The lines as a .lin file, with excluded lines after a blank line.
+
+    Half-integers are rounded up; wavenumbers have a negative error."""
     excluded = lines.is_excluded
     counted_ones = _listed(lines.take(~excluded))
     return with_excluded(counted_ones, _listed(lines.take(excluded))) if excluded.any() else counted_ones
@@ -53,14 +54,14 @@ def _listed(lines: Assignments) -> LineList:
     ordered = _with_widths(lines.take(np.argsort(rank[places.reshape(-1)], kind="stable")))
     halves = np.array([name in ordered.halves for name in ordered.names])
     upper, lower = (np.where(halves, (side + 1) // 2, side) for side in (ordered.upper, ordered.lower))
-    made = line_list(upper, lower, ordered.frequency_mhz, ordered.error_mhz, ordered.weight)
+    listed = line_list(upper, lower, ordered.frequency_mhz, ordered.error_mhz, ordered.weight)
     unit = np.where(ordered.wavenumber, 1 / MHZ_PER_CM, 1.0)
     sign = np.where(ordered.wavenumber, -1.0, 1.0)
-    return replace(made, frequency=ordered.frequency_mhz * unit, error=sign * ordered.error_mhz * unit)
+    return replace(listed, frequency=ordered.frequency_mhz * unit, error=sign * ordered.error_mhz * unit)
 
 
 def note_of_lin(lines: Assignments) -> list[str]:
-    """What is to be known of these lines in a .lin file: those of one frequency that no other line parts are one blend there."""
+    """Notes on these lines in a .lin file, where neighbours of equal frequency become one blend."""
     pairs = _meetings(_in_order(lines.take(~lines.is_excluded)))
     if not pairs:
         return []
@@ -72,7 +73,7 @@ def note_of_lin(lines: Assignments) -> list[str]:
 
 
 def with_excluded_lines(lines: Assignments, read: LineList) -> Assignments:
-    """Assigned lines with those behind a .lin file's list that are marked as excluded."""
+    """Assigned lines together with the excluded lines after the list of a .lin file."""
     names, marked = lines.names, excluded_lines(read, len(lines.names))
     if marked is None:
         return lines
@@ -87,6 +88,7 @@ def with_excluded_lines(lines: Assignments, read: LineList) -> Assignments:
 
 
 def _blends(lines: Assignments) -> list[_Blend]:
+    """The blends of the lines."""
     numbers, first, counts = np.unique(lines.blend, return_index=True, return_counts=True)
     unit = np.where(lines.wavenumber, 1 / MHZ_PER_CM, 1.0)
     frequency, error = lines.frequency_mhz * unit, lines.error_mhz * unit * np.where(lines.wavenumber, -1.0, 1.0)
@@ -98,30 +100,34 @@ def _blends(lines: Assignments) -> list[_Blend]:
 
 
 def _in_order(lines: Assignments) -> list[_Blend]:
-    """The blends by their numbers, but where one would run into the next this one stands behind the first that parts them, or before."""
-    made, waiting = list[_Blend](), list[_Blend]()
+    """The blends in an order in which neighbours do not merge, as near to the order of their numbers as possible."""
+    ordered, waiting = list[_Blend](), list[_Blend]()
     for blend in _blends(lines):
-        if made and made[-1].runs_into(blend):
+        if ordered and ordered[-1].runs_into(blend):
             waiting.append(blend)
             continue
-        made.append(blend)
+        ordered.append(blend)
         ready = next((candidate for candidate in waiting if not blend.runs_into(candidate)), None)
         if ready is not None:
             waiting.remove(ready)
-            made.append(ready)
+            ordered.append(ready)
     for blend in waiting:
-        fits = (i for i in range(len(made) + 1) if not _meetings([*made[max(i - 1, 0) : i], blend, *made[i : i + 1]]))
-        made.insert(next(fits, len(made)), blend)
-    return made
+        fits = (
+            i
+            for i in range(len(ordered) + 1)
+            if not _meetings([*ordered[max(i - 1, 0) : i], blend, *ordered[i : i + 1]])
+        )
+        ordered.insert(next(fits, len(ordered)), blend)
+    return ordered
 
 
 def _meetings(order: Sequence[_Blend]) -> int:
-    """How many blends run into the next one."""
+    """Number of blends that would merge with the next one."""
     return sum(first.runs_into(second) for first, second in itertools.pairwise(order))
 
 
 def _with_widths(lines: Assignments) -> Assignments:
-    """Lines in order of their blends, and behind each blend of known width one more, whose error is the width."""
+    """Lines by blend, each blend of known width followed by a line whose error is the width."""
     last = np.flatnonzero(np.append(np.diff(lines.blend) != 0, True))
     wide = [i for i in last.tolist() if int(lines.blend[i]) in lines.widths_mhz]
     rows = np.sort(np.concatenate([np.arange(len(lines)), np.array(wide, dtype=np.int64)]), kind="stable")

@@ -68,7 +68,7 @@ _ERROR = {"error_mhz": 1.0, "error_khz": 1e-3, "error_ghz": 1e3, "error_cm": MHZ
 def read_assigned_lines(
     path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str] = ()
 ) -> tuple[Assignments, list[str]]:
-    """The assigned lines of a file, and what must be known of how they were read.
+    """The assigned lines of a file, and notes on how they were read.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def read_assigned_lines(
     names : sequence of str
         The quantum numbers that label a state, such as ("j", "ka", "kc"); in the order of a .lin file.
     halves : collection of str, optional
-        Those of them that are half-integers: the labels have twice their value. A .lin and a .cat have them rounded up.
+        Half-integer quantum numbers, which labels contain doubled. In .lin and .cat files they are rounded up.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def read_assigned_lines(
     Raises
     ------
     ValueError
-        For another suffix, no lines, columns or quantum numbers that do not fit, with file and line.
+        With file and line, for an unknown suffix, no lines, or columns and quantum numbers that do not fit.
     """
     text = os.fspath(path).lower()
     if not text.endswith(SUFFIXES):
@@ -108,7 +108,7 @@ def read_assigned_lines(
 
 
 def with_halves(lines: Assignments, halves: Collection[str]) -> Assignments:
-    """Lines whose half-integers are rounded up as lines with twice their values."""
+    """Lines with doubled half-integers, from lines with half-integers rounded up."""
     columns = [i for i, name in enumerate(lines.names) if name in halves]
     upper, lower = lines.upper.copy(), lines.lower.copy()
     for side in (upper, lower):
@@ -117,7 +117,7 @@ def with_halves(lines: Assignments, halves: Collection[str]) -> Assignments:
 
 
 def names_sums(path: str | os.PathLike[str], count: int) -> bool:
-    """Whether the lines of a file name sums with spins: a column of F, J unlike N (.lne), or more than `count` quantum numbers a state."""
+    """Whether lines have sums with spins: a column F, J unlike N (.lne), or more than `count` quantum numbers for each state."""
     text = os.fspath(path).lower()
     if text.endswith(".csv"):
         return any(name in ("f_upper", "f_lower", "n_upper", "n_lower") for name in _table_of(path)[0])
@@ -130,11 +130,12 @@ def names_sums(path: str | os.PathLike[str], count: int) -> bool:
 
 
 def names_field(path: str | os.PathLike[str]) -> bool:
-    """Whether the lines of a .csv file have a column of the field."""
+    """Whether the lines of a .csv file have a column for an electric field."""
     return os.fspath(path).lower().endswith(".csv") and bool(set(_FIELD) & set(_table_of(path)[0]))
 
 
 def _from_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
+    """The lines of a .lin file."""
     read = read_lin(path, len(names))
     lines = with_defaults(read if {"v", "f"} & set(names) else without_v(read, len(names)), names)
     blends = lines.blends()
@@ -189,6 +190,7 @@ def _from_westerfit(path: str | os.PathLike[str], names: Sequence[str], halves: 
 def _from_csv(
     path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]
 ) -> tuple[Assignments, list[str]]:
+    """The lines of a .csv file."""
     columns, rows = _table_of(path)
     notes: list[str] = []
     if "species" in names:
@@ -200,8 +202,8 @@ def _from_csv(
         columns = [name for name in columns if name not in PREDICTED]
         notes = [*notes, f"columns of a prediction that a fit does not use: {', '.join(passed)}"]
     labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
-    known = {*labels, *_FREQUENCY, *_ERROR, *_WIDTH, "weight", "blend", "comment", "excluded"}
-    _refuse_columns(path, columns, labels, known)
+    accepted = {*labels, *_FREQUENCY, *_ERROR, *_WIDTH, "weight", "blend", "comment", "excluded"}
+    _refuse_columns(path, columns, labels, accepted)
     unit = next(name for name in _FREQUENCY if name in columns)
     error = next((name for name in _ERROR if name in columns), None)
     _refuse_rows(path, rows)
@@ -217,7 +219,7 @@ def _from_csv(
     errors = np.array([_size(path, i, error, row, 0.0) if error else 0.0 for i, row in enumerate(rows, 1)])
     named = "blend" in columns
     blends = _blends([(row.get("blend") or "").strip() for row in rows]) if named else _equal_lines(frequency, errors)
-    made = assignments(
+    lines = assignments(
         names, quanta[:, : len(names)], quanta[:, len(names) :], frequency * _FREQUENCY[unit],
         errors * (_ERROR[error] if error else 1.0),
         weight=np.array([_size(path, i, "weight", row, 1.0) for i, row in enumerate(rows, 1)]),
@@ -229,13 +231,13 @@ def _from_csv(
         halves=halves,
     )  # fmt: skip
     if "excluded" in columns:
-        made = replace(made, excluded=np.array([_is_marked(path, i, row) for i, row in enumerate(rows, 1)]))
-    return made, notes + ([] if named else _note_of_blends(made))
+        lines = replace(lines, excluded=np.array([_is_marked(path, i, row) for i, row in enumerate(rows, 1)]))
+    return lines, notes + ([] if named else _note_of_blends(lines))
 
 
 def _with_field(path: object, columns: Sequence[str], line: int, row: dict[str, str]) -> dict[str, str]:
-    """A row with the field of both states as a whole number of steps."""
-    from rotor.quantum.effects.stark import HIGHEST_KV_PER_CM  # with all that fields need
+    """A row with the electric field of both states as an integer number of steps."""
+    from rotor.quantum.effects.stark import HIGHEST_KV_PER_CM  # imported here, since it loads all modules of fields
 
     units = [name for name in _FIELD if name in columns]
     if len(units) != 1:
@@ -254,13 +256,14 @@ def _with_field(path: object, columns: Sequence[str], line: int, row: dict[str, 
 
 
 def _equal_lines(frequency: Floats, error: Floats) -> list[int]:
-    """Numbers of blends: as in a .lin file, lines of one frequency and error behind each other are one."""
+    """Numbers of blends: as in a .lin file, neighbouring lines of equal frequency and error form one."""
     near, alike = like_line_before(frequency, error)
     places = np.cumsum(np.append(np.zeros(min(len(frequency), 1), dtype=bool), ~(near & alike)))
     return [int(place) for place in places]
 
 
 def _note_of_blends(lines: Assignments) -> list[str]:
+    """Notes on blends that follow from equal frequencies."""
     count = int(lines.blended.sum())
     if not count:
         return []
@@ -293,7 +296,7 @@ def _table_of(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, s
 def _widths(
     path: object, rows: Sequence[Mapping[str, str]], columns: Sequence[str], blends: Sequence[int]
 ) -> dict[int, float]:
-    """The width of each blend that states one, by its number."""
+    """The stated widths of blends by number."""
     widths, counts = dict[int, float](), Counter(blends)
     for name in (column for column in _WIDTH if column in columns):
         for i, (row, blend) in enumerate(zip(rows, blends, strict=True), 1):
@@ -317,21 +320,22 @@ def _refuse_rows(path: object, rows: Sequence[Mapping[Any, Any]]) -> None:
 
 
 def _shown(labels: Sequence[str]) -> list[str]:
-    """Columns of labels as a file has them: the field of a line stands once."""
+    """Columns of labels in a file, in which the field of a line occurs once."""
     field = [next(iter(_FIELD))] if "field_upper" in labels else []
     return [name for name in labels if not name.startswith("field_")] + field
 
 
 def _refuse_columns(
-    path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], known: set[str]
+    path: str | os.PathLike[str], columns: Sequence[str], labels: Sequence[str], accepted: set[str]
 ) -> None:
+    """Raise ValueError for missing or unknown columns."""
     other = next((sign for sign in (";", "\t") if len(columns) == 1 and sign in columns[0]), None)
     if other is not None:
         raise ValueError(
             f"{path}: its columns are parted by {other!r}; commas are needed, and a point in decimal numbers"
         )
     missing = [name for name in labels if name not in columns]
-    strange = [name for name in columns if name not in known]
+    strange = [name for name in columns if name not in accepted]
     if missing or strange:
         what = f"no column {', '.join(missing)}" if missing else f"unknown column {', '.join(map(repr, strange))}"
         present = f"; the file has {', '.join(columns)}" if missing else ""
@@ -350,6 +354,7 @@ def _refuse_columns(
 
 
 def _real(path: object, line: int, name: str, row: Mapping[str, str], default: float | None = None) -> float:
+    """A number of a row."""
     text = (row.get(name) or "").strip().replace("−", "-")
     if not text and default is not None:
         return default
@@ -363,7 +368,7 @@ def _real(path: object, line: int, name: str, row: Mapping[str, str], default: f
 
 
 def _size(path: object, line: int, name: str, row: Mapping[str, str], default: float) -> float:
-    """A number of 0 or more."""
+    """A number of a row, 0 or more."""
     value = _real(path, line, name, row, default)
     if value < 0:
         raise ValueError(f"{path}, line {line} of the table: {name} = {value:g}; a number of 0 or more is needed")
@@ -371,6 +376,7 @@ def _size(path: object, line: int, name: str, row: Mapping[str, str], default: f
 
 
 def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
+    """An integer of a row."""
     text = (row.get(name) or "").strip()
     if name.startswith("species_"):
         return species_number(path, line, name, text)
@@ -383,7 +389,7 @@ def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
 
 
 def _half(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
-    """Twice a half-integer, which stands as 5/2, 2.5, or as twice its value, 5."""
+    """Twice a half-integer, written as 5/2, 2.5, or doubled as 5."""
     text = (row.get(name) or "").strip()
     number, slash, two = text.partition("/")
     if number.isdigit() and int(number) % 2 and (two == "2" or not slash):
@@ -398,7 +404,7 @@ def _half(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
 
 
 def _blends(texts: Sequence[str]) -> list[int]:
-    """Numbers of blends: lines with one text are one, a line without any is alone."""
+    """Numbers of blends: lines with equal text form one; a line without text is separate."""
     places: dict[str, int] = {}
     return [places.setdefault(text or f"\0{i}", len(places)) for i, text in enumerate(texts)]
 
@@ -438,7 +444,7 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
             numbers = [lines.frequency_mhz[i] / unit, lines.error_mhz[i] / unit, lines.weight[i]]
             sides = zip((*lines.upper[i].tolist(), *lines.lower[i].tolist()), halves * 2, strict=True)
             quanta = [value_text(value, half) for value, half in sides]
-            if in_field:  # the last of both states is the field
+            if in_field:  # the last number of both states is the field
                 del quanta[len(names)]
                 quanta[-1] = repr(float(lines.lower[i, -1]) * FIELD_STEP_KV_PER_CM)
             row = [*quanta, *map(float, numbers), int(lines.blend[i])]

@@ -1,7 +1,7 @@
-"""Results are written beside and renamed: a reader of the path finds the whole file, the old one, or none.
+"""Atomic writing of files: a result is written elsewhere and renamed, so that the path never holds a partial file.
 
-What is not finished stands in a folder `.rotor-...` beside the result, locked as long as its process lives. A process that is
-killed leaves its folder behind; the next one that writes there finds it unlocked and removes it.
+Unfinished files are in a folder `.rotor-...` next to the result, locked while their process lives. A killed process leaves its folder; the
+next process that writes there finds it unlocked and removes it.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # the disk, a quota
 
 
 class DoesNotFitError(ValueError):
-    """A result that the format of one file cannot hold; files of other formats are written all the same."""
+    """A result that a format cannot hold; files of other formats are still written."""
 
 
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A path to write to, in a folder of its own beside; moved to `path` when the block ends, removed when it fails.
+    """A path to write to, in a separate folder; the file moves to `path` when the block ends, and is removed when it fails.
 
-    A link is followed, so that the file it names is replaced and the link stays. What is no regular file (a pipe,
-    a device such as /dev/null) cannot be renamed over and is used as it is.
+    A link is followed: its target is replaced and the link remains. Pipes and devices such as /dev/null cannot be replaced and are written
+    directly.
 
     Raises FileNotFoundError when the folder does not exist, IsADirectoryError when `path` is a folder.
 
@@ -57,7 +57,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextmanager
 def open_atomic(path: str | os.PathLike[str], mode: str = "wb", **options: Any) -> Iterator[IO[Any]]:
-    """An open file, text or binary by `mode`, that takes the place of `path` when the block ends without an error.
+    """An open file, text or binary by `mode`, that replaces `path` when the block ends without an error.
 
     `options` are those of `open`, such as `encoding` and `newline`.
     """
@@ -67,7 +67,7 @@ def open_atomic(path: str | os.PathLike[str], mode: str = "wb", **options: Any) 
 
 @contextmanager
 def naming(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Inside, an OSError of writing names this path, not the unfinished file; a library's own error of a full disk is one too."""
+    """Context in which an OSError names this path instead of the unfinished file; errors of libraries for a full disk are converted."""
     try:
         yield
     except Exception as error:
@@ -78,12 +78,12 @@ def naming(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def _code_of_full_disk(text: str) -> int | None:
-    """The number of the system's error that a library's own text names."""
+    """The number of the system error in the text of a library's error."""
     return next((code for code in FULL if os.strerror(code) in text or f'"errno":"{code}"' in text), None)
 
 
 def resolved(path: str | os.PathLike[str]) -> Path:
-    """The path that links lead to; ValueError where they lead in a circle."""
+    """The target of links; ValueError for circular links."""
     try:
         os.stat(path)
     except OSError as error:
@@ -94,25 +94,25 @@ def resolved(path: str | os.PathLike[str]) -> Path:
     return Path(os.path.realpath(path))
 
 
-def place(made: Path, path: Path) -> None:
+def place(finished: Path, path: Path) -> None:
     """Move a finished file to its place, through links, into a device or a pipe, and onto another file system."""
     target = resolved(path)
     replaces = target.is_file() or not target.exists()
-    if replaces and made.stat().st_dev == target.parent.stat().st_dev:
+    if replaces and finished.stat().st_dev == target.parent.stat().st_dev:
         with naming(path):
-            os.replace(made, target)
+            os.replace(finished, target)
         return
-    with atomic_path(path) as unfinished, open(made, "rb") as source, open(unfinished, "wb") as copy:
+    with atomic_path(path) as unfinished, open(finished, "rb") as source, open(unfinished, "wb") as copy:
         shutil.copyfileobj(source, copy)
 
 
 def unfinished_folder(parent: Path) -> AbstractContextManager[Path]:
-    """A new folder in `parent`, locked and at the end removed; those of processes that were killed are removed first."""
+    """A new locked folder in `parent`, removed at the end; folders of killed processes are removed first."""
     return locked_folder(parent, PREFIX)
 
 
 def write_together(writers: Mapping[Path, Callable[[Path], object]]) -> None:
-    """Write several files, each by its writer of a path: all appear at the end, with what a writer puts beside them, or none.
+    """Write several files, each by its writer: all appear at the end, with accompanying files, or none.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -126,6 +126,6 @@ def write_together(writers: Mapping[Path, Callable[[Path], object]]) -> None:
             beside = stack.enter_context(unfinished_folder(target.parent))
             with naming(target):
                 write(beside / target.name)
-            moves += [(made, target.parent / made.name) for made in sorted(beside.iterdir())]
-        for made, path in moves:
-            place(made, path)
+            moves += [(finished, target.parent / finished.name) for finished in sorted(beside.iterdir())]
+        for finished, path in moves:
+            place(finished, path)

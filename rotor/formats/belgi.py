@@ -27,7 +27,7 @@ from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 
-HEAD = 4000  # characters in which its name stands
+HEAD = 4000  # characters that contain the name of the program
 ROTATION = {"OA": "A", "B": "B", "C": "C"}
 TORSION = {"F": "F", "RHORHO": "rho", "V3": "V3", "V6": "V6"}
 _CONSTANT = re.compile(r"^\s*([A-Z]\w*)\s*=\s*([-+]?[\d.]+(?:[EeDd][-+]?\d+)?)\s*,?\s*$", re.MULTILINE)
@@ -37,7 +37,7 @@ _BLOCK = re.compile(r"N= +(\d+) +ISIG= +(\d+)")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ListedLevels(Table):
-    """Levels of a list: species (0 of A, 1 of E), v_t, J, K (counted of A, signed of E), and cm⁻¹ above the foot of the potential."""
+    """Listed levels: species (0 A, 1 E), v_t, J, K (counted for A, signed for E), and cm⁻¹ above the minimum of the potential."""
 
     species: Ints
     vt: Ints
@@ -59,7 +59,7 @@ def is_belgi_file(path: str | os.PathLike[str]) -> bool:
 
 
 def read_belgi(path: str | os.PathLike[str]) -> Top:
-    """The top whose constants stand at the head of an output of BELGI.
+    """The top with the constants at the head of an output of BELGI.
 
     Parameters
     ----------
@@ -69,27 +69,27 @@ def read_belgi(path: str | os.PathLike[str]) -> Top:
     Returns
     -------
     Top
-        With constants of internal rotation in the frame RAM.
+        Top with constants of internal rotation in the frame RAM.
 
     Raises
     ------
     ValueError
-        With the file, for constants that are missing, and for terms that are not read and not 0.
+        With the file, for missing constants, and for unsupported terms that are not 0.
     """
     text = Path(path).read_text(encoding="utf-8", errors="replace")
     head = text.partition("&CSTE")[2].partition("\n /")[0]
     values = {name: float(number.upper().replace("D", "E")) for name, number in _CONSTANT.findall(head)}
     scale = MHZ_PER_CM if re.search(r"^\s*CM-1", text.partition("&CSTE")[0], re.MULTILINE) else 1.0
-    known = ROTATION | TORSION
-    if missing := [name for name in known if name not in values]:
+    names = ROTATION | TORSION
+    if missing := [name for name in names if name not in values]:
         raise ValueError(
             f"{os.fspath(path)}: {', '.join(missing)} missing in the constants at the head of the output of BELGI"
         )
-    if strange := [name for name, value in values.items() if value and name not in known]:
+    if strange := [name for name, value in values.items() if value and name not in names]:
         raise ValueError(
-            f"{os.fspath(path)}: {', '.join(strange)}: read are {', '.join(known)}; give the others in a .toml file"
+            f"{os.fspath(path)}: {', '.join(strange)}: read are {', '.join(names)}; give the others in a .toml file"
         )
-    numbers = {ours: values[theirs] * (1.0 if ours == "rho" else scale) for theirs, ours in known.items()}
+    numbers = {ours: values[theirs] * (1.0 if ours == "rho" else scale) for theirs, ours in names.items()}
     internal = {name: value for name in TORSION.values() if (value := numbers[name]) or name in ("F", "rho", "V3")}
     rotation: dict[str, Any] = {name: numbers[name] for name in ROTATION.values()}
     return Top.from_constants(
@@ -100,9 +100,9 @@ def read_belgi(path: str | os.PathLike[str]) -> Top:
 
 
 def read_belgi_levels(path: str | os.PathLike[str]) -> ListedLevels:
-    """The levels that an output of BELGI lists, in its order.
+    """The levels listed in an output of BELGI, in its order.
 
-    Raises ValueError, with the file, where it lists none.
+    Raises ValueError, with the file, if it lists none.
     """
     text = Path(path).read_text(encoding="utf-8", errors="replace")
     rows = [_row_of_columns(line) for line in text.splitlines() if line.count(",") == 5 and "=" not in line]
@@ -122,6 +122,6 @@ def read_belgi_levels(path: str | os.PathLike[str]) -> ListedLevels:
 
 
 def _row_of_columns(line: str) -> tuple[int, int, int, int, float]:
-    """Species, v_t, J, K, E of a line v_t, K, E, J, parity, σ."""
+    """Species, v_t, J, K, E from a line with the columns v_t, K, E, J, parity, σ."""
     v, k, energy, j, _, species = line.split(",")
     return int(species), int(v), int(j), int(k), float(energy)

@@ -1,4 +1,4 @@
-"""A periodic box of atoms from a file, in whatever format ASE reads with its cell."""
+"""A periodic box of atoms from a file in any format that ASE reads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def read_box(path: str | os.PathLike[str]) -> Atoms:
-    """The last frame of a file, without its calculator; ValueError for what cannot be read and for a box without a cell."""
+    """The last frame of a file, without its calculator; ValueError for an unreadable file and for a box without a cell."""
     from rotor.molecules.readers.ase_files import structures
 
     if not Path(path).is_file():

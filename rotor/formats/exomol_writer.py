@@ -54,7 +54,7 @@ def write_exomol(lines: Lines, path: str | os.PathLike[str], settings: Mapping[s
 
 
 def refuse_exomol(path: Path) -> NoReturn:
-    """ValueError that says what the file holds and what reads it."""
+    """Raise ValueError with the content of the file and the command that reads it."""
     raise ValueError(
         f"{path}: a line list of ExoMol (levels and transitions), which has neither constants nor a dipole to make a top of; enter it in a "
         f"local catalogue (rotor catalogue add X.states --catalogue lines.rotorcat), whose species emission and identify read"
@@ -62,7 +62,7 @@ def refuse_exomol(path: Path) -> NoReturn:
 
 
 def _states(lines: Lines, used: np.ndarray) -> bytes:
-    """The levels that are upper or lower of a line, J first among the labels."""
+    """Text of the levels that occur in lines, with J as the first label."""
     levels = lines.levels
     energy = levels.energy_mhz[used] / units.MHZ_PER_CM
     labels = [levels.quanta["j"][used], *(values[used] for name, values in levels.quanta.items() if name != "j")]

@@ -48,7 +48,7 @@ _SPECIES = ("name", "isotopes", "constants", "source", "lines", "start", "correc
 
 @dataclass(frozen=True)
 class FamilyFile:
-    """What a family file says: the family, the coordinates to fit and to hold, and the fits of lines that it asked for, by name."""
+    """Content of a family file: the family, coordinates to fit and to hold, and fits of lines by isotopologue."""
 
     family: Family
     coordinates: tuple[Named, ...]
@@ -57,7 +57,7 @@ class FamilyFile:
 
 
 def read_family(path: str | os.PathLike[str], options: FitOptions | None = None) -> FamilyFile:
-    """The family in a TOML file, constants fitted to measured lines where it names some.
+    """The family in a TOML file; constants are fitted to measured lines if the file names them.
 
     Raises ValueError, with file, table and key, for text that is no TOML, unknown keys, isotopologues that do not fit the
     geometry, constants that are missing, and lines whose fit does not converge.
@@ -89,18 +89,20 @@ def read_family(path: str | os.PathLike[str], options: FitOptions | None = None)
         corrections.append(_parsed(entry, "corrections", place)[0] if "corrections" in entry else {})
         sources.append(entry.get("source", source))
     try:
-        made = family(molecule, measured, corrections_mhz=corrections, sources=sources, name=content.get("name", ""))
+        isotopologues = family(
+            molecule, measured, corrections_mhz=corrections, sources=sources, name=content.get("name", "")
+        )
         coordinates = _coordinates(molecule, content.get("coordinates", {}))
         held = _coordinates(molecule, content.get("held", {}))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    return FamilyFile(made, coordinates, held, fits)
+    return FamilyFile(isotopologues, coordinates, held, fits)
 
 
-def _refuse_unknown(table: Mapping[str, Any], known: Sequence[str], place: str) -> None:
-    strange = [key for key in table if key not in known]
+def _refuse_unknown(table: Mapping[str, Any], accepted: Sequence[str], place: str) -> None:
+    strange = [key for key in table if key not in accepted]
     if strange:
-        raise ValueError(f"{place}: unknown key {strange[0]!r}; known are {', '.join(known)}")
+        raise ValueError(f"{place}: unknown key {strange[0]!r}; known are {', '.join(accepted)}")
 
 
 def _molecule(content: Mapping[str, Any], path: str) -> Molecule:
@@ -128,7 +130,7 @@ def _parsed(entry: Mapping[str, str], key: str, place: str) -> tuple[dict[str, f
 def _constants(
     entry: Mapping[str, str], place: str, folder: Path, label: str, fits: dict[str, Fit], options: FitOptions | None
 ) -> tuple[dict[str, float], dict[str, float], str]:
-    """A, B, C and their errors, given or fitted to measured lines."""
+    """A, B, C and their errors, as stated or fitted to measured lines, and their source."""
     if ("constants" in entry) == ("lines" in entry):
         raise ValueError(f"{place}: either constants or lines (with start) say what was measured; give one of them")
     if "constants" in entry:

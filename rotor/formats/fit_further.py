@@ -1,4 +1,4 @@
-"""What a fit does beside the fit: choosing constants, trying them, lines worth measuring, errors by resampling."""
+"""Additions to a fit: choice and trial of constants, suggested measurements, errors by resampling."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_SUGGESTIONS = 20
 
 @contextmanager
 def _named(name: str) -> Iterator[None]:
-    """Inside, a ValueError begins with the name of the argument."""
+    """Context in which the message of a ValueError begins with the name of the argument."""
     try:
         yield
     except ValueError as error:
@@ -28,7 +28,7 @@ def _named(name: str) -> Iterator[None]:
 
 
 def chosen_fit(request: FitRequest, candidates: Sequence[str], by_order: bool) -> FitAnswer:
-    """The fit of the constants that the lines call for, with the steps that led to it; after an interrupt those made so far."""
+    """The fit with the constants that the lines require, and the steps of the choice; after an interrupt the steps so far."""
     if request.spfit is not None:
         raise ValueError("choose: start from a line list and constants, whose free ones are the base of the model")
     assert request.constants is not None  # a list of lines has constants to start from
@@ -39,8 +39,8 @@ def chosen_fit(request: FitRequest, candidates: Sequence[str], by_order: bool) -
             f"choose: {', '.join(idle)} is free already, part of the base of the model; choose from others"
         )
     with _named("choose"):
-        known = with_names(request.constants, candidates)
-        request.parameters.with_free(known, list(dict.fromkeys(map(full_name, candidates))))
+        constants = with_names(request.constants, candidates)
+        request.parameters.with_free(constants, list(dict.fromkeys(map(full_name, candidates))))
     fit, steps = choose_constants(
         request.lines, request.constants, request.parameters, candidates, request.options, by_order=by_order
     )
@@ -53,7 +53,7 @@ def chosen_fit(request: FitRequest, candidates: Sequence[str], by_order: bool) -
 def with_further(
     answer: FitAnswer, tried: Sequence[str] | None, suggest: str | None, samples: int, seed: int
 ) -> FitAnswer:
-    """The answer with trials of constants, the lines that would help one most, errors from samples; an interrupt leaves what is done."""
+    """The answer with trials of constants, suggested lines and errors from samples; an interrupt leaves the completed parts."""
     request, fit, now = answer.request, answer.fit, "try_constants"
     try:
         answer = replace(answer, trials=tuple(_trials(fit, request.options, tried)))
@@ -75,7 +75,7 @@ def _trials(fit: Fit, options: FitOptions, names: Sequence[str] | None) -> list[
 
 
 def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Suggestion]:
-    """The best twenty of all lines of the kinds that were measured, for J up to the highest measured."""
+    """The best twenty lines of the measured kinds, for J up to the highest measured."""
     if name is None:
         return []
     error = float(np.median(fit.line_errors_mhz[fit.used]))
@@ -92,7 +92,7 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
 
 
 def _bootstrap(request: FitRequest, fit: Fit, samples: int, seed: int) -> tuple[Sequence[float], int]:
-    """Standard deviations from samples of the lines, and from how many."""
+    """Standard deviations from resampled lines, and number of samples."""
     if not samples:
         return [], 0
     from rotor.fitting.resampling import bootstrap

@@ -41,10 +41,10 @@ def error_of_constants(answer: Any) -> float:
 
 
 def _goal(of: str, error: Callable[[Any], float]) -> Goal:
-    """The loosest tolerance of the search, in decades."""
+    """Goal that chooses the loosest sufficient tolerance of the search, in decades."""
 
     def choose(scene: Any, request: Any, accuracy: float) -> Choice:
-        """By whole fits."""
+        """The choice, by complete fits."""
         return loosest(
             DECADES, lambda value: with_options(request, tolerance=value), answer_fit, accuracy, "tolerance", error
         )
@@ -53,7 +53,7 @@ def _goal(of: str, error: Callable[[Any], float]) -> Goal:
 
 
 def sweeps_of_fit(request: Any) -> Sweeps:
-    """The search alone; weights and rejected lines are another question, not another accuracy."""
+    """Sweep of the search; weights and rejected lines do not concern its accuracy."""
     measure = Measure("a constant", "σ", _in_errors)
     finest = with_options(request, tolerance=FINEST_TOLERANCE)
     against = f"a search to {FINEST_TOLERANCE:g}"
@@ -79,7 +79,7 @@ def _in_errors(answer: Any, reference: Any) -> float:
 
 
 def plan_of_fit(request: Any) -> Plan:
-    """The plan of a fit: seconds are those of one iteration and of what is always there, for as many iterations as fits usually take."""
+    """The plan of a fit: time from the cost of the setup and of one iteration, for the usual number of iterations."""
     lines, free = request.lines, request.parameters.names
 
     def limited(iterations: int) -> Any:
@@ -110,7 +110,7 @@ def plan_of_fit(request: Any) -> Plan:
 
 
 def _absent(request: FitRequest, top: Top, j: int) -> tuple[LeftOut, ...]:
-    """What the model leaves out; no distortion where a free constant starts at 0, since its order is in the model then."""
+    """Neglected effects; without distortion if a free constant starts at 0, since the model then contains its order."""
     complete = not request.parameters.start.all()
     parts = left_out_of_levels(top, j, SEMI_RIGID)
     return tuple(part for part in parts if not (complete and part.name.startswith("centrifugal distortion")))

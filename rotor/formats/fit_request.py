@@ -1,6 +1,6 @@
-"""A request for a fit, from either kind of input: SPFIT's .par and .lin, or a list of lines with constants to start from.
+"""Request of a fit, from SPFIT's .par and .lin files or from a list of lines and starting constants.
 
-`rotor fit` and a scene of the kind fit fill the same request; what they write of its answer is written here.
+`rotor fit` and scenes of the kind fit make the same request; this module also writes their results.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class FitFiles:
-    """Files that a request was read from: the lines or case.par, the .lin of a case.par, lines merged with them, the start.
+    """Files of a request: the lines or case.par, the .lin of a case.par, merged lines, and the starting constants.
 
-    Lines that are no file have their `source` as a name.
+    Lines that do not come from a file are named by their `source`.
     """
 
     source: str
@@ -54,7 +54,7 @@ class FitFiles:
 
 @dataclass(frozen=True, eq=False)
 class FitRequest:
-    """What is to be fitted.
+    """Lines, constants and options of a fit.
 
     lines, constants, parameters, options: as `rotor.fitting.fit.fit_lines` takes them. title: for reports. files: what it was read
     from. spfit: the files of SPFIT, where it was read from them. ties, priors_mhz: as given, of a list of lines. notes: what must be
@@ -74,12 +74,12 @@ class FitRequest:
 
     @property
     def model(self) -> Callable[[Ints], LevelModel] | None:
-        """What computes levels of codes with spins or several states; None where `constants` do."""
+        """Model of levels for codes with spins or several states; None if `constants` are enough."""
         return self.spfit.model if self.spfit else None
 
     @property
     def top(self) -> Top | None:
-        """The constants to start from as a top; None of codes with spins or several states."""
+        """The starting constants as a top; None for codes with spins or several states."""
         if isinstance(self.constants, TopConstants):
             return self.constants.top
         return None if self.constants is None else Top.from_constants(self.constants)
@@ -104,7 +104,7 @@ class FittedParameters(Table):
 
 @dataclass(frozen=True, eq=False)
 class FitAnswer:
-    """A fit that was asked for.
+    """The result of a request for a fit.
 
     steps: of a choice of constants. trials, suggestions, spread: what was tried beside the fit, see `rotor.formats.fit_further`;
     interrupted: what of these is not complete.
@@ -126,23 +126,23 @@ class FitAnswer:
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far the frequencies of the lines can be trusted, in MHz."""
+        """Error budget of the frequencies of the lines, in MHz."""
         return predictions_budget(self.fit)
 
     @property
     def constants_errors(self) -> ErrorBudget:
-        """How far the constants can be trusted, in standard errors."""
+        """Error budget of the constants, in standard errors."""
         return constants_budget(self.fit)
 
     def facts(self) -> dict[str, Any]:
-        """What is known of the fit as a whole."""
+        """Facts about the fit as a whole."""
         facts = fit_facts(self.fit)
         errors = {"errors": self.errors.as_json(), "constants_errors": self.constants_errors.as_json()}
         return {"title": self.request.title, **facts, **errors, "notes": [*self.request.notes, *facts["notes"]]}
 
 
 def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnswer:
-    """The fit that a request asks for; `fit.converged` says whether it is a result.
+    """The fit of a request; `fit.converged` states whether the search ended.
 
     Raises ValueError as `rotor.fitting.fit.fit_lines` does.
     """
@@ -153,7 +153,7 @@ def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnsw
 
 
 def fit_of_spfit(par: str, lin: str | None = None) -> FitRequest:
-    """The request of a .par file and its lines; what is free and where it starts, the file says. Raises ValueError as `read_fit`."""
+    """The request of a .par file and its lines; the file states free parameters and starting values. Raises ValueError as `read_fit`."""
     inputs = read_fit(par, lin)
     title = " ".join(inputs.file.title.split()) or Path(par).stem
     files = FitFiles(par, lin)
@@ -178,7 +178,7 @@ def fit_of_lines(
     priors_mhz: Mapping[str, float] | None = None,
     start: str | None = None,
 ) -> FitRequest:
-    """The request of assigned lines and of constants to start from.
+    """The request of assigned lines and starting constants.
 
     Parameters
     ----------
@@ -186,13 +186,13 @@ def fit_of_lines(
         .lin, .csv, .cat or .cat.gz; or assigned lines; or rows of the numbers of the upper state, of the lower state, frequency and error
         (MHz).
     top : Top
-        Whose constants the fit starts from.
+        Top with the starting constants.
     free : sequence of str, optional
-        Constants to fit; those that have an error by default. One that the top does not have starts at 0.
+        Constants to fit; by default those with an error. A constant that the top does not have starts at 0.
     ties, priors_mhz : optional
-        As of `rotor.fitting.parameters.parameters`.
+        As in `rotor.fitting.parameters.parameters`.
     start : path, optional
-        The file of the top: its other tables go into a file of the result.
+        File of the top, whose other tables are copied into a file of the result.
 
     Returns
     -------
@@ -201,7 +201,7 @@ def fit_of_lines(
     Raises
     ------
     ValueError
-        Lines or names that cannot be, and no constant to fit.
+        For invalid lines or names, and without a constant to fit.
     """
     if isinstance(lines, os.PathLike):
         lines = os.fspath(lines)
@@ -222,31 +222,31 @@ def fit_of_lines(
         begin = with_names(has, names)
     except ValueError as error:
         raise ValueError(f"free: {error}") from None
-    for tie in ties:  # a constant that follows another need not be in the start
+    for tie in ties:  # a tied constant may be missing from the starting constants
         try:
             begin = with_names(begin, [tie.partition("=")[0].strip()] if "=" in tie else [])
         except ValueError as error:
             raise ValueError(f"tie {tie!r}: {error}") from None
-    made = parameters(begin, names, ties=ties, priors_mhz=priors)
-    known = np.isfinite(made.prior)  # what has an a-priori value stays at it
+    fitted = parameters(begin, names, ties=ties, priors_mhz=priors)
+    has_prior = np.isfinite(fitted.prior)  # constants with an a-priori value start there
     begin, moved = beside_zero(
-        begin, [name for name, has_one in zip(made.names, known, strict=True) if not has_one], read
+        begin, [name for name, has_one in zip(fitted.names, has_prior, strict=True) if not has_one], read
     )
     if moved:
-        made = parameters(begin, names, ties=ties, priors_mhz=priors)
+        fitted = parameters(begin, names, ties=ties, priors_mhz=priors)
         said = ", ".join(f"{name} at {value:.3g} {'D' if name in DIPOLES else 'MHz'}" for name, value in moved.items())
         notes = [*notes, f"of these the lines know the square alone, so that they start beside 0: {said}"]
     title = " ".join(top.name.split()) or f"{top.kind} top"
     files = FitFiles(name, start=start)
     return FitRequest(
-        read, begin, made, FitOptions(), title, files, ties=tuple(ties), priors_mhz=priors, notes=tuple(notes)
+        read, begin, fitted, FitOptions(), title, files, ties=tuple(ties), priors_mhz=priors, notes=tuple(notes)
     )
 
 
 def constants_for(lines: Any, top: Top, free: Sequence[str]) -> ConstantSet:
-    """The constants of a top as a fit of these lines takes them: with its further states, and its spins where the lines have F.
+    """The constants of a top for a fit of these lines: with further states, and with spins if the lines have F.
 
-    Raises ValueError for lines or free constants of spins that the top has not.
+    Raises ValueError for lines or free constants of spins that the top does not have.
     """
     rotation = len(QUANTA[top.kind]) + (top.states is not None) + 2 * (top.internal_rotation is not None)
     sums = names_sums(lines, rotation) if isinstance(lines, str) else "f" in getattr(lines, "names", ())
@@ -266,7 +266,7 @@ def constants_for(lines: Any, top: Top, free: Sequence[str]) -> ConstantSet:
 
 
 def _dipole_for(top: Top, free: Sequence[str]) -> tuple[str, ...]:
-    """The components of the dipole that act on lines in a field: those that are not 0, and those that are free."""
+    """The components of the dipole that act in a field: nonzero and free ones."""
     possible = {"linear": "a", "prolate": "a", "oblate": "c", "asymmetric": "abc", "spherical": ""}[top.kind]
     values = dict(zip(DIPOLES, top.dipole_abc_debye or (0.0, 0.0, 0.0), strict=True))
     names = tuple(name for name in DIPOLES if values[name] or name in free)
@@ -282,7 +282,7 @@ def _dipole_for(top: Top, free: Sequence[str]) -> tuple[str, ...]:
 
 
 def with_more_lines(request: FitRequest, path: str) -> FitRequest:
-    """The request with the lines of one more file of the same kind."""
+    """The request with the lines of another file of the same kind."""
     more, notes = read_assigned_lines(path, request.lines.names, request.lines.halves)
     both, remarks = merged(request.lines, more)
     files = replace(request.files, merge=path)
@@ -290,7 +290,7 @@ def with_more_lines(request: FitRequest, path: str) -> FitRequest:
 
 
 def report_of(answer: FitAnswer) -> str:
-    """The report of a fit with what it was read from, and of SPFIT's files every parameter."""
+    """The report of a fit with its input; for SPFIT's files with all parameters."""
     from rotor.formats.spcat.fits.fit_table import parameter_section
 
     request, read = answer.request, answer.request.files
@@ -301,8 +301,8 @@ def report_of(answer: FitAnswer) -> str:
     loss = request.options.loss
     if loss != "squares":
         head.append(f"robust loss {loss}: lines that are far off weigh less")
-    of_file = parameter_section(request.spfit, answer.fit) if request.spfit else ()
-    return report_text(answer.fit, request.title, notes=request.notes, head=head, file_lines=of_file)
+    parameter_lines = parameter_section(request.spfit, answer.fit) if request.spfit else ()
+    return report_text(answer.fit, request.title, notes=request.notes, head=head, file_lines=parameter_lines)
 
 
 def table_of(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:
@@ -315,9 +315,9 @@ def table_of(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:
 
 
 def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
-    """The constants with errors and correlations in the file of the start, or in a new one.
+    """Write constants with errors and correlations into a copy of the starting file, or into a new one.
 
-    Raises ValueError of SPFIT's codes with spins and several states, which have no named constants.
+    Raises ValueError for SPFIT's codes with spins and several states, which have no named constants.
     """
     from rotor.formats.molecules.molecule_file import read_molecule_file
     from rotor.formats.molecules.molecule_writer import write_molecule_file
@@ -349,7 +349,7 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
         sources |= {"dipole": origin} if named.dipole_errors else {}
         file = replace(file, dipole_abc_debye=top.dipole_abc_debye) if named.in_field else file
         named = top.constants
-    made = replace(
+    fitted = replace(
         file,
         constants=named,
         covariance=covariance_of_determined(fit.parameters, fit.statistics),
@@ -360,11 +360,11 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
         serves=None,
         sources=sources,
     )
-    write_molecule_file(made, path)
+    write_molecule_file(fitted, path)
 
 
 def _file_of(request: FitRequest, path: str | os.PathLike[str]) -> MoleculeFile:
-    """A new file; of states and spins with the dipole and the weights without which they make no spectrum."""
+    """A new molecule file; with states or spins also dipole and weights, which a spectrum needs."""
     from rotor.formats.molecules.molecule_file import MoleculeFile
 
     name = request.title or Path(path).stem
@@ -384,14 +384,14 @@ def _file_of(request: FitRequest, path: str | os.PathLike[str]) -> MoleculeFile:
 
 
 def write_fitted_par(answer: FitAnswer, path: str | os.PathLike[str], *, variances: bool) -> None:
-    """The .par file of SPFIT after the fit, or, with variances, the .var file. Raises ValueError as `fitted_par` does."""
+    """Write SPFIT's .par file after the fit, or with variances the .var file. Raises ValueError as `fitted_par` does."""
     from rotor.formats.spcat.text.par import write_par
 
     write_par(fitted_par(answer, variances=variances), path)
 
 
 def fitted_par(answer: FitAnswer, *, variances: bool) -> ParameterFile:
-    """What stands in the .par file after the fit, or in the .var file. ValueError where SPFIT has no such parameters."""
+    """The .par file after the fit, or the .var file; ValueError for parameters that SPFIT does not have."""
     request, fit = answer.request, answer.fit
     if request.spfit is not None:
         return fitted_file(request.spfit, fit, variances=variances)

@@ -29,14 +29,14 @@ from rotor.spectra.lines import Lines
 from rotor.table import Table
 
 LENGTH = 160
-MORE = ","  # behind the record, between further parameters (line mixing, other profiles) in tables of HAPI
-MOST_LENGTH = 4096  # of the first line with those
+MORE = ","  # separates further parameters (line mixing, other profiles) after a record in tables of HAPI
+MOST_LENGTH = 4096  # longest first line with further parameters
 TEMPERATURE_K = 296.0
 _ISOTOPOLOGUES = "1234567890ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # 0 is the tenth, A the eleventh
 
 
 class _Field(NamedTuple):
-    """One field: where it stands, and how a number in it is written (None for text)."""
+    """One field: its columns, and the format of its number (None for text)."""
 
     name: str
     start: int
@@ -251,8 +251,7 @@ def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundanc
     molecule, isotopologue : int
         HITRAN's numbers for the species (CO is 5, its main isotopologue 1).
     abundance : float, optional
-        Of the isotopologue, a factor of every intensity in HITRAN; 1 leaves the intensities those of the pure
-        isotopologue.
+        Abundance of the isotopologue, a factor of all intensities in HITRAN; 1 for the pure isotopologue.
 
     Returns
     -------
@@ -305,7 +304,7 @@ def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundanc
 
 
 def _refuse_spins(lines: Lines) -> None:
-    """ValueError for labels that end in F: written as J, K they would be other lines' labels."""
+    """Raise ValueError for labels that end in F, which written as J, K would be labels of other lines."""
     if "n" in lines.levels.quanta:
         names = " ".join(lines.levels.quanta)
         raise ValueError(
@@ -315,7 +314,7 @@ def _refuse_spins(lines: Lines) -> None:
 
 
 def _global_quanta(lines: Lines) -> tuple[NDArray[np.str_], NDArray[np.str_]]:
-    """The name of the state of every line, (n,) each: that of the top's states where it has several, such as 0+ and 0-."""
+    """Names of the upper and lower states, (n,) each: those of the top's states if it has several, such as 0+ and 0-."""
     v, states = lines.levels.quanta.get("v"), lines.top.states
     if v is None or states is None:
         alike = np.full(len(lines), _ground_state(lines))

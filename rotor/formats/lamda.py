@@ -18,7 +18,7 @@ def is_lamda_file(path: Path) -> bool:
 
 
 def refuse_lamda(path: Path) -> NoReturn:
-    """ValueError that says what the file holds and what to read instead."""
+    """Raise ValueError with the content of the file and an alternative."""
     raise ValueError(
         f"{path}: a file of LAMDA (levels, Einstein coefficients, collision rates), which has neither constants nor a dipole "
         "to make a top of; give the catalogue of the molecule (.cat of JPL or CDMS), its constants, or its geometry"

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 MAX_QUANTA = 9  # the last digit of QNFMT counts them
 _BEFORE_SPINS = ("n", "j", "k", "ka", "kc", "v")
 _IN_A_CATALOGUE = (*_BEFORE_SPINS, "i_sym", "i_tot", *(f"f{i}" for i in range(1, 9)), "f")
-PIECE = 1 << 15  # lines of a long list that are made into text at once
+PIECE = 1 << 15  # lines of a long list that are converted into text at once
 
 Settings = Mapping[str, Any]
 
@@ -96,12 +96,12 @@ def write_catalogue(lines: Lines, path: str | os.PathLike[str], settings: Settin
 
 
 def write_read_catalogue(lines: Catalogue, path: str | os.PathLike[str], settings: Settings) -> None:
-    """Write a catalogue as it is; nothing is known of where it is from."""
+    """Write a catalogue that was read, without provenance."""
     write_cat(lines, path)
 
 
 def _write_in_pieces(lines: Lines, path: str | os.PathLike[str], tag: int) -> None:
-    """The 80-column file of a long list: pieces made side by side on all cores and written in order."""
+    """Write the 80-column file of a long list: pieces are made in parallel on all cores and written in order."""
     from concurrent.futures import ThreadPoolExecutor
 
     _ = lines.partition, lines.spread  # made once, before the pieces ask for them
@@ -120,7 +120,7 @@ def _write_in_pieces(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
 
 
 def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], bytes], starts: Iterable[int]) -> Iterator[bytes]:
-    """make(start) of every start, in order; only so many are under way that memory stays bounded."""
+    """make(start) for all starts, in order; the number of pending calls is limited to bound memory."""
     under_way: deque[Future[bytes]] = deque()
     for start in starts:
         under_way.append(pool.submit(make, start))
@@ -141,13 +141,13 @@ def write_hitran_lines(lines: Lines, path: str | os.PathLike[str], settings: Set
         raise ValueError(
             f'{path}: HITRAN\'s records begin with its number of the molecule; give settings={{"molecule": 5}} (5 is CO)'
         )
-    known = {key: settings[key] for key in ("molecule", "isotopologue", "abundance") if key in settings}
-    write_hitran(hitran_lines(lines, **known), path)
+    options = {key: settings[key] for key in ("molecule", "isotopologue", "abundance") if key in settings}
+    write_hitran(hitran_lines(lines, **options), path)
     write_beside(path, record_of(lines, settings))
 
 
 def write_records(lines: HitranLines, path: str | os.PathLike[str], settings: Settings) -> None:
-    """Write records of HITRAN as they are; nothing is known of where they are from."""
+    """Write records of HITRAN that were read, without provenance."""
     from rotor.formats.hitran import write_hitran
 
     write_hitran(lines, path)

@@ -17,7 +17,7 @@ _TENSORS = ("g", "magnetisability")
 
 
 def magnetic_of_table(table: TableReader | None, kind: str) -> MagneticTensors | None:
-    """The tensors of the table, None without one; ValueError, with file, table and key, for what is unknown or missing."""
+    """The tensors of the table, None without one; ValueError, with file, table and key, for unknown or missing entries."""
     if table is None:
         return None
     endings = ("", *(f"_{element}" for element in (*ELEMENTS, "parallel", "perpendicular")))
@@ -50,7 +50,7 @@ def _tensor(table: TableReader, name: str, kind: str) -> Tensor | None:
 
 
 def magnetic_table(tensors: MagneticTensors | None) -> dict[str, Any]:
-    """What `magnetic_of_table` reads back; a g that is not symmetric has no place in a file and raises ValueError."""
+    """The table that `magnetic_of_table` reads; ValueError for a g tensor that is not symmetric."""
     if tensors is None:
         return {}
     out: dict[str, Any] = {}

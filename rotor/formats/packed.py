@@ -1,4 +1,4 @@
-"""Files packed with gzip or not, read with a bound: a small file cannot fill the memory."""
+"""Reading of files with or without gzip, with a bound on the unpacked size."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
-MOST_BYTES = 1 << 32  # of an unpacked file
-HARMLESS_BYTES = 1 << 27  # that may be unpacked whatever the file's own size
-MOST_TIMES = 100  # the packed size beyond that: lines of numbers shrink to a fifth, at best to a twentieth
+MOST_BYTES = 1 << 32  # largest unpacked file
+HARMLESS_BYTES = 1 << 27  # unpacked size that is always allowed
+MOST_TIMES = (
+    100  # largest ratio to the packed size beyond that; lines of numbers shrink to a fifth, at best to a twentieth
+)
 _GZIP = b"\x1f\x8b"
 _PIECE = 1 << 22
 
 
 def load(source: str | os.PathLike[str] | bytes) -> tuple[bytes, str]:
-    """The bytes of a file or the bytes given, unpacked where they are gzip's, and what to call it in a message.
+    """The content of a file or of bytes, unpacked from gzip if needed, and its name for messages.
 
     Raises ValueError for a packed file that is damaged, or grows to more than 4 GB or a hundred times its size.
     """
@@ -34,17 +36,17 @@ def load(source: str | os.PathLike[str] | bytes) -> tuple[bytes, str]:
 
 
 def name_of(source: str | os.PathLike[str] | bytes) -> str:
-    """What messages call a file, or bytes that are given instead of one."""
+    """Name of a file, or of bytes, in messages."""
     return "the text given" if isinstance(source, bytes) else os.fspath(source)
 
 
 def unpacked(packed: bytes, name: str) -> bytes:
-    """What gzip packed, of one or more members; `name` is what messages call the file."""
+    """The content of gzip data of one or more members; `name` is used in messages."""
     return b"".join(_pieces(gzip.GzipFile(fileobj=io.BytesIO(packed)), len(packed), name))
 
 
 def refuse_bomb(path: Path) -> None:
-    """ValueError for a file of gzip, bzip2 or xz, for ASE to read, that is damaged or unpacks to more than `load` allows."""
+    """Raise ValueError for a gzip, bzip2 or xz file (for ASE) that is damaged or unpacks to more than `load` allows."""
     opened: Any = {".gz": gzip.open, ".bz2": bz2.open, ".xz": lzma.open}.get(path.suffix.lower())
     if opened is not None:
         for _ in _pieces(opened(path), path.stat().st_size, os.fspath(path)):
@@ -52,7 +54,7 @@ def refuse_bomb(path: Path) -> None:
 
 
 def _pieces(file: IO[bytes] | gzip.GzipFile, packed_size: int, name: str) -> Iterator[bytes]:
-    """The unpacked content; ValueError where it is damaged or grows beyond the bound."""
+    """The unpacked content in pieces; ValueError if it is damaged or exceeds the bound."""
     most, size = max(HARMLESS_BYTES, min(MOST_BYTES, MOST_TIMES * packed_size)), 0
     try:
         with file:
@@ -73,7 +75,7 @@ def _too_large(name: str, most: int, packed_size: int) -> str:
 
 
 def first_bytes(path: Path, count: int) -> bytes:
-    """The first bytes of a file, unpacked where it is gzip's; as many as there are where they are fewer."""
+    """The first bytes of a file, unpacked if it is a gzip file; fewer if the file is shorter."""
     with open(path, "rb") as handle:
         text = handle.read(count)
         if text[:2] != _GZIP:

@@ -13,8 +13,8 @@ from rotor.assignment.peak_finding import peaks_of_spectrum
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.formats.packed import first_bytes, load
 
-EQUAL_STEPS = 0.02  # relative spread of the steps up to which frequencies are a grid
-LEAST_GRID = 64  # points
+EQUAL_STEPS = 0.02  # largest relative spread of the steps of a grid
+LEAST_GRID = 64  # fewest points of a grid
 _FITS = b"SIMPLE  ="
 
 
@@ -29,7 +29,7 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
     ----------
     path : path
     band_mhz : (float, float), optional
-        First and last frequency that was recorded; peaks outside are left out.
+        First and last recorded frequency; peaks outside are left out.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
     Raises
     ------
     ValueError
-        With file and rule for what cannot be read.
+        With file and rule, for unreadable input.
     """
     name = os.fspath(path)
     if not Path(path).is_file():
@@ -63,7 +63,7 @@ def peaks_of_columns(columns: Floats, band_mhz: tuple[float, float] | None = Non
 
 
 def _in_band(peaks: PeakList, band_mhz: tuple[float, float] | None) -> PeakList:
-    """The peaks inside a band, which takes the place of that of the file."""
+    """The peaks inside a band, which replaces the band of the file."""
     if band_mhz is None:
         return peaks
     inside = (peaks.frequency_mhz >= band_mhz[0]) & (peaks.frequency_mhz <= band_mhz[1])

@@ -1,4 +1,4 @@
-"""What a file says of where its content is from: the record, and the file beside those formats that have no place for it."""
+"""Provenance of files: the record, and an accompanying file for formats without a place for it."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from rotor.version import version
 
 
 def record_of(table: Table, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The program with its version, what the table itself knows, and the settings, as JSON can hold them.
+    """The program with its version, the provenance of the table, and the settings, as values for JSON.
 
     Numbers that are not finite are None.
     """
-    known = {name: _finite(value) for name, value in table.provenance.items()}
-    return {"program": "rotor", "version": version()} | known | dict(settings or {})
+    stated = {name: _finite(value) for name, value in table.provenance.items()}
+    return {"program": "rotor", "version": version()} | stated | dict(settings or {})
 
 
 def _finite(value: Any) -> Any:
@@ -31,7 +31,7 @@ def _finite(value: Any) -> Any:
 
 
 def write_beside(path: str | os.PathLike[str], record: Mapping[str, Any]) -> None:
-    """Write the record of a file whose format has no place for it, as `path` + ".provenance.json"."""
+    """Write the record of a file whose format cannot contain it, as `path` + ".provenance.json"."""
     with open_atomic(f"{os.fspath(path)}.provenance.json", "w", encoding="utf-8") as handle:
         json.dump(record, handle, indent=1, ensure_ascii=False)
         handle.write("\n")

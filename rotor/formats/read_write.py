@@ -1,4 +1,4 @@
-"""How things come in and go out: `read` makes a top of whatever means a molecule, `write` chooses a format by suffix."""
+"""Reading and writing: `read` makes a top from any description of a molecule, `write` chooses a format by suffix."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Isotopes = Mapping[int | str, str] | str
 
 
 def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
-    """A top from whatever means a molecule; from a .cat or .hitran file its lines.
+    """A top from any description of a molecule; lines from a .cat or .hitran file.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
     Raises
     ------
     ValueError
-        What was read, where, which rule it breaks and what would do.
+        With the input, its place, the rule that it breaks and the remedy.
 
     Examples
     --------
@@ -81,19 +81,21 @@ def _g2_names() -> tuple[str, ...]:
 
 
 def _meaning(word: str) -> Path | str:
-    """The path that a bare word names: a file that exists, else a file of the library; else the word itself."""
+    """The path of a word: an existing file, else a file of the library; else the word itself."""
     from rotor.formats.molecules.library import library_file
 
-    known, path = library_file(word), Path(word)
-    if path.exists() and (known or (not _looks_like_a_path(word) and word in _g2_names())):  # ASE takes 0.7 s to load
-        what = "a molecule of the library" if known else "a molecule of ASE's g2 set"
+    library_path, path = library_file(word), Path(word)
+    if path.exists() and (
+        library_path or (not _looks_like_a_path(word) and word in _g2_names())
+    ):  # ASE takes 0.7 s to load
+        what = "a molecule of the library" if library_path else "a molecule of ASE's g2 set"
         raise ValueError(
             f"{word!r} is ambiguous: it is a path here and {what}; write '{os.path.join('.', word)}' for the path, "
             "or use another folder for the molecule"
         )
     if path.exists() or _looks_like_a_path(word):
         return path
-    if known is None and word not in _g2_names():
+    if library_path is None and word not in _g2_names():
         if _SMILES.fullmatch(word):
             raise ValueError(f"{word!r} is no file and no name of a molecule; did you mean 'SMILES:{word}'?")
         import difflib
@@ -106,7 +108,7 @@ def _meaning(word: str) -> Path | str:
             f"{word!r} is no file here, no molecule of the library ('rotor molecules' lists it) and none of ASE's g2 set; "
             f"{meant}a SMILES is written 'SMILES:...'"
         )
-    return known or word
+    return library_path or word
 
 
 _SMILES = re.compile(r"(?=.*[=#()\[\]])[A-Za-z0-9@+\-\[\]()=#]+")  # letters with a bond or a branch among them
@@ -139,7 +141,7 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
 
 
 def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
-    """The top of a .par or .var file, with the dipole of the .int file beside it; or of an .int file likewise.
+    """The top of a .par or .var file with the dipole of the .int file of the same name, or of an .int file likewise.
 
     Constants in cm⁻¹ (FLAGS of the .int file) become MHz. errors: of files with spins or several states, whether errors of parameters
     become uncertainties.
@@ -205,7 +207,7 @@ def read_top_file(path: Path) -> Top:
 
 
 def top_of_file(file: MoleculeFile, isotopes: Isotopes | None = None) -> Top:
-    """The top that a molecule file describes: its constants if it has some, else those of its geometry."""
+    """The top of a molecule file: with its constants if it has any, else with those of its geometry."""
     return _with_isotopes(_top_as_written(file), isotopes)
 
 

@@ -1,4 +1,4 @@
-"""Every file format, registered once: its suffixes, what reads it, and what writes it for each type of thing.
+"""Registry of file formats: suffixes, readers, and writers by type of object.
 
 `rotor.read` and `rotor.write` look here and nowhere else. Readers, writers and types are named by text ("module:name"), so
 that nothing is imported before it is used. A writer that is registered for a class serves its subclasses. A file of this folder that
@@ -28,7 +28,7 @@ Writer = Callable[[Any, str | os.PathLike[str], Mapping[str, Any]], None]
 
 @dataclass(frozen=True)
 class Format:
-    """One format of files.
+    """A file format.
 
     name: what messages call it. suffixes: how its files' names end, in lower case. reader: "module:function" of a path, which
     returns a top, a catalogue or another table. writers: by type, "module:function" of (thing, path, settings), settings being
@@ -127,7 +127,7 @@ FORMATS = (
 
 
 def formats() -> Iterator[Format]:
-    """Every format: those of the table first, so that no file is looked into where one of them fits."""
+    """All formats: those of the table first, so that modules are not searched if one of them fits."""
     yield from FORMATS
     yield from _declared(FOLDER, PACKAGE)
 
@@ -146,7 +146,7 @@ def loaded(name: str) -> Any:
 
 
 def reader_of(path: Path) -> Callable[[Path], Any] | None:
-    """What reads the file of this name; None where no format here has its suffix."""
+    """The reader for a file name; None if no format has its suffix."""
     for known_format in formats():
         fits = known_format.reader and path.name.lower().endswith(known_format.suffixes)
         if fits and (known_format.recognises is None or loaded(known_format.recognises)(path)):
@@ -156,26 +156,27 @@ def reader_of(path: Path) -> Callable[[Path], Any] | None:
 
 
 def writer_of(thing: Any, path: str | os.PathLike[str]) -> Writer:
-    """What writes a thing into a file of this name.
+    """The writer of an object for a file name.
 
-    Raises ValueError, with the suffixes that there are for such a thing, where no format has the suffix.
+    Raises ValueError, with the suffixes for such objects, if no format has the suffix.
     """
     name, types = Path(path).name.lower(), [_name_of(cls) for cls in type(thing).__mro__]
     for known_format in formats():
-        writers = [known_format.writers[known] for known in types if known in known_format.writers]
+        writers = [known_format.writers[cls] for cls in types if cls in known_format.writers]
         if writers and name.endswith(known_format.suffixes):
             writer: Writer = loaded(writers[0])
             return writer
-    known = suffixes_for(type(thing))
-    if not known:
+    suffixes = suffixes_for(type(thing))
+    if not suffixes:
         raise ValueError(f"{os.fspath(path)}: there is no format for a {type(thing).__name__}")
     raise ValueError(
-        f"{os.fspath(path)}: a {type(thing).__name__} can be written as {', '.join(known[:-1])} or {known[-1]}; the suffix names the format"
+        f"{os.fspath(path)}: a {type(thing).__name__} can be written as {', '.join(suffixes[:-1])} or {suffixes[-1]}; "
+        "the suffix names the format"
     )
 
 
 def suffixes_for(kind: type) -> list[str]:
-    """The suffixes of the files into which things of a class can be written."""
+    """The suffixes of files to which objects of a class can be written."""
     types = {_name_of(cls) for cls in kind.__mro__}
     return [suffix for known_format in formats() if types & {*known_format.writers} for suffix in known_format.suffixes]
 

@@ -1,4 +1,4 @@
-"""Pieces of a long list on disk: the folder that belongs to one list, and their sort by DuckDB into one Parquet file."""
+"""Pieces of a long list on disk: the folder of a list, and the sort of its pieces by DuckDB into one Parquet file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MANIFEST = "manifest.json"
 
 
 def open_folder(folder: Path, record: Mapping[str, Any]) -> None:
-    """Make the folder of pieces, or see that what it holds belongs to this list."""
+    """Make the folder of pieces, or check that an existing one belongs to this list."""
     text = json.dumps(record, sort_keys=True, ensure_ascii=False)
     mark = {"sha256": hashlib.sha256(text.encode()).hexdigest(), "list": record}
     manifest = folder / _MANIFEST
@@ -30,10 +30,10 @@ def open_folder(folder: Path, record: Mapping[str, Any]) -> None:
         return
     try:
         before = json.loads(manifest.read_text(encoding="utf-8"))
-        known, differs = before["sha256"], _first_difference(before["list"], json.loads(text))
+        recorded, differs = before["sha256"], _first_difference(before["list"], json.loads(text))
     except (ValueError, KeyError, TypeError):
         raise ValueError(f"{manifest}: is no manifest of pieces; remove the folder to begin anew") from None
-    if known != mark["sha256"]:
+    if recorded != mark["sha256"]:
         raise ValueError(
             f"{folder}: holds pieces of another list ({differs}); finish that list with its own settings, or remove the "
             "folder to begin anew"

@@ -17,7 +17,7 @@ WORDS = {"sigma": "species", "symmetry": "species", "sym": "species", "v_t": "vt
 def with_species(
     columns: Sequence[str], rows: Sequence[Mapping[str, str]], names: Sequence[str]
 ) -> tuple[list[str], list[dict[str, str]], list[str]]:
-    """Columns and rows of a molecule with internal rotation by the names of its quantum numbers, and a note of v_t that is not stated."""
+    """Columns and rows of a molecule with internal rotation, named by its quantum numbers, and a note if v_t is not stated."""
     sided = WORDS | ({"j": "n"} if names[0] == "n" and not {"n_upper", "n_lower"} & set(columns) else {})
     renamed = {}
     for column in columns:

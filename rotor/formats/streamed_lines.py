@@ -1,7 +1,7 @@
-"""Line lists larger than memory: pieces by J on disk, sorted by DuckDB into one Parquet or .cat file; a cut-off run goes on.
+"""Line lists larger than memory: pieces by J on disk, sorted by DuckDB into one Parquet or .cat file; interrupted runs can resume.
 
-A piece holds the transitions whose lower J lies in its range. Each is written beside and renamed, so that what a killed
-run leaves behind is whole pieces; the next run with the same settings makes the others.
+A piece contains the transitions whose lower J lies in its range. Each is written atomically, so that a killed run leaves only complete
+pieces; the next run with the same settings makes the others.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from rotor.thermodynamics.trusted_levels import are_trusted
 from rotor.tops.top import Top
 from rotor.version import version
 
-PIECE_LINES = 300_000  # transitions of a piece before the cut, where one J has not more of its own
-MEMORY_MB = 500  # for the sort, beside the program itself
-MOST_TRANSITIONS = 1e11  # before the cut, some days of work
-_BATCH = 1 << 18  # lines that are made into text at once
+PIECE_LINES = 300_000  # transitions of a piece before the intensity cut, unless a single J has more
+MEMORY_MB = 500  # memory of the sort, besides the program
+MOST_TRANSITIONS = 1e11  # before the intensity cut; a few days of computation
+_BATCH = 1 << 18  # lines that are converted into text at once
 
 
 @dataclass(frozen=True)
 class StreamedList:
-    """What a streamed run made: the file, its lines, how many pieces were made now and how many were there already."""
+    """Result of a streamed run: the file, its number of lines, and the numbers of new and of existing pieces."""
 
     path: Path
     lines: int
@@ -57,7 +57,7 @@ class StreamedList:
 
 @dataclass(frozen=True)
 class SortedLines:
-    """A list that is sorted on disk, in a Parquet file of its own folder, to be written in other formats."""
+    """A list that is sorted on disk in a Parquet file, to be written in other formats."""
 
     file: Path
     count: int
@@ -87,7 +87,7 @@ class SortedLines:
         write_beside(target, dict(self.record) | {"lines": count})
 
     def strongest_cut(self, count: int) -> tuple[float | None, int]:
-        """The lgint that so many lines reach, and the highest J of these; None where the list has no more."""
+        """The lgint that `count` lines exceed, and their highest J; None if the list has no more lines."""
         from rotor.formats.tables import quoted
 
         with engine_in(self.plan.folder, self.memory_mb) as engine:
@@ -116,7 +116,7 @@ class SortedLines:
 
 @dataclass(frozen=True)
 class _Plan:
-    """Everything a piece is made from; it goes to other processes as it is."""
+    """The input of all pieces, which can be sent to other processes."""
 
     top: Top
     dipole_abc: tuple[float, float, float]
@@ -152,21 +152,21 @@ def stream_lines(
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
 ) -> StreamedList:
-    """The lines of `rotor.api.line_list`, rising in frequency, written to a .parquet, .csv or .cat file without being in memory.
+    """Write the lines of `rotor.api.line_list`, rising in frequency, to a .parquet, .csv or .cat file with bounded memory.
 
-    Pieces stand in the folder `path` + ".pieces" until the file is whole, then removed. A run that was cut off leaves
-    them; the same call goes on from there.
+    Pieces are stored in the folder `path` + ".pieces" and removed when the file is complete. After an interruption the same call resumes
+    from them.
 
     Parameters
     ----------
     top : Top
-        With a dipole in debye.
+        Top with a dipole in debye.
     path : path
         The suffix names the format.
     jmax : int, optional
         The highest J; by default the one beyond which no line can reach `min_lgint`.
     temperature_k : float, optional
-        For intensities.
+        Temperature of the intensities.
     min_lgint : float or None, optional
         log10 of nm² MHz below which lines are left out.
     range_mhz : (float, float), optional
@@ -176,33 +176,31 @@ def stream_lines(
     vibrational_factor : float, optional
         Multiplies Q.
     tag : int, optional
-        Of a .cat.
+        Tag of a .cat file.
     memory_mb : int, optional
-        What the sort may take beside the program itself.
+        Memory of the sort, besides the program.
     piece_lines : int, optional
-        Transitions of a piece; one J is never parted, and with all three dipole components it has about 4.5 J².
+        Transitions of a piece. A single J is never divided; with all three dipole components it has about 4.5 J².
     effects : sequence of QuantumEffect, optional
-        What the Hamiltonian consists of.
+        Effects of the Hamiltonian.
     executor : Executor, optional
-        Pieces are spread over it, a process pool for instance, whose processes must be spawned: a forked copy of a
-        program with threads may never answer.
+        Makes pieces in parallel. Processes of a pool must be spawned, since a forked copy of a program with threads may hang.
 
     Returns
     -------
     StreamedList
-        The file, its number of lines, and how many pieces were made and found.
+        The file, its number of lines, and the numbers of new and of existing pieces.
 
     Raises
     ------
     ValueError
-        For another suffix, for a pool that forks, for what `line_list` refuses, and where the folder holds pieces of
-        another list.
+        For another suffix, for a pool that forks, for input that `line_list` refuses, and if the folder has pieces of another list.
     """
     target = Path(path)
     if target.suffix.lower() not in (".parquet", ".csv", ".cat"):
         raise ValueError(f"{path}: a streamed list is written as .parquet, .csv or .cat; the suffix names the format")
     with locked_file(target):
-        made = sorted_lines(
+        lines = sorted_lines(
             top,
             Path(f"{target}.pieces"),
             jmax=jmax,
@@ -216,9 +214,11 @@ def stream_lines(
             effects=effects,
             executor=executor,
         )
-        made.write(target, tag)
-        made.remove()
-    return StreamedList(target, made.count, made.pieces_made, made.pieces_found, made.plan.jmax, made.plan.partition.q)
+        lines.write(target, tag)
+        lines.remove()
+    return StreamedList(
+        target, lines.count, lines.pieces_made, lines.pieces_found, lines.plan.jmax, lines.plan.partition.q
+    )
 
 
 def sorted_lines(
@@ -237,7 +237,7 @@ def sorted_lines(
     executor: Executor | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> SortedLines:
-    """The lines of `stream_lines`, sorted in a folder; pieces that are there already are not made again."""
+    """The lines of `stream_lines`, sorted in a folder; existing pieces are reused."""
     if piece_lines < 1 or memory_mb < 100:
         raise ValueError(f"piece_lines = {piece_lines}, memory_mb = {memory_mb}: expected at least 1 line and 100 MB")
     require_cut(min_lgint)
@@ -268,7 +268,7 @@ def sorted_lines(
 
 
 def transition_count(top: Top, jmax: int) -> float:
-    """About how many transitions a list has up to a J before any cut, without spins and further states."""
+    """Approximate number of transitions up to a J before any cut, without spins and further states."""
     components = sum(1 for mu in top.dipole_abc_debye or () if mu)
     return 0.5 * components * (jmax + 1) ** 3 if top.kind == "asymmetric" else components * (jmax + 1.0) ** 2
 
@@ -315,7 +315,7 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
 
 
 def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
-    """First and last lower J of every piece: so many that a piece has about `piece_lines` transitions."""
+    """First and last lower J of the pieces, chosen for about `piece_lines` transitions in each."""
     if plan.top.kind != "asymmetric":  # closed forms start at J = 0; their lists, of about J² lines, are one piece
         yield 0, plan.jmax
         return
@@ -357,15 +357,15 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
     cut = intensity_cut(levels, plan.temperature_k, plan.partition.q, plan.min_lgint, plan.ground_mhz)
     dipoles = dipoles_by_state(plan.top, plan.dipole_abc, levels.effects)
     transitions = all_transitions(levels, dipoles, plan.range_mhz, cut)
-    of_piece = np.minimum(rotational[transitions.upper], rotational[transitions.lower]) <= last
-    of_piece &= trusted[transitions.upper] & trusted[transitions.lower]
+    in_piece = np.minimum(rotational[transitions.upper], rotational[transitions.lower]) <= last
+    in_piece &= trusted[transitions.upper] & trusted[transitions.lower]
     lines = Lines(
         plan.top,
         levels,
-        transitions.frequency_mhz[of_piece],
-        transitions.strength_debye2[of_piece],
-        transitions.upper[of_piece],
-        transitions.lower[of_piece],
+        transitions.frequency_mhz[in_piece],
+        transitions.strength_debye2[in_piece],
+        transitions.upper[in_piece],
+        transitions.lower[in_piece],
         plan.temperature_k,
         plan.min_lgint,
         plan.range_mhz,

@@ -1,4 +1,4 @@
-"""A request for the structure of a family of isotopologues, and what answers it."""
+"""Request of the structure of a family of isotopologues, and its answer."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ METHODS = ("rs", "r0", "rm1", "rm2", "re")
 
 @dataclass(frozen=True)
 class StructureRequest:
-    """Structures of a family; every field is checked when the request is made.
+    """Structures of a family; all values are checked when the request is made.
 
     file: the family, with its coordinates. methods: substitution (rs), fitted to all moments (r0, rm1, rm2), of equilibrium (re).
     weights: of the moments. leave_out: axes whose moments are not fitted. pair: moments of a planar molecule that serve for rs. check:
@@ -91,7 +91,7 @@ class StructureTable(Table):
 
 @dataclass(frozen=True, eq=False)
 class StructureAnswer:
-    """What each method gives. without: fits without each isotopologue, by method. doubts: about isotopologues."""
+    """Results of all methods. without: fits without each isotopologue, by method. doubts: about isotopologues."""
 
     request: StructureRequest
     substitution: SubstitutionStructure | None
@@ -108,7 +108,7 @@ class StructureAnswer:
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far the bond lengths of the last method can be trusted."""
+        """Error budget of the bond lengths of the last method."""
         weights = self.request.weights
         if self.fitted:
             last = self.fitted[-1]
@@ -149,21 +149,21 @@ class StructureAnswer:
             "kind": family.top.kind,
             "isotopologues": [
                 {
-                    "name": one.name,
-                    "formula": one.molecule.formula,
-                    "constants_mhz": dict(one.constants_mhz),
-                    "errors_mhz": dict(one.errors_mhz),
-                    "corrections_mhz": dict(one.corrections_mhz),
-                    "moments_u_angstrom2": one.moments,
-                    "axes": one.axes,
-                    "source": one.source or None,
+                    "name": item.name,
+                    "formula": item.molecule.formula,
+                    "constants_mhz": dict(item.constants_mhz),
+                    "errors_mhz": dict(item.errors_mhz),
+                    "corrections_mhz": dict(item.corrections_mhz),
+                    "moments_u_angstrom2": item.moments,
+                    "axes": item.axes,
+                    "source": item.source or None,
                 }
-                for one in family.species
+                for item in family.species
             ],
-            "planar_moments": [{**vars(one), "doubtful": one.doubtful} for one in self.planar],
-            "without": {method: [vars(one) for one in found] for method, found in self.without.items()},
+            "planar_moments": [{**vars(item), "doubtful": item.doubtful} for item in self.planar],
+            "without": {method: [vars(item) for item in fits] for method, fits in self.without.items()},
             "rs": _substitution_record(self.substitution),
-            **{one.method: _fitted_record(one) for one in self.fitted},
+            **{item.method: _fitted_record(item) for item in self.fitted},
             "notes": self.notes,
             "errors": self.errors.as_json(),
         }

@@ -1,4 +1,4 @@
-"""Every table of the package as a file: CSV and Parquet by DuckDB, JSON, each with where it came from.
+"""Tables as files: CSV and Parquet by DuckDB, and JSON, each with its provenance.
 
 One way for all of them: every number is the shortest text that gives the same double back, and what is not a number is an
 empty field or null. The provenance stands inside a .parquet and a .json, and beside a .csv in `path` + ".provenance.json".
@@ -64,7 +64,7 @@ def write_json(table: Table, path: str | os.PathLike[str], settings: Settings, k
     settings : mapping
         Of the command or call that made the table; part of the provenance.
     key : str, optional
-        Under which the rows stand.
+        Key of the rows.
     """
     columns = dict(table.columns)
     rows = [dict(zip(columns, row, strict=True)) for row in _rows(columns)]
@@ -118,7 +118,7 @@ def registered(engine: DuckDBPyConnection, name: str, columns: Columns) -> str:
 
 
 def run(engine: DuckDBPyConnection, command: str, path: Path) -> None:
-    """Carry out a command that writes a file; a disk that is full is an OSError with the file's name."""
+    """Run a command that writes a file; a full disk raises OSError with the name of the file."""
     import duckdb
 
     try:

@@ -1,4 +1,4 @@
-"""TOML text as tables, with every way in which it can be wrong as one kind of error."""
+"""TOML text as tables; all faults raise ValueError."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import math
 import tomllib
 from typing import Any
 
-MOST_DEPTH = 50  # of lists and tables inside one another; the files here have four
+MOST_DEPTH = 50  # deepest nesting of lists and tables; the files here have four levels
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
-    """The tables of a TOML text; ValueError for text that is none, nested too deep, or with numbers too large for a double."""
+    """The tables of a TOML text; ValueError for invalid text, too deep nesting, or numbers too large for a double."""
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

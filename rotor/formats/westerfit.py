@@ -87,13 +87,12 @@ def read_westerfit(path: str | os.PathLike[str]) -> Top:
     Returns
     -------
     Top
-        With constants of internal rotation in the frame RAM, levels named as westerfit names them, and of S > 0 the constants of the spin
-        I1.
+        Top with constants of internal rotation in the frame RAM, labels as in westerfit, and for S > 0 constants of the spin I1.
 
     Raises
     ------
     ValueError
-        With the file, for lines that are none, tops that are not threefold, and terms that have no counterpart here.
+        With the file, for invalid lines, tops that are not threefold, and unsupported terms.
     """
     try:
         return _top(Path(path).stem, _sections(Path(path).read_text(encoding="utf-8")))
@@ -177,7 +176,7 @@ def _second_order(lines: Sequence[tuple[int, str]]) -> tuple[dict[str, float], d
 
 
 def _terms(lines: Sequence[tuple[int, str]]) -> list[_Term]:
-    """The terms with the values that they multiply written out."""
+    """The terms, with factors by other terms multiplied into their values."""
     terms: list[_Term] = []
     for number, line in lines:
         parts = [part.strip() for part in line.split(";")]
@@ -207,7 +206,7 @@ def _further(terms: Sequence[_Term], dipole: list[float]) -> dict[str, float]:
 
 
 def _constant(term: _Term) -> tuple[str, float] | None:
-    """Name and value (MHz) of a term; None of one that moves all levels alike."""
+    """Name and value (MHz) of a term; None for a term that shifts all levels equally."""
     powers = term.powers
     strange = [key for key in ("S", "Sz", "S ladder", "NS", "sin") if powers.get(key)]
     if strange:
@@ -245,7 +244,7 @@ def read_line_table(path: str | os.PathLike[str]) -> tuple[Ints, Ints, Floats, F
     Raises
     ------
     ValueError
-        With file and line, for another number of columns, and excited A states, whose m has no order that its documents state.
+        With file and line, for another number of columns, and for excited A states, whose order of m is not documented.
     """
     rows = []
     for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):

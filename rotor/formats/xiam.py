@@ -66,12 +66,12 @@ def read_xiam(path: str | os.PathLike[str]) -> Top:
     Returns
     -------
     Top
-        With constants of internal rotation in the frame PAM, and of one nucleus called I1.
+        Top with constants of internal rotation in the frame PAM, and of one nucleus named I1.
 
     Raises
     ------
     ValueError
-        With the file, for constants that are missing or that have no counterpart here.
+        With the file, for missing or unsupported constants.
     """
     text = load(path)[0].decode("utf-8", errors="replace")
     settings, values = _content(text)
@@ -82,12 +82,12 @@ def read_xiam(path: str | os.PathLike[str]) -> Top:
 
 
 def _content(text: str) -> tuple[dict[str, int], dict[str, float]]:
-    """Settings and constants of the first set; of an output what stands before its lines."""
+    """Settings and constants of the first set; for an output, from the part before its lines."""
     settings: dict[str, int] = {}
     values: dict[str, float] = {}
     if "Using Watson S Reduction" in text:
         settings["reduc"] = 1
-    known = {*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE, *SPIN_ROTATION}
+    accepted = {*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE, *SPIN_ROTATION}
     for line in text.split("-- B ")[0].splitlines():
         words = line.split()
         for name, number in pairwise(words):
@@ -97,7 +97,7 @@ def _content(text: str) -> tuple[dict[str, int], dict[str, float]]:
         if match is None or match["set"] not in (None, "1"):
             continue
         plain = re.sub(r"_[123]$", "", match["name"])
-        if plain in known or plain.startswith(("Dpi2", "Dc3", "F12", "Vss", "Vcc", "mk")):
+        if plain in accepted or plain.startswith(("Dpi2", "Dc3", "F12", "Vss", "Vcc", "mk")):
             values.setdefault(match["name"], float(match["value"].upper().replace("D", "E")))
     return settings, values
 

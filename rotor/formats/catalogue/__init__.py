@@ -1,1 +1,1 @@
-"""A local catalogue of spectral lines in one file, and the formats it is made from."""
+"""A local catalogue of spectral lines in one file, and the formats from which it is built."""

@@ -1,8 +1,8 @@
 """Sources added to a local catalogue: files and folders of .cat, ExoMol, HITRAN, and the library of molecules.
 
-What is added goes into a copy beside the catalogue, which takes its place when all is sorted: an interrupted command leaves the old one.
-A file that cannot be read is reported with file, line and rule, and the others are added all the same. A source that is added again
-replaces its lines.
+Lines are added to a copy of the catalogue, which replaces it when all lines are sorted; an interrupted command leaves the old catalogue. A
+file that cannot be read is reported with file, line and rule, and the others are still added. A source that is added again replaces its
+lines.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class SourceFacts:
-    """What the user says of sources: licence, citation, date, and names, formulas or InChIKeys by tag or name of a species."""
+    """Statements of the user about sources: licence, citation, date, and names, formulas or InChIKeys by tag or name of a species."""
 
     database: str = ""
     licence: str = ""
@@ -50,7 +50,7 @@ class SourceFacts:
 
 @dataclass(frozen=True)
 class Added:
-    """What became of a source: its name, the species and number of lines it gave, or the fault."""
+    """Result of adding a source: its name, its species and number of lines, or the fault."""
 
     source: str
     species: str = ""
@@ -60,7 +60,7 @@ class Added:
 
 @dataclass(frozen=True)
 class Batch:
-    """Lines of a source as they arrive, in pieces of bounded size.
+    """Lines of a source in pieces of bounded size.
 
     states: texts of the states where `upper` and `lower` of the pieces are rows of them, else None.
     """
@@ -78,19 +78,19 @@ def add_sources(
     catdir: str | None = None,
     progress: Progress | None = None,
 ) -> list[Added]:
-    """Add sources to a catalogue, which is made where it does not exist.
+    """Add sources to a catalogue, which is created if it does not exist.
 
     Parameters
     ----------
     path : path
-        Of the catalogue.
+        Path of the catalogue.
     sources : sequence of str
         Files (.cat, .cat.gz, .par or .hitran of HITRAN, .states of ExoMol), folders of them, or `library`.
     facts : SourceFacts, optional
     catdir : path, optional
         Table of species with Q(T); by default those beside each .cat file.
     progress : callable, optional
-        Called with the name of every source.
+        Called with the name of each source.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def add_sources(
 
 
 def _jobs(source: str, entries: Mapping[int, CatdirEntry] | None) -> Iterator[tuple[str, Callable[[], Batch]]]:
-    """What a source consists of: names, and functions that begin to read."""
+    """Files or molecules of a source: names, and functions that start reading."""
     if source == LIBRARY and not Path(source).exists():
         yield from _library()
         return
@@ -176,7 +176,7 @@ def _batch(file: Path, entries: Mapping[int, CatdirEntry] | None) -> Batch:
 
 
 def _library() -> Iterator[tuple[str, Callable[[], Batch]]]:
-    """Every molecule of the library that has a dipole."""
+    """The molecules of the library with a dipole."""
     from rotor.formats.molecules.library import names
 
     for name in sorted({path.stem for path in names().values()}):
@@ -194,7 +194,7 @@ def _library_batch(name: str) -> Batch:
 
 
 def _add(engine: DuckDBPyConnection, name: str, read: Callable[[], Batch], facts: SourceFacts) -> Added:
-    """One source; all of it or, with a fault, nothing.
+    """Add one source; with a fault nothing is added.
 
     Pieces are stored as they come, since a transaction of all of them would stand in memory: what a source gave before is removed when
     all is entered, and what was entered when there is a fault.
@@ -240,7 +240,7 @@ def _entered(engine: DuckDBPyConnection, batch: Batch, facts: SourceFacts) -> Ad
 
 
 def _remove(engine: DuckDBPyConnection, condition: str, value: Any) -> None:
-    """Species that a condition means, with their lines."""
+    """Remove the species of a condition, with their lines."""
     for (number,) in engine.execute(f"SELECT number FROM species WHERE {condition}", [value]).fetchall():
         for table in ("lines", "partition"):
             engine.execute(f"DELETE FROM {table} WHERE species = ?", [number])
@@ -291,7 +291,7 @@ def _insert(
 def _state_numbers(
     engine: DuckDBPyConnection, piece: SpeciesLines, texts: dict[str, int]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Numbers of the states of a piece; texts that are new are entered."""
+    """Numbers of the states of a piece; new texts are entered."""
     unique, inverse = np.unique(np.concatenate([piece.upper, piece.lower]), return_inverse=True)
     new = [text for text in unique.tolist() if text not in texts]
     if new:

@@ -40,9 +40,9 @@ def read_cat_species(
     entries : mapping, optional
         Species by tag, of `read_catdir`; by default those of files catdir*.cat in the same folder and the one above.
     name : str, optional
-        Instead of the one in the table of species.
+        Replaces the name in the table of species.
     partition : PartitionTable, optional
-        Q(T) instead of the one in that table.
+        Replaces Q(T) of that table.
 
     Returns
     -------
@@ -51,7 +51,7 @@ def read_cat_species(
     Raises
     ------
     ValueError
-        For a line that cannot be read, by file, line and column, for a file without lines, and for one with several tags.
+        For an unreadable line, with file, line and column, for a file without lines, and for a file with several tags.
     """
     file = Path(path)
     return species_of_catalogue(
@@ -66,7 +66,7 @@ def species_of_catalogue(
     source: str = "",
     partition: PartitionTable | None = None,
 ) -> SpeciesLines:
-    """A catalogue that was read as a species.
+    """A catalogue as a species.
 
     Parameters
     ----------
@@ -90,14 +90,14 @@ def species_of_catalogue(
         raise ValueError(f"{source}: {len(tags)} tags; expected the lines of one species")
     tag = int(tags[0])
     entry = entries.get(tag)
-    known = partition or (entry.partition if entry is not None else None)
-    table = known or partition_from_lines(catalogue)
+    stated = partition or (entry.partition if entry is not None else None)
+    table = stated or partition_from_lines(catalogue)
     frequency, error = in_mhz(catalogue)
     lower_k = catalogue.energy_lower_cm * units.MHZ_PER_CM / units.MHZ_PER_K
     identity = (
         {"tag": tag}
         | ({"database": entry.database} if entry else {})
-        | ({} if known else {"note": f"{NO_CATDIR}: Q {table.source}"})
+        | ({} if stated else {"note": f"{NO_CATDIR}: Q {table.source}"})
     )
     return species_lines(
         name or (entry.name if entry else Path(source).stem or f"tag {tag}"),

@@ -27,7 +27,7 @@ _JPL = re.compile(rf"\s*(\d+)\s+(\S.*?)\s+(\d+)((?:\s*{_NUMBER}){{7}})\s*(\S*)\s
 
 @dataclass(frozen=True)
 class CatdirEntry:
-    """A species: tag, name, number of lines, Q(T) where a temperature is known, and the database by its temperatures."""
+    """A species: tag, name, number of lines, Q(T) if known, and the database that its temperatures identify."""
 
     tag: int
     name: str
@@ -69,15 +69,15 @@ def _entry(line: str, where: str) -> CatdirEntry:
 
 
 def _table(texts: list[str], temperatures: tuple[float, ...], source: str) -> PartitionTable | None:
-    known = [(t, 10.0 ** float(text)) for text, t in zip(texts, temperatures, strict=True) if text != UNKNOWN]
-    if not known:
+    points = [(t, 10.0 ** float(text)) for text, t in zip(texts, temperatures, strict=True) if text != UNKNOWN]
+    if not points:
         return None
-    kelvin, q = np.array(sorted(known)).T
+    kelvin, q = np.array(sorted(points)).T
     return PartitionTable(kelvin, q, source)
 
 
 def catdir_beside(path: Path) -> dict[int, CatdirEntry]:
-    """Species of the catdir files in the folder of a catalogue and the one above it; empty where there are none."""
+    """Species of the catdir files in the folder of a catalogue and its parent folder; empty without such files."""
     entries: dict[int, CatdirEntry] = {}
     for folder in (path.resolve().parent.parent, path.resolve().parent):
         for file in sorted(folder.glob("catdir*.cat")):

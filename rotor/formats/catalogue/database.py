@@ -2,8 +2,8 @@
 
 Tables: `species` (name, formula, tag, InChIKey, source, licence, citation, date, note), `partition` (Q at temperatures), `states`
 (quantum numbers as text, each once), `lines` (frequency, error, strength, lower energy, degeneracy, and numbers of the other tables). The
-lines are stored in order of frequency, so that a range of them is read without looking at the others: DuckDB keeps the least and the
-largest value of every block of rows. `SpeciesLines` come out as they went in.
+lines are stored in order of frequency. A range is read without scanning the others, since DuckDB stores the smallest and the largest
+value of each block of rows. `SpeciesLines` are returned as they were added.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _FACTS = ("name", "formula", "tag", "inchikey", "source", "database", "licence",
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CatalogueSpecies(Table):
-    """The species of a catalogue, a row each: number, the facts of `species`, and how many lines."""
+    """The species of a catalogue in rows: number, the facts of `species`, and number of lines."""
 
     number: NDArray[np.int64]
     facts: Mapping[str, NDArray[Any]]
@@ -55,7 +55,7 @@ class CatalogueSpecies(Table):
 
 
 class LineCatalogue:
-    """A catalogue opened for reading; a context that closes it.
+    """A catalogue opened for reading, as a context manager.
 
     >>> # with LineCatalogue("lines.rotorcat") as catalogue: catalogue.species_between(100e3, 101e3)
     """
@@ -92,7 +92,7 @@ class LineCatalogue:
         return CatalogueSpecies(np.array(columns[0], dtype=np.int64), facts)
 
     def numbers(self, word: str) -> list[int]:
-        """Numbers of the species that a word means: name, tag, formula or InChIKey; ValueError for none."""
+        """Numbers of the species with a name, tag, formula or InChIKey; ValueError if there are none."""
         rows = self._engine.execute(
             "SELECT number, name, formula, tag, inchikey FROM species ORDER BY number"
         ).fetchall()
@@ -100,7 +100,7 @@ class LineCatalogue:
             row[0] for row in rows if row[1] == word or str(row[3]) == word.lstrip("0") or (row[4] and row[4] == word)
         ]
         matches = matches or [row[0] for row in rows if same_species(row[1], word)]
-        if not matches and "," not in word:  # a state is behind a comma, and a formula means none
+        if not matches and "," not in word:  # a state follows a comma, and a formula has no state
             matches = [row[0] for row in rows if row[2] and row[2] == hill_formula(word)]
         if not matches:
             import difflib
@@ -133,12 +133,12 @@ class LineCatalogue:
         Returns
         -------
         list of SpeciesLines
-            With the lines in the range alone.
+            Species with their lines in the range only.
 
         Raises
         ------
         ValueError
-            For a word that means no species.
+            For a word without a species.
         """
         rows = self.lines(first_mhz, last_mhz, words)
         self._read_texts(np.unique(np.concatenate([rows["upper"], rows["lower"]])))
@@ -172,7 +172,7 @@ class LineCatalogue:
     def _species(
         self, facts: Mapping[str, Any], partition: PartitionTable, rows: Mapping[str, NDArray[Any]]
     ) -> SpeciesLines:
-        known = {
+        identity = {
             key: value
             for key, value in facts.items()
             if value not in (None, "") and key not in ("name", "source", "lines")
@@ -188,11 +188,11 @@ class LineCatalogue:
             upper=np.array([self._texts[text] for text in rows["upper"].tolist()], dtype=np.str_),
             lower=np.array([self._texts[text] for text in rows["lower"].tolist()], dtype=np.str_),
             source=facts["source"] or str(self.path),
-            identity=known,
+            identity=identity,
         )
 
     def _read_texts(self, numbers: NDArray[Any]) -> None:
-        """Texts of states that were not read before."""
+        """Read texts of states that are not in memory yet."""
         new = np.array([each for each in numbers.tolist() if each not in self._texts], dtype=np.int64)
         if len(new):
             self._engine.register("requested", {"number": new})

@@ -24,7 +24,7 @@ from rotor.arrays import Floats
 from rotor.observed.partition import SUMMED_K, PartitionTable
 from rotor.observed.species import SpeciesLines, species_lines, strength_from_einstein
 
-PIECE_BYTES = 1 << 22  # of text that is in memory at once; its words as objects take ten times that
+PIECE_BYTES = 1 << 22  # text in memory at a time; as Python objects it needs ten times as much
 _PACKED: dict[str, Any] = {".bz2": bz2.open, ".gz": gzip.open, ".xz": lzma.open}
 
 
@@ -125,7 +125,7 @@ def _base(path: Path) -> str:
 
 
 def _transitions(path: Path, states: States) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Floats]]:
-    """Rows of upper and lower states and Einstein coefficients, some hundred thousand at a time."""
+    """Rows of upper and lower states and Einstein coefficients, a few hundred thousand at a time."""
     count = 0
     with opened(path) as handle:
         while lines := handle.readlines(PIECE_BYTES):

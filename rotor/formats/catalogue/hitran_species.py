@@ -32,13 +32,13 @@ _COLUMNS = {"molecule": (0, 2), "isotopologue": (2, 3), "wavenumber": (3, 15), "
 def hitran_species(path: Path) -> Iterator[SpeciesLines]:
     """The lines of a file, a species for each isotopologue, in pieces; ValueError with file, line and column for what is no record."""
     tables: dict[str, PartitionTable] = {}
-    known = _partition_beside(path)
+    stated = _partition_beside(path)
     for piece in _pieces(path):
         for key in np.unique(piece["species"]).tolist():
             rows = {name: values[piece["species"] == key] for name, values in piece.items()}
             if key not in tables:
-                tables[key] = known or _partition_of_intensities(rows)
-            yield _species(key, rows, tables[key], path, known is None)
+                tables[key] = stated or _partition_of_intensities(rows)
+            yield _species(key, rows, tables[key], path, stated is None)
 
 
 def _species(key: str, rows: Columns, table: PartitionTable, path: Path, scaled: bool) -> SpeciesLines:
@@ -66,7 +66,7 @@ def _partition_beside(path: Path) -> PartitionTable | None:
 
 
 def _partition_of_intensities(rows: Columns) -> PartitionTable:
-    """Q(296 K) as the median over lines of what strength and intensity say."""
+    """Q(296 K) as the median over lines of the value from strength and intensity."""
     frequency = rows["wavenumber"] * units.MHZ_PER_CM
     strength = strength_from_einstein(rows["a"], frequency, rows["g_upper"])
     lower_k = rows["energy"] * units.MHZ_PER_CM / units.MHZ_PER_K

@@ -2,9 +2,9 @@
 
     Q(T) = Σ_levels g exp(-E/kT)
 
-An upper level has g of its line (GUP), an energy of ELO + FREQ. A lower level that is no upper level of another line has
-g = GUP (2F″+1)/(2F′+1): a line leaves the spin weight as it is. F is the last quantum number, rounded up where QNFMT says that it is
-half an integer, or N, the first, where there are no spins (H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998)).
+An upper level has g of its line (GUP) and the energy ELO + FREQ. A lower level that is not the upper level of another line has
+g = GUP (2F″+1)/(2F′+1), since transitions conserve the spin weight. F is the last quantum number, rounded up if QNFMT marks it as a
+half-integer; without spins it is N, the first (H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998)).
 The sum lacks the levels that no line reaches: those beyond the last J of the catalogue, and vibrational states that the file leaves out
 (of 38 catalogues of JPL and CDMS 29 agree with the published Q within 0.02 % at 300 K; HCN lacks 6 %, CH3CN 31 %).
 """
@@ -46,7 +46,7 @@ def levels_of_lines(catalogue: Catalogue) -> tuple[Floats, Floats]:
 
 
 def _components(catalogue: Catalogue, quanta: np.ndarray) -> Floats:
-    """2F+1 of every level (n,), F the last quantum number; 2N+1, N the first, where there is none of spins."""
+    """2F+1 of all levels (n,) with F the last quantum number; without spins 2N+1 with N the first."""
     count, before_spins = catalogue.qnfmt % 10, catalogue.qnfmt // 100 % 10
     spins = count > before_spins
     total = quanta[np.arange(len(quanta)), np.where(spins, count - 1, 0)].astype(np.float64)

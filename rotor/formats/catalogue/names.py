@@ -17,9 +17,9 @@ _HEAVY = {"D": ("H", "2"), "T": ("H", "3")}
 
 @lru_cache(maxsize=10_000)
 def hill_formula(name: str) -> str:
-    """The formula that a name means, empty where it is not one.
+    """The formula of a name; empty if the name is not a formula.
 
-    >>> [hill_formula(one) for one in ("C-13-O", "H2C-13-S,v=0", "CH3OD", "[13C]O", "CO+", "glycol")]
+    >>> [hill_formula(name) for name in ("C-13-O", "H2C-13-S,v=0", "CH3OD", "[13C]O", "CO+", "glycol")]
     ['[13C]O', '[13C]H2S', 'CH3[2H]O', '[13C]O', 'CO+', '']
     """
     bare = _STATE.sub("", name.strip())
@@ -57,7 +57,7 @@ def _elements() -> frozenset[str]:
 
 
 def same_species(name: str, word: str) -> bool:
-    """Whether a word is a name but for case, blanks and `v=0`.
+    """Whether a word equals a name, ignoring case, blanks and `v=0`.
 
     >>> same_species("CO, v=0", "co"), same_species("HC3N, v7=1", "HC3N")
     (True, False)

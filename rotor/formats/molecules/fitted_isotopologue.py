@@ -1,4 +1,4 @@
-"""Fitted constants of the library beside those that were scaled from another isotopologue."""
+"""Comparison of constants that were scaled from another isotopologue with fitted ones of the library."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile
     from rotor.tops.top import Top
 
-_NEAR = 0.03  # of a distance: two geometries of one molecule are nearer
+_NEAR = 0.03  # largest relative difference of distances between two geometries of one molecule
 _HYDROGEN = {"D": "H", "T": "H"}
 
 
 def with_fitted_isotopologue(top: Top) -> Top:
-    """The top with a note where the library has constants of this very isotopologue, and by how much its own differ.
+    """The top with a note if the library has fitted constants of this isotopologue, with the differences from them.
 
     >>> import rotor
     >>> rotor.read("water", isotopes="H=2H").notes[-1]
@@ -42,7 +42,7 @@ def with_fitted_isotopologue(top: Top) -> Top:
 
 
 def _library_entry(molecule: Molecule) -> tuple[str, MoleculeFile] | None:
-    """The name and file of the library whose molecule has these isotopes at these distances."""
+    """Name and file of the library for the molecule with these isotopes and distances."""
     elements = _elements(molecule.formula)
     paths = {path: name for name, path in names().items() if _elements(name) == elements and name == path.stem}
     for path, name in paths.items():
@@ -62,7 +62,7 @@ def _elements(formula: str) -> dict[str, int]:
 
 
 def _same(molecule: Molecule, other: Molecule) -> bool:
-    """Whether two molecules have the same isotopes, and between them the same distances."""
+    """Whether two molecules have the same isotopes at the same distances."""
     if sorted(zip(molecule.symbols, molecule.mass_numbers, strict=True)) != sorted(
         zip(other.symbols, other.mass_numbers, strict=True)
     ):
@@ -72,7 +72,7 @@ def _same(molecule: Molecule, other: Molecule) -> bool:
 
 
 def _distances(molecule: Molecule) -> dict[tuple[tuple[str, int], ...], Floats]:
-    """Rising distances between isotopes, by their pair."""
+    """Rising distances by pair of isotopes."""
     kinds = list(zip(molecule.symbols, molecule.mass_numbers, strict=True))
     out: dict[tuple[tuple[str, int], ...], list[float]] = {}
     for i, j in combinations(range(len(kinds)), 2):

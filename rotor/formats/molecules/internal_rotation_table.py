@@ -56,7 +56,7 @@ def internal_rotation_of(table: TableReader | None, constants: Constants | None)
 
 
 def internal_rotation_table(constants: InternalRotationConstants | None) -> Mapping[str, Any]:
-    """What a file says of an internal rotor, in MHz."""
+    """The table of an internal rotor for a file, in MHz."""
     if constants is None:
         return {}
     values = {

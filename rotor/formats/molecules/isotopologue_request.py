@@ -1,4 +1,4 @@
-"""The family of a molecule: isotopologues by abundance or by substitution, with what is known of each."""
+"""Request of the isotopologues of a molecule, by abundance or by substitution, and its answer."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MIN_ABUNDANCE = 1e-4
 
 @dataclass(frozen=True)
 class IsotopologuesRequest:
-    """Which isotopologues of a molecule; every field is checked when the request is made.
+    """Isotopologues of a molecule; all values are checked when the request is made.
 
     top: the parent, with a geometry. min_abundance: least abundance in nature; None: 1e-4 unless others are named. each: elements of which
     each atom is substituted, one at a time, "O=18O". site: atoms that are substituted together, "2=2H".
@@ -76,19 +76,19 @@ class IsotopologueTable(Table):
 
 @dataclass(frozen=True, eq=False)
 class IsotopologuesAnswer:
-    """The isotopologues that a request asked for."""
+    """The isotopologues of a request."""
 
     request: IsotopologuesRequest
     family: tuple[Isotopologue, ...]
 
     @property
     def table(self) -> IsotopologueTable:
-        """One row an isotopologue."""
+        """One row for each isotopologue."""
         return IsotopologueTable(self.family)
 
     @property
     def remarks(self) -> list[str]:
-        """What is not said of the parent, each text once with the isotopologues that it is about."""
+        """Notes that the parent does not have, each once with its isotopologues."""
         about: dict[str, list[str]] = {}
         for each in self.family:
             for text in each.top.notes:
@@ -98,7 +98,7 @@ class IsotopologuesAnswer:
 
     @property
     def errors(self) -> ErrorBudget:
-        """How far A, B and C of all of them can be trusted."""
+        """Error budget of A, B and C of all isotopologues."""
         return constants_budget([isotopologue.top for isotopologue in self.family])
 
     def facts(self) -> dict[str, Any]:
@@ -111,7 +111,7 @@ class IsotopologuesAnswer:
 
 
 def answer_isotopologues(request: IsotopologuesRequest) -> IsotopologuesAnswer:
-    """Those above the least abundance, those of `each`, that of `site`; none of them twice.
+    """The isotopologues above the smallest abundance, those of `each` and that of `site`, each once.
 
     Raises ValueError for constants without a geometry, and for substitutions that the molecule does not have.
     """

@@ -15,9 +15,9 @@ _QUANTA = ("v", "j", "ka", "kc", "k")
 
 
 def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTable:
-    """The level energies of a file; lines that begin with # are comments, other columns are passed over.
+    """The level energies of a file; lines that begin with # are comments, other columns are ignored.
 
-    Raises ValueError, with file and line, for a missing column and for what is no number.
+    Raises ValueError, with file and line, for a missing column or an invalid number.
     """
     try:
         with open(path, encoding="utf-8", newline="") as handle:
@@ -49,7 +49,7 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
 
 
 def write_level_table(table: LevelTable, path: str | os.PathLike[str]) -> None:
-    """Writes a table of level energies, beside and renamed, every number in full."""
+    """Write a table of level energies atomically, with all digits."""
     with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
         import csv
 

@@ -1,4 +1,4 @@
-"""The library of molecules: every name and where its file is, in the package's folder and in the user's own.
+"""The library of molecules: names and files, in the folders of the user and of the package.
 
 Folders are searched in this order, and the first that knows a name wins, so that a user's own water is the water meant:
 
@@ -40,11 +40,11 @@ def folders() -> tuple[Path, ...]:
 
 
 def names() -> dict[str, Path]:
-    """Every name and alias with the file it means: formulas as written, words in lower case.
+    """All names and aliases with their files: formulas as written, words in lower case.
 
     A formula is a name with a capital after the first letter, or with a digit; anything else is a word.
 
-    Raises ValueError where two files of one folder claim one name.
+    Raises ValueError if two files of one folder have the same name.
     """
     paths: dict[str, Path] = {}
     for folder in reversed(folders()):
@@ -59,8 +59,8 @@ def library_file(name: str) -> Path | None:
     'D2O.toml'
     """
     for folder in folders():
-        known = _index(folder)
-        path = known.get(name) or known.get(name.casefold())
+        index = _index(folder)
+        path = index.get(name) or index.get(name.casefold())
         if path is not None:
             return path
     return None
@@ -70,8 +70,8 @@ def molecule_path(name: str) -> Path:
     """The file of a molecule by name, as `library_file`; ValueError, with the nearest names, where there is none."""
     path = library_file(name)
     if path is None:
-        known = {key.casefold(): key for key in names()}
-        near = [known[key] for key in difflib.get_close_matches(name.casefold(), known, n=3)]
+        name_by_lower_case = {key.casefold(): key for key in names()}
+        near = [name_by_lower_case[key] for key in difflib.get_close_matches(name.casefold(), name_by_lower_case, n=3)]
         hint = f"did you mean {' or '.join(near)}? " if near else ""
         raise ValueError(f"no molecule {name!r} in the library: {hint}'rotor molecules' lists what it has")
     return path
@@ -87,7 +87,7 @@ def library_molecule(name: str) -> MoleculeFile:
 
 
 def written_formula(name: str, formula: str) -> str:
-    """The formula as the library writes that of a molecule of this name, else as it is, in Hill's order.
+    """The formula as the library writes it for a molecule of this name, else unchanged in Hill's order.
 
     An isotopologue of such a molecule, whose name has its own formula in brackets, is written like it where that says which atoms
     are replaced: all of an element, or some of its hydrogens.
@@ -101,9 +101,9 @@ def written_formula(name: str, formula: str) -> str:
     path = library_file(parent) if parent else None
     if path is None:
         return formula
-    known = [path.stem, *(key for key, file in names().items() if file == path)]
-    same = (key for key in known if atoms_of(key) == atoms_of(formula))
-    return next(same, None) or next(filter(None, (_substituted(key, formula) for key in known)), formula)
+    spellings = [path.stem, *(key for key, file in names().items() if file == path)]
+    same = (key for key in spellings if atoms_of(key) == atoms_of(formula))
+    return next(same, None) or next(filter(None, (_substituted(key, formula) for key in spellings)), formula)
 
 
 def _substituted(written: str, formula: str) -> str | None:
@@ -135,7 +135,7 @@ _SHORT = {"[2H]": "D", "[3H]": "T"}
 
 
 def atoms_of(formula: str) -> dict[str, int]:
-    """How many atoms of each element, or of each isotope that is marked, a formula has."""
+    """Number of atoms of each element, or of each marked isotope, in a formula."""
     counts: dict[str, int] = {}
     for atom, number in re.findall(r"(\[\d+[A-Z][a-z]?\]|[A-Z][a-z]?)(\d*)", formula):
         counts[atom] = counts.get(atom, 0) + int(number or 1)
@@ -143,7 +143,7 @@ def atoms_of(formula: str) -> dict[str, int]:
 
 
 def _index(folder: Path) -> dict[str, Path]:
-    """Names with files of one folder, read anew only when a file has come, gone or changed."""
+    """Names with files of one folder, read again only if files were added, removed or changed."""
     with os.scandir(folder) as entries:
         files = [(entry.name, entry.stat().st_mtime_ns) for entry in entries if entry.name.endswith(".toml")]
     return _read_index(folder, tuple(sorted(files)))
@@ -160,9 +160,9 @@ def _read_index(folder: Path, files: Stamp) -> dict[str, Path]:
 
 
 def _names_in(path: Path) -> tuple[str, ...]:
-    """`name` and `names` of a file, from what stands before its first table; none where that cannot be understood.
+    """`name` and `names` of a file, from the text before its first table; empty if that is invalid.
 
-    Such a file is found by its own name alone: a request for it gets the error, and other requests are not disturbed.
+    An invalid file is only listed by its file name, so that it raises its error when requested and does not affect others.
     """
     head, _, _ = path.read_bytes().partition(b"\n[")
     try:

@@ -156,7 +156,7 @@ _TABLES = (
 
 @dataclass(frozen=True)
 class MoleculeFile:
-    """What a molecule file says.
+    """Content of a molecule file.
 
     name, names : what the molecule is called, other names
     molecule : its geometry, with the dipole turned into the same frame; None in a file without one
@@ -199,14 +199,14 @@ class MoleculeFile:
     internal_rotation: InternalRotationConstants | None = None
 
     def cited(self, table: str) -> str:
-        """The source of a table, with what in it is unverified said first."""
+        """The source of a table, preceded by its unverified entries."""
         names = sorted(name.partition(".")[2] for name in self.unverified if name.startswith(f"{table}."))
         mark = "unverified: " if table in self.unverified else f"{', '.join(names)} unverified; " if names else ""
         return mark + self.sources.get(table, "")
 
 
 def read_molecule_file(path: str | os.PathLike[str], *, listed: bool = False) -> MoleculeFile:
-    """What a molecule file says, checked. listed: of a file with constants only what a list shows, in a third of the time.
+    """Read and check a molecule file. listed: read only what a list shows of a file with constants, in a third of the time.
 
     Raises ValueError, with file, table and key, for text that is no TOML, unknown tables and keys, numbers that
     cannot be, and a file with neither constants nor a geometry.
@@ -221,7 +221,7 @@ def read_molecule_file(path: str | os.PathLike[str], *, listed: bool = False) ->
 def parse_molecule_file(
     text: str, where: str = "molecule file", default_name: str = "", folder: Path | None = None, *, listed: bool = False
 ) -> MoleculeFile:
-    """What the text of a molecule file says.
+    """Parse the text of a molecule file.
 
     Parameters
     ----------
@@ -230,21 +230,21 @@ def parse_molecule_file(
     where : str, optional
         Names the file in errors.
     default_name : str, optional
-        Serves where the file gives no name.
+        Name for a file without one.
     folder : Path, optional
-        From which the name of a file of levels counts.
+        Folder of a relative path to a file of levels.
     listed : bool, optional
-        Of a file with constants only what a list of molecules shows: constants, dipole, the lines that it serves, sources.
+        Whether to read only what a list of molecules shows of a file with constants: constants, dipole, range of lines, sources.
 
     Returns
     -------
     MoleculeFile
-        Everything that the file has.
+        The content of the file.
 
     Raises
     ------
     ValueError
-        With file, table and key, for what is unknown, missing or contradictory.
+        With file, table and key, for unknown, missing or contradictory entries.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The tables of a molecule file, one function each: what stands in it, checked, with file, table and key in every error."""
+"""Readers of the tables of a molecule file; all errors state file, table and key."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ Table = dict[str, Any]
 
 @dataclass(frozen=True)
 class MeasuredLines:
-    """How constants meet the measured lines of a catalogue: rms in MHz of `lines` lines up to `j_max` and `k_max`.
+    """Agreement of constants with measured lines of a catalogue: rms in MHz of `lines` lines up to `j_max` and `k_max`.
 
-    k_max bounds Ka of an asymmetric and K of a symmetric top; None where there is no K or no bound.
+    k_max limits Ka of an asymmetric and K of a symmetric top; None without K or without a limit.
     """
 
     tag: str
@@ -48,10 +48,10 @@ class MeasuredLines:
 
 @dataclass(frozen=True)
 class Served:
-    """The lines that a file's constants and level table are good for: up to `j_max`, `k_max` and `max_ghz`.
+    """Range of lines for which constants and level table of a file are valid: up to `j_max`, `k_max` and `max_ghz`.
 
-    error_mhz: no measured line in that range is missed by more, three times the laboratory's error apart. None: there was no
-    catalogue to compare with, and the range is what the constants are meant for.
+    error_mhz: largest deviation from a measured line in this range, beyond three times its error. None: the range is the intended one,
+    without a catalogue to compare with.
     """
 
     j_max: int
@@ -61,7 +61,7 @@ class Served:
 
 
 class TableReader:
-    """One table of a file, whose errors say file, table and key."""
+    """One table of a file; its errors state file, table and key."""
 
     def __init__(self, where: str, name: str, content: Any) -> None:
         self.place = f"{where}, [{name}]" if name else where
@@ -69,8 +69,8 @@ class TableReader:
             raise ValueError(f"{self.place}: expected a table of key = value, found {content!r}")
         self.content: Table = content
 
-    def refuse_unknown(self, known: Iterable[str]) -> None:
-        refuse_unknown_keys(self.content, known, self.place)
+    def refuse_unknown(self, accepted: Iterable[str]) -> None:
+        refuse_unknown_keys(self.content, accepted, self.place)
 
     def error(self, key: str, reason: object) -> ValueError:
         return ValueError(f"{self.place}, {key} = {self.content.get(key)!r}: {reason}")
@@ -111,14 +111,14 @@ class TableReader:
         return None if value is None else int(value)
 
     def quantity(self, key: str, value: Any, unit: str, expected: str) -> float:
-        """A number in the table's unit, or text with its own, in the unit expected.
+        """A number in the unit of the table, or text with a unit, converted to the expected unit.
 
         Parameters
         ----------
         key : str
-            Named in the error.
+            Key, for messages.
         value : object
-            What the table has under the key.
+            Value of the key.
         unit : str
             Unit of a bare number.
         expected : str
@@ -127,12 +127,12 @@ class TableReader:
         Returns
         -------
         float
-            In the unit expected.
+            The number in the expected unit.
 
         Raises
         ------
         ValueError
-            With file, table and key, for what is no finite number or has a unit that does not fit.
+            With file, table and key, unless it is a finite number with a suitable unit.
         """
         if not is_number(value) and not isinstance(value, str):
             raise self.error(key, f"expected a finite number of {unit}, or text with a unit")
@@ -146,13 +146,15 @@ def is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def refuse_unknown_keys(keys: Iterable[str], known: Iterable[str], place: str) -> None:
-    known = tuple(known)
+def refuse_unknown_keys(keys: Iterable[str], accepted: Iterable[str], place: str) -> None:
+    accepted = tuple(accepted)
     for key in keys:
-        if key not in known:
-            near = difflib.get_close_matches(key, known, n=1)
+        if key not in accepted:
+            near = difflib.get_close_matches(key, accepted, n=1)
             hint = f"did you mean {near[0]}? " if near else ""
-            raise ValueError(f"{place}: unknown key {key!r}; {hint}{'K' if hint else 'k'}nown are {', '.join(known)}")
+            raise ValueError(
+                f"{place}: unknown key {key!r}; {hint}{'K' if hint else 'k'}nown are {', '.join(accepted)}"
+            )
 
 
 # One function a table
@@ -168,11 +170,11 @@ def geometry(
     table : TableReader or None
         The geometry, where the file has one.
     name : str
-        Of the molecule.
+        Name of the molecule.
     dipole : (float, float, float) or None
-        Debye, along a, b, c.
+        Dipole along a, b, c in debye.
     dipole_table : TableReader or None
-        Where the dipole comes from.
+        Table of the dipole, for messages.
 
     Returns
     -------
@@ -182,7 +184,7 @@ def geometry(
     Raises
     ------
     ValueError
-        With file, table and key, for what is unknown or cannot be a molecule.
+        With file, table and key, for unknown entries or an invalid molecule.
     """
     if table is None:
         return None
@@ -268,13 +270,13 @@ def constants_of(table: TableReader | None) -> Constants | None:
 def covariance_of(
     table: TableReader | None, *parts: Constants | StateConstants | SpinConstants | InternalRotationConstants | None
 ) -> Covariance | None:
-    """From the lower triangle of the correlations and the uncertainties of the constants, those of states and spins too."""
+    """The covariance from the lower triangle of correlations and the uncertainties of all constants, states and spins included."""
     if table is None:
         return None
     table.refuse_unknown(("source", "names", "correlations"))
     names = table.texts("names")
-    known = {name: error for part in parts if part is not None for name, error in part.uncertainties.items()}
-    lost = [name for name in names if name not in known]
+    errors = {name: error for part in parts if part is not None for name, error in part.uncertainties.items()}
+    lost = [name for name in names if name not in errors]
     if lost or not names:
         raise table.error("names", f"{', '.join(lost) or 'none'}: expected constants of the file with an uncertainty")
     rows: Any = table.content.get("correlations") or []
@@ -287,7 +289,7 @@ def covariance_of(
     for i, row in enumerate(rows):
         matrix[i, : i + 1] = row
     try:
-        return Covariance.from_correlations(names, [known[name] for name in names], whole_of_lower(matrix))
+        return Covariance.from_correlations(names, [errors[name] for name in names], whole_of_lower(matrix))
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 
@@ -308,7 +310,7 @@ _AXIAL = (("parallel", "perpendicular"), ("mean", "anisotropy"))
 def polarizability_of(
     table: TableReader | None, constants: Constants | None, molecule: Molecule | None
 ) -> Tensor | None:
-    """The tensor along a, b, c, from its elements or from the two numbers that an axial one has."""
+    """The tensor along a, b, c, from its elements or from the two numbers of an axial tensor."""
     if table is None:
         return None
     table.refuse_unknown(("unit", "source", "unverified", *_ELEMENTS, *_AXIAL[0], *_AXIAL[1]))
@@ -340,7 +342,7 @@ def _axial(table: TableReader, values: Mapping[str, float], kind: str) -> Tensor
 
 
 def kind_of(constants: Constants | None, molecule: Molecule | None) -> str:
-    """The kind of top of a file: as its constants have it, else its geometry."""
+    """The kind of top of a file, from its constants, else its geometry."""
     if constants is not None:
         return constants.kind
     assert molecule is not None  # the reader refuses a file with neither
@@ -414,7 +416,7 @@ def level_table_of(table: TableReader | None, folder: Path | None) -> LevelTable
 
 
 def unverified_in(name: str, table: TableReader) -> frozenset[str]:
-    """What a table marks as unverified: its own name, or names such as constants.DK of single entries."""
+    """Unverified parts of a table: its name, or names such as constants.DK of single entries."""
     entries = {f"{name}.{key}": item for key, item in table.content.items() if isinstance(item, dict)}
     marks = {name: table.content, **entries}
     for key, content in marks.items():

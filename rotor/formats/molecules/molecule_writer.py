@@ -1,4 +1,4 @@
-"""Writes a molecule file as text that reads back as the same molecule."""
+"""Writer of molecule files; the text reads back as the same molecule."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from rotor.tops.states.state_constants import StateConstants
 
 
 def write_molecule_file(molecule: MoleculeFile, path: str | os.PathLike[str]) -> None:
-    """Writes a molecule file, beside and renamed: the path holds the whole file or what it held before.
+    """Write a molecule file atomically: after an error the path has its previous content.
 
-    Level energies, where there are some, go to a file of their own beside it, `NAME_levels.csv`.
+    Level energies are written to a separate file in the same folder, `NAME_levels.csv`.
     """
     levels_file = f"{Path(path).stem}_levels.csv" if molecule.levels is not None else ""
     text = molecule_file_text(molecule, levels_file)
@@ -32,7 +32,7 @@ def write_molecule_file(molecule: MoleculeFile, path: str | os.PathLike[str]) ->
 def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
     """The TOML text of a molecule; constants in MHz, dipole in D, polarizability in Å³, positions in Å.
 
-    levels_file: where its level energies stand, which the text only names. Raises ValueError where they have no file.
+    levels_file: file of the level energies, which the text only names. Raises ValueError if they have no file.
 
     >>> from rotor.tops.constants import Constants
     >>> print(molecule_file_text(MoleculeFile("hydrogen chloride", constants=Constants(B=312989.0))))
@@ -121,7 +121,7 @@ def _constants(molecule: MoleculeFile) -> dict[str, Any]:
 
 
 def _covariance(molecule: MoleculeFile) -> dict[str, Any]:
-    """Correlations as far as the diagonal; the standard errors stand with the constants."""
+    """Correlations up to the diagonal; standard errors are written with the constants."""
     if molecule.covariance is None:
         return {}
     rows = [[float(value) for value in row[: i + 1]] for i, row in enumerate(molecule.covariance.correlations.tolist())]
@@ -135,7 +135,7 @@ def _dipole(molecule: MoleculeFile) -> dict[str, Any]:
 
 
 def _polarizability(molecule: MoleculeFile) -> dict[str, Any]:
-    """The elements of the tensor; those off the diagonal only where they are not 0."""
+    """The elements of the tensor, without off-diagonal ones that are 0."""
     if molecule.polarizability_abc_angstrom3 is None:
         return {}
     (aa, ab, ac), (_, bb, bc), (_, _, cc) = molecule.polarizability_abc_angstrom3

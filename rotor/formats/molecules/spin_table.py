@@ -46,7 +46,7 @@ _OF_SPIN = ("spin", "atom", "total", "source", "unverified")
 
 
 def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> SpinConstants | None:
-    """The constants of spins of a file, checked; None where it has none."""
+    """The spin constants of a file, checked; None without any."""
     if table is None:
         return None
     unit = table.text("unit", "MHz")
@@ -76,7 +76,7 @@ def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> Spin
 
 
 def _twice(part: TableReader, name: str) -> int:
-    """Twice a spin, from the isotope it is called after or from what the table says."""
+    """Twice a spin, from the isotope in its name or from the table."""
     stated = part.content.get("spin")
     size = str(stated) if isinstance(stated, float | int) and not isinstance(stated, bool) else None
     size = part.text("spin") if stated is not None and size is None else size
@@ -87,7 +87,7 @@ def _twice(part: TableReader, name: str) -> int:
 
 
 def _atom(part: TableReader, name: str, molecule: Molecule | None) -> int | None:
-    """The number of the nucleus in the geometry; None for spins of electrons, and where there is no geometry."""
+    """The number of the nucleus in the geometry; None for electron spins and without a geometry."""
     number = part.whole("atom")
     if molecule is None or "," in name:
         if number is not None:
@@ -112,7 +112,7 @@ def _own_name(label: str) -> tuple[str, ...]:
 def spin_tables(
     constants: SpinConstants | None, unverified: Collection[str], geometry: bool = True
 ) -> dict[str, dict[str, Any]]:
-    """The tables that a molecule file is written with, by name: that of all spins, and one for each.
+    """The tables of spins for a molecule file, by name: one for all spins, and one for each.
 
     unverified: names of tables that are marked so. geometry: whether the file has one, to which the numbers of atoms belong.
     """
@@ -138,5 +138,5 @@ def spin_tables(
 
 
 def uncertain_entry(value: float, error: float | None) -> float | dict[str, float]:
-    """A number as a file has it, with its standard deviation where it has one."""
+    """A number for a file, with its standard deviation if it has one."""
     return value if error is None else {"value": value, "uncertainty": error}

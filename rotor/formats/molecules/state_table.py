@@ -16,10 +16,10 @@ def states_of(table: TableReader | None, constants: Constants | None) -> StateCo
         return None
     if constants is None:
         raise ValueError(f"{table.place}: states beyond the one of [constants], which is missing")
-    known = ("source", "unverified", "unit", "names", "symmetry", "weights", "dipoles")
+    other_keys = ("source", "unverified", "unit", "names", "symmetry", "weights", "dipoles")
     unit, values, errors = table.text("unit", "MHz"), dict[str, float](), dict[str, float]()
     for key in table.content:
-        if key not in known:
+        if key not in other_keys:
             values[key], error = uncertain_number(table, key, unit)
             if error is not None:
                 errors[key] = error

@@ -45,7 +45,7 @@ _INTENSITY = {
 
 @dataclass(frozen=True)
 class ReadChoices:
-    """What the user states where a file does not, or instead of it.
+    """Settings that complete or replace those of a file.
 
     axis_unit, unit: of frequency (or velocity) and intensity. rest_mhz: of a velocity axis. convention: of velocities. frame: of the
     spectrum. noise: of a channel, in the unit of the file. beam_arcsec: two full widths. row: of a table of several spectra, from 1.
@@ -66,7 +66,7 @@ class ReadChoices:
 def frequency_of_velocity(velocity_km_s: Any, rest_mhz: float, convention: str = RADIO) -> Floats:
     """Frequencies in MHz of velocities; ValueError for an unknown convention.
 
-    >>> [round(float(frequency_of_velocity(1000.0, 1e5, one)), 3) for one in CONVENTIONS]
+    >>> [round(float(frequency_of_velocity(1000.0, 1e5, convention)), 3) for convention in CONVENTIONS]
     [99666.436, 99667.545, 99666.99]
     """
     beta = np.asarray(velocity_km_s, dtype=np.float64) / _C_KM_S
@@ -80,7 +80,7 @@ def frequency_of_velocity(velocity_km_s: Any, rest_mhz: float, convention: str =
 
 
 def axis_mhz(values: Any, unit: str, where: str, choices: ReadChoices, rest_mhz: float | None = None) -> Floats:
-    """A spectral axis in MHz; ValueError for another unit than of frequency, velocity or length, and velocities without rest frequency."""
+    """A spectral axis in MHz; ValueError unless its unit is of frequency, velocity (with a rest frequency) or length."""
     text = " ".join(unit.lower().split())
     numbers = np.asarray(values, dtype=np.float64)
     if text in _AXIS_UNITS:
@@ -92,12 +92,12 @@ def axis_mhz(values: Any, unit: str, where: str, choices: ReadChoices, rest_mhz:
         return frequency_of_velocity(numbers * _VELOCITY_UNITS[text], rest, choices.convention or RADIO)
     if text in _LENGTH_UNITS:
         return np.asarray(units.SPEED_OF_LIGHT_M_PER_S * 1e-6 / (numbers * _LENGTH_UNITS[text]))
-    known = ", ".join([*_AXIS_UNITS, *list(_VELOCITY_UNITS)[:2], *_LENGTH_UNITS])
-    raise ValueError(f"{where}: spectral axis in {unit!r}; known units are {known}")
+    accepted = ", ".join([*_AXIS_UNITS, *list(_VELOCITY_UNITS)[:2], *_LENGTH_UNITS])
+    raise ValueError(f"{where}: spectral axis in {unit!r}; known units are {accepted}")
 
 
 def intensity_unit(text: str | None, where: str) -> tuple[str, float]:
-    """The unit of `ObservedSpectrum` and the factor to it; ValueError for none and for one that is not known.
+    """The unit of `ObservedSpectrum` and the factor to it; ValueError for a missing or unknown unit.
 
     >>> intensity_unit("mJy/beam", "a file")
     ('Jy/beam', 0.001)

@@ -1,4 +1,4 @@
-"""Cubes in FITS as a whole, masks of their pixels, and maps of fitted parameters written beside one another with the sky of the cube."""
+"""Cubes in FITS, masks of their pixels, and maps of fitted parameters with the celestial coordinates of the cube."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ _UNITS = {
     "fwhm_km_s": "km s-1",
     "size_arcsec": "arcsec",
 }
-_LEAST_FINITE = 0.5  # of the channels of a pixel, below which it has no noise and is not fitted
+_LEAST_FINITE = 0.5  # smallest share of finite channels of a pixel that is fitted
 
 
 @dataclass(frozen=True)
 class Cube:
-    """Brightness over the sky: frequency_mhz (n,) rising, intensity_k (n, y, x) with nan where there is none, noise_k (y, x).
+    """Brightness over the sky: frequency_mhz (n,) rising, intensity_k (n, y, x) with nan for missing values, noise_k (y, x).
 
     sky: cards of the celestial coordinates. beam_arcsec, frame, rest_mhz, source: as in `ObservedSpectrum`.
     """
@@ -50,7 +50,7 @@ class Cube:
     source: str
 
     def between(self, first_mhz: float, last_mhz: float) -> Cube:
-        """The channels of a range; ValueError where there are none."""
+        """The channels of a range; ValueError if there are none."""
         first, last = np.searchsorted(self.frequency_mhz, [first_mhz, np.nextafter(last_mhz, np.inf)]).tolist()
         if first == last:
             span = f"{self.frequency_mhz[0]:.10g} to {self.frequency_mhz[-1]:.10g} MHz"
@@ -68,7 +68,7 @@ def read_cube(path: Path, choices: ReadChoices | None = None) -> Cube:
     ----------
     path : path
     choices : ReadChoices, optional
-        What the header does not state. The noise of each pixel is estimated from its line-free channels where none is given.
+        Settings that the header does not state. By default the noise of each pixel is estimated from its line-free channels.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def read_cube(path: Path, choices: ReadChoices | None = None) -> Cube:
 def _to_kelvin(
     header: Any, frequency: Floats, beam: tuple[float, float] | None, name: str, choices: ReadChoices
 ) -> Floats:
-    """What brings the numbers of a file to K, (n,)."""
+    """Factors from the unit of a file to K, (n,)."""
     stated = choices.unit or header.get("BUNIT")
     unit, factor = intensity_unit(None if stated is None else str(stated), name)
     if unit == KELVIN:
@@ -121,7 +121,7 @@ def _to_kelvin(
 
 
 def _noise(values: NDArray[Any], stated: float | None) -> Floats:
-    """Noise of every pixel, nan where too few channels are finite."""
+    """Noise of each pixel; nan if too few channels are finite."""
     shape = values.shape[1:]
     finite = np.isfinite(values)
     enough = finite.mean(axis=0) >= _LEAST_FINITE
@@ -161,7 +161,7 @@ def read_mask(path: Path, shape: tuple[int, int]) -> NDArray[np.bool_]:
 
 
 def write_maps(fit: CubeFit, cube: Cube, path: Path, command: str = "") -> None:
-    """One extension for each parameter and one for its error, named after both; χ²/ν; the pixels whose fit converged."""
+    """Write maps as extensions: each parameter and its error, χ²/ν, and the pixels whose fit converged."""
     fits = astropy_fits()
     primary = fits.PrimaryHDU()
     primary.header["ORIGIN"] = f"rotor {version()}"

@@ -53,7 +53,7 @@ _CONVENTION = {
 
 
 def unreadable(path: Path, error: OSError) -> ValueError:
-    """The error of a file that cannot be opened as FITS: the system's reason, or that its first card is another."""
+    """The error for a file that cannot be opened as FITS: the reason of the system, or a wrong first card."""
     return ValueError(f"{path}: {error.strerror or 'not a FITS file; its first card is not SIMPLE'}")
 
 
@@ -75,7 +75,7 @@ def read_fits_spectrum(path: Path, choices: ReadChoices | None = None) -> Observ
     ----------
     path : path
     choices : ReadChoices, optional
-        What the header does not state; `row` of a table of several spectra, `pixel` of a cube.
+        Settings that the header does not state; `row` of a table of several spectra, `pixel` of a cube.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def read_fits_spectrum(path: Path, choices: ReadChoices | None = None) -> Observ
     Raises
     ------
     ValueError
-        With file and rule: no spectrum, several of which none is chosen, missing or unknown units, no rest frequency for velocities.
+        With file and rule: no spectrum, several spectra without a choice, missing or unknown units, velocities without rest frequency.
     ImportError
         Without astropy.
     """
@@ -131,7 +131,7 @@ def _one_spectrum(data: Floats, axis: int, name: str, choices: ReadChoices) -> F
 
 
 def spectral_axis_number(header: Mapping[str, Any], name: str) -> int:
-    """Which axis, from 1, is the spectral one; ValueError where none is."""
+    """Number, from 1, of the spectral axis; ValueError if there is none."""
     for number in range(1, int(header.get("NAXIS", 0)) + 1):
         if str(header.get(f"CTYPE{number}", "")).upper()[:4] in _CONVENTION:
             return number

@@ -1,4 +1,4 @@
-"""Spectra as columns of text: two or three numbers a line, with blanks or commas between, under any heading.
+"""Spectra as columns of text: two or three numbers in each line, separated by blanks or commas, after any heading.
 
 Read are frequency (or velocity) and intensity, and the noise from a third column where the heading calls it so. Units stand in the heading:
 `#xLabel: frequency [MHz]` and `#yLabel: (Jy/beam) Mean` as CASA and CASSIS write them, or a line of names such as
@@ -35,7 +35,7 @@ def read_text_spectrum(path: Path, choices: ReadChoices | None = None) -> Observ
     path : path
         Packed with gzip or not.
     choices : ReadChoices, optional
-        What the file does not state.
+        Settings that the file does not state.
 
     Returns
     -------
@@ -44,14 +44,16 @@ def read_text_spectrum(path: Path, choices: ReadChoices | None = None) -> Observ
     Raises
     ------
     ValueError
-        With file, line and rule: a line that is not two or three numbers, a unit that is not known.
+        With file, line and rule: a line without two or three numbers, or an unknown unit.
     """
     choices = choices or ReadChoices()
     text, name = load(path)
     heading, numbers = _parsed(text.decode("utf-8", "replace"), name)
     names, labels = _names_and_labels(heading)
     axis_unit, unit = choices.axis_unit or labels.get("x"), choices.unit or labels.get("y")
-    assumed = [text for known, text in ((axis_unit, "frequencies in MHz"), (unit, "intensities in K")) if known is None]
+    assumed = [
+        text for stated, text in ((axis_unit, "frequencies in MHz"), (unit, "intensities in K")) if stated is None
+    ]
     chosen, factor = intensity_unit(unit or "K", name)
     notes = (f"no units in the file: {' and '.join(assumed)} assumed",) if assumed else ()
     third = numbers.shape[1] > 2 and len(names) > 2 and _NOISE.search(names[2])
@@ -77,10 +79,9 @@ def _parsed(text: str, name: str) -> tuple[list[str], NDArray[np.float64]]:
 
 
 def _plain_columns(text: str) -> tuple[list[str], NDArray[np.float64]] | None:
-    """The same of a file with nothing but equal columns of numbers behind its heading; None for all others.
+    """Heading and numbers of a file with nothing but equal columns of numbers after its heading; None for other files.
 
-    numpy's reader in C takes 0.1 s for a million channels, line by line it is 2 s.
-    """
+    numpy's reader in C needs 0.1 s for a million channels; line by line it takes 2 s."""
     heading, start = list[str](), 0
     while start < len(text):
         end = text.find("\n", start)
