@@ -207,8 +207,9 @@ def kill_servers(folder: Path, moments: int, seed: int) -> Outcome:
                     if not journal.begin(random_action(lines, random)):
                         continue
                     answer = call(socket, journal.action)
-                    journal.end(answer.get("ok", {}).get("label") is not None)
-                    outcome.acknowledged += 1
+                    moved = answer.get("ok", {}).get("label") is not None
+                    journal.end(moved)
+                    outcome.acknowledged += moved
             timer.join()
             assert process.wait(10) == -9
         outcome.moments += 1
@@ -254,7 +255,7 @@ def kill_pages(folder: Path, moments: int, seed: int, browser: Any) -> Outcome:
 
     def end(label: Any) -> None:
         journal.end(label is not None)
-        outcome.acknowledged += 1
+        outcome.acknowledged += label is not None
 
     with served(folder) as (_, address):
         for moment in range(moments + 1):
