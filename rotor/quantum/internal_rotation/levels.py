@@ -20,7 +20,6 @@ from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_to
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.operators.rotation import body_tensor
-from rotor.quantum.solvers.dominated import SHARE
 from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
 from rotor.tops.internal_rotation import InternalRotationConstants, species_of_tops
 
@@ -30,6 +29,7 @@ if TYPE_CHECKING:
 
 TurningTops = RamModel | SeveralTops
 FEW = 1 << 14  # up to so many elements a dense matrix is faster than a sparse one
+MOST_POPULATED = 2  # products of three tops below the limit of a sum, of which blocks of any size are solved
 MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a whole for a sum
 REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
 
@@ -202,7 +202,7 @@ def energies_alone(
         highest = float(blocks.functions.torsion.energies[jmax].max())
         linear = blocks.summed(model.coefficients, max(below_mhz, highest))
         populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
-        if constants.tops > 2 and populated > SHARE * constants.functions:
+        if constants.tops > 2 and populated > MOST_POPULATED:
             _refuse_long_sums((2 * jmax + 1) * constants.functions)
         each = linear.solve_dominated([1.0], linear.labels["t"] < populated).energies
         solved = ~np.isnan(each)
@@ -226,10 +226,10 @@ def energies_alone(
 
 
 def _refuse_long_sums(size: int) -> None:
-    """ValueError for blocks of three tops that take minutes, where the populated torsional states are no small share of all."""
+    """ValueError for blocks of three tops that take minutes where more than two torsional states are populated."""
     if size > MOST_SUMMED:
         raise ValueError(
-            f"internal rotation of three tops: sums over levels at this temperature need all states of blocks of {size} functions; "
+            f"internal rotation of three tops: sums over levels at this temperature need many states of blocks of {size} functions; "
             "give the partition function (--q), a lower temperature, or fewer functions"
         )
 
