@@ -17,7 +17,7 @@ LEAST_CERTAIN, LEAST_LIKELY = 0.99, 0.5
 MIDDLE, POWER = 40.0, 3.68  # ln Z at even odds, and the power of ln Z with which the odds rise
 CEILING = 0.9977  # 4 of 1,372 answers with more than 0.99 were wrong, three of them at ln Z above 300
 MIDDLE_OF_ISOTOPOLOGUES = 6.0
-UNDETERMINED = 0.5  # factor for constants that the lines do not determine: a twin is as good
+UNDETERMINED = 0.51  # factor for constants that the lines do not determine: a twin is as good
 FEWEST = 6  # peaks below which nothing is found: three constants, a temperature and a scale are fitted
 
 

@@ -31,6 +31,7 @@ LEAST_SHARE = (
 )
 MOST_LINES = 400
 OPEN = 1e-3  # relative standard error above which a constant is not determined
+FEWEST_MOVED = 4  # lines with ΔJ ≠ 0: wrong twins of Q branches had two by chance, right constants five or more
 FIRST_MHZ = 0.05  # standard error of the family's lines, for distortion
 LARGER = (10.0, 40.0)  # factors of the errors when a species is grown again
 SHARP_MHZ = 0.03  # largest standard error of predicted lines used for the temperature
@@ -54,7 +55,7 @@ class Grown:
     constants (8,), covariance (8, 8) in MHz: A, B, C, DJ, DJK, DK, d1, d2. temperature_k. ratios (3,), scales (3,) by type: ln of
     likelihood ratios and of intensity scales (-inf: absent). rows, peak, residual, share, weight (m,) : assigned lines, their peaks,
     obs - calc in MHz, share in the peak, weight in the fit (1/MHz²). rms_mhz. evidence : ln of the evidence ratio against chance.
-    start : the root from which it was grown.
+    start : the root from which it was grown. moved : how many of the peaks have lines with ΔJ ≠ 0, which a change of A + C moves.
     """
 
     constants: Floats
@@ -70,12 +71,13 @@ class Grown:
     rms_mhz: float
     evidence: float
     start: Candidate | None = None
+    moved: int = 0
 
     @property
     def determined(self) -> bool:
-        """Whether B and C are known to 0.1 %. Q branches alone do not determine A + C, so that twins are possible."""
+        """Whether B and C are known to 0.1 %. Q branches alone do not determine A + C; with few other lines a twin fits as well."""
         errors = np.sqrt(np.diag(self.covariance)[1:3])
-        return bool((errors < OPEN * self.constants[1:3]).all())
+        return self.moved >= FEWEST_MOVED and bool((errors < OPEN * self.constants[1:3]).all())
 
     @property
     def lines(self) -> int:
@@ -372,6 +374,7 @@ def _refitted(
     _kernels.level_energies(field.table.levels, field.table.theta, field.jj, constants, energy)
     calculated = energy[field.table.upper[matched.rows]] - energy[field.table.lower[matched.rows]]
     slopes = slopes_of(field, matched.rows, constants)
+    change = field.jj[field.table.upper[matched.rows]] - field.jj[field.table.lower[matched.rows]]
     peak, group = np.unique(matched.peak, return_inverse=True)
     total = np.bincount(group, matched.share)
     share = matched.share / total[group]
@@ -393,7 +396,7 @@ def _refitted(
     grown = Grown(
         new, covariance, temperature, matched.ratios, matched.scales, matched.rows, matched.peak, after[group], matched.share,
         weight[group],
-        float(np.sqrt(np.mean(after**2))), 0.0, start,
+        float(np.sqrt(np.mean(after**2))), 0.0, start, len(np.unique(matched.peak[change != 0])),
     )  # fmt: skip
     return new, covariance, sigma0, grown
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.assignment import _kernels
 from rotor.assignment.families import Bounds, Family
 from rotor.assignment.growth import LEAST_RATIO, Grown, grow, predict, regrown
@@ -118,7 +118,7 @@ def _finished(seen: Field, grown: list[Grown], candidates: list[Candidate]) -> l
     again = [
         regrown(seen, first),
         *_grown(seen, near, [], 2),
-        *_grown(seen, aliases(seen, first) if first.evidence < BEYOND_ALIASES else [], [], 2 * MOST_ALIASES),
+        *_grown(seen, aliases(seen, first) if first.evidence < BEYOND_ALIASES else [], [], 3 * MOST_ALIASES),
     ]
     return _best(best + again)
 
@@ -196,14 +196,39 @@ def multiples(seen: Field, grown: Grown) -> list[Candidate]:
 
 
 def shifts(seen: Field, grown: Grown) -> list[Candidate]:
-    """Candidates A + x, B + x, C + x with the same Q branches; x matches an R-branch line to a strong peak."""
-    table, constants = seen.table, grown.constants.copy()
+    """Candidates with the same Q branches: A + x, B + x, C + x, and mirrored ones; x matches an R-branch line to a strong peak.
+
+    In E = ½(A+C) J(J+1) + ½(A-C) E_κ(J, τ) the sum is absent from Q branches, and E_κ(J, τ) = -E_-κ(J, -τ) (G. W. King, R. M. Hainer and
+    P. C. Cross, J. Chem. Phys. 11, 27 (1943)): a top with A - C and -κ has the Q branches too, Ka and Kc and a and c types exchanged.
+    """
+    table = seen.table
+    present = grown.ratios > LEAST_RATIO
+    slow = grown.rows[seen.jj[table.upper[grown.rows]] == seen.jj[table.lower[grown.rows]]][:2]
+    shifted = _shifted(seen, grown.constants, present, slow)
+    mirrored = np.zeros_like(grown.constants)
+    a, b, c = grown.constants[:3]
+    mirrored[:3] = a, a + c - b, c
+    rows = [row for row in (_mirrored_row(table, row) for row in slow.tolist()) if row is not None]
+    if len(rows) < len(slow) or not len(slow):
+        return shifted
+    return [*shifted, *_shifted(seen, mirrored, present[::-1], np.array(rows))]
+
+
+def _mirrored_row(table: RigidTable, row: int) -> int | None:
+    """The line between the levels of a line with Ka and Kc exchanged, the upper one below; None where the table lacks it."""
+    upper, lower = (table.quanta[side[row]][[0, 2, 1]] for side in (table.lower, table.upper))
+    same = (table.quanta[table.upper] == upper).all(axis=1) & (table.quanta[table.lower] == lower).all(axis=1)
+    return int(np.argmax(same)) if same.any() else None
+
+
+def _shifted(seen: Field, start: Floats, present: NDArray[np.bool_], slow: Ints) -> list[Candidate]:
+    """Candidates A + x, B + x, C + x; present : types of lines (3,). slow : lines of Q branches that the candidates begin with."""
+    table, constants = seen.table, start.copy()
     energy = np.empty(len(seen.jj))
     _kernels.level_energies(table.levels, table.theta, seen.jj, constants, energy)
     change = seen.jj[table.upper] - seen.jj[table.lower]
     low = (table.quanta[table.upper, 0] <= LOW_J) & (table.quanta[table.upper, 1] <= LOW_KA)
-    present = (grown.ratios > LEAST_RATIO)[table.kind]
-    rows = np.flatnonzero(low & present & (change > 0) & (table.quanta[table.lower, 1] <= LOW_KA))
+    rows = np.flatnonzero(low & present[table.kind] & (change > 0) & (table.quanta[table.lower, 1] <= LOW_KA))
     line = energy[table.upper[rows]] - energy[table.lower[rows]]
     peaks = seen.peaks.frequency_mhz[seen.order[:SHIFT_PEAKS]]
     x = ((peaks[None, :] - line[:, None]) / change[rows][:, None]).ravel()
@@ -214,12 +239,11 @@ def shifts(seen: Field, grown: Grown) -> list[Candidate]:
     tops, which = np.ascontiguousarray(tops[sound]), np.repeat(rows, len(peaks))[sound]
     if not len(tops):
         return []
-    each = [quick_ratios(seen, tops, np.full(len(tops), q)) for q in np.flatnonzero(grown.ratios > LEAST_RATIO)]
+    each = [quick_ratios(seen, tops, np.full(len(tops), q)) for q in np.flatnonzero(present)]
     ratios = np.sum([ratio for ratio, _ in each], axis=0)
     temperatures = np.array([temperature for _, temperature in each])[
         np.argmax([ratio for ratio, _ in each], axis=0), np.arange(len(tops))
     ]
-    slow = grown.rows[change[grown.rows] == 0][:2]
     out = list[Candidate]()
     for n in np.argsort(-ratios)[: 5 * MOST_ALIASES].tolist():
         if ratios[n] > FAINT and not any(alike(tops[n], candidate.constants, NEAR) for candidate in out):

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import rotor
 from rotor.assignment import _kernels
+from rotor.assignment.evidence import probability, word
 from rotor.assignment.families import Bounds, families, sample_tops
-from rotor.assignment.growth import predict, slopes_of
+from rotor.assignment.growth import FEWEST_MOVED, Grown, predict, slopes_of
 from rotor.assignment.peaks import peak_list
 from rotor.assignment.rigid_table import JMAX, PARAMETERS, rigid_table
 from rotor.assignment.search import Field
+from rotor.assignment.species import _mirrored_row
 
 TOPS = [
     (2458.69, 490.426, 408.870, 2.6e-5, 6.7e-5, 2.0e-3, -4.3e-6, -5.8e-7),  # κ = -0.92
@@ -96,3 +100,33 @@ def test_families_determine_three_constants() -> None:
         assert (change != 0).any()  # Q branches alone say nothing of A + C
         assert len(entry.companions) >= 4
         assert not set(entry.lines.tolist()) & set(entry.companions.tolist())
+
+
+def test_a_mirrored_top_has_the_same_q_branches():
+    """A - C the same and kappa of the other sign: the line with Ka and Kc exchanged has the same frequency, wherever A + C lies."""
+    table = rigid_table(JMAX)
+    j = table.quanta[:, 0].astype(float)
+    rows = np.flatnonzero((j[table.upper] == j[table.lower]) & (j[table.upper] <= 12))[::7]
+    a, b, c, shift = 6686.0, 4871.3, 3814.2, 431.7
+    tops = np.array([[a, b, c], np.array([a, a + c - b, c]) + shift])
+    energy = np.empty((2, len(j)))
+    for top, out in zip(tops, energy, strict=True):
+        _kernels.level_energies(table.levels, table.theta, j * (j + 1), np.append(top, np.zeros(5)), out)
+    pairs = [(row, _mirrored_row(table, row)) for row in rows.tolist()]
+    pairs = [(row, mirrored) for row, mirrored in pairs if mirrored is not None]  # the table ends at a highest Ka
+    assert len(pairs) > 30
+    for row, mirrored in pairs:
+        frequencies = [energy[k][table.upper[n]] - energy[k][table.lower[n]] for k, n in ((0, row), (1, mirrored))]
+        assert frequencies[0] == pytest.approx(frequencies[1], abs=1e-5)  # of levels near 10^6 MHz
+
+
+def test_constants_with_few_lines_beside_q_branches_are_not_determined():
+    grown = Grown(
+        np.append([5000.0, 3000.0, 2000.0], np.zeros(5)), 1e-6 * np.eye(8), 2.0, np.ones(3), np.ones(3), np.arange(9),
+        np.arange(9), np.zeros(9), np.ones(9), np.ones(9), 0.01, 400.0, None, FEWEST_MOVED,
+    )  # fmt: skip
+    assert grown.determined
+    assert word(probability(grown)) == "certain"
+    few = replace(grown, moved=FEWEST_MOVED - 1)
+    assert not few.determined
+    assert word(probability(few)) == "likely"
