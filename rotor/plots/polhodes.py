@@ -17,7 +17,7 @@ from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL, draw_axes, draw_cur
 from rotor.version import version
 
 SIZE_INCHES = (7.2, 3.6)
-POINTS = 1500  # of a curve
+POINTS = 1500  # per curve
 MOST_PERIODS = 12  # in the diagram over time; more would be a solid band
 
 
@@ -30,26 +30,26 @@ def polhode_figure(
     time_factor: float = 1.0,
     title: str = "",
 ) -> Any:
-    """A matplotlib figure of one free motion: where L goes in the body, and when.
+    """A matplotlib figure of one free motion: the path of L in the body, and its components over time.
 
-    Left the sphere of directions of L in principal axes, with polhodes about the axes of smallest (blue) and largest
+    Left: the sphere of directions of L in principal axes, with polhodes about the axes of smallest (blue) and largest
     moment (green), the separatrix (black) and the path of L from the first to the last time (orange; the dot is the
-    start). Filled axis ends are stable, open ones unstable. Right the components of L/|L| over time.
+    start). Filled axis ends are stable, open ones unstable. Right: the components of L/|L| over time.
 
     Parameters
     ----------
     motion : FreeMotion
-        Of one body, in any units.
+        Motion of one body, in any units.
     times : (n,) array
-        In the units of the motion, of which only the range counts.
+        Times in the units of the motion; only the first and last count.
     axis_names : (str, str, str), optional
-        Of the principal axes.
+        Names of the principal axes.
     time_label : str, optional
-        Of the axis of time.
+        Label of the time axis.
     time_factor : float, optional
-        By which times are multiplied before they are shown.
+        Factor that converts the times to the unit of the label.
     title : str, optional
-        Above the picture.
+        Title of the picture.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def polhode_figure(
     times = np.asarray(times, dtype=np.float64)
     size = np.linalg.norm(motion.momentum0, axis=-1)
     if motion.moments.shape != (3,) or not size > 0.0 or not times.size:
-        raise ValueError("a polhode picture is that of one body with an angular momentum, at one time or more")
+        raise ValueError("a polhode picture needs one body with an angular momentum, and at least one time")
     with styled():
         figure = new_figure(SIZE_INCHES)
         left, right = figure.subplots(1, 2, width_ratios=(1.2, 1.0))
@@ -99,26 +99,26 @@ def plot_polhodes(
     Parameters
     ----------
     motion : FreeMotion
-        Of one body, in any units.
+        Motion of one body, in any units.
     times : (n,) array
-        In the units of the motion, of which only the range counts.
+        Times in the units of the motion; only the first and last count.
     path : path
         A .png, .pdf or .svg file.
     axis_names : (str, str, str), optional
-        Of the principal axes.
+        Names of the principal axes.
     time_label : str, optional
-        Of the axis of time.
+        Label of the time axis.
     time_factor : float, optional
-        By which times are multiplied before they are shown.
+        Factor that converts the times to the unit of the label.
     title : str, optional
-        Above the picture.
+        Title of the picture.
     provenance : mapping, optional
-        Written into the metadata.
+        Entries of the metadata.
 
     Raises
     ------
     ValueError
-        For a suffix that is no picture, and as `polhode_figure` does.
+        For a suffix other than .png, .pdf, .svg, and as `polhode_figure` does.
     """
     checked_suffix(path)
     figure = polhode_figure(
@@ -155,10 +155,10 @@ def _draw_direction(axes: Any, view: Any, path: Floats) -> None:
         return
     travelled = np.concatenate([[0.0], np.cumsum(steps)])
     expected = min(0.45, 0.4 * travelled[-1])
-    here = int(np.clip(np.searchsorted(travelled, expected), 1, len(path) - 1))
-    if view.depth(path[here]) > 0.0:
+    arrow = int(np.clip(np.searchsorted(travelled, expected), 1, len(path) - 1))
+    if view.depth(path[arrow]) > 0.0:
         axes.annotate(
-            "", view.flat(path[here]), view.flat(path[here - 1]), zorder=8,
+            "", view.flat(path[arrow]), view.flat(path[arrow - 1]), zorder=8,
             arrowprops={"arrowstyle": "-|>,head_width=0.28,head_length=0.5", "color": MOTION, "lw": 1.2,
                         "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip

@@ -33,20 +33,20 @@ def plot_raman(
     Parameters
     ----------
     lines : RamanLines
-        What is drawn.
+        Lines to draw.
     path : path
         A .png, .pdf or .svg file.
     title : str, optional
-        Instead of name, temperature and laser.
+        By default name, temperature and laser.
     view : View
         Shifts (cm⁻¹) and cross sections shown, another title, and whether the cross sections are on a logarithmic axis.
     provenance : mapping, optional
-        What the metadata of the file shall say besides version and settings.
+        Entries of the metadata besides version and settings.
 
     Raises
     ------
     ValueError
-        For a suffix that is no picture, for no lines, and none in the view.
+        For a suffix other than .png, .pdf, .svg, for an empty list, and for no line in the view.
     """
     checked_suffix(path)
     title = title if view.title is None else view.title
@@ -54,7 +54,7 @@ def plot_raman(
 
 
 def raman_figure(lines: RamanLines, title: str | None = None, view: View = WHOLE, axes: Any = None) -> Any:
-    """A matplotlib figure of Raman lines as sticks at their shifts, on the axes of a user if given; ValueError for no lines."""
+    """A matplotlib figure of Raman lines as sticks at their shifts, on `axes` if not None; ValueError for no lines."""
     if not len(lines):
         raise ValueError(f"there is no Raman line to draw for {lines.top.name or 'this top'}")
     with styled():
@@ -78,7 +78,7 @@ def _draw(axes: Any, lines: RamanLines) -> None:
 
 
 def _frame(axes: Any, lines: RamanLines, view: View) -> None:
-    """The limits of a view; without vertical ones from the lines that it shows, at most eight decades of a logarithmic axis."""
+    """Set the limits of a view; by default from the lines that it shows, at most eight decades of a logarithmic axis."""
     first, last = view.horizontal or axes.get_xlim()
     heights = lines.cross_section_cm2_per_sr[(lines.shift_cm >= first) & (lines.shift_cm <= last)]
     if not len(heights):
@@ -95,7 +95,7 @@ def _frame(axes: Any, lines: RamanLines, view: View) -> None:
 def _name(axes: Any, lines: RamanLines) -> None:
     """Names of the strongest lines, the initial level first."""
     heights, shifts, levels = lines.cross_section_cm2_per_sr, lines.shift_cm, lines.levels
-    quanta = without_nuclei(levels.quanta)  # what nuclear spins part, by some 1e-4 cm⁻¹, is one line in the picture
+    quanta = without_nuclei(levels.quanta)  # splittings by nuclear spins, some 1e-4 cm⁻¹, cannot be seen
     first, last = sorted(axes.get_xlim())
     inside = np.flatnonzero((shifts >= first) & (shifts <= last))
     strongest = inside[np.argsort(-heights[inside], kind="stable")][:MOST_TRIED]
@@ -115,7 +115,7 @@ def _title(lines: RamanLines) -> str:
 
 
 def _facts(lines: RamanLines) -> dict[str, Any]:
-    """What the metadata of the file say of the lines."""
+    """Entries of the metadata that describe the lines."""
     top = lines.top
     return {
         "constants": top.constants.text(),

@@ -1,4 +1,4 @@
-"""`rotor.plot`: a matplotlib figure of every result of the package, for notebooks; or a picture in a file."""
+"""`rotor.plot`: a matplotlib figure of any result of the package, for notebooks, or a picture in a file."""
 
 from __future__ import annotations
 
@@ -61,26 +61,26 @@ def plot(
     Parameters
     ----------
     thing : Lines, Spectrum, RamanLines, Levels, FreeMotion, ThermoFunctions, Correlations, Equipartition, Catalogue
-        Or the answer to a request for one of them.
+        What to draw: one of these, or the answer to a request for one of them.
     path : path, optional
         A .png, .pdf or .svg file to write.
     ax : matplotlib.axes.Axes, optional
-        Axes of yours to draw on, for lines, spectra, Raman lines, levels, emission and catalogues; other pictures have several panels.
+        Axes to draw on, for lines, spectra, Raman lines, levels, emission and catalogues; other pictures have several panels.
     style : str or path, optional
         A style of matplotlib ("ggplot") or an .mplstyle file over the style of the package: letters, lines, grid, size, background.
         Colours that have a meaning stay.
     options :
-        Of the picture: those of `spectrum_figure`, `raman_figure`, `levels_figure`, `polhode_figure`, ...
+        Options of the picture: those of `spectrum_figure`, `raman_figure`, `levels_figure`, `polhode_figure`, ...
 
     Returns
     -------
     matplotlib.figure.Figure
-        Shown by a notebook where it is the last thing of a cell.
+        A notebook shows it as the last expression of a cell.
 
     Raises
     ------
     ValueError
-        A thing that there is no picture of; a suffix that is no picture; `ax` for a picture of several panels.
+        For an object without a picture, a suffix other than .png, .pdf, .svg, and `ax` for a picture of several panels.
 
     Examples
     --------
@@ -92,9 +92,9 @@ def plot(
     """
     if ax is not None:
         if not isinstance(thing, ONE_PANEL):
-            known = ", ".join(sorted(kind.__name__ for kind in ONE_PANEL))
+            accepted = ", ".join(sorted(kind.__name__ for kind in ONE_PANEL))
             raise ValueError(
-                f"ax: the picture of a {type(thing).__name__} is a figure of its own; axes are taken for {known}"
+                f"ax: the picture of a {type(thing).__name__} is a figure of its own; axes are taken for {accepted}"
             )
         options["axes"] = ax
     with users_style(style):
@@ -108,8 +108,8 @@ def plot(
 
 @singledispatch
 def _figure(thing: Any, **options: Any) -> Any:
-    known = ", ".join(sorted(kind.__name__ for kind in _figure.registry if kind is not object))
-    raise ValueError(f"there is no picture of a {type(thing).__name__}; there are pictures of {known}")
+    drawable = ", ".join(sorted(kind.__name__ for kind in _figure.registry if kind is not object))
+    raise ValueError(f"there is no picture of a {type(thing).__name__}; there are pictures of {drawable}")
 
 
 @_figure.register(Lines)
@@ -199,7 +199,9 @@ def _(thing: Catalogue, **options: Any) -> Any:
     return catalogue_figure(thing, **options)
 
 
-def _passed_on(attribute: str) -> Callable[..., Any]:
+def _drawn_by_attribute(attribute: str) -> Callable[..., Any]:
+    """A function that draws an attribute of an answer instead of the answer."""
+
     def figure(thing: Any, **options: Any) -> Any:
         return _figure(getattr(thing, attribute), **options)
 
@@ -259,6 +261,6 @@ def _(thing: ZeemanAnswer, **options: Any) -> Any:
     return zeeman_figure(thing.states, spins=len(thing.request.spin_g), **options)
 
 
-_figure.register(StarkAnswer, _passed_on("states"))
-_figure.register(RamanAnswer, _passed_on("lines"))
-_figure.register(ThermoAnswer, _passed_on("functions"))
+_figure.register(StarkAnswer, _drawn_by_attribute("states"))
+_figure.register(RamanAnswer, _drawn_by_attribute("lines"))
+_figure.register(ThermoAnswer, _drawn_by_attribute("functions"))

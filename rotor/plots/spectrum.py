@@ -21,13 +21,13 @@ from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_widths
 from rotor.units import MHZ_PER_CM
 
-UNITS = {"MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM}  # of the frequency axis
+UNITS = {"MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM}  # units of the frequency axis, in MHz
 VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
-LEAST_HEIGHT = 0.55  # of a linear axis for the strongest line; long names have the rest
-TALL = 1e-2  # and below this they cannot be seen on a linear axis
-NARROW = 1e-3  # of the frequency: a range that is narrower is shown in MHz, with all digits
+LEAST_HEIGHT = 0.55  # part of a linear axis for the strongest line; long names have the rest
+TALL = 1e-2  # below this part of the strongest, lines cannot be seen on a linear axis
+NARROW = 1e-3  # a range narrower than this part of its frequency is shown in MHz, with all digits
 MOST_DECADES = 8
-MOST_VERTICES = 20_000  # of a curve; more cannot be distinguished on paper
+MOST_VERTICES = 20_000  # per curve; more cannot be distinguished on paper
 
 
 @dataclass(frozen=True)
@@ -64,12 +64,12 @@ def plot_spectrum(
     path : path
         Its suffix chooses the format.
     provenance : mapping, optional
-        What the metadata of the file shall hold besides version, constants and settings.
+        Entries of the metadata besides version, constants and settings.
 
     Raises
     ------
     ValueError
-        A suffix that is no picture, a spectrum without lines or with nothing in the range, an unknown unit.
+        For a suffix other than .png, .pdf, .svg, a spectrum without lines or with nothing in the range, an unknown unit.
     """
     checked_suffix(path)
     figure = spectrum_figure(
@@ -97,19 +97,19 @@ def spectrum_figure(
     thing : Lines or Spectrum
         Sticks are integrated absorption in nm² MHz, a curve is the cross section in nm².
     range_mhz : (2,), optional
-        The frequencies shown; else the range the lines were asked for, else where lines are above 0.4 % of the strongest.
+        Frequencies shown. By default the range of the request; without one, that of the lines above 0.4 % of the strongest.
     title : str, optional
-        Instead of name, formula and temperature.
+        By default name, formula and temperature.
     labels : int
-        The most lines that are named: the strongest first, others where their names lie on nothing.
+        Greatest number of lines that are named: the strongest first, others where there is space.
     unit : "MHz", "GHz", "THz" or "cm-1", optional
-        Of the frequency axis; else the one that gives numbers below 2000.
+        Unit of the frequency axis; by default the one that gives numbers below 2000.
     log : bool, optional
-        Whether the axis of intensity is logarithmic; else it is where fewer than ten lines would be seen on a linear one.
+        Whether the axis of intensity is logarithmic; by default where fewer than ten lines would be seen on a linear one.
     vertical : (2,), optional
         Lowest and highest intensity shown, in the unit of the axis.
     axes : matplotlib.axes.Axes, optional
-        Drawn on instead of a new figure.
+        Axes to draw on; by default those of a new figure.
 
     Returns
     -------
@@ -120,7 +120,7 @@ def spectrum_figure(
     Raises
     ------
     ValueError
-        A spectrum without lines or with nothing in the range, an unknown unit, a logarithmic axis from 0 or less.
+        For a spectrum without lines or with nothing in the range, an unknown unit, a logarithmic axis from 0 or less.
     """
     if unit is not None:
         require_one_of("unit", unit, UNITS)
@@ -142,7 +142,7 @@ def spectrum_figure(
 
 
 def _heights(thing: Lines | Spectrum, lines: Lines | None) -> Floats:
-    """How high each line stands in the picture: its intensity, or the curve at its centre."""
+    """Height of each line in the picture: its intensity, or the curve at its centre."""
     if lines is None:
         return np.zeros(0)
     if isinstance(thing, Lines):
@@ -165,7 +165,7 @@ def _frequency_axis(
 
 
 def _range_shown(thing: Lines | Spectrum, lines: Lines | None, heights: Floats) -> tuple[float, float]:
-    """The range that was asked for; without one, up to the last visible line, and from 0 where the first is near it."""
+    """The range of the request; without one, that of the visible lines, from 0 if the first is near it."""
     if lines is None:
         assert isinstance(thing, Spectrum)
         return float(thing.frequency_mhz[0]), float(thing.frequency_mhz[-1])
@@ -231,20 +231,22 @@ def _tallest(thing: Lines | Spectrum, x: _Axis) -> float:
 
 
 def _is_logarithmic(heights: Floats) -> bool:
-    """Whether fewer than ten lines (or than half, of less than twenty) reach a hundredth of the tallest."""
+    """Whether fewer than ten lines (or fewer than half of less than twenty) reach a hundredth of the tallest."""
     if len(heights) < 2:
         return False
     return int((heights >= TALL * heights.max()).sum()) < min(10, len(heights) / 2)
 
 
 def _only_transition(lines: Lines, rows: Ints) -> str:
-    """The rotational transition of lines that spins split, where all of them have the same; else an empty text."""
+    """The rotational transition that all hyperfine lines in `rows` share, or an empty text."""
     quanta = lines.levels.quanta
     rotation = of_rotation(quanta)
     if len(rows) < 2 or len(rotation) == len(quanta):
         return ""
-    both = np.stack([column[side[rows]] for column in rotation.values() for side in (lines.upper, lines.lower)])
-    alike = bool((both == both[:, :1]).all())
+    quanta_by_line = np.stack(
+        [column[side[rows]] for column in rotation.values() for side in (lines.upper, lines.lower)]
+    )
+    alike = bool((quanta_by_line == quanta_by_line[:, :1]).all())
     return (
         line_text(rotation, int(lines.upper[rows[0]]), int(lines.lower[rows[0]]), lines.levels.halves) if alike else ""
     )
@@ -287,13 +289,13 @@ def _name_lines(
     rows = rows[(heights[rows] > low) & (heights[rows] <= high)][: 15 * most]
     drawn = _drawn_points(axes, thing, x)
     places = axes.transData.transform(np.stack([lines.frequency_mhz[rows] / x.mhz, heights[rows]], axis=1))
-    taken: list[Any] = []
+    boxes: list[Any] = []
     for row, place in zip(rows.tolist(), places, strict=True):
-        if len(taken) == most:
+        if len(boxes) == most:
             break
-        if any(box.x0 - 6 < place[0] < box.x1 + 6 and box.y0 - 40 < place[1] < box.y1 for box in taken):
+        if any(box.x0 - 6 < place[0] < box.x1 + 6 and box.y0 - 40 < place[1] < box.y1 for box in boxes):
             continue  # no need to measure a name that cannot fit
-        leave_or_remove(_label(axes, lines, row, heights[row], x, transition), axes, taken, drawn)
+        leave_or_remove(_label(axes, lines, row, heights[row], x, transition), axes, boxes, drawn)
 
 
 def _strongest_first(thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis) -> Ints:
@@ -324,14 +326,14 @@ def _stands_out(thing: Lines | Spectrum, lines: Lines, heights: Floats) -> NDArr
     if isinstance(thing, Lines):
         return heights > 0
     width = line_widths(lines, thing.profile, thing.fwhm_mhz)
-    either = [
+    on_sides = [
         np.interp(lines.frequency_mhz + side * width / 2, thing.frequency_mhz, thing.intensity) for side in (-1, 1)
     ]
-    return (heights > 0) & (heights > np.maximum(*either))
+    return (heights > 0) & (heights > np.maximum(*on_sides))
 
 
 def _drawn_points(axes: Any, thing: Lines | Spectrum, x: _Axis) -> Floats:
-    """Pixels (n, 2) of the tops of sticks, or of the curve: what no name may lie on."""
+    """Pixels (n, 2) of the tops of sticks, or of the curve: names must not cover them."""
     shown = x.inside(thing.frequency_mhz)
     height = thing.intensity_nm2_mhz if isinstance(thing, Lines) else thing.intensity
     points = np.stack([thing.frequency_mhz[shown] / x.mhz, height[shown]], axis=1)
@@ -357,7 +359,7 @@ def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis, transitio
 
 
 def _facts(thing: Lines | Spectrum, lines: Lines | None) -> dict[str, Any]:
-    """What the metadata of the file say of the lines and of their shape."""
+    """Entries of the metadata that describe the lines and their shape."""
     facts: dict[str, Any] = {}
     if lines is not None:
         top = lines.top

@@ -1,4 +1,4 @@
-"""The momentum sphere seen from a side: what lies on the front, what behind, drawn flat so that it prints sharp."""
+"""The momentum sphere seen from one direction: visible and hidden curves, projected to a plane, so that they print sharp."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.free.polhodes import centre_axis, even_levels, polhode, separatrix
 
-# colours that the colour-blind tell apart (Okabe and Ito): about the axis of smallest moment, of largest, the motion
+# colours for colour-blind readers (Okabe and Ito): polhodes about the axis of smallest moment, intermediate, largest; the motion
 SMALL, MIDDLE, LARGE, MOTION = "#0072B2", "#A06A92", "#009E73", "#D55E00"
 _RIM, _HIDDEN = "#9A9A9A", 0.22
 
@@ -47,7 +47,7 @@ def view_of(moments: Floats, start: Floats) -> View:
 
 
 def draw_sphere(axes: Any) -> None:
-    """A shaded disc with a rim; nothing else on the axes."""
+    """Draw a shaded disc with a rim, without ticks and frame."""
     span = np.linspace(-1.0, 1.0, 256)
     x, y = np.meshgrid(span, span)
     light = np.hypot(x + 0.35, y - 0.45)
@@ -63,18 +63,18 @@ def draw_sphere(axes: Any) -> None:
 
 
 def draw_curve(axes: Any, view: View, curve: Floats, **style: Any) -> None:
-    """A curve on the sphere: its visible parts in full, its hidden ones faint and thin.
+    """Draw a curve on the sphere, its hidden parts faint and thin.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Where it is drawn.
+        Axes to draw on.
     view : View
-        From where the sphere is seen.
+        Direction from which the sphere is seen.
     curve : (n, 3) array
         Points on the unit sphere.
     style : object
-        Of `Axes.plot`: colour, width, label.
+        Options of `Axes.plot`: colour, width, label.
     """
     flat, front = view.flat(curve), view.depth(curve) >= 0.0
     width = style.pop("linewidth", 1.0)
@@ -87,7 +87,7 @@ def draw_curve(axes: Any, view: View, curve: Floats, **style: Any) -> None:
 
 
 def draw_family(axes: Any, view: View, moments: Floats, per_side: int = 5) -> None:
-    """Polhodes on both sides of the separatrix, in the colour of the axis that they go round, and the separatrix.
+    """Draw the separatrix, and polhodes on both sides in the colour of the axis that they enclose.
 
     A symmetric top has circles and an equator of points at rest, drawn dotted; a spherical or linear body has no
     polhodes.
@@ -95,9 +95,9 @@ def draw_family(axes: Any, view: View, moments: Floats, per_side: int = 5) -> No
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Where they are drawn.
+        Axes to draw on.
     view : View
-        From where the sphere is seen.
+        Direction from which the sphere is seen.
     moments : (3,) array
         Moments of inertia, any unit.
     per_side : int, optional
@@ -120,18 +120,18 @@ def draw_family(axes: Any, view: View, moments: Floats, per_side: int = 5) -> No
 
 
 def draw_axes(axes: Any, view: View, moments: Floats, names: tuple[str, str, str]) -> None:
-    """The ends of the principal axes: filled where spin about them is stable, open where it is not, and their names.
+    """Draw the ends of the principal axes with their names: filled where rotation about them is stable, else open.
 
     Parameters
     ----------
     axes : matplotlib.axes.Axes
-        Where they are drawn.
+        Axes to draw on.
     view : View
-        From where the sphere is seen.
+        Direction from which the sphere is seen.
     moments : (3,) array
         Moments of inertia, any unit.
     names : (str, str, str)
-        Of the axes, as TeX.
+        Names of the axes, as TeX.
     """
     values = np.sort(moments)
     for axis, name in enumerate(names):

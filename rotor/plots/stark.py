@@ -18,10 +18,10 @@ from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 
 NARROW_INCHES = 5.0
 SIZE_INCHES = (7.2, 6.4)
-LEAST_DRAWN = 1e-4  # of the strongest line
-MOST_LABELS = 40  # on an axis of energies: the height of a name is a fortieth of it
-LETTER = 0.0105  # width of a letter of a name, in the width of the fields
-SAME_HEIGHT = 0.1  # of a name: nearer levels share a name
+LEAST_DRAWN = 1e-4  # relative to the strongest line
+MOST_LABELS = 40  # on the axis of energies; a name takes 1/40 of its height
+LETTER = 0.0105  # width of a letter, relative to the range of fields
+SAME_HEIGHT = 0.1  # part of the height of a name; nearer levels share one
 
 
 def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm", view: View = WHOLE) -> Any:
@@ -30,11 +30,11 @@ def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm", view
     Parameters
     ----------
     field_map : FieldMap
-        Of two fields or more.
+        A map of at least two fields.
     title : str
-        Above the picture.
+        Title of the picture.
     unit : str
-        Of the field.
+        Unit of the field.
     view : View
         Fields and energies (cm⁻¹) shown; its title is not used here.
 
@@ -46,7 +46,7 @@ def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm", view
     Raises
     ------
     ValueError
-        For a map of one field, or with less than two in the view.
+        For a map with fewer than two fields in the view.
     """
     if len(field_map.fields) < 2:
         raise ValueError("a picture of a map needs two fields or more")
@@ -73,22 +73,22 @@ def plot_stark(
     Parameters
     ----------
     field_map : FieldMap
-        Of two fields or more.
+        A map of at least two fields.
     path : path
         Its suffix chooses the format.
     title : str
-        Above the picture.
+        Title of the picture.
     unit : str
-        Of the field.
+        Unit of the field.
     view : View
         Fields and energies (cm⁻¹) shown, and another title.
     provenance : mapping, optional
-        Further facts for the metadata.
+        Further entries of the metadata.
 
     Raises
     ------
     ValueError
-        For a map of one field, and for a suffix that is no picture.
+        For a map of one field, and for a suffix other than .png, .pdf, .svg.
     """
     checked_suffix(path)
     title = title if view.title is None else view.title
@@ -133,7 +133,7 @@ def _colour(m: float) -> str:
 
 
 def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]]) -> None:
-    """Names of all free levels at the left, moved apart where they would stand on each other; thin lines lead to the levels."""
+    """Write the names of all free levels at the left, moved apart where they would overlap; thin lines lead to the levels."""
     low, high = axes.get_ylim()
     first, end = fields
     height = (high - low) / MOST_LABELS
@@ -149,7 +149,7 @@ def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]
 
 
 def _grouped(levels: list[tuple[float, str]], height: float) -> list[tuple[float, str]]:
-    """Energies with their names; the nearest share a name as long as there are more of them than have space."""
+    """Energies with their names; the nearest levels share a name until all names have space."""
     groups = [([energy], [label]) for energy, label in levels]
     while len(groups) > MOST_LABELS or (len(groups) > 1 and min(_gaps(groups)) < SAME_HEIGHT * height):
         near = int(np.argmin(_gaps(groups)))
@@ -163,7 +163,7 @@ def _gaps(groups: list[tuple[list[float], list[str]]]) -> Floats:
 
 
 def _apart(energies: Floats, height: float, low: float, high: float) -> Floats:
-    """Places at least `height` apart and inside the axis, near to rising energies: moved up, then down from the top."""
+    """Places near the energies (ascending), at least `height` apart and inside the axis: moved up, then down from the top."""
     places = energies.copy()
     for n in range(len(places)):
         places[n] = max(places[n], (places[n - 1] + height) if n else low)
@@ -174,7 +174,7 @@ def _apart(energies: Floats, height: float, low: float, high: float) -> Floats:
 
 def _slopes(axes: Any, field_map: FieldMap, unit: str, view: View) -> None:
     for rows in _curves(field_map, view):
-        x, y = _bent(field_map, rows)
+        x, y = _with_curve(field_map, rows)
         axes.plot(x, y, color=_colour(float(field_map.m[rows[0]])), linewidth=0.8)
     axes.axhline(0.0, color=GREY, linewidth=0.6, linestyle=":")
     axes.set_xlabel(f"Field ({unit})")
@@ -182,10 +182,10 @@ def _slopes(axes: Any, field_map: FieldMap, unit: str, view: View) -> None:
     axes.set_ylabel(name)
 
 
-def _bent(field_map: FieldMap, rows: Ints) -> tuple[Floats, Floats]:
-    """Fields and effective dipoles, from zero field to the first one as the energies bend there.
+def _with_curve(field_map: FieldMap, rows: Ints) -> tuple[Floats, Floats]:
+    """Fields and effective dipoles, with a curve instead of a straight line from zero field to the first field.
 
-    Between the two fields the energy is the cubic that has the energies and slopes of both; its slope is drawn, not a straight line.
+    The curve is the slope of the cubic that has the energies and slopes at both fields.
     """
     x, y = field_map.field[rows], field_map.slope[rows]
     if field_map.slope_name != "mu_eff_debye" or x[0] != 0:
@@ -193,9 +193,7 @@ def _bent(field_map: FieldMap, rows: Ints) -> tuple[Floats, Floats]:
     mean = -(field_map.energy_mhz[rows[1]] - field_map.energy_mhz[rows[0]]) / (MHZ_PER_DEBYE_KV_PER_CM * x[1])
     s = np.linspace(0.0, 1.0, 31)[:-1]
     bent = y[0] * (1 - s) * (1 - 3 * s) + y[1] * s * (3 * s - 2) + 6 * mean * s * (1 - s)
-    inside = np.clip(
-        bent, min(y[0], y[1]), max(y[0], y[1])
-    )  # no curve beyond both ends where the field mixes close pairs
+    inside = np.clip(bent, min(y[0], y[1]), max(y[0], y[1]))  # the cubic overshoots where the field mixes close pairs
     return np.concatenate([s * x[1], x[1:]]), np.concatenate([inside, y[1:]])
 
 
@@ -244,18 +242,18 @@ def plot_lobes(
     Parameters
     ----------
     lines : FieldLines
-        At two fields or more.
+        Lines at two fields or more.
     path : path
         Its suffix chooses the format.
     title : str
-        Above the picture.
+        Title of the picture.
     provenance : mapping, optional
-        Further facts for the metadata.
+        Further entries of the metadata.
 
     Raises
     ------
     ValueError
-        For lines at one field, and for a suffix that is no picture.
+        For lines at one field, and for a suffix other than .png, .pdf, .svg.
     """
     checked_suffix(path)
     figure = lobes_figure(lines, title)

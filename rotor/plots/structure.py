@@ -1,4 +1,4 @@
-"""A picture of a molecule in its principal axes: atoms, bonds with their lengths, and the errors of the positions."""
+"""A picture of a molecule in its principal axes: atoms and bonds, with the lengths of the bonds and their errors."""
 
 from __future__ import annotations
 
@@ -15,16 +15,27 @@ from rotor.structures.coordinates import bonded
 from rotor.structures.substitution import Value
 
 _MARGIN = 0.9  # Å around the atoms
-_STANDS, _BESIDE = 0.5, 0.1  # sine of a bond's slope from which its length stands beside it, and how far, Å
-_OUTSIDE = 0.3  # Å that a bond passes the centre of the molecule by, from which its length stands outside
-SMALLEST_ERROR = 1e-5  # of a label: what is fitted to exact constants has errors of round-off, which are not written
+_STANDS, _BESIDE = 0.5, 0.1  # sine of a bond's slope above which its length is written beside it; distance, Å
+_OUTSIDE = 0.3  # Å; the length of a bond farther than this from the centre is written on its outer side
+SMALLEST_ERROR = 1e-5  # smaller errors are round-off (a fit to exact constants) and are not written
 
 
 def structure_figure(molecule: Molecule, *, values: Sequence[Value] = (), title: str = "") -> Any:
     """A matplotlib figure of a molecule in its principal axes.
 
-    molecule : in the frame of a, b, c; atoms are drawn along the two axes across which it spreads most. values : bond lengths to
-    write at the bonds, with errors.
+    Parameters
+    ----------
+    molecule : Molecule
+        Positions in the frame of a, b, c (Å); the two axes along which it extends farthest are drawn.
+    values : sequence of Value, optional
+        Bond lengths with errors, written at the bonds.
+    title : str, optional
+        By default the formula.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel.
     """
     x = molecule.positions_angstrom
     spread = np.ptp(x, axis=0)
@@ -65,14 +76,14 @@ def plot_structure(
     values : sequence of Value, optional
         Distances and angles with their errors.
     title : str, optional
-        Above the picture.
+        Title of the picture.
     provenance : mapping, optional
-        What the metadata shall say besides the atoms.
+        Entries of the metadata besides the atoms.
 
     Raises
     ------
     ValueError
-        For a suffix that is no picture.
+        For a suffix other than .png, .pdf, .svg.
     """
     checked_suffix(path)
     places = np.round(molecule.positions_angstrom, 6).tolist()
@@ -102,9 +113,9 @@ def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: 
 
 
 def _write_at_bond(axes: Any, ends: Floats, radii: Sequence[float], centre: Floats, text: str) -> None:
-    """Beside the middle of what is seen of a bond: beyond both atoms where it lies flat, beside the line where it stands.
+    """Write a text at the middle of the visible part of a bond: above the circles of both atoms if it is flat, else beside it.
 
-    It stands on the side away from the centre of the molecule, above bonds that pass the centre.
+    The side is that away from the centre of the molecule; for bonds through the centre, the upper one.
     """
     along = (ends[1] - ends[0]) / (np.linalg.norm(ends[1] - ends[0]) or 1.0)
     normal = np.array([-along[1], along[0]])
@@ -119,7 +130,7 @@ def _write_at_bond(axes: Any, ends: Floats, radii: Sequence[float], centre: Floa
 
 
 def _radius(symbol: str) -> float:
-    """Radius of the circle of an atom, Å."""
+    """Radius of the circle drawn for an atom, Å."""
     from ase.data import atomic_numbers, covalent_radii
 
     return float(0.42 * covalent_radii[atomic_numbers[symbol]])

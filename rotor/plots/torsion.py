@@ -15,7 +15,7 @@ from rotor.thermodynamics.torsion_request import TorsionAnswer
 from rotor.version import version
 
 POINTS = 721
-AMPLITUDE = 0.55  # of the smallest distance of two levels with different v, that a wave function reaches
+AMPLITUDE = 0.55  # greatest amplitude of a wave function, relative to the smallest spacing of levels of different v
 MOST_DRAWN = 12
 
 
@@ -33,7 +33,7 @@ def plot_torsion(
 
 
 def torsion_figure(answer: TorsionAnswer, view: View = WHOLE) -> Any:
-    """A matplotlib figure: V(α) in cm⁻¹, points of the scan, levels as lines, real wave functions about them by colour of the species."""
+    """A matplotlib figure of V(α) in cm⁻¹, points of the scan, levels as lines, and their real wave functions coloured by species."""
     levels, torsion = answer.levels, answer.torsion
     drawn = min(len(levels), MOST_DRAWN)
     angles = np.linspace(0, 2 * np.pi, POINTS)
@@ -46,21 +46,22 @@ def torsion_figure(answer: TorsionAnswer, view: View = WHOLE) -> Any:
         axes = figure.subplots()
         axes.plot(degrees, potential, color="black", linewidth=1.4, label="V(α)")
         if answer.scan is not None:
-            shift = (
-                torsion.potential.mean - torsion.foot_mhz
-            ) / units.MHZ_PER_CM  # of the fitted series: the scan has its own zero
-            fitted = (
-                torsion.potential.values(answer.scan.angles).mean() / units.MHZ_PER_CM
-                - torsion.potential.mean / units.MHZ_PER_CM
+            # the scan has a zero of its own: shift it so that its mean is that of the fitted potential at the same angles
+            fitted_mean = (torsion.potential.values(answer.scan.angles).mean() - torsion.foot_mhz) / units.MHZ_PER_CM
+            offset = fitted_mean - answer.scan.energies_cm.mean()
+            axes.plot(
+                np.degrees(answer.scan.angles) % 360,
+                answer.scan.energies_cm + offset,
+                "o",
+                color=GREY,
+                markersize=3,
+                label="scan",
             )
-            place = np.degrees(answer.scan.angles) % 360
-            offset = shift + fitted - answer.scan.energies_cm.mean()
-            axes.plot(place, answer.scan.energies_cm + offset, "o", color=GREY, markersize=3, label="scan")
-        named: set[int] = set()
+        in_legend: set[int] = set()
         for row in range(drawn):
             species = int(levels.species[row])
-            label = f"σ = {species}" if torsion.fold > 1 and species not in named else None
-            named.add(species)
+            label = f"σ = {species}" if torsion.fold > 1 and species not in in_legend else None
+            in_legend.add(species)
             colour, energy = PALETTE[species % len(PALETTE)], levels.energy_cm[row]
             axes.axhline(energy, color=colour, linewidth=0.5, alpha=0.6)
             axes.plot(degrees, energy + height * waves[:, row], color=colour, linewidth=0.9, label=label)

@@ -1,4 +1,4 @@
-"""What of a picture is shown: its title, the limits of its main axes, and whether one of them is logarithmic."""
+"""Title and limits of a picture, and whether its vertical axis is logarithmic."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Limits = tuple[float, float]
 
 @dataclass(frozen=True)
 class View:
-    """Title, limits of the horizontal and the vertical axis in their own units, and the scale; None: as the picture chooses."""
+    """Title; limits of the horizontal and the vertical axis in their units; log: vertical scale. None: chosen by the picture."""
 
     title: str | None = None
     horizontal: Limits | None = None
@@ -38,6 +38,6 @@ def show_part(axes: Any, view: View, scale: float = 1.0) -> None:
         low, high = view.vertical
         if low <= 0 and axes.get_yscale() == "log":
             raise ValueError(
-                f"the vertical limits {low:g}:{high:g}: a logarithmic axis has none of 0 or less; raise the first"
+                f"the vertical limits {low:g}:{high:g}: a logarithmic axis starts above 0; raise the first"
             )
         axes.set_ylim(low, high)

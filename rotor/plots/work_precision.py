@@ -1,7 +1,7 @@
-"""Work-precision pictures: the error of a calculation against its processor time, one panel a knob, its settings named at the points.
+"""Work-precision pictures: error of a calculation against its processor time, one panel for each parameter, settings named at the points.
 
-Four settings and more are joined by a line; fewer, such as the three methods that there are, stand as marks alone. Names of settings stand
-beside their points where they lie on no other name and on no mark.
+A line joins four settings or more; fewer (such as three methods) are marks alone. Names of settings that would lie on another name or a
+mark are left out.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ PLACES = (
     (-6.0, -8.0, "right"),
     (-6.0, 2.0, "right"),
     (0.0, 8.0, "center"),
-)  # points
+)  # offset (points) of a name from its mark, and its alignment
 MARK_PIXELS = 3.0  # half of a mark
-LEAST_JOINED = 4  # settings of a curve
+LEAST_JOINED = 4  # settings; fewer are not joined by a line
 MARKERS = "osD^vP*"  # one more than colours, so that no two curves are alike
 
 
 @dataclass(frozen=True)
 class Point:
-    """One setting. error: 0 where it cannot be seen. own: drawn with a ring."""
+    """One setting. error: 0 if too small to be seen. own: the setting of the scene itself, drawn with a ring."""
 
     setting: str
     seconds: float
@@ -40,7 +40,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Panel:
-    """Curves by name that share one unit of error. of: of what, with its unit. joined: False for methods, which are no series."""
+    """Curves by name that share one unit of error. of: quantity of the error, with its unit. joined: False for methods, not a series."""
 
     title: str
     of: str
@@ -82,28 +82,28 @@ def plot_work_precision(
     Parameters
     ----------
     panels : sequence of Panel
-        At least one of them with a point.
+        Panels, at least one with a point.
     path : path
         Its suffix chooses the format.
     title : str
-        Above the picture.
+        Title of the picture.
     facts : mapping, optional
-        For the metadata.
+        Entries of the metadata.
 
     Raises
     ------
     ValueError
-        Where there is no point to draw, and for a suffix that is no picture.
+        Where there is no point to draw, and for a suffix other than .png, .pdf, .svg.
     """
     checked_suffix(path)
     save(work_precision_figure(panels, title), path, title or "work and precision", facts or {})
 
 
-Places = list[tuple[Point, float]]  # settings of a curve, with the errors as they are drawn
+Places = list[tuple[Point, float]]  # settings of a curve, with the errors as drawn
 
 
 def _draw(axes: Any, panel: Panel) -> list[Places]:
-    """Draw the curves of a panel."""
+    """Draw the curves of a panel; their settings with the errors as drawn."""
     points = [point for curve in panel.curves.values() for point in curve]
     floor = max(min((point.error for point in points if point.error > 0.0), default=0.0) / 10.0, LEAST_DRAWN)
     few = len(panel.curves) == 1
@@ -134,7 +134,7 @@ def _legend_above(axes: Any, count: int) -> None:
 
 
 def _scale(axes: Any) -> None:
-    """Times that are alike stay alike: the axis of time spans a factor of ten at least."""
+    """Let the time axis span a factor of ten at least, so that similar times look similar."""
     low, high = axes.get_xlim()
     if high < 10.0 * low:
         middle = math.sqrt(low * high)
@@ -155,7 +155,7 @@ def _label(axis: Any, limits: tuple[float, float]) -> None:
 
 
 def _curve(axes: Any, curve: Sequence[Point], floor: float, look: tuple[str, str, str], joined: bool) -> list[float]:
-    """Draw one curve; the errors as they are drawn."""
+    """Draw one curve; return the errors as drawn (0 is raised to `floor`)."""
     colour, marker, name = look
     times, errors = [point.seconds for point in curve], [max(point.error, floor) for point in curve]
     if joined and len(curve) >= LEAST_JOINED:
@@ -176,9 +176,9 @@ def _curve(axes: Any, curve: Sequence[Point], floor: float, look: tuple[str, str
 
 
 def _name_settings(axes: Any, curves: Sequence[Places]) -> None:
-    """The setting beside each point, the ends of curves first, where it lies on no other name and on no mark."""
+    """Write the setting beside each point, the ends of curves first, unless it would lie on another name or a mark."""
     marks = axes.transData.transform([(point.seconds, error) for curve in curves for point, error in curve])
-    taken: list[Any] = []
+    boxes: list[Any] = []
     ends = [place for curve in curves for place in (curve[0], curve[-1])[: len(curve)]]
     inner = [place for curve in curves for place in curve[1:-1]]
     for point, error in ends + inner:
@@ -188,12 +188,12 @@ def _name_settings(axes: Any, curves: Sequence[Places]) -> None:
             point.setting, (point.seconds, error), xytext=(0, 0), textcoords="offset points", fontsize=6.5, color=GREY
         )
         text.set_in_layout(False)
-        if not any(_fits_at(text, axes, offset, taken, marks) for offset in PLACES):
+        if not any(_fits_at(text, axes, offset, boxes, marks) for offset in PLACES):
             text.remove()
 
 
-def _fits_at(text: Any, axes: Any, place: tuple[float, float, str], taken: list[Any], marks: Any) -> bool:
-    """Put a name at a place beside its point; whether nothing is in its way there. Its box is then added to those taken."""
+def _fits_at(text: Any, axes: Any, place: tuple[float, float, str], boxes: list[Any], marks: Any) -> bool:
+    """Move a name to a place beside its point; whether it is free there. If so, its box is added to `boxes`."""
     across, up, side = place
     text.set_position((across, up))
     text.set_horizontalalignment(side)
@@ -202,7 +202,7 @@ def _fits_at(text: Any, axes: Any, place: tuple[float, float, str], taken: list[
     x, y = marks[:, 0], marks[:, 1]
     covered = ((x > around.x0) & (x < around.x1) & (y > around.y0) & (y < around.y1)).any()
     inside = axes.bbox.x0 <= box.x0 and box.x1 <= axes.bbox.x1 and axes.bbox.y0 <= box.y0 and box.y1 <= axes.bbox.y1
-    if not inside or covered or any(box.overlaps(other) for other in taken):
+    if not inside or covered or any(box.overlaps(other) for other in boxes):
         return False
-    taken.append(box)
+    boxes.append(box)
     return True

@@ -1,4 +1,4 @@
-"""A picture of levels in a magnetic field: for each free level how far its components move, a colour for each M."""
+"""A picture of levels in a magnetic field: the shifts of the components of each free level, a colour for each M."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from rotor.plots.picture import checked_suffix, joined, new_figure, save_describ
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.field_map import FieldMap
 
-PANELS = 9  # levels drawn at most: the first ones
+PANELS = 9  # at most; further levels are left out
 PANEL_INCHES = (2.6, 2.3)
 
 
@@ -22,11 +22,11 @@ def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0, view: Vi
     Parameters
     ----------
     field_map : FieldMap
-        Of two fields or more.
+        A map of at least two fields.
     title : str
-        Above the picture.
+        Title of the picture.
     spins : int
-        Quantum numbers of spins at the end of a label.
+        Number of spins, whose quantum numbers end each label.
     view : View
         Fields (T) and shifts (MHz) shown in every panel; its title is not used here.
 
@@ -73,22 +73,22 @@ def plot_zeeman(
     Parameters
     ----------
     field_map : FieldMap
-        Of two fields or more.
+        A map of at least two fields.
     path : path
         Its suffix chooses the format.
     title : str
-        Above the picture.
+        Title of the picture.
     spins : int
-        Quantum numbers of spins at the end of a label.
+        Number of spins, whose quantum numbers end each label.
     view : View
         Fields (T) and shifts (MHz) shown, and another title.
     provenance : mapping, optional
-        Further facts for the metadata.
+        Further entries of the metadata.
 
     Raises
     ------
     ValueError
-        For a map of one field, and for a suffix that is no picture.
+        For a map of one field, and for a suffix other than .png, .pdf, .svg.
     """
     checked_suffix(path)
     title = title if view.title is None else view.title
@@ -97,7 +97,7 @@ def plot_zeeman(
 
 
 def _levels(field_map: FieldMap, spins: int) -> dict[str, list[slice]]:
-    """The first levels, in order of energy, with their curves."""
+    """The lowest levels with their curves, in order of energy."""
     by_level: dict[str, list[slice]] = {}
     curves = sorted(field_map.curves(), key=lambda rows: float(field_map.free_mhz[rows.start]))
     for rows in curves:
@@ -107,7 +107,7 @@ def _levels(field_map: FieldMap, spins: int) -> dict[str, list[slice]]:
 
 
 def _panel(axes: Any, field_map: FieldMap, label: str, curves: list[slice]) -> None:
-    """Energies from the mean of the free level, weighted by how many states coincide."""
+    """Draw energies relative to the mean of the free level, weighted by the number of coinciding states."""
     from matplotlib import colormaps
 
     free = np.array([field_map.free_mhz[rows.start] for rows in curves])
