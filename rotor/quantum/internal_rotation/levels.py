@@ -201,11 +201,14 @@ def energies_alone(
         # low levels need all torsional functions, so the highest one of K = 0 is the least limit
         highest = float(blocks.functions.torsion.energies[jmax].max())
         linear = blocks.summed(model.coefficients, max(below_mhz, highest))
-        populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
-        if constants.tops > 2 and populated > MOST_POPULATED:
-            _refuse_long_sums((2 * jmax + 1) * constants.functions)
-        each = linear.solve_dominated([1.0], linear.labels["t"] < populated).energies
-        solved = ~np.isnan(each)
+        if constants.tops == 1:  # a few functions for each K: whole blocks, energies alone
+            solved, each = linear.block >= 0, linear.energies([1.0])
+        else:
+            populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
+            if constants.tops > 2 and populated > MOST_POPULATED:
+                _refuse_long_sums((2 * jmax + 1) * constants.functions)
+            each = linear.solve_dominated([1.0], linear.labels["t"] < populated).energies
+            solved = ~np.isnan(each)
         energies.append(each[solved])
         labels = {key: column[solved] for key, column in linear.labels.items()}
         k = labels["K"]
