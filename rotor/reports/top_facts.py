@@ -158,6 +158,8 @@ _COMPONENTS = {
 def weights_facts(top: Top, mapping: Mapping[str, int]) -> list[tuple[str, str]]:
     """Spin weights of the levels, for each vibrational state if the states have weights, else for the top."""
     states = top.states
+    if top.internal_rotation is not None and not mapping:
+        return [("spin weights", "by torsional species, from the nuclei of the turning groups")]
     if states is None or not states.weights:
         components = f" ({_COMPONENTS[top.kind]})" if mapping and top.kind in _COMPONENTS else ""
         return [("spin weights", weights_text(mapping) + components)]

@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
+from places import ORACLES
 
 import rotor
 from rotor.formats import read
@@ -78,3 +79,10 @@ def test_mistakes_are_one_line(call, words, error):
     last = err.rstrip("\n").splitlines()[-1]
     assert last.startswith(error)
     assert not Path("a.csv").exists()
+
+
+def test_spin_weights_of_a_turning_group_are_not_called_missing(call):
+    code, out, _ = call("spectrum", str(ORACLES / "ch3cho_ram.toml"), "--jmax", "2", "--temperature", "5", "--q", "100")
+    assert code == 0
+    assert "by torsional species, from the nuclei of the turning groups" in out
+    assert "not given" not in out

@@ -51,7 +51,7 @@ def test_a_long_list_is_the_same_in_every_format(call, folder, monkeypatch, shor
     code, plain, _ = _in_memory(call, monkeypatch, *TYPED, "--cat", "b.cat", "--parquet", "b.parquet")
     assert code == 0
     # facts and strongest lines; those of one frequency in any order
-    assert sorted(out.split()) == sorted(plain.split())
+    assert sorted(out.split()) == sorted(plain.replace("b.cat", "a.cat").replace("b.parquet", "a.parquet").split())
     assert sorted(Path("a.cat").read_text().splitlines()) == sorted(Path("b.cat").read_text().splitlines())
     import duckdb
 
