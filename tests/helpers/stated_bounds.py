@@ -199,7 +199,7 @@ def torsion(seed: int) -> Case:
 def emission(seed: int) -> Case:
     """Brightness at the brightest line of CO or of a random top, against lines of any optical depth."""
     from rotor.spectra.emission_request import EmissionRequest, Source, answer_emission
-    from rotor.spectra.emitters import BELOW
+    from rotor.spectra.emitters import WEAKEST
 
     rng = rng_of(9, seed)
     top = random_top(rng, linear=0.5)
@@ -211,7 +211,7 @@ def emission(seed: int) -> Case:
     interpolated = np.interp(grid, answer.spectrum.frequency_mhz, answer.spectrum.brightness_k)
     floor = answer.errors.rounding.value + exact.errors.rounding.value
     stated = answer.errors.truncation.value + floor
-    uncounted = contrast(answer) * BELOW * request.least_depth  # K, of lines so weak that they are not computed
+    uncounted = contrast(answer) * WEAKEST * request.least_depth  # K, of lines so weak that they are not computed
     return Case(stated, float(np.abs(interpolated - exact.spectrum.brightness_k).max(initial=0.0)), floor + uncounted)
 
 

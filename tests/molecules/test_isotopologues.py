@@ -457,7 +457,7 @@ def test_a_geometry_alone_is_taken_for_a_closed_shell_and_says_so():
     assert odd.spin_weights.to_mapping() == {"even": 0, "odd": 1}
     assert "change in sign" in odd.weights_source
     ion = Top.from_molecule(replace(pair, charge=1))
-    assert "odd number" in ion.weights_source
+    assert "their number is odd" in ion.weights_source
     with pytest.raises(ValueError, match="electronic 'ungerade'"):
         replace(pair, electronic="ungerade")
 

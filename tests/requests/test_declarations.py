@@ -56,7 +56,7 @@ def test_a_verb_is_two_files(ring, call, folder):
         "ring", "CO", "--radius", "100 pm", "--csv", "a.csv", "--save-scene", "s.toml", "--cut", "none"
     )
     assert (code, err) == (0, "")
-    assert out == "levels  4\n"
+    assert out == "levels  4\nfiles  a.csv, s.toml\n"
     written = (folder / "a.csv").read_bytes()
     assert 'cut = "none"' in (folder / "s.toml").read_text()
     assert call("run", "s.toml")[0] == 0
@@ -73,7 +73,7 @@ def test_a_verb_without_scenes_is_one_file(monkeypatch, call, folder):
     monkeypatch.setitem(rotor.cli.VERBS, "count", "Words.")
     (folder / "a.txt").write_text("one two three\n")
     code, out, err = call("count", "a.txt", "--least", "4", "--out", "b.txt")
-    assert (code, out, err, (folder / "b.txt").read_text()) == (0, "words  1\n", "", "1")
+    assert (code, out, err, (folder / "b.txt").read_text()) == (0, "words  1\nfiles  b.txt\n", "", "1")
     assert json.loads(call("count", "a.txt", "--json", "-")[1]) == {
         "rotor_version": rotor.__version__, "command": "rotor count a.txt --json -", "input": "a.txt", "words": 3, "files": [],
     }  # fmt: skip
