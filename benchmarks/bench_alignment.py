@@ -150,7 +150,12 @@ def picture(curves: dict[str, list[tuple[float, float]]], path: Path) -> None:
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     for name, points in curves.items():
-        axes.loglog([ms for _, ms in points], [max(error, 1e-13) for error, _ in points], "o-", label=name)
+        axes.loglog(
+            [ms for _, ms in points],
+            [max(error, 1e-13) for error, _ in points],
+            "o-",
+            label=name.replace("ours", "rotor"),
+        )
     axes.set_xlabel("Processor time (ms)")
     axes.set_ylabel("Largest error of ⟨cos²θ⟩")
     axes.set_title("OCS from J = 0, 50 fs, 4001 times", loc="left")

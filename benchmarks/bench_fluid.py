@@ -307,8 +307,10 @@ def draw(table: dict[str, Any], picture: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    from rotor.plots.picture import BLUE, GREEN, ORANGE
+
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained", sharey=True)
-    looks = {"rotor": ("tab:red", "o"), "OpenMM": ("tab:blue", "s"), "LAMMPS": ("tab:green", "^")}
+    looks = {"rotor": (ORANGE, "o"), "OpenMM": (BLUE, "s"), "LAMMPS": (GREEN, "^")}
     for name, rows in table.items():
         step = np.array([float(key) for key in rows])
         rms, cost = (np.array([row[key] for row in rows.values()]) for key in ("rms", "seconds_per_ps"))
@@ -323,7 +325,7 @@ def draw(table: dict[str, Any], picture: Path) -> None:
     left.set_ylabel("Error of the total energy per degree, rms (kT)")
     right.set_xlabel("Processor time per ps on one core (s)")
     left.set_title("216 SPC/E, reaction field, constant energy")
-    right.set_title("what accuracy costs")
+    right.set_title("What accuracy costs")
     for axes, ticks in ((left, [0.25, 0.5, 1, 2, 3, 4, 6]), (right, [0.1, 0.2, 0.5, 1, 2, 4])):
         axes.set_xticks(ticks, map(str, ticks))
         axes.minorticks_off()

@@ -203,12 +203,12 @@ def picture(computed: dict[str, dict[str, tuple[float, float]]], path: Path) -> 
         errors = [
             max(points[method][1], 1e-9) for method in METHODS
         ]  # the exact one counts as far as digits of energies go
-        axes.loglog(seconds, errors, "o-", label=name)
+        axes.loglog(seconds, errors, "o", label=name)
         for method, x, y in zip(METHODS, seconds, errors, strict=True):
             above = 5 if method == "first-order" else -11
             axes.annotate(method, (x, y), xytext=(4, above), textcoords="offset points", fontsize=8)
     axes.set_xlabel("Processor time for all levels (s)")
-    axes.set_ylabel("Largest error of a level (MHz)")
+    axes.set_ylabel("Largest error of a level (MHz); 10⁻⁹ for none")
     axes.margins(x=0.25, y=0.15)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False)

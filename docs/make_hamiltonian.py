@@ -35,16 +35,19 @@ def main() -> None:
     terms = ["A", "B", "C", "A[1]", "G_c[0,1]"]
     matrices = [_matrix(block, factors[:, shown.index(name)]) for name in terms]
     whole = _matrix(block, factors @ np.array([values[name] for name in shown]))
-    figure, axes = plt.subplots(1, len(terms) + 1, figsize=(12, 2.6), constrained_layout=True)
+    figure, axes = plt.subplots(2, 3, figsize=(6.6, 4.6), constrained_layout=True)
     labels = [f"$O$ of {name}" for name in terms] + ["$H = \\sum_i c_i O_i$"]
-    for axis, matrix, label in zip(axes, [*matrices, whole - whole[0, 0] * np.eye(len(whole))], labels, strict=True):
+    for axis, matrix, label in zip(
+        axes.flat, [*matrices, whole - whole[0, 0] * np.eye(len(whole))], labels, strict=True
+    ):
         largest = np.abs(matrix).max()
         axis.imshow(matrix, cmap="RdBu_r", vmin=-largest, vmax=largest)
         axis.set_title(label, fontsize=10)
         axis.set_xticks([])
         axis.set_yticks([])
-    axes[0].set_ylabel(f"functions of J = {J}: v = 0, v = 1", fontsize=8)
-    figure.savefig(Path(__file__).with_name("pictures") / "hamiltonian.png", dpi=110)
+    for axis in axes[:, 0]:
+        axis.set_ylabel(f"Functions of J = {J}: v = 0, v = 1", fontsize=9)
+    figure.savefig(Path(__file__).with_name("pictures") / "hamiltonian.png", dpi=160)
 
 
 def _matrix(block: LinearBlock, elements: np.ndarray) -> np.ndarray:

@@ -76,9 +76,12 @@ def without_checks(notebook: Any) -> Any:
 
 
 def _is_bare_object(output: Any) -> bool:
-    """Whether an output is the name of an object of matplotlib, which the last call of a cell returns beside its picture."""
+    """Whether an output is what the last call of a cell on matplotlib returns beside its picture: objects, or limits and titles set."""
     text = output.get("data", {}).get("text/plain", "")
-    return len(output.get("data", {})) == 1 and re.match(r"\[?(<matplotlib\.|Text\()", text) is not None
+    return (
+        len(output.get("data", {})) == 1
+        and re.match(r"\[?(<matplotlib\.|Text\()|\[\(.*\bText\(", text, re.DOTALL) is not None
+    )
 
 
 def _story(source: str) -> str:

@@ -46,7 +46,7 @@ for k in range(J + 1):
     axis.text(1.03, right, f"$K_c={k}$", va="center", fontsize=9)
 axis.set(xlabel="Ray's asymmetry parameter κ", xlim=(-1, 1), yticks=[])
 axis.set_title(
-    "Levels of J = 4 between the prolate and the oblate top\n(A = 10, C = 4; Ka even blue, odd red)", fontsize=10
+    "Levels of J = 4 between the prolate and the oblate top\n(A = 10, C = 4; Ka even blue, odd orange)", fontsize=10
 )
 axis.spines[["top"]].set_visible(False)
 
@@ -80,7 +80,7 @@ for place, values in enumerate(off.values()):
     axes.plot(np.full(len(values), place) + np.linspace(-0.3, 0.3, len(values)), 1e6 * values, ".", ms=4)
 axes.axhspan(-0.5, 0.5, color="gray", alpha=0.2, lw=0)
 axes.set_xticks(range(len(off)), [case.replace("_", "\n", 1) for case in off], fontsize=8)
-axes.set(ylabel="Calculated - SPCAT (1e-6 cm⁻¹)", title="Energies; gray: what rounding to six decimals allows")
+axes.set(ylabel="Calculated - SPCAT (10⁻⁶ cm⁻¹)", title="Energies; grey: what rounding to six decimals allows")
 
 # %%
 assert all(np.abs(values).max() < 5.1e-7 for values in off.values())  # half of the last printed digit, and 1 % for ties
@@ -120,7 +120,7 @@ for i, values in enumerate(off.values()):
     axis.semilogy(i + np.linspace(-0.25, 0.25, len(values)), values, ".", ms=4, color="#0072B2")
     axis.semilogy([i - 0.3, i + 0.3], [np.median(values)] * 2, color="#D55E00", lw=2)
 axis.set_xticks(range(len(off)), list(off))
-axis.set(ylabel="|calculated - measured| (MHz)", title="110 measured lines of water, order by order (orange: median)")
+axis.set(ylabel="|Calculated - measured| (MHz)", title="110 measured lines of water, order by order (orange: median)")
 
 # %%
 medians = [float(np.median(values)) for values in off.values()]

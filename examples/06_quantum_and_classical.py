@@ -111,7 +111,8 @@ with ThreadPoolExecutor(2) as pool:
                 f"{name:6s} {kelvin:4d} K, {correction:9s}: area {beside.area:.4f}, mean frequency {beside.mean:.4f}, largest "
                 f"difference {100 * beside.largest:4.1f} % of the peak, at {beside.at_mhz / MHZ_PER_CM:.1f} cm⁻¹"
             )
-        pairs.append((f"{name}, {kelvin} K, smoothed to {width} cm⁻¹", bands, quantum))
+        named = {"Schofield" if each == "schofield" else each: band for each, band in bands.items()}
+        pairs.append((f"{name}, {kelvin} K, smoothed to {width} cm⁻¹", named, quantum))
 
 band_figure(pairs)
 

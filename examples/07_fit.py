@@ -70,7 +70,7 @@ top = rotor.Top.from_constants(fit.constants, dipole_abc_debye=(0.715, 0, 0), co
 predicted = rotor.api.line_list(top, jmax=140, min_lgint=None)
 upper = predicted.levels.quanta["j"][predicted.upper]
 for j in (1, 30, 90, 140):
-    print(f"J = {j}: {predicted.frequency_mhz[upper == j][0]:.4f} ± {predicted.error_mhz[upper == j][0]:.4f} MHz")
+    print(f"J = {j}: {predicted.frequency_mhz[upper == j][0]:.4f} ± {predicted.error_mhz[upper == j][0]:.1g} MHz")
 assert predicted.error_mhz[upper == 1][0] < 2e-5
 assert predicted.error_mhz[upper == 140][0] > 3 * predicted.error_mhz[upper == 90][0]
 
@@ -137,7 +137,7 @@ for free, expected in ((["A", "B", "C"], 138.0), (["A", "B", "C", "DeltaJ", "Del
 upper, lower = np.array([[1, 1, 0], [2, 1, 1], [12, 3, 9]]), np.array([[1, 0, 1], [2, 0, 2], [11, 3, 8]])
 for one in suggest_lines(chain_fit, "A", upper, lower, error_mhz=0.005):
     print(
-        f"{one.upper} - {one.lower}: {one.frequency_mhz:.1f} ± {one.error_mhz:.1f} MHz, error of A × {one.error_ratio:.2g}"
+        f"{one.upper} - {one.lower}: {one.frequency_mhz:.1f} ± {one.error_mhz:.2g} MHz, error of A × {one.error_ratio:.2g}"
     )
 best = suggest_lines(chain_fit, "A", upper, lower, error_mhz=0.005)[0]
 assert best.error_ratio < 1e-3  # a b-type line has A itself

@@ -57,7 +57,7 @@ for method, found in fits.items():
 assert fits["rm1"].values[0].value < values["CO"].value  # r_m is nearer to equilibrium, 1.156 Å, than r_s
 
 # %%
-structure_figure(fits["rm1"].molecule, values=fits["rm1"].values, title="OCS, r_m(1)")
+structure_figure(fits["rm1"].molecule, values=fits["rm1"].values, title="OCS, $r_m^{(1)}$")
 
 # %% [markdown]
 # ## Symmetry
@@ -83,7 +83,7 @@ assert symmetric_displacements(start).shape == (12, 3)
 assert len(coordinates[1].alike) == 2  # both C-H bonds are one coordinate
 
 # %%
-structure_figure(found.molecule, values=found.values, title="H2CO")
+structure_figure(found.molecule, values=found.values, title="H₂CO")
 
 # %% [markdown]
 # ## What cannot be seen

@@ -71,7 +71,7 @@ assert abs(low + dipole**2 / (6 * b)) < 1e-4
 
 # %%
 indole = rotor.read("indole")
-states = stark_map(indole, np.linspace(0, 100, 51), j_highest=1, tolerance_mhz=1e-3)
+states = stark_map(indole, 100 * np.linspace(0, 1, 81) ** 2, j_highest=1, tolerance_mhz=1e-3)
 print(f"indole: {len(states.curves())} states, J max {states.jmax}, edge population {states.edge_population.max():.1e}")
 stark_figure(states, title="Indole in a static field")
 
@@ -154,7 +154,7 @@ figure, axes = plt.subplots(figsize=(5, 2.7), layout="constrained")
 axes.plot(angles, held, "s-", ms=4, label="⟨cos²θ⟩ with the laser")
 axes.plot(angles, along, "o-", ms=4, label="⟨cosθ⟩ with the field")
 axes.plot(angles, along[0] * np.cos(np.radians(angles)), "k:", lw=0.8, label="the projection of an axis along Z")
-axes.set(xlabel="Angle between field and laser (°)", title="OCS, ground state, 5 kV/cm and 0.2 TW/cm²")
+axes.set(xlabel="Angle between field and laser (degrees)", title="OCS, ground state, 5 kV/cm and 0.2 TW/cm²")
 axes.legend(fontsize=8)
 print("<cosθ>:", np.round(along, 3), "<cos²θ>:", np.round(held, 3))
 
@@ -175,7 +175,7 @@ for omega in omegas:
     found = stark_map(rod, [0.0], j_highest=0, intensity_w_per_cm2=intensity)
     exact = obl_cv(0, 0, np.sqrt(omega))
     print(
-        f"Δω = {omega:5.0f}: E/B = {found.energy_mhz[0] / 6000:.8f}, spheroidal {exact:.8f}, <cos²θ> {found.cosines['cos2theta'][0]:.6f}"
+        f"Δω = {omega:5g}: E/B = {found.energy_mhz[0] / 6000:.8f}, spheroidal {exact:.8f}, <cos²θ> {found.cosines['cos2theta'][0]:.6f}"
     )
     assert abs(found.energy_mhz[0] / 6000 - exact) < 1e-9
     energies.append(found.energy_mhz[0] / 6000)

@@ -110,7 +110,7 @@ iodobenzene = Top.from_constants("A=5669.126 B=750.414293 C=662.636162 MHz").wit
 trace = align(
     iodobenzene, GaussianPulse(1e12, 0.3), np.linspace(1.05, 400, 2001), observables=("cos2_aZ", "cos2_bX", "cos2_cY")
 )
-print(f"iodobenzene from 0_00: highest <cos²> of the a axis {trace.cosines['cos2_aZ'].max():.5f}")
+print(f"iodobenzene from 0₀₀: highest <cos²> of the a axis {trace.cosines['cos2_aZ'].max():.5f}")
 assert abs(trace.cosines["cos2_aZ"].max() - 0.709876) < 2e-4  # at 339.05 ps on a finer grid
 
 times_3d, axes_3d = np.linspace(1.05, 801, 2001), ("cos2_aZ", "cos2_bX", "cos2_cY")
@@ -121,7 +121,7 @@ figure, axes = plt.subplots(figsize=(8, 3.2), layout="constrained")
 for name, label in zip(axes_3d, ("a with Z", "b with X", "c with Y"), strict=True):
     axes.plot(times_3d, held.cosines[name], lw=0.7, label=label)
 axes.axhline(1 / 3, color="black", lw=0.5, ls=":")
-axes.set(xlabel="Time (ps)", ylabel="⟨cos²⟩", title="Iodobenzene from 0_00, 0.3 ps, 1 TW/cm², I_X : I_Z = 1 : 3")
+axes.set(xlabel="Time (ps)", ylabel="⟨cos²⟩", title="Iodobenzene from $0_{00}$, 0.3 ps, 1 TW/cm², $I_X : I_Z$ = 1 : 3")
 axes.legend(ncols=3)
 highest = [float(held.cosines[name].max()) for name in axes_3d]
 print("elliptical light: highest <cos²> of a with Z, b with X, c with Y:", np.round(highest, 4))

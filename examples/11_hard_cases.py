@@ -52,7 +52,9 @@ round_off = float(np.spacing(A * J**2))
 
 figure, axes = plt.subplots(figsize=(8, 4.5), layout="constrained")
 for k, found in splitting.items():
-    axes.loglog(deltas[:-1], np.maximum(np.abs(found[:-1]), 1e-11), "o-", ms=3, label=f"splitting of Ka = {k}")
+    axes.loglog(
+        deltas[:-1], np.where(found[:-1] != 0, np.abs(found[:-1]), np.nan), "o-", ms=3, label=f"splitting of Ka = {k}"
+    )
 axes.loglog(deltas[:-1], B * deltas[:-1] * J * (J + 1) / 2, "k--", lw=1, label="(B - C) J (J + 1) / 2")
 axes.axhline(round_off, color="gray", lw=1, ls=":", label="one unit in the last place of the highest level")
 axes.invert_xaxis()
@@ -143,16 +145,24 @@ print(
 # %%
 bottom = levels.energy_mhz - (500 - 0.05) * J * (J + 1)
 figure, axes = plt.subplots(figsize=(8, 3.5), layout="constrained")
-for parity, color in ((0, "C0"), (1, "C1")):
+for parity, color, name in ((0, "C0", "even"), (1, "C1", "odd")):
     chosen = (levels.quanta["ka"] + levels.quanta["kc"] - J) % 2 == parity
-    axes.plot(levels.quanta["ka"][chosen], bottom[chosen] / 1e3, ".", ms=3 + 2 * (1 - parity), color=color)
+    axes.plot(
+        levels.quanta["ka"][chosen],
+        bottom[chosen] / 1e3,
+        ".",
+        ms=3 + 2 * (1 - parity),
+        color=color,
+        label=f"Ka + Kc {name}",
+    )
 axes.set(
-    xlim=(-1, 30),
-    ylim=(-60, 450),
+    xlim=(-1, 30.5),
+    ylim=(-60, 470),
     xlabel="Ka",
     ylabel="E - (B + C) J(J + 1)/2 (GHz)",
     title="J = 1000: the lowest levels",
 )
+axes.legend()
 
 # %%
 energies = [block.energies_mhz for block in levels.blocks]
@@ -196,7 +206,7 @@ right.loglog(distances, np.maximum(drift, 1e-18), "s-", ms=3, label="exact: ener
 right.loglog(distances[: len(stepped)], stepped, "^-", ms=3, label="stepped: return after a period")
 for axes in (left, right):
     axes.invert_xaxis()
-right.set(xlabel="Distance from the axis (rad)", ylabel="Error", title="Errors")
+right.set(xlabel="Distance from the axis (rad)", ylabel="Error", title="Errors; 10⁻¹⁸ stands for 0")
 right.legend(fontsize=8)
 
 # %%

@@ -76,7 +76,7 @@ for color, (name, counts) in zip(
     assert (np.diff(lost) < 0).all()
     assert lost[-1] < 1e-9
 left.set_ylim(1e-16, 2)
-left.legend(loc="lower left")
+left.legend(loc="center left")
 
 # %% [markdown]
 # Choose J max by the population that you may lose; `rotor.api.line_list` does so from the cut of the intensities, and
@@ -107,7 +107,7 @@ for color, name in zip(("C0", "C1", "C2"), ("OCS", "SO2", "CH3CN"), strict=True)
 left.plot(asked, asked, "k:", lw=1)
 left.set_xscale("log")
 left.invert_xaxis()
-left.legend(loc="lower left")
+left.legend(loc="center left", bbox_to_anchor=(0.0, 0.3))
 
 # %% [markdown]
 # Eight more digits cost less than a factor of three: there is no reason to ask for less than the default of 1e-6.

@@ -228,7 +228,7 @@ axes.legend(fontsize=8)
 assert all(largest <= stated for _, _, largest, stated, _ in found)
 assert all(stated < 10 * largest for _, _, largest, stated, _ in found)  # and it is no empty bound
 chosen = {name: used_method(components(top, 5, "auto")[0].levels) for name, top in tops.items()}
-print({name: used.method for name, used in chosen.items()})
+print(", ".join(f"{name}: {used.method}" for name, used in chosen.items()))
 assert chosen["HCN"].method == "first-order"
 assert chosen["made up, ⁷⁹Br"].method == "exact"
 
@@ -366,7 +366,7 @@ print(f"{len(ratios)} lines; strength of all components / line - 3: at most {np.
 print(
     f"centres move by at most {1e3 * np.abs(moved).max():.1e} kHz; intensities by {np.abs(brightness - 1).max():.1e} of themselves"
 )
-print({temperature: round(with_spin / without, 10) for temperature, (without, with_spin) in q.items()})
+print("; ".join(f"Q with / without at {kelvin} K: {each / plain:.10g}" for kelvin, (plain, each) in q.items()))
 
 # %%
 assert len(ratios) > 90

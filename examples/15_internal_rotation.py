@@ -39,7 +39,7 @@ samples = Path("../tests/oracles")  # measured lines, in this repository
 
 # %%
 scan = rotor.torsion("SMILES:CC=O", bond="1-2")
-print(f"barrier of the scan {scan.facts()['barrier_cm']:.0f} cm-1")
+print(f"barrier of the scan {scan.facts()['barrier_cm']:.0f} cm⁻¹")
 torsion_figure(scan)
 
 # %% [markdown]
@@ -98,7 +98,7 @@ for free in (rigid, [*rigid, "DeltaJ", "DeltaJK", "DeltaK", "deltaJ"]):
     start = start.replace(**{name: 0.0 for name in free if name not in start})
     fits.append(fit_lines(lines, start, parameters(start, free), FitOptions(poor_rms=1e4)))
     start = fits[-1].constants
-    print(f"{len(free)} constants: rms {fits[-1].rms_mhz():.3f} MHz, V3 = {start['V3'] / CM:.2f} cm-1")
+    print(f"{len(free)} constants: rms {fits[-1].rms_mhz():.3f} MHz, V3 = {start['V3'] / CM:.2f} cm⁻¹")
 assert all(fit.converged for fit in fits)
 assert fits[-1].rms_mhz() < 0.25
 assert abs(start["V3"] / CM - 407.6) < 8  # of a fit with V6 and forty more terms: 407.598, with V6 = -11.64

@@ -52,7 +52,7 @@ display(widget)
 # %%
 widget.do("search", seconds=15)
 species = widget.session.state.species[1]
-print({name: round(value, 3) for name, value in species.constants.items() if name in "ABC"})
+print(", ".join(f"{name} = {species.constants[name]:.3f} MHz" for name in "ABC"))
 print(len(widget.session.state.lines), "lines assigned")
 assert all(abs(species.constants[name] - truth[name]) < 0.05 for name in "ABC")
 assert len(widget.session.state.lines) > 20

@@ -41,7 +41,7 @@ figure.tight_layout()
 for name, answer in answers.items():
     facts = answer.facts()
     print(
-        f"{name}: barrier {facts['barrier_cm']:.0f} cm-1, reduced moment {facts['reduced_moment_u_angstrom2']:.2f} u Å²"
+        f"{name}: barrier {facts['barrier_cm']:.0f} cm⁻¹, reduced moment {facts['reduced_moment_u_angstrom2']:.2f} u Å²"
     )
 assert 6000 < answers["peptide bond"].facts()["barrier_cm"] < 8500  # 20 kcal/mol: 7000 cm-1
 
@@ -77,7 +77,7 @@ for rate, text in ((1e9, "fluorescence, 1 ns"), (1.0, "1 s")):
 axis.set(xlabel="Temperature (K)", ylabel="Passages per second", ylim=(1e-10, 1e14))
 axis.legend(loc="lower right")
 at_room = {name: crossings_per_s(answer, 298.0) for name, answer in answers.items()}
-print({name: f"{rate:.1e} per second" for name, rate in at_room.items()})
+print(", ".join(f"{name}: {rate:.1e} per second" for name, rate in at_room.items()))
 assert at_room["ethane"] > 1e9  # turns while one looks
 assert at_room["peptide bond"] < 10  # locked
 

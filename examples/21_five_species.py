@@ -48,7 +48,7 @@ published = {  # tag: column density (1/cm²), vibrational correction, temperatu
 }
 species = {tag: read_cat_species(folder / f"{tag}.cat") for tag in published}
 print(spectrum)
-print({lines.name: len(lines) for lines in species.values()})
+print("; ".join(f"{lines.name}: {len(lines)} lines" for lines in species.values()))
 assert len(spectrum) == 5076
 
 # %% [markdown]

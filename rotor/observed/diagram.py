@@ -232,11 +232,13 @@ def plot_rotational_diagram(diagram: RotationalDiagram, axes: Any) -> None:
     centre = float(np.average(diagram.energy_upper_k, weights=diagram.error**-2))
     middle = float(np.average(diagram.log_population, weights=diagram.error**-2))
     x = np.array([0.0, float(diagram.energy_upper_k.max()) * 1.05])
+    error = diagram.excitation_error_k
+    places = math.ceil(-math.log10(error)) if 0.0 < error < 0.1 else 1
     axes.plot(
         x,
         middle + slope * (x - centre),
         linewidth=0.8,
-        label=f"{diagram.excitation_k:.1f} ± {diagram.excitation_error_k:.1f} K",
+        label=f"{diagram.excitation_k:.{places}f} ± {error:.{places}f} K",
     )
     axes.set_xlabel("Energy of the upper level $E_u/k$ (K)")
     axes.set_ylabel(r"Population ln($N_u/g_u$ cm²)")

@@ -81,6 +81,8 @@ def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules
         _draw_temperatures(temperature_axes, record)
         potential = record.potential_ev * KJ_PER_MOL_EV / molecules
         energy_axes.plot(record.time_ps, potential, color=BLUE, linewidth=0.8)
+        if shells is None:
+            temperature_axes.xaxis.label.set_visible(False)  # the panels share the axis below
         energy_axes.set(xlabel=TIME, ylabel="Potential energy (kJ/mol)")
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
     return figure

@@ -9,7 +9,18 @@ from typing import Any
 import numpy as np
 
 from rotor.classical.gas.ensembles import Correlations
-from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, SIZE_INCHES, checked_suffix, new_figure, save, styled
+from rotor.plots.picture import (
+    BLUE,
+    GREEN,
+    GREY,
+    ORANGE,
+    SIZE_INCHES,
+    checked_suffix,
+    name_text,
+    new_figure,
+    save,
+    styled,
+)
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.spectra.spectrum import Spectrum
 from rotor.statistics.equipartition import Equipartition
@@ -20,7 +31,7 @@ def equipartition_figure(tests: Mapping[str, Equipartition], columns: int = 3) -
     """A matplotlib figure of the mean of 2E/kT by degree for each gas, with bands of 1 and 3 expected standard deviations."""
     figure, axes = _panels(len(tests), columns, 2.6)
     for panel, (name, test) in zip(axes, tests.items(), strict=False):
-        _draw_test(panel, test, name)
+        _draw_test(panel, test, name_text(name))
     return figure
 
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, new_figure, save, styled
+from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, name_text, new_figure, save, styled
 
 PANEL_INCHES = (3.6, 2.8)
 LEAST_DRAWN = 1e-17  # an error of 0 is drawn as an open point below all others
@@ -117,7 +118,7 @@ def _draw(axes: Any, panel: Panel) -> list[Places]:
     _scale(axes)
     if any(point.error == 0.0 for point in points):
         axes.text(0.99, 0.01, "open points: error 0", transform=axes.transAxes, ha="right", fontsize=6.5, color=GREY)
-    axes.set_title(panel.title, loc="left")
+    axes.set_title(panel.title[:1].upper() + panel.title[1:], loc="left")
     axes.grid(alpha=0.25)
     if not few:
         _legend_above(axes, len(panel.curves))
@@ -171,7 +172,7 @@ def _curve(axes: Any, curve: Sequence[Point], floor: float, look: tuple[str, str
         )
         if point.own:
             axes.plot(point.seconds, error, "o", color=ORANGE, markersize=10, fillstyle="none")
-    axes.plot([], [], marker, color=colour, markersize=4.5, label=name)
+    axes.plot([], [], marker, color=colour, markersize=4.5, label=name_text(name))
     return errors
 
 
@@ -185,11 +186,29 @@ def _name_settings(axes: Any, curves: Sequence[Places]) -> None:
         if not point.setting:
             continue
         text = axes.annotate(
-            point.setting, (point.seconds, error), xytext=(0, 0), textcoords="offset points", fontsize=6.5, color=GREY
+            setting_text(point.setting),
+            (point.seconds, error),
+            xytext=(0, 0),
+            textcoords="offset points",
+            fontsize=6.5,
+            color=GREY,
         )
         text.set_in_layout(False)
         if not any(_fits_at(text, axes, offset, boxes, marks) for offset in PLACES):
             text.remove()
+
+
+def setting_text(setting: str) -> str:
+    """A setting for matplotlib, powers written as such.
+
+    >>> setting_text("1e-06"), setting_text("J^10"), setting_text("0.001"), setting_text("N-diagonal")
+    ('$10^{-6}$', '$J^{10}$', '0.001', 'N-diagonal')
+    """
+    if power := re.fullmatch(r"1e([+-]?\d+)", setting):
+        return f"$10^{{{int(power[1])}}}$"
+    if power := re.fullmatch(r"([A-Z])\^(\d+)", setting):
+        return f"${power[1]}^{{{power[2]}}}$"
+    return setting.replace("$", r"\$")
 
 
 def _fits_at(text: Any, axes: Any, place: tuple[float, float, str], boxes: list[Any], marks: Any) -> bool:
