@@ -56,7 +56,7 @@ class StructureRequest:
     check: bool = declared(
         False,
         Flag(),
-        "Fit again without each isotopologue: is one unlike the others?",
+        "Fit again without each isotopologue, to see which one differs from the others",
         "observables.check",
         panel=OBSERVABLES,
         common=True,

@@ -272,9 +272,7 @@ def _refuse(spectrum: ObservedSpectrum, components: Sequence[Component], sight: 
     first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
     for component in components:
         if not len(component.species.between(first, last)):
-            raise ValueError(
-                f"{component.species.name}: no lines from {first:.10g} to {last:.10g} MHz in {component.species.source or 'its list'}"
-            )
+            raise ValueError(f"{component.species.name}: no lines from {first:.10g} to {last:.10g} MHz")
 
 
 def total_noise(
