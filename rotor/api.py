@@ -36,6 +36,7 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.assignment.peak_finding import peaks_of_spectrum as peaks_of_spectrum
     from rotor.assignment.request import AssignRequest as AssignRequest
     from rotor.assignment.request import answer_assign as answer_assign
+    from rotor.classical.effect import Torque as Torque
     from rotor.classical.effects.changing_inertia import ChangingInertia as ChangingInertia
     from rotor.classical.effects.drag import LinearDrag as LinearDrag
     from rotor.classical.effects.gravity import GravityAboutPivot as GravityAboutPivot

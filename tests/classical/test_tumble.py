@@ -281,7 +281,7 @@ def test_moments_of_no_real_body_are_noted(call):
 def test_code_in_the_documentation_runs():
     text = (PROJECT / "docs" / "classical.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    assert len(blocks) == 2
+    assert len(blocks) == 3
     exec(compile("\n".join(blocks), "docs/classical.md", "exec"), {})
 
 
