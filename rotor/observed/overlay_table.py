@@ -41,11 +41,13 @@ def modelled(spectrum: ObservedSpectrum, components: Sequence[Component], sight:
 
 def overlay_table(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> ColumnTable:
     """frequency_mhz, observed_k, noise_k, model_k, residual_k, optical_depth of every channel; without `_k` in absorbance."""
-    seen, unit = modelled(spectrum, components, sight), _suffix(spectrum)
+    unit = _suffix(spectrum)
     if spectrum.unit == ABSORBANCE:
+        seen = absorbance(components, spectrum.frequency_mhz)
         depth = seen * math.log(10)
     else:
-        depth = model(components, spectrum.frequency_mhz, sight).optical_depth
+        source = model(components, spectrum.frequency_mhz, sight)
+        seen, depth = source.brightness_k, source.optical_depth
     return ColumnTable(
         {
             "frequency_mhz": spectrum.frequency_mhz,

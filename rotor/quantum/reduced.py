@@ -21,7 +21,7 @@ AnyBlock = Any  # SolvedBlock, MomentBlock or SpinBlock
 def amplitudes(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> Floats:
     """Real reduced elements between all states of two blocks of one kind, (n_up, n_low)."""
     if isinstance(up, SolvedBlock):
-        return wang_amplitudes(up, low, tensors[0, 0]) if up.alone else _of_coupled(up, low, tensors)
+        return wang_amplitudes(up, low, tensors[0, 0]) if up.alone else _coupled_amplitudes(up, low, tensors)
     if isinstance(up, MomentBlock):
         return up.amplitudes(low, tensors)
     from rotor.quantum.spins import lines
@@ -29,7 +29,7 @@ def amplitudes(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> Floats:
     return lines.amplitudes(up, low, tensors)
 
 
-def _of_coupled(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> Floats:
+def _coupled_amplitudes(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> Floats:
     moved = np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
     for target in up.parts:
         for source in low.parts:
