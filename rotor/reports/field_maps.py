@@ -26,3 +26,10 @@ def table_of_states(states: FieldMap, names: tuple[str, ...], row_of: Callable[[
     rows = [row_of(rows_of) for rows_of in curves[:SHOWN]]
     title = f"{len(rows)} of {len(curves)} states" if len(rows) < len(curves) else "all states"
     return Table(f"{title}, by M and block", names, rows, frozenset({"state"}))
+
+
+def results_of_map(answer: Any) -> dict[str, Any]:
+    """The largest shift of a level between the first and the last field, for a sweep."""
+    states = answer.states
+    curves = [states.energy_mhz[rows] for rows in states.curves()]
+    return {"levels": len(curves), "largest_shift_mhz": max(abs(curve[-1] - curve[0]) for curve in curves)}

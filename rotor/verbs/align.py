@@ -201,6 +201,13 @@ def _pulse_text(pulse: Pulse) -> str:
     return f"{type(pulse).__name__} on the {pulse.acts_on}, {first:g} to {last:g} ps"
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """Largest and smallest cosines, for a sweep."""
+    cosines = {name: values for name, values in answer.table.columns.items() if name != "t_ps"}
+    highest = {f"max_{name}": values.max() for name, values in cosines.items()}
+    return highest | {f"min_{name}": values.min() for name, values in cosines.items()}
+
+
 VERB = Verb(
     name="align",
     about="Molecules aligned or oriented by pulses of light: cosines against time of a rotational wave packet.",
@@ -208,6 +215,7 @@ VERB = Verb(
     request=AlignRequest,
     answer=lambda request, work: answer_align(request, work.executor),
     table=lambda answer: answer.table,
+    results=results,
     rows="trace",
     show=show,
     outputs=(

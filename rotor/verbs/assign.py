@@ -174,6 +174,13 @@ def _facts(species: AssignedSpecies) -> list[tuple[str, str]]:
     return facts
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """Number of species and peaks, and the probability of the first species, for a sweep."""
+    facts = answer.facts()
+    numbers = {name: facts[name] for name in ("peaks", "unexplained")} | {"species": len(facts["species"])}
+    return numbers | ({"probability": facts["species"][0]["probability"]} if facts["species"] else {})
+
+
 VERB = Verb(
     name="assign",
     about="Rotational constants of unknown molecules from a spectrum, with the probability that they are right.",
@@ -181,6 +188,7 @@ VERB = Verb(
     request=AssignRequest,
     answer=lambda request, work: answer_assign(request),
     table=lambda answer: answer.table,
+    results=results,
     rows="assignments",
     numerics="rotor.assignment.numerics:ASSIGN",
     show=show,

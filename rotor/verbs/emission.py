@@ -310,6 +310,12 @@ def _table(answer: EmissionAnswer, shown: int) -> Table:
     return Table(f"{title}, in order of frequency; each alone", columns, cells, frozenset({"molecule"}))
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """Number of lines and the brightest of them, for a sweep."""
+    peak = answer.peak
+    return {"lines": len(answer.lines), "peak_k": peak.brightness_k, "peak_mhz": peak.observed_mhz}
+
+
 VERB = Verb(
     name="emission",
     about="Lines of a source as a radio telescope sees them: brightness temperature in local thermodynamic equilibrium.",
@@ -317,6 +323,7 @@ VERB = Verb(
     request=EmissionRequest,
     answer=lambda request, work: answer_emission(request),
     table=lambda answer: answer.lines,
+    results=results,
     rows="lines",
     show=show,
     outputs=(

@@ -348,6 +348,13 @@ def show(answer: FluidAnswer, report: Report) -> None:
     show_table(Table(title, columns, rows, frozenset({"quantity", "unit"})))
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """Means of the run and the drift of its conserved energy, for a sweep."""
+    facts = answer.facts()
+    means = {f"{mean['quantity']} ({mean['unit']})": mean["mean"] for mean in facts["means"]}
+    return means | {"conserved_drift_ev_per_ns": facts["conserved_drift_ev_per_ns"]}
+
+
 VERB = Verb(
     name="fluid",
     about="Rigid molecules in a periodic box: a run, its temperatures, energies and pressure.",
@@ -355,6 +362,7 @@ VERB = Verb(
     request=FluidRequest,
     answer=answer,
     table=lambda answer: answer.record,
+    results=results,
     rows="record",
     show=show,
     outputs=(

@@ -127,6 +127,7 @@ VERB = Verb(
     answer=answer,
     table=lambda answer: answer.test if answer.correlations is None else answer.correlations,
     records=lambda answer: answer.correlations,
+    results=lambda answer: {"p_value": answer.test.p_value, "chi2": answer.test.chi2},
     rows="correlation",
     show=show,
     outputs=(

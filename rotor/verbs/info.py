@@ -198,6 +198,13 @@ def _conformers_table(records: Sequence[Mapping[str, Any]], top: Top) -> Table |
     return Table("", columns, rows)
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """Rotational constants, mass and Ray's parameter, for a sweep."""
+    facts, columns = answer.facts(), answer.table.columns
+    constants = {name: columns[name][0] for name in ("a_mhz", "b_mhz", "c_mhz")}
+    return constants | {name: facts[name] for name in ("mass_u", "kappa")}
+
+
 VERB = Verb(
     name="info",
     about="Frame, constants, kind of top with its margin, moments, dipole, table of Q(T).",
@@ -205,6 +212,7 @@ VERB = Verb(
     request=InfoRequest,
     answer=answer,
     table=lambda answer: answer.table,
+    results=results,
     rows="partition_function",
     records=lambda answer: None,
     show=show,

@@ -91,6 +91,7 @@ VERB = Verb(
     request=IsotopologuesRequest,
     answer=lambda request, work: answer_isotopologues(request),
     table=lambda answer: answer.table,
+    results=lambda answer: {"isotopologues": len(answer.table)},
     rows="isotopologues",
     records=lambda answer: None,
     show=show,

@@ -123,6 +123,12 @@ def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
     return Table(f"{title}, in order of energy", head, cells)
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """Number of levels, the lowest and the highest energy, for a sweep."""
+    energy = answer.table.energy_cm
+    return {"levels": len(energy), "lowest_cm": energy.min(), "highest_cm": energy.max()}
+
+
 VERB = Verb(
     name="levels",
     about="Energy levels of a molecule: quantum numbers, energies, degeneracies, term diagram.",
@@ -130,6 +136,7 @@ VERB = Verb(
     request=LevelsRequest,
     answer=lambda request, work: answer_levels(request, work.executor),
     table=lambda answer: answer.table,
+    results=results,
     rows="levels",
     show=show,
     outputs=(

@@ -98,6 +98,18 @@ def _table(lines: RamanLines, rows: Any) -> Table:
     return Table(f"{title}, in order of shift (states: {names})", columns, list(zip(*cells, *labels, strict=True)))
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """The strongest line and Q, for a sweep."""
+    lines = answer.lines
+    strongest = lines.cross_section_cm2_per_sr.argmax()
+    return {
+        "lines": len(lines),
+        "strongest_cm": lines.shift_cm[strongest],
+        "strongest_cm2_per_sr": lines.cross_section_cm2_per_sr[strongest],
+        "q": lines.partition.q,
+    }
+
+
 VERB = Verb(
     name="raman",
     about="Rotational Raman lines: Stokes and anti-Stokes shifts and their cross sections.",
@@ -105,6 +117,7 @@ VERB = Verb(
     request=RamanRequest,
     answer=lambda request, work: answer_raman(request, work.executor),
     table=lambda answer: answer.lines,
+    results=results,
     rows="lines",
     show=show,
     outputs=(

@@ -283,6 +283,19 @@ def answer_of(request: SpectrumRequest, work: Work) -> SpectrumAnswer:
     )
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """The strongest line, Q and J max, for a sweep."""
+    lines = answer.lines
+    strongest = lines.intensity_nm2_mhz.argmax()
+    return {
+        "lines": len(lines),
+        "strongest_mhz": lines.frequency_mhz[strongest],
+        "strongest_lgint": lines.lgint[strongest],
+        "q": lines.partition.q,
+        "jmax": lines.jmax,
+    }
+
+
 VERB = Verb(
     name="spectrum",
     about="Rotational lines of a molecule: frequencies, intensities, and the data behind them.",
@@ -290,6 +303,7 @@ VERB = Verb(
     request=SpectrumRequest,
     answer=answer_of,
     table=lambda answer: answer.lines,
+    results=results,
     rows="lines",
     show=show,
     outputs=(

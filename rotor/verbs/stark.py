@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.fields.stark_request import StarkAnswer, StarkRequest, answer_stark
 from rotor.reports import top_facts
-from rotor.reports.field_maps import accuracy_fact, table_of_states
+from rotor.reports.field_maps import accuracy_fact, results_of_map, table_of_states
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.requests.field import declared_fields
@@ -170,6 +170,7 @@ VERB = Verb(
     request=StarkRequest,
     answer=lambda request, work: answer_stark(request, work.executor),
     table=lambda answer: answer.states,
+    results=results_of_map,
     rows="states",
     show=show,
     outputs=(

@@ -200,6 +200,12 @@ def _value_text(value: float, error: float) -> str:
     return value_text(value, error) if error > ROUND_OFF * abs(value) else f"{value:.6g} (by symmetry)"
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """Number of coordinates, and the residuals of the fit of r0 if there is one, for a sweep."""
+    fitted = answer.facts()["r0"]
+    return {"coordinates": len(answer.table)} | ({"rms_u_angstrom2": fitted["rms_u_angstrom2"]} if fitted else {})
+
+
 VERB = Verb(
     name="structure",
     about="Structures of a family: by substitution (rs), fitted to all moments (r0, rm1, rm2), at equilibrium (re).",
@@ -207,6 +213,7 @@ VERB = Verb(
     request=StructureRequest,
     answer=lambda request, work: answer_structure(request),
     table=lambda answer: answer.table,
+    results=results,
     rows="rs",
     records=lambda answer: None,
     show=show,

@@ -141,6 +141,12 @@ def _gas_table(functions: ThermoFunctions) -> Table:
     return Table(f"ideal gas at {gas.pressure_bar:g} bar, {gas.mass_u:.6f} u; {spin}", columns, cells)
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """Q, entropy and C_v at the last temperature, for a sweep."""
+    columns = answer.functions.columns
+    return {name: columns[name][-1] for name in ("temperature_k", "q_rot", "entropy_j_per_mol_k", "cv_over_r")}
+
+
 VERB = Verb(
     name="thermo",
     about="Rotational partition function, energy, entropy and heat capacity, quantum and classical.",
@@ -148,6 +154,7 @@ VERB = Verb(
     request=ThermoRequest,
     answer=answer,
     table=lambda answer: answer.functions,
+    results=results,
     rows="functions",
     show=show,
     notes=lambda answer: answer.notes,

@@ -157,6 +157,14 @@ def _thermo_table(answer: TorsionAnswer) -> Table:
     return Table(title, ("T (K)", "Q", "S (J/mol K)", *methods), rows)
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """The barrier, the zero-point energy, and C_v by the levels at the last temperature, for a sweep."""
+    facts = answer.facts()
+    exact = answer.functions.of_method("levels")
+    names = ("barrier_cm", "zero_point_cm", "reduced_moment_u_angstrom2")
+    return {name: facts[name] for name in names} | {"cv_over_r": exact.cv_over_r[-1]}
+
+
 VERB = Verb(
     name="torsion",
     about="Rotation about a bond: potential, levels, tunnelling, thermodynamics.",
@@ -164,6 +172,7 @@ VERB = Verb(
     request=TorsionRequest,
     answer=answer,
     table=lambda answer: answer.levels,
+    results=results,
     rows="levels",
     show=show,
     outputs=(

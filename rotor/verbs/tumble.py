@@ -271,6 +271,13 @@ def _component(value: float, column: Floats) -> str:
     return f"{value:.6g}" if 0 < largest < SMALL else f"{round(value, 6) + 0.0:.6f}"
 
 
+def results(answer: Any) -> dict[str, Any]:
+    """Energies and periods of the motion, for a sweep."""
+    facts = answer.facts()
+    names = ("energy", "period", "turning_rate", "energy_first", "energy_last", "energy_drift")
+    return {name: facts[name] for name in names if name in facts}
+
+
 VERB = Verb(
     name="tumble",
     about="Rotation of a molecule or a rigid body: exact free motion, conserved quantities, stable axes; motion under effects.",
@@ -278,6 +285,7 @@ VERB = Verb(
     request=MotionInput,
     answer=lambda request, work: answer(request),
     table=lambda answer: answer.table,
+    results=results,
     rows="motion",
     show=show,
     outputs=(

@@ -213,6 +213,7 @@ class Verb:
     build: makes the request if its fields alone do not. adapt: changes the request for the requested files.
     check: refuses a request that does not fit these files.
     answer: computes a request. table: of an answer; rows: its key in the JSON; records: rows of the JSON if not the table.
+    results: a few numbers of an answer with rows, by name with units, for the table of a sweep.
     content: further keys of the JSON. notes: remarks on an answer. failure: reason why an answer is not a result.
     outputs: files. withheld: reasons why some of them are not written. stated: keys of the JSON in the provenance of files.
     show: prints the report. stepwise: whether every step is shown from the start.
@@ -232,6 +233,7 @@ class Verb:
     table: Callable[[Any], Table]
     rows: str
     show: Callable[[Any, Report], None]
+    results: Callable[[Any], Mapping[str, Any]] = lambda answer: {}
     outputs: tuple[Output, ...]
     subject: SubjectKind
     shown: type = Shown

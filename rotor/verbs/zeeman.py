@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.fields.zeeman_request import ZeemanAnswer, ZeemanRequest, answer_zeeman
 from rotor.reports import top_facts
-from rotor.reports.field_maps import accuracy_fact, table_of_states
+from rotor.reports.field_maps import accuracy_fact, results_of_map, table_of_states
 from rotor.reports.screen import Table, show_facts, show_table
 from rotor.reports.sources import source_facts
 from rotor.requests.field import CONDITIONS, all_fields, declared
@@ -172,6 +172,7 @@ VERB = Verb(
     request=ZeemanRequest,
     answer=lambda request, work: answer_zeeman(request, work.executor),
     table=lambda answer: answer.states,
+    results=results_of_map,
     rows="states",
     show=show,
     outputs=(

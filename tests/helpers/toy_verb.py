@@ -99,6 +99,7 @@ VERB = Verb(
     answer=lambda request, work: answer_ring(request),
     table=lambda answer: answer.table,
     rows="levels",
+    results=lambda answer: {"highest_mhz": answer.table.energy_mhz.max()},
     show=lambda answer, report: show_facts([("levels", str(report.content["levels"]))]),
     outputs=(Output("csv", (".csv",), "Write the energies as CSV", example="ring.csv"),),
     subject=OneMolecule(),

@@ -65,6 +65,15 @@ def test_a_verb_is_two_files(ring, call, folder):
     assert [level["energy_mhz"] for level in content["levels"]] == [0.0, 505379.0]  # 4 B is above the cut of 1e6 MHz
 
 
+def test_a_sweep_of_a_new_verb_has_its_results(ring, call, folder):
+    (folder / "s.toml").write_text(
+        'schema = 1\nkind = "ring"\nmolecule = "CO"\nsweep = { "conditions.radius" = ["1 Å", "1.5 Å"] }\n'
+    )
+    assert call("run", "s.toml", "--json", "a.json")[0] == 0
+    points = json.loads((folder / "a.json").read_text())["points"]
+    assert [point["highest_mhz"] for point in points] == pytest.approx([505379.0, 505379.0 * 4 / 2.25])
+
+
 def test_a_verb_without_scenes_is_one_file(monkeypatch, call, folder):
     """Options, help, errors, files and JSON of a verb on files follow from its declaration too."""
     import rotor.cli

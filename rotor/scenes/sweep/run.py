@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -15,15 +16,15 @@ from typing import Any
 from rotor.checks import NoAnswerError
 from rotor.formats.atomic_write import FULL
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import Scene
+from rotor.scenes.scene import Scene, SceneResult
 from rotor.scenes.scene_file import scene_of, scene_text
 from rotor.scenes.sweep.combined import KEY_LENGTH, CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
-from rotor.scenes.sweep.point_results import point_results
 from rotor.scenes.sweep.points import check_first, points, text_of
 from rotor.scenes.sweep.record import Record, appended, read_records
 from rotor.scenes.sweep.result import SweepResult
 from rotor.temporary import locked_file
+from rotor.verbs.verb import verb_of
 
 AHEAD = 200  # points that are submitted before they are begun, so that workers never wait and memory stays bounded
 
@@ -188,7 +189,7 @@ def run_point(job: Job) -> Record:
         joined = CombinedFile.of(job.combined, job.out)
         if joined is not None:
             joined.write_part(job.key, job.values, result.table)
-        results = point_results(scene.kind, result.answer, len(result.table))
+        results = _results(result)
     except (ValueError, NoAnswerError) as error:
         return _failed(job, str(error), time.perf_counter() - start)
     except MemoryError:
@@ -205,6 +206,13 @@ def run_point(job: Job) -> Record:
         "files": files,
         "results": results,
     }
+
+
+def _results(result: SceneResult) -> dict[str, Any]:
+    """The results of the verb that are finite numbers; none of an answer without rows."""
+    numbers = verb_of(result.scene.kind).results(result.answer) if len(result.table) else {}
+    plain = {name: value.item() if hasattr(value, "item") else value for name, value in numbers.items()}
+    return {name: value for name, value in plain.items() if value is not None and math.isfinite(value)}
 
 
 def _failed(job: Job, reason: str, seconds: float) -> Record:
