@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.axial import AxialBlock
-from rotor.quantum.fields.direction_cosines import cosine_bands
+from rotor.quantum.fields.axial import AxialBlock, cosine_bands
 from rotor.quantum.fields.solved_space import SolvedFieldBlock
 from rotor.quantum.tensors import frame_of, phase_exponent
 

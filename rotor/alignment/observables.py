@@ -47,13 +47,13 @@ class Observable:
     isotropic: float
     axis: int = 0
 
-    def matrix(self, block: FieldBlock) -> NDArray[Any]:
+    def matrix(self, block: FieldBlock) -> Any:
         """The matrix (n, n) over the states of a block."""
         if self.contraction is not None:
             return block.matrix(self.contraction)
         if isinstance(block, AxialBlock):
             return absolute_cosine(block)
-        if isinstance(block, SolvedFieldBlock):
+        if isinstance(block, SolvedFieldBlock) and block.space.m_is_good:
             return asymmetric_elements(block, self.axis)
         raise ValueError(f"{self.name} is made for fields with the symmetry of Z; use cos2theta")
 

@@ -22,7 +22,7 @@ from rotor.alignment.observables import observable
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
 from rotor.alignment.timeline import Channel, Window, timeline
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.direction_cosines import cosine_bands
+from rotor.quantum.fields.axial import cosine_bands
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
 from rotor.quantum.symmetric_top_elements import coupling

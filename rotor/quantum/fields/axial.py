@@ -1,4 +1,13 @@
-"""Linear and symmetric tops in fields along Z: chains of J for each k and M, in closed form."""
+"""Linear and symmetric tops in fields along Z: chains of J for each k and M, in closed form.
+
+With θ between the figure axis and Z, over symmetric-top functions |J k M⟩,
+
+    ⟨J-1 k M|cosθ|J k M⟩ = √[(J²-k²)(J²-M²)] / (J √(4J²-1)),     ⟨J k M|cosθ|J k M⟩ = kM / (J(J+1))
+
+(C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, table 4.4; Condon-Shortley phases in space, ⟨J k±1|Jx ∓ iJy|J k⟩
+positive in the molecule). k = 0 gives the functions of a linear molecule. cos²θ is the square of a matrix of cosθ with one more J, which
+makes it exact for the requested J.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +19,37 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.fields.direction_cosines import cosine_bands, cosine_squared_bands
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Magnet, along
+from rotor.quantum.in_field import space_factor
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.symmetric_top_elements import coupling
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
+
+
+def cosine_bands(j: Ints, k: int, m: int) -> tuple[Floats, Floats]:
+    """Diagonal (n,) and the band beside it (n-1,) of cosθ over successive J ≥ max(|k|, |M|).
+
+    >>> cosine_bands(np.arange(3), 0, 0)[1].round(6).tolist()  # 1/√3, 2/√15
+    [0.57735, 0.516398]
+    """
+    j = j.astype(np.float64)
+    diagonal = k * m / np.where(j > 0, j * (j + 1), 1.0)
+    up = j[1:]
+    return diagonal, np.sqrt((up**2 - k * k) * (up**2 - m * m) / (4 * up**2 - 1)) / up
+
+
+def cosine_squared_bands(j: Ints, k: int, m: int) -> tuple[Floats, Floats, Floats]:
+    """The diagonals of cos²θ with ΔJ = 0 (n,), 1 (n-1,) and 2 (n-2,) over successive J ≥ max(|k|, |M|).
+
+    >>> cosine_squared_bands(np.arange(2), 0, 0)[0].round(6).tolist()  # 1/3, 3/5
+    [0.333333, 0.6]
+    """
+    longer = np.append(j, j[-1] + 1)
+    d, b = cosine_bands(longer, k, m)
+    below = np.concatenate([[0.0], b[:-1]])  # J - 1 to J; zero for the first J
+    return d[:-1] ** 2 + below**2 + b**2, (b * (d[:-1] + d[1:]))[:-1], (b[:-1] * b[1:])[:-1]
 
 
 @dataclass(frozen=True)
@@ -56,7 +90,7 @@ class AxialBlock(FieldBlock):
         main = contraction.scalar + size * (d[:: self.step] - 1 / 3)
         return [main, size * second_j[::2]] if self.step == 2 else [main, size * next_j, size * second_j]
 
-    def matrix(self, operator: FieldOperator) -> Floats:
+    def dense(self, operator: FieldOperator) -> Floats:
         """The operator over the states (n, n), real; a vector has no elements where even and odd J are separate."""
         if isinstance(operator, Magnet):
             return self._moment(operator.g)
@@ -67,6 +101,19 @@ class AxialBlock(FieldBlock):
         for n, band in enumerate(self.bands(operator)):
             out[n : size * (size - n) : size + 1] = out[n * size :: size + 1] = band
         return out.reshape(size, size)
+
+    def between(self, operator: FieldOperator, low: FieldBlock) -> Floats:
+        """Elements of T_q of a vector along the axis; the block of k stands for that of -k at M = 0."""
+        out = np.zeros((len(self), len(low)))
+        place = {int(j): row for row, j in enumerate(self.j)}
+        size = along(operator.body, self.axis) if isinstance(operator, Contraction) else 0.0
+        for column, j in enumerate(low.j.tolist()):
+            for above in (j - 1, j, j + 1):
+                if above in place:
+                    in_body = float(coupling(j, above, 1, 0, self.k))
+                    in_space = space_factor(2 * above, 2 * j, 1, round(2 * low.m), round(self.m - low.m))
+                    out[place[above], column] = size * in_body * in_space
+        return out
 
     def _moment(self, g: Floats) -> Floats:
         """The magnetic moment g⊥ M + (g∥ - g⊥) k cosθ."""

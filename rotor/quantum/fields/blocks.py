@@ -109,13 +109,16 @@ class FieldBlock(ABC):
         return len(self.rows)
 
     @abstractmethod
-    def matrix(self, operator: FieldOperator) -> NDArray[Any]:
-        """The operator over the states (n, n), Hermitian; large matrices of mixed M are sparse."""
+    def between(self, operator: FieldOperator, low: FieldBlock) -> NDArray[Any]:
+        """Elements of T_q of an operator from the states of another block (n, n_low), q = M' - M."""
 
+    @abstractmethod
     def dense(self, operator: FieldOperator) -> NDArray[Any]:
-        """The operator over the states as a dense matrix (n, n)."""
-        matrix: Any = self.matrix(operator)
-        return np.asarray(matrix if isinstance(matrix, np.ndarray) else matrix.toarray())
+        """The operator over the states (n, n), Hermitian."""
+
+    def matrix(self, operator: FieldOperator) -> Any:
+        """The operator over the states (n, n); a sparse one where most elements of many states are 0."""
+        return self.dense(operator)
 
 
 class FieldSpace(ABC):

@@ -64,6 +64,11 @@ class Contraction:
         """Identifies the molecule-fixed part, whose elements are cached."""
         return (self.body.tobytes(), *sorted(self.states.items()))
 
+    @cached_property
+    def key_in_space(self) -> Key:
+        """Identifies both parts."""
+        return (*self.key, self.space.tobytes())
+
     def tensors(self, states: tuple[int, ...], representation: str) -> Tensors:
         """T^K by pairs of states (v', v)."""
         bodies = dict(self.states) if self.states else {(v, v): self.body for v in states}
@@ -99,6 +104,7 @@ class Magnet:
 
     rank = 1
     time_odd = True
+    along_z = True
     size = 1.0
     scalar = 0.0
 
@@ -106,6 +112,15 @@ class Magnet:
     def key(self) -> Key:
         """Identifies the moment, whose elements are cached."""
         return ("magnet", self.g.tobytes(), *self.nuclei.items())
+
+    @property
+    def key_in_space(self) -> Key:
+        """The moment is taken along Z."""
+        return self.key
+
+    def axial_about(self, axis: int) -> bool:
+        """Whether the g tensor is symmetric about a (0), b (1) or c (2)."""
+        return _axial(self.g, axis)
 
 
 FieldOperator = Contraction | Magnet

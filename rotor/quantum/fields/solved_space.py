@@ -11,33 +11,39 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Ints
+from rotor.arrays import Floats, Ints
 from rotor.quantum.connected import coloured_components, connected_parts
 from rotor.quantum.fields.blocks import BEFORE_J, FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
+from rotor.quantum.fields.operators import FieldOperator, Key, Magnet
 from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.in_field import space_factor
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.wang.basis import WangBlock
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
+SPARSE_ABOVE = 600  # matrices over more states of mixed M are sparse
+
 
 class FieldSector(NamedTuple):
-    """States of a solved block: number of the block, places in it (None: all), rows among the levels, and twice F."""
+    """States of a solved block: number of the block, places in it (None: all), rows among the levels, and twice F.
+
+    projections: Wang functions of M by which the states are multiplied where M is mixed, M varying more slowly than the states.
+    """
 
     block: int
     places: Ints | None
     rows: Ints
     twice_f: int
+    projections: WangBlock | None = None
 
 
 @dataclass(frozen=True)
@@ -45,11 +51,12 @@ class SolvedFieldBlock(FieldBlock):
     """States |F τ M⟩ of the sectors `members`, each multiplied by 1 or i according to its colour 0 or 1.
 
     real: whether this makes all matrices real. paired: whether each state represents its mirror image too (K and -K, σ and -σ), so that M
-    and -M differ in an electric field.
+    and -M differ in an electric field. number: of the block among those of its M.
     """
 
     m: float
     copies: int
+    number: int
     members: tuple[int, ...]
     colours: tuple[int, ...]
     real: bool
@@ -69,71 +76,101 @@ class SolvedFieldBlock(FieldBlock):
 
     @property
     def label(self) -> str:
-        """Species of Wang functions, K where it is a good quantum number, else the lowest level."""
-        blocks = [self.space.elements.blocks[self.space.sectors[i].block] for i in self.members]
+        """Species of Wang functions, K where it is a good quantum number, else the lowest level; a number where M is mixed."""
+        if not self.space.m_is_good:
+            return f"block {self.number}"
+        blocks = [self.space.elements.blocks[sector.block] for sector in self._sectors]
         if blocks[0].alone:
             return "+".join(sorted({block.basis.species for block in blocks}))
         k = blocks[0].axial_k
         return f"from {self.levels.label(int(self.rows[0]))}" if k is None else f"k={k}"
 
+    @property
+    def abs_m(self) -> Ints:
+        """|M| of the states (n,)."""
+        parts = [
+            np.repeat(sector.projections.k, len(sector.rows) // sector.projections.size)
+            for sector in self._sectors
+            if sector.projections is not None
+        ]
+        return np.concatenate(parts) if parts else super().abs_m
+
+    @property
+    def _sectors(self) -> list[FieldSector]:
+        """The sectors of the members."""
+        return [self.space.sectors[i] for i in self.members]
+
     @cached_property
     def starts(self) -> Ints:
         """First place of the states of each sector, and the number of states."""
-        return np.cumsum([0, *(len(self.space.sectors[i].rows) for i in self.members)])
+        return np.cumsum([0, *(len(sector.rows) for sector in self._sectors)])
 
     @cached_property
     def signs(self) -> Ints:
         """(-1)^(F + c) of the states (n,), up to a common sign: v(-M) is v(M)* times it (see `rotor.quantum.in_field`)."""
-        sectors = [self.space.sectors[i] for i in self.members]
+        sectors = self._sectors
         odd = [(sector.twice_f - sectors[0].twice_f) // 2 + c for sector, c in zip(sectors, self.colours, strict=True)]
         return np.repeat(np.where(np.array(odd) % 2, -1, 1), np.diff(self.starts))
 
-    def matrix(self, operator: FieldOperator) -> NDArray[Any]:
+    def dense(self, operator: FieldOperator) -> NDArray[Any]:
         """The operator over the states (n, n), real symmetric or complex Hermitian."""
         out: NDArray[Any] = np.diag(np.full(len(self), operator.scalar))
-        places = [slice(a, b) for a, b in pairwise(self.starts.tolist())]
-        for i, k, elements in self._elements(operator):
+        for rows, columns, elements in self._elements(operator, self, triangle=True):
             if elements.dtype != out.dtype and elements.dtype == np.complex128:
                 out = out.astype(np.complex128)
-            rows, columns = places[i], places[k]
             out[rows, columns] += elements
-            if i != k:
+            if rows != columns:
                 out[columns, rows] += elements.conj().T
         return out
 
-    def _elements(self, operator: FieldOperator) -> Iterator[tuple[int, int, NDArray[Any]]]:
-        """Places of two members, F' ≥ F, and the elements between their states with the phases of their colours."""
-        space, place = self.space, {sector: i for i, sector in enumerate(self.members)}
-        for i, up in enumerate(self.members):
-            for low, odd in space.below(operator).get(up, ()):
-                k = place.get(low)
-                factor = 0.0 if k is None else space.factor(operator, up, low, self.twice_m)
-                elements = space.reduced(operator, up, low) if factor else None
-                if k is not None and elements is not None:
-                    yield i, k, _turned(self.colours[k] - self.colours[i] + odd, factor * elements)
+    def matrix(self, operator: FieldOperator) -> Any:
+        """The operator over the states (n, n); in compressed rows for many states of mixed M."""
+        if self.space.m_is_good or len(self) <= SPARSE_ABOVE:
+            return self.dense(operator)
+        from scipy.sparse import csr_array, eye_array
 
-    def between(self, operator: FieldOperator, low: SolvedFieldBlock) -> NDArray[Any]:
-        """⟨M'|T_q|M⟩ of an operator from the states of another block (n, n_low), q = M' - M; T_q† = (-1)^q T_-q of Hermitian tensors."""
-        q, space = (self.twice_m - low.twice_m) // 2, self.space
-        place = {sector: i for i, sector in enumerate(self.members)}
+        pieces: list[tuple[Ints, Ints, Floats]] = []
+        for rows, columns, elements in self._elements(operator, self, triangle=True):
+            i, k = np.nonzero(elements)
+            pieces.append((rows.start + i, columns.start + k, elements[i, k]))
+            if rows != columns:
+                pieces.append((columns.start + k, rows.start + i, elements[i, k]))
+        places, others, values = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+        size = len(self)
+        return csr_array((values, (places, others)), shape=(size, size)) + operator.scalar * eye_array(
+            size, format="csr"
+        )
+
+    def between(self, operator: FieldOperator, low: FieldBlock) -> NDArray[Any]:
+        """⟨M'|T_q|M⟩ of an operator from the states of another block (n, n_low), q = M' - M."""
+        assert isinstance(low, SolvedFieldBlock)
         out = np.zeros((len(self), len(low)), dtype=np.complex128)
-        low_place = {sector: i for i, sector in enumerate(low.members)}
-        for first in {*self.members, *low.members}:
+        for rows, columns, elements in self._elements(operator, low):
+            out[rows, columns] += elements
+        return out
+
+    def _elements(
+        self, operator: FieldOperator, low: SolvedFieldBlock, triangle: bool = False
+    ) -> Iterator[tuple[slice, slice, NDArray[Any]]]:
+        """Places of a member and of a member of `low`, and the elements between their states with the phases of their colours.
+
+        triangle: only from F to F' ≥ F. All others follow from T_q† = (-1)^q T_-q of Hermitian tensors.
+        """
+        space, q = self.space, (self.twice_m - low.twice_m) // 2
+        here, there = ({sector: i for i, sector in enumerate(block.members)} for block in (self, low))
+        for first in dict.fromkeys((*self.members, *low.members)):
             for second, odd in space.below(operator).get(first, ()):
-                for bra, ket, adjoint in ((first, second, False), (second, first, True))[: 1 + (first != second)]:
-                    if bra not in place or ket not in low_place:
+                for bra, ket, adjoint in ((first, second, False), (second, first, True)):
+                    if bra not in here or ket not in there or (adjoint and (first == second or triangle)):
                         continue
-                    m = self.twice_m if adjoint else low.twice_m
-                    factor = space.factor(operator, first, second, m, -q if adjoint else q)
-                    elements = space.reduced(operator, first, second) if factor else None
+                    i, k = here[bra], there[ket]
+                    m, step = (self.twice_m, -q) if adjoint else (low.twice_m, q)
+                    elements = space.between(operator, first, second, m, step)
                     if elements is None:
                         continue
-                    i, k = place[bra], low_place[ket]
                     turns = low.colours[k] - self.colours[i] + (-odd if adjoint else odd)
-                    matrix = (-1) ** q * elements.conj().T if adjoint else elements
-                    rows, columns = slice(*self.starts[i : i + 2]), slice(*low.starts[k : k + 2])
-                    out[rows, columns] += _turned(turns, factor * matrix)
-        return out
+                    elements = (-1) ** q * elements.conj().T if adjoint else elements
+                    yield slice(*self.starts[i : i + 2]), slice(*low.starts[k : k + 2]), _turned(turns, elements)
 
 
 def _turned(turns: int, matrix: NDArray[Any]) -> NDArray[Any]:
@@ -164,9 +201,9 @@ class SolvedSpace(FieldSpace):
             for low, odd in lows
             if self.factor(operator, up, low, twice_m)
         ]
-        magnetic = any(isinstance(operator, Magnet) for operator in self.operators)
+        magnetic = any(operator.time_odd for operator in self.operators)
         out: list[FieldBlock] = []
-        for members, colours, real in coloured_components(len(self.sectors), edges):
+        for place, (members, colours, real) in enumerate(coloured_components(len(self.sectors), edges)):
             if self.sectors[members[0]].twice_f < abs(twice_m):
                 continue
             paired = self.elements.paired[self.sectors[members[0]].block]
@@ -175,17 +212,19 @@ class SolvedSpace(FieldSpace):
             rows = np.concatenate([self.sectors[i].rows for i in members])
             for sign in signs:
                 number = sign * twice_m / 2 if twice_m % 2 else sign * (twice_m // 2)
-                out.append(SolvedFieldBlock(number, copies, tuple(members), tuple(colours), real, paired, rows, self))
+                out.append(
+                    SolvedFieldBlock(number, copies, place, tuple(members), tuple(colours), real, paired, rows, self)
+                )
         return out
 
     def below(self, operator: FieldOperator) -> dict[int, list[tuple[int, int]]]:
         """For each sector, those of equal or lower F that an operator connects, with 1 where elements lack a factor i, else 0."""
-        if operator.key not in self._below:
+        if operator.key_in_space not in self._below:
             pairs: dict[int, list[tuple[int, int]]] = {}
             for up, low, odd in self._pairs(operator):
                 pairs.setdefault(up, []).append((low, odd))
-            self._below[operator.key] = pairs
-        return self._below[operator.key]
+            self._below[operator.key_in_space] = pairs
+        return self._below[operator.key_in_space]
 
     def _pairs(self, operator: FieldOperator) -> Iterator[tuple[int, int, int]]:
         """Pairs of sectors that an operator connects, with 1 where elements lack a factor i, else 0."""
@@ -216,13 +255,16 @@ class SolvedSpace(FieldSpace):
         factor = space_factor(self.sectors[up].twice_f, self.sectors[low].twice_f, operator.rank, twice_m, q)
         return factor if q else operator.size * factor
 
-    def reduced(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
-        """Reduced elements between two sectors."""
+    def between(self, operator: FieldOperator, up: int, low: int, twice_m: int, q: int) -> NDArray[Any] | None:
+        """Elements of T_q from the states of M of a sector to those of another, F' ≥ F; None where all are 0."""
+        factor = self.factor(operator, up, low, twice_m, q)
         first, second = self.sectors[up], self.sectors[low]
-        elements = self.elements.between(operator, first.block, second.block)
-        if elements is None or first.places is None or second.places is None:
-            return elements
-        return np.asarray(elements[np.ix_(first.places, second.places)])
+        elements = self.elements.between(operator, first.block, second.block) if factor else None
+        if elements is None:
+            return None
+        if first.places is not None and second.places is not None:
+            elements = elements[np.ix_(first.places, second.places)]
+        return np.asarray(factor * elements)
 
 
 def solved_space(
@@ -266,10 +308,7 @@ def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence
     axis = {"prolate": 0, "oblate": 2}.get(top.kind)
     if axis is None or not any(elements.paired):
         return
-    acting = [
-        Contraction(operator.g, np.eye(3)) if isinstance(operator, Magnet) else operator for operator in operators
-    ]
-    if not all(contraction.axial_about(axis) for contraction in acting):
+    if not all(operator.axial_about(axis) for operator in operators):
         raise ValueError("a symmetric top with spins is solved with tensors that have its axis")
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rotor.quantum.fields.axial import AxialSpace, axial_levels
 from rotor.quantum.fields.blocks import FieldSpace
-from rotor.quantum.fields.operators import Contraction, FieldOperator, Magnet
+from rotor.quantum.fields.operators import FieldOperator
 from rotor.quantum.fields.solved_space import solved_levels, solved_space
 from rotor.quantum.fields.tilted_blocks import tilted_space
 
@@ -42,19 +42,17 @@ def field_space(
     ValueError
         For a spherical top, and for a field at an angle with Z beside spins or internal rotation.
     """
-    if not all(isinstance(operator, Magnet) or operator.along_z for operator in operators):
-        contractions = [operator for operator in operators if isinstance(operator, Contraction)]
-        return tilted_space(top, jmax, contractions, effects)
+    if not all(operator.along_z for operator in operators):
+        return tilted_space(top, jmax, operators, effects)
     if top.kind == "spherical":
         raise ValueError(
             f"{top.name or 'this top'} is a spherical top: it has neither a dipole nor an anisotropy, and no field of the first "
             "or second order turns it"
         )
     axis = 2 if top.kind == "oblate" else 0
-    magnetic = any(isinstance(operator, Magnet) for operator in operators)
     axial = top.kind != "asymmetric" and not effects and top.states is None
-    if axial and all(isinstance(operator, Magnet) or operator.axial_about(axis) for operator in operators):
-        return AxialSpace(
-            axial_levels(top, jmax), jmax, axis, any(operator.rank == 1 for operator in operators), magnetic
-        )
+    if axial and all(operator.axial_about(axis) for operator in operators):
+        oriented = any(operator.rank == 1 for operator in operators)
+        magnetic = any(operator.time_odd for operator in operators)
+        return AxialSpace(axial_levels(top, jmax), jmax, axis, oriented, magnetic)
     return solved_space(top, solved_levels(top, jmax, effects), jmax, operators)

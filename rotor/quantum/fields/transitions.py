@@ -5,27 +5,21 @@
 μ_0 = μ_Z; for M' = M + 1 the squares of μ_X and of μ_Y are each half of that of μ_1. A field along Z has the same energies for M and -M,
 and by reflection the same squares for (M, M') and (-M, -M'). Only M, M' ≥ 0 are therefore computed, and -½ to ½ for half-integers; states
 that are paired with their mirror images have both signs of M in the map. States of mixed M have elements of μ_X, μ_Y and μ_Z between any
-two blocks (`tilted_blocks`).
+two blocks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from rotor.arrays import Floats
 from rotor.quantum.fields.axial import AxialBlock
 from rotor.quantum.fields.block_states import BlockStates, block_states
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.map_request import MapRequest
-from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.solved_space import SolvedFieldBlock
-from rotor.quantum.in_field import space_factor
-from rotor.quantum.symmetric_top_elements import coupling
 
 
 class BlockPair(NamedTuple):
@@ -76,25 +70,3 @@ def _same_k(up: FieldBlock, low: FieldBlock) -> bool:
     if isinstance(up, AxialBlock) and isinstance(low, AxialBlock):
         return abs(up.k) == abs(low.k) if low.m == 0 else up.k == low.k
     return _is_paired(up) == _is_paired(low)
-
-
-def dipole_elements(up: FieldBlock, low: FieldBlock, dipole: Contraction) -> NDArray[Any]:
-    """⟨up|μ_q|low⟩ over the free states of two blocks (n_up, n_low), in D; q = M' - M."""
-    if isinstance(up, AxialBlock) and isinstance(low, AxialBlock):
-        return _axial_elements(up, low if low.k == up.k else replace(low, k=up.k), float(dipole.body[up.axis]))
-    assert isinstance(up, SolvedFieldBlock)
-    assert isinstance(low, SolvedFieldBlock)
-    return up.between(dipole, low)
-
-
-def _axial_elements(up: AxialBlock, low: AxialBlock, dipole: float) -> Floats:
-    """Elements of μ_q between functions |J k M⟩."""
-    out = np.zeros((len(up), len(low)))
-    place = {int(j): row for row, j in enumerate(up.j)}
-    for column, j in enumerate(low.j.tolist()):
-        for above in (j - 1, j, j + 1):
-            if above in place:
-                in_body = float(coupling(j, above, 1, 0, low.k))
-                in_space = space_factor(2 * above, 2 * j, 1, 2 * low.m, up.m - low.m)
-                out[place[above], column] = dipole * in_body * in_space
-    return out

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -32,8 +32,7 @@ from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.field_map import each_block, smallest_jmax
 from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.operators import Contraction
-from rotor.quantum.fields.tilted_blocks import TiltedBlock, elements_of_mixed
-from rotor.quantum.fields.transitions import BlockPair, dipole_elements, pairs_of_blocks, states_of_both_signs
+from rotor.quantum.fields.transitions import BlockPair, pairs_of_blocks, states_of_both_signs
 from rotor.spectra.fields.light import Light, LightText, Vector, light_of
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table
@@ -127,8 +126,6 @@ class FieldLines(Table):
 
     def where(self, chosen: NDArray[np.bool_]) -> FieldLines:
         """Some of the rows; whole pairs of states where `pairs` is to be used."""
-        from dataclasses import replace
-
         names = (*self.columns, "upper_state", "lower_state")
         cut: dict[str, Any] = {name: getattr(self, name)[chosen] for name in names}
         return replace(self, **cut)
@@ -208,13 +205,14 @@ def field_lines(
     both = each_block(request, jmax, partial(states_of_both_signs, request, fields=request.fields, jmax=jmax), executor)
     solved = [states for pair in both for states in pair]
     populations_of_states = populations_in_field(top, solved, temperature_k, populations, effects)
-    seen = seen if isinstance(solved[0].block, TiltedBlock) else seen.about(unit)
+    mixed = not solved[0].block.space.m_is_good
+    seen = seen if mixed else seen.about(unit)
     parts = [
         _lines_of(solved, pair, strength, populations_of_states, j_highest)
         for pair, strength in _strengths(acting(top, 0.0, unit, effects)[0], solved, seen, unit)
     ]
     columns = _joined(parts)
-    if effects or isinstance(solved[0].block, TiltedBlock):
+    if effects or mixed:
         columns = merged(columns, len(request.fields))
     columns = _strong(columns, len(request.fields))
     return FieldLines(
@@ -244,9 +242,10 @@ def _strengths(
 ) -> Iterator[tuple[BlockPair, Floats]]:
     """Pairs of blocks and S (fields, up, low) of their states in D²."""
     blocks = [states.block for states in solved]
-    if isinstance(blocks[0], TiltedBlock):
+    if not blocks[0].space.m_is_good:
+        along = [replace(dipole, space=axis) for axis in np.eye(3)]
         for low, up in combinations_with_replacement(range(len(blocks)), 2):
-            axes = elements_of_mixed(blocks[up], blocks[low], dipole)  # type: ignore[arg-type]
+            axes = [blocks[up].between(operator, blocks[low]) for operator in along]
             if any(elements.any() for elements in axes):
                 between = [_between(solved[up], solved[low], elements) for elements in axes]
                 yield BlockPair(up, low, 0, 1), light.strength(between, unit)
@@ -254,7 +253,7 @@ def _strengths(
     for pair in pairs_of_blocks(blocks):
         factor = light.factors[pair.q] * pair.copies
         if factor > 1e-30:  # the cosine of 90 degrees is not quite 0
-            elements = dipole_elements(blocks[pair.up], blocks[pair.low], dipole)
+            elements = blocks[pair.up].between(dipole, blocks[pair.low])
             if elements.any():
                 yield pair, factor * np.abs(_between(solved[pair.up], solved[pair.low], elements)) ** 2
 
@@ -312,7 +311,7 @@ def _names(
             for side, rows in zip(sides, states, strict=True)
         ]
         out.append(np.where(turned, labels[other], labels[this]))
-        m_values = [side.block.m if isinstance(side.block, TiltedBlock) else abs(side.block.m) for side in sides]
+        m_values = [abs(side.block.m) if side.block.space.m_is_good else side.block.m for side in sides]
         out.append(np.where(turned, m_values[other], m_values[this]))
     return out[0], out[1], out[2], out[3]
 
