@@ -63,7 +63,7 @@ class StarkLevels(LevelModel):
             error = 0.0
             for group in self.groups(request, jmax):
                 fields, number = np.unique(group.fields, return_inverse=True)
-                states = solve_block(request, group.block, request.problem(group.block), fields, jmax)
+                states = solve_block(request, group.block, fields, jmax)
                 error = max(error, float(states.error[number, group.ranks].max()))
                 energies[group.places] = states.energies[number, group.ranks]
                 slopes[group.places] = self._slopes(constants, group, states, number)
@@ -152,7 +152,7 @@ class StarkLevels(LevelModel):
 def _request(constants: TopConstants, labels: Ints) -> MapRequest:
     """A Stark map at the fields of the labels."""
     fields = np.unique(labels[:, -1]) * FIELD_STEP_KV_PER_CM
-    return map_request(constants.top, fields, int(labels[:, 0].max()), None, 0.0, tolerance_mhz=TOLERANCE_MHZ)
+    return map_request(constants.top, fields, j_highest=int(labels[:, 0].max()), tolerance_mhz=TOLERANCE_MHZ)
 
 
 def _expectation(block: LinearBlock, states: Floats) -> Floats:

@@ -14,28 +14,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.field_map import FieldMap, field_map
-from rotor.quantum.fields.map_request import (
-    MOST_AT_EDGE,
-    BlockProblem,
-    KnownSpaces,
-    MapRequest,
-    checked_fields,
-    checked_tolerance_mhz,
-)
+from rotor.quantum.fields.map_request import MOST_AT_EDGE, FieldKind, FieldTerm, MapRequest
 from rotor.quantum.fields.operators import Contraction
-from rotor.quantum.fields.space import field_space
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -43,6 +32,9 @@ if TYPE_CHECKING:
 HIGHEST_KV_PER_CM = 1e5  # 1 V/Å is 1e5 kV/cm: molecules are ionised
 HIGHEST_W_PER_CM2 = 1e17
 DEFAULT_TOLERANCE_MHZ = 1e-6
+ELECTRIC = FieldKind(
+    "kV/cm", "fields_kv_per_cm", "field_kv_per_cm", "mu_eff_debye", units.MHZ_PER_DEBYE_KV_PER_CM, HIGHEST_KV_PER_CM
+)
 Z = (0.0, 0.0, 1.0)
 # 2π I/(c h) in MHz for 1 Å³ and 1 W/cm²
 MHZ_ANGSTROM3_W_PER_CM2 = 2 * math.pi * 1e-30 * 1e4 / (units.SPEED_OF_LIGHT_M_PER_S * units.PLANCK_J_S) * 1e-6
@@ -110,83 +102,58 @@ def stark_map(
     request = map_request(
         top,
         fields_kv_per_cm,
-        j_highest,
-        m_values,
-        intensity_w_per_cm2,
-        direction,
-        tolerance_mhz,
-        diabatic_gap_mhz,
-        effects,
+        j_highest=j_highest,
+        m_values=m_values,
+        intensity_w_per_cm2=intensity_w_per_cm2,
+        direction=direction,
+        effects=effects,
+        tolerance_mhz=tolerance_mhz,
+        diabatic_gap_mhz=diabatic_gap_mhz,
+        most_at_edge=most_at_edge,
     )
-    return field_map(replace(request, most_at_edge=most_at_edge), jmax, executor)
+    return field_map(request, jmax, executor)
 
 
 def map_request(
     top: Top,
     fields_kv_per_cm: ArrayLike,
+    *,
     j_highest: int,
-    m_values: Sequence[float] | None,
-    intensity_w_per_cm2: float,
+    m_values: Sequence[float] | None = None,
+    intensity_w_per_cm2: float = 0.0,
     direction: Sequence[float] = Z,
+    effects: Sequence[QuantumEffect] = (),
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
     diabatic_gap_mhz: float | None = None,
-    effects: Sequence[QuantumEffect] = (),
+    most_at_edge: float = MOST_AT_EDGE,
 ) -> MapRequest:
-    """The request that `stark_map` solves, with checked arguments.
+    """The Hamiltonian, fields and states of a map, from the parameters of `stark_map`, with its errors.
 
-    Parameters
-    ----------
-    top : Top
-        Top with a dipole, or with a polarizability for light.
-    fields_kv_per_cm : (f,) array
-        Static fields.
-    j_highest : int
-        Highest J of the free levels in the map.
-    m_values : sequence of int or None
-        The |M| of the states; None for all.
-    intensity_w_per_cm2 : float
-        Intensity of a laser beam polarized along Z; 0 for none.
-    direction : (3,) sequence, optional
-        Direction of the static field; Z by default.
-    tolerance_mhz : float, optional
-        Largest truncation error of an energy.
-    diabatic_gap_mhz : float, optional
-        Avoided crossings with a smaller gap are passed diabatically; by default labels are adiabatic.
-    effects : sequence of QuantumEffect, optional
-        Effects of a top with spins; `m_values` are then |M_F|.
-
-    Returns
-    -------
-    MapRequest
-        Blocks, matrices and fields of the map.
-
-    Raises
-    ------
-    ValueError
-        As `stark_map`, and for `m_values` with a field at an angle with Z.
+    ValueError also for `m_values` with a field at an angle with Z.
     """
-    fields = checked_fields(fields_kv_per_cm, "kV/cm", HIGHEST_KV_PER_CM)
     unit = checked_direction(direction)
     dipole, light = acting(top, intensity_w_per_cm2, unit, effects)
     tilted = not dipole.along_z
     if tilted and m_values is not None:
         raise ValueError("a field at an angle with Z mixes M: its states have no M to choose; leave m_values out")
-    names = {"costheta": _orientation(top, unit), "cos2theta": _alignment(top)}
+    terms = [FieldTerm(1, -units.MHZ_PER_DEBYE_KV_PER_CM, dipole)]
+    if light is not None:
+        terms.append(FieldTerm(0, -MHZ_ANGSTROM3_W_PER_CM2 * intensity_w_per_cm2, light))
+    observables = {"costheta": _orientation(top, unit), "cos2theta": _alignment(top)}
     if top.internal_rotation is not None and any(effect.spins(top) for effect in effects):
-        del names["cos2theta"]  # no elements of rank 2 with spins and internal rotation
-    contractions = tuple(contraction for contraction in (dipole, light) if contraction is not None)
+        del observables["cos2theta"]  # no elements of rank 2 with spins and internal rotation
     return MapRequest(
-        space=KnownSpaces(partial(field_space, top, operators=contractions, effects=tuple(effects))),
-        problem=partial(_problem, dipole, light, intensity_w_per_cm2, names),
-        fields=fields,
+        top=top,
+        effects=tuple(effects),
+        terms=tuple(terms),
+        observables=observables,
+        kind=ELECTRIC,
+        fields=ELECTRIC.checked(fields_kv_per_cm),
         j_highest=checked_j(j_highest),
         m_values=(0,) if tilted else projections(top, effects, m_values, j_highest),
-        tolerance_mhz=checked_tolerance_mhz(tolerance_mhz),
-        field_name="field_kv_per_cm",
-        slope_name="mu_eff_debye",
-        slope_unit_mhz=units.MHZ_PER_DEBYE_KV_PER_CM,
+        tolerance_mhz=tolerance_mhz,
         diabatic_gap_mhz=diabatic_gap_mhz,
-        reach=1 if light is None else 2,
+        most_at_edge=most_at_edge,
     )
 
 
@@ -319,14 +286,3 @@ def _alignment(top: Top) -> Contraction:
     """cos²θ of the figure axis and Z."""
     axis = np.eye(3)[figure_axis(top)]
     return Contraction(np.outer(axis, axis), np.outer(Z, Z))
-
-
-def _problem(
-    dipole: Contraction, light: Contraction | None, intensity: float, names: dict[str, Contraction], block: FieldBlock
-) -> BlockProblem:
-    """Matrices of a block: energies and light, dipole in the field, observables."""
-    fixed: NDArray[Any] = np.diag(block.energies_mhz)
-    if light is not None:
-        fixed = fixed - MHZ_ANGSTROM3_W_PER_CM2 * intensity * block.dense(light)
-    slope = -units.MHZ_PER_DEBYE_KV_PER_CM * block.dense(dipole)
-    return BlockProblem(fixed, slope, {name: partial(block.dense, operator) for name, operator in names.items()})

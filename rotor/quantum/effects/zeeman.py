@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,17 +23,9 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.stark import projections
-from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.field_map import FieldMap, field_map
-from rotor.quantum.fields.map_request import (
-    BlockProblem,
-    KnownSpaces,
-    MapRequest,
-    checked_fields,
-    checked_tolerance_mhz,
-)
+from rotor.quantum.fields.map_request import FieldKind, FieldTerm, MapRequest
 from rotor.quantum.fields.operators import Contraction, Magnet
-from rotor.quantum.fields.space import field_space
 from rotor.units import AVOGADRO_PER_MOL, NUCLEAR_MAGNETON_MHZ_PER_T, PLANCK_J_S
 
 if TYPE_CHECKING:
@@ -42,6 +33,9 @@ if TYPE_CHECKING:
 
 HIGHEST_TESLA = 1000.0
 DEFAULT_TOLERANCE_MHZ = 1e-6
+MAGNETIC = FieldKind(
+    "T", "fields_tesla", "field_tesla", "moment_nuclear_magnetons", NUCLEAR_MAGNETON_MHZ_PER_T, HIGHEST_TESLA
+)
 MHZ_PER_T2 = 1e-11 / (AVOGADRO_PER_MOL * PLANCK_J_S)  # value of 1e-6 erg/(G² mol), which is 1e-5 J/(T² mol)
 Z = (0.0, 0.0, 1.0)
 
@@ -103,26 +97,50 @@ def zeeman_map(
     >>> (states.energy_mhz[rows] - 12000).round(4).tolist()  # 0.03 μ_N B
     [0.0, 0.2287]
     """
+    request = magnetic_map_request(
+        top,
+        fields_tesla,
+        g,
+        magnetisability=magnetisability,
+        effects=effects,
+        nuclear_g=nuclear_g,
+        j_highest=j_highest,
+        tolerance_mhz=tolerance_mhz,
+    )
+    return field_map(request, jmax, executor)
+
+
+def magnetic_map_request(
+    top: Top,
+    fields_tesla: ArrayLike,
+    g: ArrayLike,
+    *,
+    magnetisability: ArrayLike | None,
+    effects: Sequence[QuantumEffect],
+    nuclear_g: Mapping[str, float] | None,
+    j_highest: int,
+    tolerance_mhz: float,
+) -> MapRequest:
+    """The Hamiltonian, fields and states of a map, from the parameters of `zeeman_map`, with its errors."""
     tensor, nuclei = checked_g(top, g), dict(nuclear_g or {})
     if nuclei and not effects:
         raise ValueError("nuclear_g: give the effects that have these spins too")
-    square = None if magnetisability is None else Contraction(_axial_tensor(top, magnetisability, "χ"), np.outer(Z, Z))
-    magnet = Magnet(tensor, nuclei)
-    acting = (magnet,) if square is None else (magnet, square)
+    terms = [FieldTerm(1, -NUCLEAR_MAGNETON_MHZ_PER_T, Magnet(tensor, nuclei))]
+    if magnetisability is not None:
+        chi = Contraction(_axial_tensor(top, magnetisability, "χ"), np.outer(Z, Z))
+        terms.append(FieldTerm(2, -0.5 * MHZ_PER_T2, chi))
     positive = projections(top, effects, None, j_highest)
-    request = MapRequest(
-        space=KnownSpaces(partial(field_space, top, operators=acting, effects=tuple(effects))),
-        problem=partial(_problem, magnet, square),
-        fields=checked_fields(fields_tesla, "T", HIGHEST_TESLA),
+    return MapRequest(
+        top=top,
+        effects=tuple(effects),
+        terms=tuple(terms),
+        observables={},
+        kind=MAGNETIC,
+        fields=MAGNETIC.checked(fields_tesla),
         j_highest=j_highest,
         m_values=tuple(sorted({*positive, *(-m for m in positive)})),
-        tolerance_mhz=checked_tolerance_mhz(tolerance_mhz),
-        field_name="field_tesla",
-        slope_name="moment_nuclear_magnetons",
-        slope_unit_mhz=NUCLEAR_MAGNETON_MHZ_PER_T,
-        reach=1 if square is None else 2,
+        tolerance_mhz=tolerance_mhz,
     )
-    return field_map(request, jmax, executor)
 
 
 def checked_g(top: Top, g: ArrayLike) -> Floats:
@@ -145,9 +163,3 @@ def _axial_tensor(top: Top, values: ArrayLike, name: str) -> Floats:
                 f"the {name} tensor of a {top.kind} top is symmetric about {'abc'[axis]}; got {tensor.tolist()}"
             )
     return np.array(tensor)
-
-
-def _problem(magnet: Magnet, square: Contraction | None, block: FieldBlock) -> BlockProblem:
-    """Matrices of a block: energies, magnetic moment, magnetisability."""
-    curvature = None if square is None else -0.5 * MHZ_PER_T2 * block.dense(square)
-    return BlockProblem(np.diag(block.energies_mhz), -NUCLEAR_MAGNETON_MHZ_PER_T * block.dense(magnet), {}, curvature)

@@ -1,15 +1,16 @@
-"""The lowest states of one block of a map at several fields, in the smallest sufficient basis of free states."""
+"""The lowest states of blocks of a map at several fields, in the smallest sufficient basis of free states."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import FieldBlock
-from rotor.quantum.fields.map_request import BlockProblem, MapRequest
-from rotor.quantum.fields.solver import DENSE, Matrix, solve_fields
+from rotor.quantum.fields.map_request import MapRequest, terms_over
+from rotor.quantum.fields.solver import DENSE, Matrix, Terms, solve_fields, solve_together
 from rotor.quantum.fields.truncation import left_out_mhz
 
 FIRST_BASIS = 64
@@ -30,6 +31,11 @@ class BlockStates(NamedTuple):
     vectors: Matrix
     error: Floats
 
+    @property
+    def j(self) -> Ints:
+        """J of the free levels (states,)."""
+        return self.block.levels.j[self.rows]
+
 
 def basis_order(block: FieldBlock, jmax: int) -> Ints:
     """Places of the states up to J max, in order of their free energies."""
@@ -37,26 +43,23 @@ def basis_order(block: FieldBlock, jmax: int) -> Ints:
     return order[block.j[order] <= jmax]
 
 
-def followed(block: FieldBlock, order: Ints, j_highest: int) -> int:
-    """Number of lowest states of a basis that contain all free levels up to J = `j_highest`."""
-    return int(np.flatnonzero(block.j[order] <= j_highest)[-1]) + 1
-
-
 def count_of(request: MapRequest, block: FieldBlock, order: Ints) -> int:
-    """Number of states to solve: those of the map, and for diabatic labels as many above as they may cross."""
-    count = followed(block, order, request.j_highest)
+    """Number of states to solve: those that contain all levels of the map, and for diabatic labels as many above as they may cross."""
+    count = int(np.flatnonzero(block.j[order] <= request.j_highest)[-1]) + 1
     return count if request.diabatic_gap_mhz is None else min(len(order), count + count // 2 + 4)
 
 
-def block_states(request: MapRequest, block: FieldBlock, fields: Floats, jmax: int) -> BlockStates:
-    """The states of a block that a map follows, at several fields.
+def solve_blocks(
+    request: MapRequest, blocks: Sequence[tuple[FieldBlock, Terms]], fields: Floats, jmax: int
+) -> list[BlockStates]:
+    """The states that a map follows, block by block.
 
     Parameters
     ----------
     request : MapRequest
-        Hamiltonian, fields and states of the map.
-    block : FieldBlock
-        A block of the space of `jmax + request.margin`.
+        Hamiltonian and states of the map.
+    blocks : sequence of (FieldBlock, Terms)
+        Blocks of the space of `jmax + request.margin`, with their matrices.
     fields : (f,) array
         Fields in the unit of the request.
     jmax : int
@@ -64,43 +67,42 @@ def block_states(request: MapRequest, block: FieldBlock, fields: Floats, jmax: i
 
     Returns
     -------
-    BlockStates
-        Energies (f, states) in MHz, and the states.
+    list of BlockStates
+        Energies (f, states) in MHz, and the states; the bound of the truncation error is added to the error of the solver.
     """
-    return solve_block(request, block, request.problem(block), fields, jmax)
+    orders = [basis_order(block, jmax) for block, _ in blocks]
+    counts = [count_of(request, block, order) for (block, _), order in zip(blocks, orders, strict=True)]
+    bases = [
+        enough_states(terms, order, count, fields, request.tolerance_mhz)
+        for (_, terms), order, count in zip(blocks, orders, counts, strict=True)
+    ]
+    if len(blocks) == len(fields) == 1 and bases[0][1] is not None:
+        solved = [bases[0][1]]
+    else:
+        parts = [terms_over(terms, places) for (_, terms), (places, _) in zip(blocks, bases, strict=True)]
+        solved = solve_together(list(zip(parts, counts, strict=True)), fields, request.tolerance_mhz)
+    out = []
+    for (block, terms), order, (places, _), states in zip(blocks, orders, bases, solved, strict=True):
+        energies, vectors, error = states
+        bound = error + left_out_mhz(terms, places, energies, vectors, fields)
+        out.append(BlockStates(block, block.rows[order[: energies.shape[1]]], energies, places, vectors, bound))
+    return out
 
 
-def solve_block(
-    request: MapRequest, block: FieldBlock, problem: BlockProblem, fields: Floats, jmax: int
-) -> BlockStates:
-    """`block_states` with the matrices of the block, so that they are computed once."""
-    order = basis_order(block, jmax)
-    count = count_of(request, block, order)
-    places, states = enough_states(problem, order, count, fields, request.tolerance_mhz)
-    if states is None or len(fields) > 1:
-        states = solve_fields(problem.terms(places), fields, count, request.tolerance_mhz)
-    energies, vectors, error = states
-    return bounded_states(block, problem, order, places, energies, vectors, error, fields)
-
-
-def bounded_states(
-    block: FieldBlock, problem: BlockProblem, order: Ints, places: Ints, energies: Floats, vectors: Matrix, error: Floats,
-    fields: Floats,
-) -> BlockStates:  # fmt: skip
-    """Solved states with labels; the bound of the truncation error is added to the error of the solver."""
-    error = error + left_out_mhz(problem, places, energies, vectors, fields)
-    return BlockStates(block, block.rows[order[: energies.shape[1]]], energies, places, vectors, error)
+def solve_block(request: MapRequest, block: FieldBlock, fields: Floats, jmax: int) -> BlockStates:
+    """`solve_blocks` of one block."""
+    return solve_blocks(request, [(block, request.matrices(block))], fields, jmax)[0]
 
 
 def enough_states(
-    problem: BlockProblem, order: Ints, count: int, fields: Floats, tolerance_mhz: float
+    terms: Terms, order: Ints, count: int, fields: Floats, tolerance_mhz: float
 ) -> tuple[Ints, tuple[Floats, Matrix, Floats] | None]:
     """The lowest free states that form a sufficient basis at the strongest field.
 
     Parameters
     ----------
-    problem : BlockProblem
-        Matrices of the block.
+    terms : tuple of (n, n) arrays
+        H_0, H_1, ... over the block.
     order : (n,) array
         States of the basis by energy.
     count : int
@@ -117,16 +119,15 @@ def enough_states(
     states : tuple or None
         The lowest states in this basis at the strongest field, as from `solve_fields`; None if they were not solved.
     """
-    size = max(FIRST_BASIS, 2 * count)
-    rising = np.sort(order)
+    size, rising = max(FIRST_BASIS, 2 * count), np.sort(order)
     if len(order) <= max(size, 2 * DENSE):
         return rising, None
     strongest = fields[np.argmax(np.abs(fields))][None]
-    whole = problem.over(rising)
+    whole = terms_over(terms, rising)
     while size < len(order):
-        basis = np.searchsorted(rising, np.sort(order[:size]))
-        states = solve_fields(whole.terms(basis), strongest, count)
-        if left_out_mhz(whole, basis, *states[:2], strongest).max() <= PART_OF_TOLERANCE * tolerance_mhz:
-            return rising[basis], states
+        places = np.searchsorted(rising, np.sort(order[:size]))
+        states = solve_fields(terms_over(whole, places), strongest, count)
+        if left_out_mhz(whole, places, *states[:2], strongest).max() <= PART_OF_TOLERANCE * tolerance_mhz:
+            return rising[places], states
         size = int(1.4 * size) + 1
     return rising, None

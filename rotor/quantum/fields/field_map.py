@@ -23,27 +23,11 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import AxialBlock
-from rotor.quantum.fields.block_states import (
-    BlockStates,
-    basis_order,
-    bounded_states,
-    count_of,
-    enough_states,
-    solve_block,
-)
+from rotor.quantum.fields.block_states import BlockStates, basis_order, count_of, enough_states, solve_blocks
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.chains import TOGETHER
-from rotor.quantum.fields.map_request import BlockProblem, MapRequest, over
-from rotor.quantum.fields.solver import (
-    DENSE,
-    SPANNED,
-    Terms,
-    at_fields,
-    derivatives,
-    expectation,
-    solve_together,
-    spanning,
-)
+from rotor.quantum.fields.map_request import MapRequest, over, terms_over
+from rotor.quantum.fields.solver import DENSE, SPANNED, Terms, at_fields, derivatives, expectation, spanning
 from rotor.table import Table
 
 Of = TypeVar("Of")
@@ -58,16 +42,14 @@ ROUND_OFF = 2 * float(np.finfo(np.float64).eps)  # of eigenvalues, relative to t
 class FieldMap(Table):
     """States in a field as columns (n,): all fields of one state, then those of the next.
 
-    field: in the unit that `field_name` names. m: M. rank: order in energy inside the exact block. block: label of the block.
-    energy_mhz: E/h. label: the free level of this rank. slope: -dE/dfield in the unit of `slope_name`. cosines: expectation values by name.
+    field: in the unit of `request.kind`. m: M. rank: order in energy inside the exact block. block: label of the block.
+    energy_mhz: E/h. label: the free level of this rank. slope: -dE/dfield, named by `slope_name`. cosines: expectation values by name.
     edge_population: of the two highest J. copies: number of coinciding states (M and -M). diabatic_label: or None. free_row, free_mhz,
     weight: row, energy and spin weight (of one state) of the free level. jmax: of the basis. truncation_mhz: bound of the truncation error
     of each energy; NaN for states listed only for their diabatic label. round_off_mhz: round-off of each energy. block_number: place of the
     block in `blocks_of_map`. request: the request of the map.
     """
 
-    field_name: str
-    slope_name: str
     field: Floats
     m: Ints
     block: NDArray[np.str_]
@@ -90,6 +72,16 @@ class FieldMap(Table):
 
     def __len__(self) -> int:
         return len(self.energy_mhz)
+
+    @property
+    def field_name(self) -> str:
+        """Name of the column of the field."""
+        return self.request.kind.column
+
+    @property
+    def slope_name(self) -> str:
+        """Name of the column of -dE/dfield."""
+        return self.request.kind.slope
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
@@ -255,14 +247,14 @@ def _smallest_between(request: MapRequest, lowest: int, highest: int, executor: 
 
 def _smallest_of_block(request: MapRequest, lowest: int, highest: int, block: FieldBlock) -> int:
     """The lowest sufficient J max from `lowest` to `highest` for a block, by bisection; `highest` + 1 if none is."""
-    problem = request.problem(block)
+    terms = request.matrices(block)
     strongest = request.fields[np.argmax(np.abs(request.fields))][None]
 
     def serves(jmax: int) -> bool:
-        states = solve_block(request, block, problem, strongest, jmax)
-        return float(states.error[:, block.levels.j[states.rows] <= request.j_highest].max()) <= request.tolerance_mhz
+        states = solve_blocks(request, [(block, terms)], strongest, jmax)[0]
+        return float(states.error[:, states.j <= request.j_highest].max()) <= request.tolerance_mhz
 
-    least = _round_off(problem.over(np.sort(basis_order(block, lowest))), strongest)
+    least = _round_off(terms_over(terms, np.sort(basis_order(block, lowest))), strongest)
     if least > request.tolerance_mhz:
         raise ValueError(
             f"tolerance_mhz: {request.tolerance_mhz:g}: energies at the highest field have a round-off of {least:.1e} MHz; give more"
@@ -308,25 +300,11 @@ def _lowest_jmax(request: MapRequest) -> int:
     raise ValueError(f"levels beyond J = {HIGHEST_J} lie among those up to J = {request.j_highest}; follow fewer")
 
 
-def _solve_block(request: MapRequest, jmax: int, block: FieldBlock) -> _Solved:
-    """The states of one block at all fields."""
-    problem = request.problem(block)
-    return _measured(request, jmax, problem, solve_block(request, block, problem, request.fields, jmax))
-
-
-def _solve_blocks(request: MapRequest, jmax: int, blocks: Sequence[FieldBlock]) -> list[_Solved]:
-    """The states of all blocks in this process, together where they are chains."""
-    parts = []
-    for block in blocks:
-        problem, order = request.problem(block), basis_order(block, jmax)
-        count = count_of(request, block, order)
-        places = enough_states(problem, order, count, request.fields, request.tolerance_mhz)[0]
-        parts.append((block, problem, order, places, (problem.terms(places), count)))
-    solved = solve_together([part[-1] for part in parts], request.fields, request.tolerance_mhz)
-    return [
-        _measured(request, jmax, problem, bounded_states(block, problem, order, places, *states, request.fields))
-        for (block, problem, order, places, _), states in zip(parts, solved, strict=True)
-    ]
+def _solve(request: MapRequest, jmax: int, blocks: Sequence[FieldBlock]) -> list[_Solved]:
+    """The states of blocks at all fields."""
+    terms = [request.matrices(block) for block in blocks]
+    solved = solve_blocks(request, list(zip(blocks, terms, strict=True)), request.fields, jmax)
+    return [_measured(request, jmax, *pair) for pair in zip(terms, solved, strict=True)]
 
 
 def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
@@ -336,24 +314,22 @@ def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
     return chains and max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
 
 
-def _measured(request: MapRequest, jmax: int, problem: BlockProblem, states: BlockStates) -> _Solved:
+def _measured(request: MapRequest, jmax: int, terms: Terms, states: BlockStates) -> _Solved:
     """Slopes, cosines and leakage of the states of a block."""
     block, fields, vectors = states.block, request.fields, states.vectors
-    slopes = -derivatives(problem.terms(states.places), fields, vectors)
+    slopes = -derivatives(terms_over(terms, states.places), fields, vectors)
     cosines = {
-        name: expectation(over(observable(), states.places), vectors)
-        for name, observable in problem.observables.items()
+        name: expectation(over(block.dense(operator), states.places), vectors)
+        for name, operator in request.observables.items()
     }
     edge = (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1)
-    return _Solved(
-        states.energies, slopes, edge, cosines, states.rows, block, states.error, _round_off(problem, fields)
-    )
+    return _Solved(states.energies, slopes, edge, cosines, states.rows, block, states.error, _round_off(terms, fields))
 
 
-def _round_off(problem: BlockProblem, fields: Floats) -> float:
+def _round_off(terms: Terms, fields: Floats) -> float:
     """Round-off (MHz) of eigenvalues at any field: LAPACK's are exact for a matrix that differs by a few units in the last place of |H|."""
     strongest = float(np.abs(fields).max())
-    norms = [strongest**n * np.abs(coefficient).sum(axis=1).max() for n, coefficient in enumerate(problem.coefficients)]
+    norms = [strongest**n * np.abs(term).sum(axis=1).max() for n, term in enumerate(terms)]
     return ROUND_OFF * float(sum(norms))
 
 
@@ -361,9 +337,10 @@ def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> Fie
     """The map with J max of the basis, by block and rank."""
     blocks = blocks_of_map(request, jmax)
     if executor is None or _is_small(request, blocks):
-        solved = _solve_blocks(request, jmax, blocks)
+        solved = _solve(request, jmax, blocks)
     else:
-        solved = each_block(request, jmax, partial(_solve_block, request, jmax), executor)
+        apart = executor.map(partial(_solve, request, jmax), [[block] for block in blocks])
+        solved = [states for block_states in apart for states in block_states]
     fields, rows, numbers = request.fields, [], []
     named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, jmax, each) for each in solved]
     for number, (each, names) in enumerate(zip(solved, named, strict=True)):
@@ -381,15 +358,13 @@ def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> Fie
 
     cosines = list(solved[0].cosines) if solved else []
     return FieldMap(
-        field_name=request.field_name,
-        slope_name=request.slope_name,
         field=np.tile(fields, len(rows)),
         m=repeated(lambda each, rank: each.block.m),
         block=repeated(lambda each, rank: each.block.label),
         rank=repeated(lambda each, rank: rank),
         energy_mhz=column(lambda each, rank: each.energies[:, rank]),
         label=repeated(lambda each, rank: each.block.levels.label(int(each.rows[rank]))),
-        slope=column(lambda each, rank: each.slopes[:, rank]) / request.slope_unit_mhz,
+        slope=column(lambda each, rank: each.slopes[:, rank]) / request.kind.slope_mhz,
         cosines={name: np.concatenate([each.cosines[name][:, rank] for each, rank in rows]) for name in cosines},
         edge_population=column(lambda each, rank: each.edge[:, rank]),
         copies=repeated(lambda each, rank: each.block.copies),
@@ -439,10 +414,9 @@ def _diabatic_labels(
 
 def _small(request: MapRequest, jmax: int, block: FieldBlock, count: int) -> Terms:
     """The Hamiltonian of a block in a small basis for its lowest states at all fields."""
-    problem = request.problem(block)
-    terms = problem.terms(
-        enough_states(problem, basis_order(block, jmax), count, request.fields, request.tolerance_mhz)[0]
-    )
+    terms = request.matrices(block)
+    order = basis_order(block, jmax)
+    terms = terms_over(terms, enough_states(terms, order, count, request.fields, request.tolerance_mhz)[0])
     if len(terms[0]) <= DENSE:
         return terms
     fields = np.linspace(request.fields[0], request.fields[-1], SPANNED)

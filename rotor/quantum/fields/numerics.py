@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from rotor.quantum.effects.stark import map_request
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.plans import plan_fields
-from rotor.quantum.fields.block_states import block_states
+from rotor.quantum.fields.block_states import solve_block
 from rotor.quantum.fields.field_map import each_block
 from rotor.quantum.fields.knobs import ENERGY, largest_difference
 from rotor.quantum.fields.stark_request import answer_stark
@@ -46,19 +45,9 @@ def sweeps_of_zeeman(request: Any) -> Sweeps:
 
 def _energies(setting: tuple[Any, int]) -> Any:
     """Energies of all states of a map with a J max of the basis, even one that a map would refuse as too small."""
-    request, jmax = setting
-    request_of_map = map_request(
-        request.top, request.fields_kv_per_cm, request.j_highest, request.m_values, request.intensity_w_per_cm2,
-        request.direction, request.tolerance_mhz, None, request.effects,
-    )  # fmt: skip
-    parts = each_block(request_of_map, jmax, partial(_energies_of_block, request_of_map, jmax))
-    return np.concatenate([part.ravel() for part in parts])
-
-
-def _energies_of_block(request: Any, jmax: int, block: Any) -> Any:
-    """Energies of the states of a block."""
-    states = block_states(request, block, request.fields, jmax)
-    return states.energies[:, block.levels.j[states.rows] <= request.j_highest]
+    request, jmax = setting[0].map, setting[1]
+    parts = each_block(request, jmax, partial(solve_block, request, fields=request.fields, jmax=jmax))
+    return np.concatenate([part.energies[:, part.j <= request.j_highest].ravel() for part in parts])
 
 
 def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: dict[str, str]) -> Plan:

@@ -17,13 +17,13 @@ from rotor.quantum.effects.stark import (
     acting,
     checked_direction,
     checked_j,
+    map_request,
     projections,
-    stark_map,
 )
 from rotor.quantum.estimates.limits import every_limit, limit_facts
-from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.field_map import FieldMap, field_map
 from rotor.quantum.fields.knobs import TOLERANCE
-from rotor.quantum.fields.map_request import MOST_AT_EDGE
+from rotor.quantum.fields.map_request import MOST_AT_EDGE, MapRequest
 from rotor.quantum.fields.readers import MOST_J, highest_j, read_direction, read_m
 from rotor.quantum.hamiltonian_input import spins_field
 from rotor.requests.budget import ErrorBudget, ErrorTerm
@@ -117,6 +117,22 @@ class StarkRequest:
         """Whether the field is at an angle with Z."""
         return bool(self.direction[0] or self.direction[1])
 
+    @property
+    def map(self) -> MapRequest:
+        """Hamiltonian, fields and states of the map."""
+        return map_request(
+            self.top,
+            self.fields_kv_per_cm,
+            j_highest=self.j_highest,
+            m_values=self.m_values,
+            intensity_w_per_cm2=self.intensity_w_per_cm2,
+            direction=self.direction,
+            effects=self.effects,
+            tolerance_mhz=self.tolerance_mhz,
+            diabatic_gap_mhz=self.diabatic_gap_mhz,
+            most_at_edge=self.most_at_edge,
+        )
+
 
 @dataclass(frozen=True, repr=False)
 class StarkAnswer(TextOf):
@@ -179,18 +195,4 @@ def answer_stark(request: StarkRequest, executor: Executor | None = None) -> Sta
     >>> answer_stark(StarkRequest(rod, (0.0, 1.0), j_highest=0)).states.energy_mhz.round(3).tolist()  # -μ²E²/6B
     [0.0, -3.449]
     """
-    states = stark_map(
-        request.top,
-        request.fields_kv_per_cm,
-        j_highest=request.j_highest,
-        m_values=request.m_values,
-        intensity_w_per_cm2=request.intensity_w_per_cm2,
-        direction=request.direction,
-        effects=request.effects,
-        jmax=request.jmax,
-        tolerance_mhz=request.tolerance_mhz,
-        diabatic_gap_mhz=request.diabatic_gap_mhz,
-        most_at_edge=request.most_at_edge,
-        executor=executor,
-    )
-    return StarkAnswer(request, states)
+    return StarkAnswer(request, field_map(request.map, request.jmax, executor))

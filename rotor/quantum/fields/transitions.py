@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from rotor.arrays import Floats
 from rotor.quantum.fields.axial import AxialBlock
-from rotor.quantum.fields.block_states import BlockStates, block_states
+from rotor.quantum.fields.block_states import BlockStates, solve_block
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.solved_space import SolvedFieldBlock
@@ -33,7 +33,7 @@ class BlockPair(NamedTuple):
 
 def states_of_both_signs(request: MapRequest, block: FieldBlock, fields: Floats, jmax: int) -> list[BlockStates]:
     """The states of a block; for M = ½ also those of M = -½, which the block represents and μ_1 connects with it."""
-    here = block_states(request, block, fields, jmax)
+    here = solve_block(request, block, fields, jmax)
     if not isinstance(block, SolvedFieldBlock) or block.paired or block.twice_m != 1:
         return [here]
     signs = block.signs[here.places][:, None]

@@ -18,19 +18,18 @@ from __future__ import annotations
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.map_request import BlockProblem
-from rotor.quantum.fields.solver import Matrix
+from rotor.quantum.fields.solver import Matrix, Terms
 
 HELD = 1 << 22  # most numbers in a temporary array
 
 
-def left_out_mhz(problem: BlockProblem, places: Ints, energies: Floats, vectors: Matrix, fields: Floats) -> Floats:
+def left_out_mhz(terms: Terms, places: Ints, energies: Floats, vectors: Matrix, fields: Floats) -> Floats:
     """Bound of the lowering of each energy by functions of a block outside the basis.
 
     Parameters
     ----------
-    problem : BlockProblem
-        Matrices over the block, which reaches at least twice as far in J beyond the basis as they connect.
+    terms : tuple of (m, m) arrays
+        H_0, H_1, ... over the block, which reaches at least twice as far in J beyond the basis as they connect.
     places : (n,) array
         Functions of the basis, rising.
     energies : (f, s) array
@@ -38,21 +37,21 @@ def left_out_mhz(problem: BlockProblem, places: Ints, energies: Floats, vectors:
     vectors : (f, n, s) array
         Eigenvectors of these states.
     fields : (f,) array
-        Fields in the unit of the problem.
+        Fields in the unit of the terms.
 
     Returns
     -------
     (f, s) array
         MHz, not negative; 0 where the basis is the whole block.
     """
-    outside = np.ones(len(problem.fixed), dtype=bool)
+    outside = np.ones(len(terms[0]), dtype=bool)
     outside[places] = False
     rest = np.flatnonzero(outside)
-    couplings = [coefficient[np.ix_(rest, places)] for coefficient in problem.coefficients]
+    couplings = [term[np.ix_(rest, places)] for term in terms]
     touched = np.flatnonzero(np.any([np.any(coupling, axis=1) for coupling in couplings], axis=0))
     if not len(touched):
         return np.zeros(energies.shape)
-    within = [coefficient[np.ix_(rest[touched], rest)] for coefficient in problem.coefficients]
+    within = [term[np.ix_(rest[touched], rest)] for term in terms]
     diagonals = [matrix[np.arange(len(touched)), touched].real for matrix in within]
     radii = [np.abs(matrix).sum(axis=1) - np.abs(diagonal) for matrix, diagonal in zip(within, diagonals, strict=True)]
     couplings = [matrix[touched] for matrix in couplings]

@@ -14,12 +14,12 @@ import numpy as np
 from rotor.molecules.nuclei import isotope
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import checked_j
-from rotor.quantum.effects.zeeman import DEFAULT_TOLERANCE_MHZ, HIGHEST_TESLA, checked_g, zeeman_map
+from rotor.quantum.effects.zeeman import DEFAULT_TOLERANCE_MHZ, MAGNETIC, checked_g, magnetic_map_request
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.limits import every_limit, limit_facts
-from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.field_map import FieldMap, field_map
 from rotor.quantum.fields.knobs import TOLERANCE
-from rotor.quantum.fields.map_request import checked_fields
+from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.readers import MOST_J, highest_j
 from rotor.quantum.hamiltonian_input import spins_field
 from rotor.requests.budget import ErrorBudget, ErrorTerm
@@ -84,7 +84,7 @@ class ZeemanRequest:
     def __post_init__(self) -> None:
         check_fields(self)
         checked_j(self.j_highest)
-        checked_fields(self.fields_tesla, "T", HIGHEST_TESLA)
+        MAGNETIC.checked(self.fields_tesla)
         checked_g(self.top, self.magnetic.g)
         if self.nuclear_g and not self.hyperfine:
             raise ValueError("nuclear_g: belongs to spins; ask for the hyperfine structure too")
@@ -103,6 +103,20 @@ class ZeemanRequest:
     def effects(self) -> tuple[QuantumEffect, ...]:
         """Effects with spins if these are requested; empty for the default Hamiltonian."""
         return effects_of(self.top, True) if self.hyperfine else ()
+
+    @property
+    def map(self) -> MapRequest:
+        """Hamiltonian, fields and states of the map."""
+        return magnetic_map_request(
+            self.top,
+            self.fields_tesla,
+            self.magnetic.g,
+            magnetisability=self.magnetic.magnetisability,
+            effects=self.effects,
+            nuclear_g=self.spin_g,
+            j_highest=self.j_highest,
+            tolerance_mhz=self.tolerance_mhz,
+        )
 
     @property
     def spin_g(self) -> dict[str, float]:
@@ -214,16 +228,4 @@ def answer_zeeman(request: ZeemanRequest, executor: Executor | None = None) -> Z
     >>> (states.energy_mhz[states.curve("1", 1)] - 12000).round(4).tolist()  # 0.03 μ_N B
     [0.0, 0.2287]
     """
-    states = zeeman_map(
-        request.top,
-        request.fields_tesla,
-        request.magnetic.g,
-        magnetisability=request.magnetic.magnetisability,
-        effects=request.effects,
-        nuclear_g=request.spin_g,
-        j_highest=request.j_highest,
-        jmax=request.jmax,
-        tolerance_mhz=request.tolerance_mhz,
-        executor=executor,
-    )
-    return ZeemanAnswer(request, states)
+    return ZeemanAnswer(request, field_map(request.map, request.jmax, executor))

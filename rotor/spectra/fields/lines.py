@@ -199,7 +199,13 @@ def field_lines(
     require_positive("temperature_k", temperature_k, "K")
     require_one_of("populations", populations, POPULATIONS)
     request = map_request(
-        top, fields_kv_per_cm, j_highest, None, intensity_w_per_cm2, direction, tolerance_mhz, effects=effects
+        top,
+        fields_kv_per_cm,
+        j_highest=j_highest,
+        intensity_w_per_cm2=intensity_w_per_cm2,
+        direction=direction,
+        effects=effects,
+        tolerance_mhz=tolerance_mhz,
     )
     jmax = smallest_jmax(request, executor) if jmax is None else jmax
     both = each_block(request, jmax, partial(states_of_both_signs, request, fields=request.fields, jmax=jmax), executor)
@@ -232,9 +238,7 @@ def field_lines(
 
 def _largest_error(solved: Sequence[BlockStates], j_highest: int) -> float:
     """Bound of what the basis leaves out of energies of states that come from levels up to a J, MHz."""
-    return max(
-        float(block.error[:, block.block.levels.j[block.rows] <= j_highest].max(initial=0.0)) for block in solved
-    )
+    return max(float(states.error[:, states.j <= j_highest].max(initial=0.0)) for states in solved)
 
 
 def _strengths(
@@ -280,7 +284,7 @@ def _lines_of(
 ) -> _Part:
     """Every pair of states of two blocks with its strength (fields, up, low)."""
     up, low = solved[pair.up], solved[pair.low]
-    ours = [side.block.levels.j[side.rows] <= j_highest for side in (up, low)]
+    ours = [side.j <= j_highest for side in (up, low)]
     first, second = np.nonzero(np.multiply.outer(*ours) & (_above(len(ours[0])) if pair.up == pair.low else True))
     frequency = up.energies[:, first] - low.energies[:, second]
     turned = frequency[-1] < 0

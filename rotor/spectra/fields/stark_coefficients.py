@@ -113,9 +113,8 @@ def _series_of_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> Fiel
 
 def _block_series(request: MapRequest, block: FieldBlock) -> FieldSeries:
     """c_1 ... c_6 of the states of a block, ranked as at the fields of the map."""
-    terms = request.problem(block).terms(np.arange(len(block)))
     sign = -1 if request.fields.max() <= 0 > request.fields.min() else 1
-    turned = tuple(sign**n * term for n, term in enumerate(terms))
+    turned = tuple(sign**n * term for n, term in enumerate(request.matrices(block)))
     series = field_series(turned, count_of(request, block, block.free_order), _SUMMED, block.even_in_field)
     return FieldSeries(series.coefficients * np.power(sign, np.arange(1, _SUMMED + 1)), series.errors)
 

@@ -6,7 +6,6 @@ import pytest
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.zeeman import zeeman_map
 from rotor.quantum.fields import block_states
-from rotor.quantum.fields.map_request import BlockProblem
 from rotor.quantum.fields.solver import reduced_basis, spanning
 from rotor.quantum.fields.truncation import left_out_mhz
 from rotor.tops.top import Top
@@ -123,7 +122,7 @@ def test_a_magnetic_map_states_a_bound():
 )
 def test_the_bound_in_small_cases(matrix):
     matrix = np.array(matrix, dtype=float)
-    problem = BlockProblem(matrix, np.zeros_like(matrix), {})
+    problem = (matrix, np.zeros_like(matrix))
     energies, vectors = np.linalg.eigh(matrix[:2, :2])
     bound = left_out_mhz(problem, np.arange(2), energies[None], vectors[None], np.zeros(1))[0]
     lowering = energies - np.linalg.eigvalsh(matrix)[:2]
@@ -175,7 +174,7 @@ def test_enough_free_states_are_taken_at_the_strongest_field():
         np.diag(0.3 * np.arange(size)),
         np.diag(np.full(size - 1, 1.0), 1) + np.diag(np.full(size - 1, 1.0), -1),
     )
-    problem, fields = BlockProblem(fixed, slope, {}), np.array([0.0, 250.0])
+    problem, fields = (fixed, slope), np.array([0.0, 250.0])
     places = block_states.enough_states(problem, np.arange(size), 3, fields, tolerance)[0]
     whole = np.linalg.eigvalsh(fixed + 250.0 * slope)[:3]
     inside = np.linalg.eigvalsh((fixed + 250.0 * slope)[np.ix_(places, places)])[:3]
