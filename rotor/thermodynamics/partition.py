@@ -14,7 +14,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.table import Table
 from rotor.thermodynamics.level_sums import NOT_SUMMED, LevelSums, Progress, checked_temperatures, level_sums
-from rotor.thermodynamics.spin_factor import without_spins
+from rotor.thermodynamics.spin_factor import rotational_sum
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -171,10 +171,10 @@ def partition_functions(
     """
     temperatures = checked_temperatures(temperatures_k)
     weights = [top.spin_weights]
-    spinless, factor = without_spins(top, effects)
+    rotation = rotational_sum(top, effects)
     settings: dict[str, Any] = {"energies": False, "refuse": refuse, "progress": progress}
-    if factor == 1:
-        sums = level_sums(top, weights, temperatures, relative_error, effects=spinless, **settings)[0]
+    if rotation.is_original:
+        sums = level_sums(top, weights, temperatures, relative_error, effects=rotation.effects, **settings)[0]
     else:  # energies count from the lowest split level
         from rotor.thermodynamics.spin_sums import spin_sums
 

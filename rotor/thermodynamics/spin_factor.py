@@ -4,36 +4,78 @@
 
 The first order in the shifts δ vanishes for traceless couplings, since the mean of δ over all F of a rotational level, with weights
 2F+1, is zero. The second order (δ/kT)²/2 is 1e-5 for a coupling of 100 MHz at 1 K.
+
+Three equivalent nuclei of a symmetric top, coupled to one total spin, have n = 2I+1 functions each. Of the n³ products, (n³ + 2n)/3 are
+unchanged by the cyclic exchange and belong to K = 0, 3, 6, ...; each other level of K has (n³ - n)/3 (Burnside's lemma for the cyclic
+group of order 3). The product is then a sum with these numbers as spin weights. Scalar couplings J I·I of the three nuclei shift the mean
+of a species, so that the first order δ/kT remains.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import prod
-from typing import TYPE_CHECKING
+from math import gcd, prod
+from typing import TYPE_CHECKING, NamedTuple
 
 from rotor.quantum.effect import QuantumEffect
+from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
-def without_spins(top: Top, effects: Sequence[QuantumEffect]) -> tuple[tuple[QuantumEffect, ...], int]:
-    """The effects without spins, and Π(2I+1) over the nuclear spins of the other effects.
+class RotationalSum(NamedTuple):
+    """A sum over rotational levels that replaces one over levels split by spins, times a number of spin functions.
 
-    All effects remain, with a factor of 1, if the product does not apply: for an unpaired electron (large couplings), for three
-    equivalent nuclei with a total spin (their number of functions depends on K), and for two whose spin weights depend on the total
-    spin.
+    effects: without spins, or all if no such sum exists; then functions is 1. weights: number of spin functions by K, reduced, instead of
+    those of the top; None without equivalent nuclei. first_order: whether the mean shift of a level does not vanish.
+    """
+
+    effects: tuple[QuantumEffect, ...]
+    functions: int
+    weights: SpinWeights | None = None
+    first_order: bool = False
+
+    @property
+    def is_original(self) -> bool:
+        """Whether this is the sum over the levels of all effects: without spins, or with split levels that must be summed."""
+        return self.functions == 1 and self.weights is None
+
+
+def rotational_sum(top: Top, effects: Sequence[QuantumEffect]) -> RotationalSum:
+    """The sum over rotational levels that replaces the sum over split levels.
+
+    Split levels must be summed for an unpaired electron (large couplings), for two nuclei whose spin weights depend on their total spin,
+    and for three nuclei with a total spin in interacting states.
     """
     spins = {spin.name: spin for effect in effects for spin in effect.spins(top)}
-    in_total_spin = sum(bool(spin.total) for spin in spins.values())
+    coupled = [spin for spin in spins.values() if spin.total]
+    three = len(coupled) == 3
+    symmetric = top.kind in ("prolate", "oblate") and top.states is None
     if (
-        in_total_spin == 3
-        or (in_total_spin and top.spin_weights.rule != "none")
+        (coupled and top.spin_weights.rule != "none")
+        or (three and not symmetric)
         or any(spin.electron for spin in spins.values())
     ):
-        return tuple(effects), 1
-    return tuple(effect for effect in effects if not effect.spins(top)), prod(spin.twice + 1 for spin in spins.values())
+        return RotationalSum(tuple(effects), 1)
+    rest = tuple(effect for effect in effects if not effect.spins(top))
+    functions = prod(spin.twice + 1 for spin in spins.values() if not (three and spin.total))
+    if not three:
+        return RotationalSum(rest, functions)
+    weights, common = weights_of_three(coupled[0].twice)
+    return RotationalSum(rest, functions * common, weights, first_order=True)
+
+
+def weights_of_three(twice_i: int) -> tuple[SpinWeights, int]:
+    """Spin weights by K modulo 3 of three equivalent nuclei of spin I, reduced, and their common divisor.
+
+    >>> weights, common = weights_of_three(2)
+    >>> weights.to_mapping(), common, weights_of_three(1)[1]
+    ({'0': 11, '1': 8, '2': 8}, 1, 2)
+    """
+    n = twice_i + 1
+    unchanged, others = (n**3 + 2 * n) // 3, (n**3 - n) // 3
+    return SpinWeights.from_mapping({"0": unchanged, "1": others, "2": others}), gcd(unchanged, others)
 
 
 def spin_functions(top: Top, effects: Sequence[QuantumEffect], electrons: bool = True) -> float:

@@ -23,7 +23,7 @@ from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.levels import weights_of_levels
 from rotor.quantum.solve import solve_levels
 from rotor.thermodynamics.level_sums import LevelSums, Progress, level_sums, lowest_level_k
-from rotor.thermodynamics.spin_factor import without_spins
+from rotor.thermodynamics.spin_factor import rotational_sum
 from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
@@ -86,23 +86,24 @@ def spin_sums(
     ValueError
         As in `level_sums`.
     """
-    spinless, functions = without_spins(top, effects)
+    plain = rotational_sum(top, effects)
     size = splitting_mhz(top, effects, float(temperatures_k.max()))
     plainly: dict[str, Any] = {"progress": progress, "energies": energies, "refuse": refuse}
     settings = plainly | {"effects": effects}
-    if functions == 1:
+    if plain.is_original:
         sums = level_sums(top, weights, temperatures_k, relative_error, **settings)
         return SpinSums(sums, size, np.ones(len(temperatures_k), dtype=np.bool_))
-    rotation = level_sums(top, weights, temperatures_k, relative_error, effects=spinless, **plainly)
+    weights_of_rotation = weights if plain.weights is None else [plain.weights]
+    rotation = level_sums(top, weights_of_rotation, temperatures_k, relative_error, effects=plain.effects, **plainly)
     ground = _lowest_split_k(top, weights, rotation, effects, size, relative_error / 10)
     product = [
-        times_functions(functions_of_rotation, functions, lowest, size)
-        for functions_of_rotation, lowest in zip(rotation, ground, strict=True)
+        times_functions(sums, plain.functions, lowest, size, plain.first_order)
+        for sums, lowest in zip(rotation, ground, strict=True)
     ]
     split = np.any(
         [
-            _worst(sums, energies) > _worst(plain, energies) + relative_error
-            for sums, plain in zip(product, rotation, strict=True)
+            _worst(sums, energies) > _worst(spinless, energies) + relative_error
+            for sums, spinless in zip(product, rotation, strict=True)
         ],
         axis=0,
     )
@@ -147,7 +148,9 @@ def splitting_mhz(top: Top, effects: Sequence[QuantumEffect], temperature_k: flo
     return sum(effect.size_mhz(top, j) for effect in effects if effect.spins(top))
 
 
-def times_functions(rotation: LevelSums, functions: int, ground_k: float, size_mhz: float) -> LevelSums:
+def times_functions(
+    rotation: LevelSums, functions: int, ground_k: float, size_mhz: float, first_order: bool = False
+) -> LevelSums:
     """The sums without spins times the number of spin functions, from the lowest split level, with error bounds for the splittings.
 
     Parameters
@@ -160,12 +163,15 @@ def times_functions(rotation: LevelSums, functions: int, ground_k: float, size_m
         Lowest split level over k, K.
     size_mhz : float
         The largest splitting.
+    first_order : bool
+        Whether the mean shift of a rotational level does not vanish.
 
     Returns
     -------
     LevelSums
     """
     above, x2 = (rotation.ground_k - ground_k) / rotation.temperatures_k, _squared(size_mhz, rotation.temperatures_k)
+    shift = np.sqrt(x2) if first_order else np.zeros_like(x2)
     energy = rotation.energy_over_rt + above
     with np.errstate(divide="ignore", over="ignore"):  # if the rotation is frozen, C_v is due to the spins alone
         return replace(
@@ -173,8 +179,8 @@ def times_functions(rotation: LevelSums, functions: int, ground_k: float, size_m
             ground_k=ground_k,
             q=functions * rotation.q * np.exp(-above),
             energy_over_rt=energy,
-            error_q=rotation.error_q + x2 / 2,
-            error_energy=rotation.error_energy + _over(x2, energy),
+            error_q=rotation.error_q + shift + x2 / 2,
+            error_energy=rotation.error_energy + _over(shift + x2, energy),
             error_cv=rotation.error_cv + _over(x2, rotation.cv_over_r),
         )
 

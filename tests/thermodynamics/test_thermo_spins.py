@@ -15,6 +15,7 @@ from rotor.thermodynamics import partition_function
 from rotor.thermodynamics.functions import ThermoFunctions, thermodynamic_functions
 from rotor.thermodynamics.level_sums import level_sums, lowest_level_k
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
+from rotor.thermodynamics.spin_factor import rotational_sum
 from rotor.thermodynamics.spin_sums import spin_sums, times_functions
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
@@ -172,3 +173,32 @@ def test_the_corrected_limit_counts_from_the_lowest_level():
     assert computed.q_rot_corrected[0] == pytest.approx(computed.q_rot[0], rel=5e-3)  # the same, 4e-3
     odd = thermodynamic_functions(rod(spin_weights={"even": 0, "odd": 1}), [300.0])
     assert odd.q_rot_corrected == pytest.approx(odd.q_rot, rel=1e-6)  # relative error asked of Q
+
+
+@pytest.mark.parametrize("nucleus", ["14N", "1H"])
+def test_three_equivalent_nuclei_count_as_spin_weights_by_k(nucleus):
+    """Weights 11:8 of three spins 1 and 4:2 of three spins 1/2, against the sum over split levels that exchange allows."""
+    size = 1 if nucleus == "14N" else 0.5
+    text = "chi_aa(14N_1)=-0.1 chi_bb-cc(14N_1)=0.1 MHz" if nucleus == "14N" else "C_aa(1H_1)=0.01 C_bb(1H_1)=0.02 MHz"
+    spins = "+".join(f"{nucleus}_{n}" for n in (1, 2, 3))
+    top = Top.from_constants("A=79 B=9 GHz", spin_constants=SpinConstants.parse(text, spins))
+    effects, temperatures = effects_of(top, True), np.array([2.0, 4.0])
+    split = level_sums(top, [top.spin_weights], temperatures, 1e-5, effects=effects)[0]
+    product = spin_sums(top, [top.spin_weights], temperatures, 1e-5, effects)
+    assert not product.split.any()
+    assert rotational_sum(top, effects).functions == (1 if size == 1 else 2)  # 11, 8 and 4, 2 = 2 (2, 1)
+    for name, error in (("q", "error_q"), ("energy_over_rt", "error_energy"), ("cv_over_r", "error_cv")):
+        off = np.abs(getattr(product.sums[0], name) / getattr(split, name) - 1)
+        assert (off < getattr(product.sums[0], error)).all()
+        assert (off < 1e-5).all()  # the error of both sums
+
+
+def test_q_of_three_equivalent_nuclei_at_room_temperature_needs_no_split_levels():
+    """54 spin functions: the sum over split levels to J = 150 took minutes and 5 GB."""
+    text = "C_aa(I1)=0.3 chi_aa(14N_1)=-0.1 chi_bb-cc(14N_1)=0.1 MHz"
+    constants = SpinConstants.parse(text, "I1=1/2 14N_1+14N_2+14N_3")
+    top = Top.from_constants("A=79 B=9 GHz", spin_constants=constants)
+    q = partition_function(top, 300.0, effects=effects_of(top, True))
+    plain = partition_function(top.with_weights({"0": 11, "1": 8, "2": 8}, "test"), 300.0)
+    assert q.source.startswith("classical with corrections")
+    assert q.q == pytest.approx(2 * plain.q, rel=1e-6)

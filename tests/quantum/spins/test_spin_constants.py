@@ -15,7 +15,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
 from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermodynamics import partition_function
-from rotor.thermodynamics.spin_factor import without_spins
+from rotor.thermodynamics.spin_factor import rotational_sum
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spins_of, twice_of
 from rotor.tops.spins.spin_weights import SpinWeights
@@ -108,7 +108,7 @@ def test_strengths_and_q_of_a_pattern_add_up_to_the_line_without_spins():
 
 def test_the_factor_of_spins_is_that_of_the_sum_over_all_levels():
     effects = effects_of(NITRILE, True)
-    rest, factor = without_spins(NITRILE, effects)
+    rest, factor = rotational_sum(NITRILE, effects)[:2]
     assert (len(rest), factor) == (2, 3)
     from rotor.quantum.solve import solve_levels
 
