@@ -11,7 +11,7 @@ from rotor.alignment.basis import least_jmax, trace_with
 from rotor.alignment.request import AlignRequest, answer_align, cosine_error
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.plans import plan_fields
-from rotor.quantum.fields.knobs import largest_difference
+from rotor.quantum.fields.inputs import largest_difference
 from rotor.requests.field import declared_fields
 from rotor.requests.knob import Choice, Measure, Setting, Sweep, Sweeps, ladder
 from rotor.requests.numerics import Goal, Numerics

@@ -110,7 +110,7 @@ DIPOLE = (2.0, 1.0, 0.0)
 
 def stark_energies(seed: int) -> list[float]:
     """Of the state that an estimated dipole moves most, in 10 kV/cm."""
-    from rotor.quantum.fields.budgets import ESTIMATED_DIPOLE_D
+    from rotor.quantum.fields.answer import ESTIMATED_DIPOLE_D
 
     answer = stark_answer(1.0)
     place = np.nanargmax(np.abs(answer.states.field * answer.states.slope))

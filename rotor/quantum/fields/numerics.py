@@ -13,7 +13,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.plans import plan_fields
 from rotor.quantum.fields.block_states import solve_block
 from rotor.quantum.fields.field_map import each_block
-from rotor.quantum.fields.knobs import ENERGY, largest_difference
+from rotor.quantum.fields.inputs import ENERGY, largest_difference
 from rotor.quantum.fields.stark_request import answer_stark
 from rotor.quantum.fields.zeeman_request import answer_zeeman
 from rotor.requests.knob import Measure, Setting, Sweep, Sweeps, ladder
@@ -50,9 +50,10 @@ def _energies(setting: tuple[Any, int]) -> Any:
     return np.concatenate([part.energies[:, part.j <= request.j_highest].ravel() for part in parts])
 
 
-def plan_in_field(request: Any, answer: Callable[[Any], Any], name: str, words: dict[str, str]) -> Plan:
-    """The plan of levels in a field, with J max and error at the ends of the fields; name: attribute of the request that has the fields."""
-    fields, top, j = getattr(request, name), request.top, max(request.j_highest, 1)
+def plan_in_field(request: Any, answer: Callable[[Any], Any], words: dict[str, str]) -> Plan:
+    """The plan of levels in a field, with J max and error at the ends of the fields."""
+    name, top, j = request.map.kind.name, request.top, max(request.j_highest, 1)
+    fields = getattr(request, name)
 
     def at(values: tuple[float, ...]) -> Any:
         """The answer at some of the fields."""
@@ -97,13 +98,13 @@ def _plan_of_stark(request: Any) -> Plan:
         "within": "Stark shift of a stray field",
     }
     followed = replace(request, diabatic_gap_mhz=None)
-    return plan_in_field(followed, answer_stark, "fields_kv_per_cm", words)
+    return plan_in_field(followed, answer_stark, words)
 
 
 def _plan_of_zeeman(request: Any) -> Plan:
     """The plan of levels in a magnetic field."""
     words = {"kind": "zeeman", "acts": "magnetic moments in the field, up to {:g} T", "good": "M"}
-    return plan_in_field(request, answer_zeeman, "fields_tesla", words)
+    return plan_in_field(request, answer_zeeman, words)
 
 
 STARK = Numerics({"MHz": Goal("energies")}, sweeps=sweeps_of_stark, plan=_plan_of_stark)

@@ -2,35 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor.checks import require_positive
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.effects.stark import (
-    Z,
-    acting,
-    checked_direction,
-    checked_j,
-    map_request,
-    projections,
-)
-from rotor.quantum.estimates.limits import every_limit, limit_facts
-from rotor.quantum.fields.field_map import FieldMap, field_map
-from rotor.quantum.fields.knobs import TOLERANCE
+from rotor.quantum.effects.stark import Z, acting, checked_direction, checked_j, map_request, projections
+from rotor.quantum.fields.answer import MapAnswer, dipole_term, static_polarization
+from rotor.quantum.fields.field_map import field_map
+from rotor.quantum.fields.inputs import basis_field, read_direction, read_m, states_field, tolerance_field
 from rotor.quantum.fields.map_request import MOST_AT_EDGE, MapRequest
-from rotor.quantum.fields.readers import MOST_J, highest_j, read_direction, read_m
 from rotor.quantum.hamiltonian_input import spins_field
-from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.budget import ErrorTerm
 from rotor.requests.field import check_fields, declared
-from rotor.requests.readers import Custom, Grid, Quantity, Whole
-from rotor.table import TextOf
-from rotor.tops.facts import top_facts
+from rotor.requests.readers import Custom, Grid, Quantity
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
@@ -56,14 +44,7 @@ class StarkRequest:
         "Fields: start:stop[:count], of 201 by default, or a comma list (kV/cm)", "conditions.field", common=True,
         typed="0:100kV/cm:201",
     )  # fmt: skip
-    j_highest: int = declared(
-        2,
-        Custom(highest_j, scene_type=int),
-        "Levels up to this J of the free molecule",
-        "observables.jmax",
-        option="--states",
-        common=True,
-    )
+    j_highest: int = states_field()
     m_values: tuple[float, ...] | None = declared(
         None, Custom(read_m, list, "LIST", list[float]), "|M| of the states: 0,1; by default all. With spins |M_F|: 0.5,1.5",
         "observables.m", common=True, example=[0, 1],
@@ -75,21 +56,8 @@ class StarkRequest:
         Z, Custom(read_direction, list, "ANGLE", list[float]), "Angle of the field with the light of the laser (degrees); M is mixed then",
         "conditions.direction", option="--tilt", example=[0.0, 0.0, 1.0],
     )  # fmt: skip
-    jmax: int | None = declared(
-        None,
-        Whole(2, MOST_J),
-        "Highest J of the basis; by default what the tolerance needs",
-        "numerics.jmax",
-        example=30,
-    )
-    tolerance_mhz: float = declared(
-        1e-4,
-        Quantity("MHz", above=0, metavar="E"),
-        "Of the energies (MHz)",
-        "numerics.tolerance",
-        typed="1e-4 MHz",
-        knob=TOLERANCE,
-    )
+    jmax: int | None = basis_field(30)
+    tolerance_mhz: float = tolerance_field(1e-4, "1e-4 MHz")
     diabatic_gap_mhz: float | None = declared(
         None, Quantity("MHz", above=0, metavar="GAP"),
         "Follow states diabatically through avoided crossings narrower than this (MHz)", "observables.diabatic_gap", example="10 MHz",
@@ -135,56 +103,29 @@ class StarkRequest:
 
 
 @dataclass(frozen=True, repr=False)
-class StarkAnswer(TextOf):
+class StarkAnswer(MapAnswer):
     """The map of a request."""
 
-    shown = "states"
-
     request: StarkRequest
-    states: FieldMap
 
-    @cached_property
-    def further_limits(self) -> list[Limit]:
-        """Neglected effects of the field."""
-        from rotor.quantum.fields.budgets import static_polarization
+    def conditions(self) -> dict[str, Any]:
+        """The laser, the direction of the field, and the gap of diabatic labels."""
+        return {
+            "intensity_w_per_cm2": self.request.intensity_w_per_cm2,
+            "field_direction": list(self.request.direction),
+            "diabatic_gap_mhz": self.request.diabatic_gap_mhz,
+        }
 
+    def field_limits(self) -> list[Limit]:
+        """The polarization by the static field."""
         return static_polarization(self.request.top, float(np.abs(self.states.fields).max()))
 
-    @cached_property
-    def errors(self) -> ErrorBudget:
-        """Error budget of the energies."""
-        from rotor.quantum.fields.budgets import constants_term, dipole_term, joined_data, map_budget
-
-        request, effects = self.request, effects_of(self.request.top, self.request.hyperfine)
-        j = max(request.j_highest, 1)
-        terms = [dipole_term(request.top, self.states), constants_term(request.top, effects, j)]
-        if request.intensity_w_per_cm2:
+    def moment_terms(self) -> list[ErrorTerm]:
+        """Errors of the dipole, and of the polarizability in light."""
+        terms = [dipole_term(self.request.top, self.states)]
+        if self.request.intensity_w_per_cm2:
             terms.append(ErrorTerm(None, "the polarizability has no stated uncertainty"))
-        limits = [*every_limit(request.top, j, effects), *self.further_limits]
-        return map_budget(self.states, limits, joined_data(*terms))
-
-    def facts(self) -> Mapping[str, Any]:
-        """Everything about the answer but its table of states, by the keys of docs/verbs."""
-        fields, request = self.states.fields, self.request
-        return {
-            **top_facts(request.top),
-            "field_kv_per_cm": [float(fields[0]), float(fields[-1]), len(fields)],
-            "intensity_w_per_cm2": request.intensity_w_per_cm2,
-            "field_direction": list(request.direction),
-            "j_highest": request.j_highest,
-            "hyperfine": request.hyperfine,
-            "diabatic_gap_mhz": request.diabatic_gap_mhz,
-            "tolerance_mhz": request.tolerance_mhz,
-            **self.states.provenance,
-            "curves": len(self.states.curves()),
-            **limit_facts(
-                request.top,
-                max(request.j_highest, 1),
-                effects_of(request.top, request.hyperfine),
-                self.further_limits,
-            ),
-            "errors": self.errors.as_json(),
-        }
+        return terms
 
 
 def answer_stark(request: StarkRequest, executor: Executor | None = None) -> StarkAnswer:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,17 +15,14 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.stark import checked_j
 from rotor.quantum.effects.zeeman import DEFAULT_TOLERANCE_MHZ, MAGNETIC, checked_g, magnetic_map_request
 from rotor.quantum.estimates.beyond import Limit
-from rotor.quantum.estimates.limits import every_limit, limit_facts
-from rotor.quantum.fields.field_map import FieldMap, field_map
-from rotor.quantum.fields.knobs import TOLERANCE
+from rotor.quantum.fields.answer import MapAnswer
+from rotor.quantum.fields.field_map import field_map
+from rotor.quantum.fields.inputs import basis_field, states_field, tolerance_field
 from rotor.quantum.fields.map_request import MapRequest
-from rotor.quantum.fields.readers import MOST_J, highest_j
 from rotor.quantum.hamiltonian_input import spins_field
-from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.budget import ErrorTerm
 from rotor.requests.field import SPINS, check_fields, declared
-from rotor.requests.readers import Custom, Grid, Pairs, Quantity, Whole
-from rotor.table import TextOf
-from rotor.tops.facts import top_facts
+from rotor.requests.readers import Grid, Pairs
 from rotor.tops.magnetic import MagneticTensors
 from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T
 
@@ -51,29 +47,9 @@ class ZeemanRequest:
         tuple(np.linspace(0.0, 5.0, POINTS).tolist()), Grid("T", points=POINTS),
         "Fields: start:stop[:count], of 51 by default, or a comma list (T, mT or G)", "conditions.field", common=True, typed="0:5T:51",
     )  # fmt: skip
-    j_highest: int = declared(
-        2,
-        Custom(highest_j, scene_type=int),
-        "Levels up to this J of the free molecule",
-        "observables.jmax",
-        option="--states",
-        common=True,
-    )
-    jmax: int | None = declared(
-        None,
-        Whole(2, MOST_J),
-        "Highest J of the basis; by default what the tolerance needs",
-        "numerics.jmax",
-        example=12,
-    )
-    tolerance_mhz: float = declared(
-        DEFAULT_TOLERANCE_MHZ,
-        Quantity("MHz", above=0, metavar="E"),
-        "Of the energies (MHz)",
-        "numerics.tolerance",
-        typed="1e-6 MHz",
-        knob=TOLERANCE,
-    )
+    j_highest: int = states_field()
+    jmax: int | None = basis_field(12)
+    tolerance_mhz: float = tolerance_field(DEFAULT_TOLERANCE_MHZ, "1e-6 MHz")
     hyperfine: bool = spins_field()
     nuclear_g: Mapping[str, float] | None = declared(
         None, Pairs(float, "spin", "14N=0.4038"),
@@ -150,50 +126,30 @@ def _g_of(name: str) -> float:
 
 
 @dataclass(frozen=True, repr=False)
-class ZeemanAnswer(TextOf):
+class ZeemanAnswer(MapAnswer):
     """The map of a request."""
 
-    shown = "states"
-
     request: ZeemanRequest
-    states: FieldMap
 
-    @cached_property
-    def errors(self) -> ErrorBudget:
-        """Error budget of the energies."""
-        from rotor.quantum.fields.budgets import constants_term, joined_data, map_budget
-
-        request, effects = self.request, effects_of(self.request.top, self.request.hyperfine)
-        j = max(request.j_highest, 1)
-        moment = ErrorTerm(0.0, "no field acts")
-        if self.states.fields.any():
-            moment = ErrorTerm(None, "the g tensor has no stated uncertainty")
-        limits = [*every_limit(request.top, j, effects), *magnetic_limits(request)]
-        return map_budget(self.states, limits, joined_data(moment, constants_term(request.top, effects, j)))
-
-    def facts(self) -> Mapping[str, Any]:
-        """Everything about the answer but its table of states, by the keys of docs/verbs."""
-        fields, request, magnetic = self.states.fields, self.request, self.request.magnetic
+    def conditions(self) -> dict[str, Any]:
+        """The tensors of the top and g of its nuclei."""
+        magnetic = self.request.magnetic
         return {
-            **top_facts(request.top),
-            "field_tesla": [float(fields[0]), float(fields[-1]), len(fields)],
             "g_abc": magnetic.g,
             "magnetisability_abc": magnetic.magnetisability,
             "magnetic_source": magnetic.source or None,
-            "nuclear_g": request.spin_g,
-            "j_highest": request.j_highest,
-            "hyperfine": request.hyperfine,
-            "tolerance_mhz": request.tolerance_mhz,
-            **self.states.provenance,
-            "curves": len(self.states.curves()),
-            **limit_facts(
-                request.top,
-                max(request.j_highest, 1),
-                effects_of(request.top, request.hyperfine),
-                magnetic_limits(request),
-            ),
-            "errors": self.errors.as_json(),
+            "nuclear_g": self.request.spin_g,
         }
+
+    def field_limits(self) -> list[Limit]:
+        """See `magnetic_limits`."""
+        return magnetic_limits(self.request)
+
+    def moment_terms(self) -> list[ErrorTerm]:
+        """The error of the g tensor."""
+        if self.states.fields.any():
+            return [ErrorTerm(None, "the g tensor has no stated uncertainty")]
+        return [ErrorTerm(0.0, "no field acts")]
 
 
 def magnetic_limits(request: ZeemanRequest) -> list[Limit]:

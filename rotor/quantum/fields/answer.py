@@ -1,4 +1,4 @@
-"""Error budgets of maps of levels in a field (`rotor.requests.budget`).
+"""Answers of maps of levels in a field, and their error budgets (`rotor.requests.budget`).
 
 H = H0 - s E·μ is linear in a scale s of the dipole, so that ∂E/∂ln s = F ∂E/∂F at a field of strength F (theorem of Hellmann and Feynman).
 A relative error of the dipole therefore shifts an energy by this error times F ∂E/∂F. Maps neglect the polarization of the molecule by a
@@ -8,21 +8,28 @@ static field, -½ α F² by definition of the polarizability, with α/4πε0 a v
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor import units
+from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, data_term, model_term, parameter_names
+from rotor.quantum.estimates.limits import every_limit, limit_facts
 from rotor.quantum.estimates.uncertainty import known_covariance, level_errors, source_of_errors
+from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.solve import solve_levels
 from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.table import TextOf
+from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
-    from rotor.quantum.fields.field_map import FieldMap
     from rotor.tops.top import Top
 
 # ½ α F² in MHz of 1 Å³ in 1 kV/cm
@@ -30,6 +37,58 @@ MHZ_PER_ANGSTROM3 = 2 * math.pi * units.VACUUM_PERMITTIVITY_F_PER_M * 1e-30 * 1e
 ESTIMATED_DIPOLE_D = (
     0.2 / 0.6745
 )  # standard deviation of a normal distribution with half of its values beyond ±0.2 D, as for the estimates
+
+
+@dataclass(frozen=True, repr=False)
+class MapAnswer(TextOf):
+    """The map of a request, the errors of its energies, and the effects that it neglects."""
+
+    shown = "states"
+
+    request: Any
+    states: FieldMap
+
+    @abstractmethod
+    def conditions(self) -> dict[str, Any]:
+        """What acts, beside the fields themselves, by the keys of docs/verbs."""
+
+    @abstractmethod
+    def field_limits(self) -> list[Limit]:
+        """Neglected effects of the field."""
+
+    @abstractmethod
+    def moment_terms(self) -> list[ErrorTerm]:
+        """Errors of the energies from those of the moments on which the field acts."""
+
+    @property
+    def _hamiltonian(self) -> tuple[Top, int, tuple[QuantumEffect, ...]]:
+        """The top, the highest J of the map, at least 1, and the effects: what estimates of neglected effects start from."""
+        request = self.request
+        return request.top, max(request.j_highest, 1), effects_of(request.top, request.hyperfine)
+
+    @cached_property
+    def errors(self) -> ErrorBudget:
+        """Error budget of the energies."""
+        top, j, effects = self._hamiltonian
+        data = joined_data(*self.moment_terms(), constants_term(top, effects, j))
+        return map_budget(self.states, [*every_limit(top, j, effects), *self.field_limits()], data)
+
+    def facts(self) -> Mapping[str, Any]:
+        """Everything about the answer but its table of states, by the keys of docs/verbs."""
+        fields, request = self.states.fields, self.request
+        top, j, effects = self._hamiltonian
+        return {
+            **top_facts(top),
+            self.states.field_name: [float(fields[0]), float(fields[-1]), len(fields)],
+            **self.conditions(),
+            "j_highest": request.j_highest,
+            "hyperfine": request.hyperfine,
+            "tolerance_mhz": request.tolerance_mhz,
+            **self.states.provenance,
+            "curves": len(self.states.curves()),
+            **limit_facts(top, j, effects, self.field_limits()),
+            "errors": self.errors.as_json(),
+        }
 
 
 def static_polarization(top: Top, strongest_kv_per_cm: float) -> list[Limit]:
