@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, record_table, show_parts
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.readers import Quantity, Text
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import PICTURES, Output, Report, Work
 
 if TYPE_CHECKING:
-    from rotor.scenes.accuracy_sweep import Row, WorkPrecision
+    from rotor.scenes.accuracy_sweep import WorkPrecision
     from rotor.scenes.scene import Scene
 
 EXAMPLES = """\b
@@ -69,7 +69,7 @@ def answer(request: AccuracyRequest, work: Work) -> AccuracyAnswer:
     except KeyboardInterrupt:
         work.note("interrupted: the knobs swept so far follow, no file is written")
         if so_far:
-            show(AccuracyAnswer(request.scene, scene, so_far[-1]), None)
+            show_parts(show(AccuracyAnswer(request.scene, scene, so_far[-1]), None))
         raise
     if "plot" in work.files and not table.rows:
         raise ValueError(f"--plot: there is nothing to draw: {'; '.join(table.remarks)}")
@@ -108,23 +108,23 @@ def _title(scene: Scene) -> str:
     return scene.title or f"a scene of the kind {scene.kind}"
 
 
-def show(answer: AccuracyAnswer, _: Any) -> None:
-    """Print a table for each knob, then the references and remarks."""
+def show(answer: AccuracyAnswer, _: Any) -> Iterable[Part | None]:
+    """A table for each knob, then the references and remarks."""
     table = answer.table
-    print(_title(answer.scene))
+    yield _title(answer.scene)
     for (knob, error_of, unit), rows in table.curves().items():
-        print()
-        heading = f"error ({unit})" if unit else "error"
-        show_table(Table(f"{knob}: {error_of}", ["setting", "", heading, "seconds"], [_cells(row) for row in rows]))
+        columns = {
+            "setting": "{0.setting}",
+            "": lambda row: "*" if row.own else "",
+            f"error ({unit})" if unit else "error": "{0.error:.2g}",
+            "seconds": "{0.seconds:.2g}",
+        }
+        yield record_table(f"{knob}: {error_of}", columns, rows)
     if table.rows:
-        print("\n* value in the scene; processor seconds, without start-up and compilation")
+        yield "* value in the scene; processor seconds, without start-up and compilation"
     facts = [("against", f"{name}: {text}") for name, text in table.references.items()]
     facts += [("remark", text) for text in table.remarks]
-    show_facts([(name if not n or facts[n - 1][0] != name else "", text) for n, (name, text) in enumerate(facts)])
-
-
-def _cells(row: Row) -> list[str]:
-    return [row.setting, "*" if row.own else "", f"{row.error:.2g}", f"{row.seconds:.2g}"]
+    yield [(name if not n or facts[n - 1][0] != name else "", text) for n, (name, text) in enumerate(facts)]
 
 
 VERB = Tool(

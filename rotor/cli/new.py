@@ -72,7 +72,7 @@ VERB = Tool(
     request=NewRequest,
     answer=answer,
     text=None,
-    show=lambda answer, report: None if answer.written else print(answer.text, end=""),
+    show=lambda answer, report: () if answer.written else (answer.text.removesuffix("\n"),),
     outputs=(
         Output(
             "out",

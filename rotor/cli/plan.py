@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import show_facts
+from rotor.reports.screen import Part
+from rotor.reports.top_facts import left_out_facts
 from rotor.requests.field import REQUIRED, declared
 from rotor.requests.readers import Text
 from rotor.verbs.tool import Tool
@@ -50,12 +52,12 @@ def answer(request: PlanRequest, work: Work) -> PlanAnswer:
     return PlanAnswer(request.scene, scene, scene.plan(folder=Path(request.scene).parent))
 
 
-def show(answer: PlanAnswer, _: Any) -> None:
-    """Print the plan."""
+def show(answer: PlanAnswer, _: Any) -> Iterable[Part | None]:
+    """The plan."""
     from rotor.requests.plan import larger_items
 
     scene, plan = answer.scene, answer.plan
-    print(scene.title or f"a scene of the kind {scene.kind}")
+    yield scene.title or f"a scene of the kind {scene.kind}"
     facts: list[tuple[str, str]] = [
         ("effects", "; ".join(plan.effects)),
         ("conserved" if plan.kind in ("tumble", "gas", "fluid") else "good numbers", ", ".join(plan.good) or "none"),
@@ -66,7 +68,7 @@ def show(answer: PlanAnswer, _: Any) -> None:
     ]
     larger, others = larger_items(plan.left_out, lambda part: part.size, lambda part: part.name)
     texts = [_text(part) for part in larger] + ([others] if others else [])
-    show_facts([*facts, *(("left out" if not number else "", text) for number, text in enumerate(texts))])
+    yield [*facts, *left_out_facts(texts)]
 
 
 def _text(part: LeftOut) -> str:

@@ -15,7 +15,7 @@ from rotor.checks import NoAnswerError
 from rotor.cli.shared import process
 from rotor.cli.shared.output import Files, answering, deliver, note
 from rotor.cli.shared.workers import MOST_WORKERS
-from rotor.reports.screen import Table, evenly, json_with_rows, show_facts, show_table
+from rotor.reports.screen import Table, evenly, json_with_rows, show_parts, show_table
 from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, declared
 from rotor.requests.fill import Entries
 from rotor.requests.readers import Flag, Text, Whole
@@ -165,7 +165,7 @@ def _single(scene: Scene, options: Options, files: Files, pool: Executor | None,
 def _deliver(result: SceneResult, options: Options, files: Files, command: str) -> None:
     """Print the report of the verb, then files and seconds of the run."""
     from rotor.plots.view import WHOLE
-    from rotor.reports.error_table import show_errors
+    from rotor.reports.error_table import error_parts
     from rotor.scenes.structures import entries_of
     from rotor.verbs.verb import verb_of
 
@@ -179,11 +179,9 @@ def _deliver(result: SceneResult, options: Options, files: Files, command: str) 
         """The report, after the title of the scene."""
         if scene.title:
             print(scene.title)
-        verb.show(result.answer, report)
         files_text = ", ".join(map(str, result.files)) or "none: [outputs] names none"
-        show_facts([("files", files_text), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)])
-        if options.errors:
-            show_errors(content)
+        run = [("files", files_text), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)]
+        show_parts([*verb.show(result.answer, report), run, *(error_parts(content) if options.errors else [])])
 
     deliver(files, {}, lambda: verb.json(result.answer, content), show)
 
@@ -290,5 +288,5 @@ VERB = Tool(
     request=Options,
     of="scene",
     answer=lambda request, work: None,
-    show=lambda answer, report: None,
+    show=lambda answer, report: (),
 )

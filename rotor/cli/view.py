@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -104,13 +105,13 @@ def export(answer: Opened, path: Path, _: Report) -> None:
     path.write_text(export_page(answer.service), encoding="utf-8")
 
 
-def show(answer: Opened, _: Report) -> None:
-    """Report the exported page, or serve the session until the process is interrupted."""
+def show(answer: Opened, _: Report) -> Iterator[str]:
+    """The exported page; or nothing, once the session that is served has been interrupted."""
     service = answer.service
     if answer.page is None:
         _serve(service, answer.request)
     else:
-        print(f"{answer.page}: {len(service.spectrum)} points, {len(service.session.state.lines)} assigned lines")
+        yield f"{answer.page}: {len(service.spectrum)} points, {len(service.session.state.lines)} assigned lines"
 
 
 def _serve(service: Service, request: ViewRequest) -> None:

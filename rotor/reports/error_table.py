@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rotor.reports.screen import show_facts
+from rotor.reports.screen import Part
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 
 KINDS = {
@@ -14,12 +14,9 @@ KINDS = {
 }  # fmt: skip
 
 
-def show_errors(content: Mapping[str, Any]) -> None:
-    """Print the table of errors of an answer, where its content has a budget."""
-    if "errors" in content:
-        print()
-        print(f"errors of {content['errors']['of']}")
-        show_facts(error_rows(content["errors"]))
+def error_parts(content: Mapping[str, Any]) -> list[Part]:
+    """The table of errors of an answer; empty if its content has no budget."""
+    return [f"errors of {content['errors']['of']}", error_rows(content["errors"])] if "errors" in content else []
 
 
 def error_rows(content: Mapping[str, Any]) -> list[tuple[str, str]]:

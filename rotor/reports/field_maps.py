@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import Table
+from rotor.reports.screen import Table, record_table
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
@@ -20,12 +20,18 @@ def accuracy_fact(content: Mapping[str, Any]) -> tuple[str, str]:
     return "numerical error", f"{accuracy}, {rounding}; edge population {content['edge_population']:.1e}"
 
 
-def table_of_states(states: FieldMap, names: tuple[str, ...], row_of: Callable[[slice], list[str]]) -> Table:
-    """The first states by M and block, one row each; `row_of` formats the rows that a state has in the map."""
-    curves = states.curves()
-    rows = [row_of(rows_of) for rows_of in curves[:SHOWN]]
-    title = f"{len(rows)} of {len(curves)} states" if len(rows) < len(curves) else "all states"
-    return Table(f"{title}, by M and block", names, rows, frozenset({"state"}))
+def table_of_states(states: FieldMap, unit: str, columns: Mapping[str, Callable[[Any], str]]) -> Table:
+    """The first states by M and block: energies at both ends of the map, and further columns from a state's first and last row."""
+    curves = [(rows.start, rows.stop - 1) for rows in states.curves()]
+    title = f"{SHOWN} of {len(curves)} states" if len(curves) > SHOWN else "all states"
+    first, last = (f"E at {field:g} {unit} (MHz)" for field in (states.fields[0], states.fields[-1]))
+    cells: dict[str, Callable[[Any], str]] = {
+        "state": lambda ends: str(states.label[ends[0]]),
+        "M": lambda ends: f"{states.m[ends[0]]:g}",
+        first: lambda ends: f"{states.energy_mhz[ends[0]]:z.6f}",
+        last: lambda ends: f"{states.energy_mhz[ends[1]]:z.6f}",
+    }
+    return record_table(f"{title}, by M and block", {**cells, **columns}, curves[:SHOWN], {"state"})
 
 
 def results_of_map(answer: Any) -> dict[str, Any]:

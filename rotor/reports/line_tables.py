@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import Table
+from rotor.reports.screen import Table, record_table, rows_of
 
 if TYPE_CHECKING:
     from rotor.spectra.lines import Lines
@@ -29,67 +30,67 @@ def pattern_records(lines: Lines, resolution_mhz: float, shown: int) -> list[dic
     return records
 
 
-def first_rows_title(count: int, what: str) -> str:
-    """Title of a table that shows only the strongest (or lowest, brightest) rows.
+def first_rows_title(count: int, total: int, what: str) -> str:
+    """Title of a table that shows only the strongest (or lowest, brightest) of all rows.
 
-    >>> first_rows_title(1, "strongest line"), first_rows_title(3, "strongest line")
-    ('the strongest line', 'the 3 strongest lines')
+    >>> first_rows_title(1, 5, "strongest line"), first_rows_title(3, 5, "strongest line"), first_rows_title(5, 5, "strongest line")
+    ('the strongest line', 'the 3 strongest lines', 'all lines')
     """
+    if count == total:
+        return f"all {what.rpartition(' ')[2]}s"
     return f"the {what}" if count == 1 else f"the {count} {what}s"
 
 
 def patterns_table(records: list[dict[str, Any]], names: str) -> Table:
     """Table of line patterns by frequency; `names` heads the quantum numbers of the rotational levels."""
-    forms = {"frequency_mhz": "{:.4f}", "intensity_nm2_mhz": "{:.3e}", "components": "{}", "width_mhz": "{:.4f}"}
-    rows = [
-        (*(form.format(record[name]) for name, form in forms.items()), record["upper"], record["lower"])
-        for record in records
-    ]
-    columns = ("frequency (MHz)", "nm² MHz", "components", "width (MHz)", "upper", "lower")
-    title = f"the strongest lines at this resolution, in order of frequency (states: {names})"
-    return Table(title, columns, rows)
+    columns = {
+        "frequency (MHz)": "{frequency_mhz:.4f}",
+        "nm² MHz": "{intensity_nm2_mhz:.3e}",
+        "components": "{components}",
+        "width (MHz)": "{width_mhz:.4f}",
+        "upper": "{upper}",
+        "lower": "{lower}",
+    }
+    return record_table(
+        f"the strongest lines at this resolution, in order of frequency (states: {names})", columns, records
+    )
 
 
-class _Column(NamedTuple):
-    """A column of the line table: its name in `Lines.columns`, its heading, its number format."""
-
-    name: str
-    heading: str
-    form: str
-
-
-_COLUMNS = (
-    _Column("frequency_mhz", "frequency (MHz)", "{:.4f}"),
-    _Column("error_mhz", "error (MHz)", "{:.4f}"),
-    _Column("lgint", "lgint", "{:.4f}"),
-    _Column("energy_lower_cm", 'E" (cm-1)', "{:.4f}"),
-    _Column("g_upper", "g'", "{}"),
-    _Column("einstein_a_per_s", "A (1/s)", "{:.2e}"),
-    _Column("strength_debye2", "Sμ² (D²)", "{:.5g}"),
-)
-
-
-def _printed(value: float, form: str) -> str:
-    """A number as text: empty where it is NaN, a bound where the intensity underflows (its logarithm is -inf)."""
-    if math.isinf(value):
-        return "<-300"
-    return "" if math.isnan(value) else form.format(value)
+_COLUMNS: dict[str, tuple[str, str | Callable[[Any], str]]] = {
+    "frequency_mhz": ("frequency (MHz)", "{frequency_mhz:.4f}"),
+    "error_mhz": ("error (MHz)", "{error_mhz:.4f}"),
+    "lgint": (
+        "lgint",
+        lambda row: "<-300" if math.isinf(row["lgint"]) else f"{row['lgint']:.4f}",
+    ),  # the intensity underflows
+    "energy_lower_cm": ('E" (cm-1)', "{energy_lower_cm:.4f}"),
+    "g_upper": ("g'", "{g_upper}"),
+    "einstein_a_per_s": ("A (1/s)", "{einstein_a_per_s:.2e}"),
+    "strength_debye2": ("Sμ² (D²)", "{strength_debye2:.5g}"),
+}  # headings and formats by the names in `Lines.columns`
 
 
 def lines_table(lines: Lines, rows: Any, depth: Any = None) -> Table:
     """Table of the selected lines in order of frequency, with their optical depths if a layer of gas is given."""
+    shown = lines.where(rows)
+    records = labelled_rows(shown, {"upper": shown.upper, "lower": shown.lower})
+    columns = dict(column for name, column in _COLUMNS.items() if name in shown.columns)
+    if depth is not None:
+        columns["τ"] = "{depth:.3e}"
+        records = [record | {"depth": value} for record, value in zip(records, depth[rows], strict=True)]
+    title = first_rows_title(len(shown), len(lines), "strongest line")
+    columns |= {"upper": "{upper}", "lower": "{lower}"}
+    return record_table(f"{title}, in order of frequency {states_text(lines)}", columns, records)
+
+
+def states_text(lines: Any) -> str:
+    """Headings of the quantum numbers that label the states of lines."""
     from rotor.quantum import quanta
 
-    shown = lines.where(rows)
-    names = quanta.headings(lines.quanta_names)
-    values = shown.columns
-    present = [column for column in _COLUMNS if column.name in values]
-    cells = [[_printed(x, column.form) for x in values[column.name]] for column in present]
-    headings = [column.heading for column in present]
-    if depth is not None:
-        headings.append("τ")
-        cells.append([f"{x:.3e}" for x in depth[rows]])
-    labels = [shown.levels.labels(states) for states in (shown.upper, shown.lower)]
-    columns = (*headings, "upper", "lower")
-    title = first_rows_title(len(shown), "strongest line") if len(shown) < len(lines) else "all lines"
-    return Table(f"{title}, in order of frequency (states: {names})", columns, list(zip(*cells, *labels, strict=True)))
+    return f"(states: {quanta.headings(lines.quanta_names)})"
+
+
+def labelled_rows(lines: Any, states: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Rows of lines as records, with the labels of their states by name."""
+    labels = (lines.levels.labels(numbers) for numbers in states.values())
+    return [row | dict(zip(states, texts, strict=True)) for row, *texts in zip(rows_of(lines), *labels, strict=True)]

@@ -1,12 +1,13 @@
-"""Tables and facts on the screen, and JSON for programs."""
+"""Reports on the screen: text, facts and tables; JSON for programs."""
 
 from __future__ import annotations
 
 import json
 import math
 import shutil
+import string
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,57 @@ class Table:
     title: str
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
-    left: frozenset[str] = frozenset()
+    left: Collection[str] = frozenset()
+
+
+Facts = Sequence[tuple[str, str]]  # names and their texts
+Part = str | Facts | Table  # of a report
+
+
+class _Cells(string.Formatter):
+    """Formatter of cells: None is an empty text, NaN or infinity a dash."""
+
+    def format_field(self, value: Any, form: str) -> str:
+        """The text of a value."""
+        if value is None:
+            return ""
+        return "-" if isinstance(value, float) and not math.isfinite(value) else format(value, form)
+
+
+def record_table(title: str, columns: Mapping[str, Any], records: Iterable[Any], left: Collection[str] = ()) -> Table:
+    """Table with a row for each record, a mapping or an object.
+
+    columns: by heading, the format of a cell, with names of the mapping or attributes of the object `0`; or a function of the record.
+
+    >>> record_table("", {"J": "{j}", "E (MHz)": "{energy:.1f}"}, [{"j": 1, "energy": 2.0}, {"j": 2, "energy": float("nan")}]).rows
+    [['1', '2.0'], ['2', '-']]
+    >>> record_table("", {"real": "{0.real:g}", "twice": lambda x: str(2 * x)}, [1.5]).rows
+    [['1.5', '3.0']]
+    """
+    cells = _Cells()
+
+    def text(form: str | Callable[[Any], str], record: Any) -> str:
+        names = record if isinstance(record, Mapping) else {}
+        return cells.vformat(form, (record,), names) if isinstance(form, str) else form(record)
+
+    return Table(title, list(columns), [[text(form, record) for form in columns.values()] for record in records], left)
+
+
+def show_parts(parts: Iterable[Part | None]) -> None:
+    """Print the parts of a report that are not empty, with a blank line before each text, and before and after each table."""
+    previous: Part | None = None
+    for part in parts:
+        if not part or (isinstance(part, Table) and not part.rows):
+            continue
+        if previous is not None and (isinstance(previous, Table) or isinstance(part, str | Table)):
+            print()
+        if isinstance(part, Table):
+            show_table(part)
+        elif isinstance(part, str):
+            print(part)
+        else:
+            show_facts(part)
+        previous = part
 
 
 def show_table(table: Table) -> None:
@@ -39,6 +90,12 @@ def evenly(count: int, most: int) -> list[int]:
     ([0, 1, 2], [0, 2, 4, 6, 8])
     """
     return list(range(count)) if count <= most else [round(i * (count - 1) / (most - 1)) for i in range(most)]
+
+
+def sampled(table: Columns, most: int, things: str = "rows") -> tuple[list[dict[str, Any]], str]:
+    """Evenly spaced rows of a long table as records, and a text on their number for the title."""
+    rows = evenly(len(table), most)
+    return rows_of(table, rows), "" if len(rows) == len(table) else f", {len(rows)} of {len(table)} {things}"
 
 
 def table_text(table: Table) -> str:
@@ -111,9 +168,9 @@ def json_with_rows(table: Columns, key: str, content: Mapping[str, Any]) -> str:
     return json_text({**content, key: rows_of(table)})
 
 
-def rows_of(table: Columns) -> list[dict[str, Any]]:
-    """All rows of a table as records by column name."""
-    columns = {name: column.tolist() for name, column in table.columns.items()}
+def rows_of(table: Columns, rows: Any = slice(None)) -> list[dict[str, Any]]:
+    """Rows of a table, by default all, as records by column name."""
+    columns = {name: column[rows].tolist() for name, column in table.columns.items()}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 

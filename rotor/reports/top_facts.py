@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rotor.reports.screen import Facts, Part
+from rotor.reports.sources import source_facts
 from rotor.tops.facts import estimated_errors_mhz, formula_of
 
 if TYPE_CHECKING:
@@ -37,7 +39,12 @@ def error_facts(errors: Mapping[str, Any] | None) -> list[tuple[str, str]]:
 
 
 def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Errors, effects in the model and effects left out (largest first), from `rotor.quantum.estimates.limits.limit_facts`."""
+    """Errors, effects in the model and effects left out (largest first), from `rotor.quantum.estimates.limits.limit_facts`.
+
+    Of a motion without a Hamiltonian: errors, and what its content states as left out.
+    """
+    if "limits" not in content:
+        return [*error_facts(content.get("errors")), *left_out_facts(content.get("left_out", ()))]
     from rotor.quantum.estimates.beyond import Limit
     from rotor.requests.plan import larger_items
 
@@ -56,6 +63,19 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
     )
     return facts + left_out_facts(limits or [NOTHING_SEEN if content["mass_u"] is not None else unknown])
+
+
+def top_parts(
+    top: Top, facts: Facts, parts: Iterable[Part | None], tables: Sequence[str], report: Any, title: str = ""
+) -> Iterator[Part | None]:
+    """Parts of a report on a top: heading, facts, further parts; then sources of the named tables, errors and what is left out.
+
+    report: a `rotor.verbs.verb.Report`. title: heading, by default that of the top.
+    """
+    yield title or heading(top)
+    yield facts
+    yield from parts
+    yield [*source_facts(top, tables, report.sources), *model_facts(report.content)]
 
 
 def with_option(sentence: str, verb: str = "spectrum") -> str:

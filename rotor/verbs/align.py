@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.alignment.pulse import SHAPES, Axis, Pulse, read_axis
 from rotor.alignment.request import AlignAnswer, AlignRequest, answer_align
 from rotor.reports import top_facts
-from rotor.reports.screen import Table, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part, record_table
 from rotor.requests.field import CONDITIONS, REQUIRED, all_fields
 from rotor.requests.fill import Entries, read_fields
 from rotor.table import counted
@@ -152,26 +151,20 @@ def _ensemble_text(trace: AlignmentTrace) -> str:
     return f"level {level}, " + ("all M" if ensemble.m is None else f"|M| = {ensemble.m}")
 
 
-def show(answer: AlignAnswer, report: Report) -> None:
-    """Print conditions, extremes of the cosines, sources and errors."""
+def show(answer: AlignAnswer, report: Report) -> Iterable[Part | None]:
+    """Conditions, extremes of the cosines, sources and errors."""
     trace, content = answer.trace, report.content
-    print(top_facts.heading(trace.top))
-    show_facts(_facts(trace, content))
-    print()
-    rows = []
-    for extreme in content["extremes"]:
-        mean = trace.permanent.get(extreme["name"])
-        numbers = (
-            f"{extreme['max']:.6f}",
-            f"{extreme['max_at_ps']:.3f}",
-            f"{extreme['min']:.6f}",
-            f"{extreme['min_at_ps']:.3f}",
-        )
-        rows.append([extreme["name"], *numbers, "" if mean is None else f"{mean:.6f}"])
-    columns = ("cosine", "max", "at (ps)", "min", "at (ps)", "mean after")
-    show_table(Table("", columns, rows, frozenset({"cosine"})))
-    sources = source_facts(trace.top, ("constants", "dipole", "polarizability"), report.sources)
-    show_facts([*sources, *top_facts.model_facts(content)])
+    columns = {
+        "cosine": "{name}",
+        "max": "{max:.6f}",
+        "max at (ps)": "{max_at_ps:.3f}",
+        "min": "{min:.6f}",
+        "min at (ps)": "{min_at_ps:.3f}",
+        "mean after": lambda row: f"{trace.permanent[row['name']]:.6f}" if row["name"] in trace.permanent else "",
+    }
+    table = record_table("", columns, content["extremes"], {"cosine"})
+    sources = ("constants", "dipole", "polarizability")
+    return top_facts.top_parts(trace.top, _facts(trace, content), (table,), sources, report)
 
 
 def _facts(trace: AlignmentTrace, content: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.fitting.publication import value_text
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, written_fields
@@ -110,23 +111,19 @@ def write_lines(answer: AssignAnswer, path: Path, report: Report) -> None:
     write_assigned_lines(answer.species[0].lines, path)
 
 
-def show(answer: AssignAnswer, report: Report) -> None:
-    """Print the species with their constants and errors."""
+def show(answer: AssignAnswer, report: Report) -> Iterable[Part | None]:
+    """The species with their constants and errors."""
     record = report.content
-    show_facts(
-        [
-            ("spectrum", f"{record['peaks']} peaks, {record['band_mhz'][0]:g} to {record['band_mhz'][1]:g} MHz"),
-            ("spurs", f"{record['spurs']} harmonics of a clock are left out"),
-            ("answer", _verdict(answer)),
-            ("left", f"{record['unexplained']} peaks belong to no species"),
-        ]
-    )
+    yield [
+        ("spectrum", f"{record['peaks']} peaks, {record['band_mhz'][0]:g} to {record['band_mhz'][1]:g} MHz"),
+        ("spurs", f"{record['spurs']} harmonics of a clock are left out"),
+        ("answer", _verdict(answer)),
+        ("left", f"{record['unexplained']} peaks belong to no species"),
+    ]
     for number, species in enumerate(answer.species, 1):
-        print()
-        show_table(_table(number, species))
-        show_facts(_facts(species))
-    print()
-    show_facts(error_facts(record.get("errors")))
+        yield _table(number, species)
+        yield _facts(species)
+    yield error_facts(record.get("errors"))
 
 
 def _verdict(answer: AssignAnswer) -> str:
@@ -137,16 +134,15 @@ def _verdict(answer: AssignAnswer) -> str:
 
 
 def _table(number: int, species: AssignedSpecies) -> Table:
-    constants = species.constants
-    undetermined = species.refined.open_constants
-    rows = [
-        [name, value_text(constants[name], constants.uncertainties[name]), "open" if name in undetermined else ""]
-        for name in constants.values
-    ]
-    title = f"species {number}, {species.word} (p = {species.probability:.4f})" + (
-        f", {species.isotopologue}" if species.isotopologue else ""
-    )
-    return Table(title, ("constant", "MHz", ""), rows)
+    constants, undetermined = species.constants, species.refined.open_constants
+    columns = {
+        "constant": "{}",
+        "MHz": lambda name: value_text(constants[name], constants.uncertainties[name]),
+        "": lambda name: "open" if name in undetermined else "",
+    }
+    isotopologue = f", {species.isotopologue}" if species.isotopologue else ""
+    title = f"species {number}, {species.word} (p = {species.probability:.4f}){isotopologue}"
+    return record_table(title, columns, constants.values)
 
 
 def _facts(species: AssignedSpecies) -> list[tuple[str, str]]:

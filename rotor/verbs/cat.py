@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import Table, json_text, show_facts, show_table
+from rotor.reports.screen import Part, Table, json_text, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.verbs.cat_request import CatRequest
 from rotor.verbs.comparing import (
@@ -108,54 +108,52 @@ def json_of(answer: CatAnswer, content: Mapping[str, Any]) -> str:
     return json_text({**content, "lines": [line_record(answer.lines, row) for row in range(len(answer.lines))]})
 
 
-def show(answer: CatAnswer, report: Report) -> None:
-    """Print a summary and the strongest lines, or the result of a comparison."""
+def show(answer: CatAnswer, report: Report) -> Iterable[Part | None]:
+    """A summary and the strongest lines, or the result of a comparison."""
     lines, content, shown = answer.lines, report.content, answer.request.top_lines
-    print(content["input"])
     first, last = content["range_mhz"] or (math.nan, math.nan)
     count = f"{len(lines)}, {content['measured']} of them measured"
-    show_facts(
-        [
-            ("lines", count + (f", from {first:.4f} to {last:.4f} MHz" if len(lines) else "")),
-            ("species", ", ".join(map(str, content["tags"])) or "none"),
-        ]
-    )
-    show_facts(error_facts(content["errors"]))
+    yield str(content["input"])
+    yield [
+        ("lines", count + (f", from {first:.4f} to {last:.4f} MHz" if len(lines) else "")),
+        ("species", ", ".join(map(str, content["tags"])) or "none"),
+        *error_facts(content["errors"]),
+    ]
     if answer.compared is None:
-        _show_strongest("", lines, shown)
+        yield _table("", lines, shown)
         return
-    print()
-    show_facts(comparison_facts(content["compared"]))
     comparison = answer.compared.comparison
-    _show_strongest("missing there: ", comparison.reference.take(comparison.missing), shown)
-    _show_strongest("only there: ", comparison.ours.take(comparison.extra), shown)
+    yield "the comparison"
+    yield comparison_facts(content["compared"])
+    yield _table("missing there: ", comparison.reference.take(comparison.missing), shown)
+    yield _table("only there: ", comparison.ours.take(comparison.extra), shown)
 
 
-def _show_strongest(title: str, lines: Catalogue, shown: int) -> None:
-    if len(lines) and shown:
-        print()
-        table = _table(lines, shown)
-        show_table(replace(table, title=title + table.title))
-
-
-def _table(lines: Catalogue, shown: int) -> Table:
+def _table(prefix: str, lines: Catalogue, shown: int) -> Table:
     """The strongest lines in order of frequency."""
     import numpy as np
 
     from rotor.formats.spcat.compare import in_mhz
 
-    strongest = np.sort(np.argsort(-lines.lgint, kind="stable")[:shown])
+    strongest = np.sort(np.argsort(-lines.lgint, kind="stable")[:shown]).tolist()
     frequency, error = in_mhz(lines)
-    rows = []
-    for row in strongest.tolist():
-        record = line_record(lines, row)
-        numbers = [f"{frequency[row]:.4f}", f"{error[row]:.4f}", f"{record['lgint']:.4f}"]
-        labels = [" ".join(f"{q:2d}" for q in record[side]) for side in ("quanta_upper", "quanta_lower")]
-        seen = "yes" if record["tag"] < 0 else ""
-        rows.append((*numbers, f"{record['energy_lower_cm']:.4f}", str(record["g_upper"]), seen, *labels))
-    columns = ("frequency (MHz)", "error", "lgint", 'E" (cm-1)', "g'", "measured", "upper", "lower")
-    title = "all lines" if len(rows) == len(lines) else f"the {len(rows)} strongest of {len(lines)} lines"
-    return Table(f"{title}, in order of frequency", columns, rows)
+    records = [line_record(lines, row) | {"frequency": frequency[row], "error": error[row]} for row in strongest]
+    columns = {
+        "frequency (MHz)": "{frequency:.4f}",
+        "error": "{error:.4f}",
+        "lgint": "{lgint:.4f}",
+        'E" (cm-1)': "{energy_lower_cm:.4f}",
+        "g'": "{g_upper}",
+        "measured": lambda line: "yes" if line["tag"] < 0 else "",
+        "upper": lambda line: _quanta(line["quanta_upper"]),
+        "lower": lambda line: _quanta(line["quanta_lower"]),
+    }
+    title = "all lines" if len(records) == len(lines) else f"the {len(records)} strongest of {len(lines)} lines"
+    return record_table(f"{prefix}{title}, in order of frequency", columns, records)
+
+
+def _quanta(numbers: Iterable[int]) -> str:
+    return " ".join(f"{number:2d}" for number in numbers)
 
 
 VERB = Tool(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.formats.provenance import write_beside
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
@@ -78,10 +78,10 @@ class Added:
             "faults": [{"source": entry.source, "fault": entry.fault} for entry in self.faults],
         }
 
-    def show(self) -> None:
-        """Print the number of added lines and sources."""
+    def parts(self) -> Iterable[Part]:
+        """Number of added lines and sources."""
         total = f"{sum(species.lines for species in self.added)} lines from {len(self.added)} sources"
-        show_facts([("catalogue", self.catalogue), ("added", total), ("left out", str(len(self.faults)))])
+        yield [("catalogue", self.catalogue), ("added", total), ("left out", str(len(self.faults)))]
 
 
 def add(request: CatalogueRequest, work: Work) -> Added:
@@ -113,14 +113,12 @@ class Listed:
         records = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         return {"catalogue": self.catalogue, "lines": self.count, "species": records}
 
-    def show(self) -> None:
-        """Print the species by name."""
+    def parts(self) -> Iterable[Part]:
+        """The species by name."""
         names = ("name", "formula", "tag", "database", "lines", "source", "date")
-        rows = [tuple(map(str, row)) for row in zip(*(self.table.columns[name] for name in names), strict=True)]
-        show_facts([("catalogue", self.catalogue), ("lines", str(self.count)), ("species", str(len(rows)))])
-        if rows:
-            print()
-            show_table(Table("species, by name", names, rows, frozenset({*names} - {"tag", "lines"})))
+        columns = {name: f"{{{name}}}" for name in names}
+        yield [("catalogue", self.catalogue), ("lines", str(self.count)), ("species", str(len(self.table)))]
+        yield record_table("species, by name", columns, rows_of(self.table), {*names} - {"tag", "lines"})
 
 
 def list_species(request: CatalogueRequest, work: Work) -> Listed:
@@ -153,14 +151,12 @@ class LinesInRange:
 
         return stored_budget(*np.array([row[1:4] for row in self.rows], dtype=np.float64).reshape(-1, 3).T)
 
-    def show(self) -> None:
-        """Print the strongest lines at 300 K, in order of frequency."""
+    def parts(self) -> Iterable[Part]:
+        """The strongest lines at 300 K, in order of frequency."""
         count = f"{len(self.rows)} of {self.species} species"
         errors = error_facts(self.errors.as_json())
-        show_facts([("catalogue", self.request.catalogue), ("lines", count), *errors])
-        if self.rows and self.request.top_lines:
-            print()
-            show_table(_table(self.rows, self.request.top_lines))
+        yield [("catalogue", self.request.catalogue), ("lines", count), *errors]
+        yield _table(self.rows, self.request.top_lines)
 
 
 def find_lines(request: CatalogueRequest, work: Work) -> LinesInRange:
@@ -208,13 +204,20 @@ def _line_rows(species: Sequence[Any]) -> list[tuple[Any, ...]]:
 
 def _table(rows: Sequence[tuple[Any, ...]], shown: int) -> Table:
     strongest = sorted(sorted(range(len(rows)), key=lambda i: -rows[i][3])[:shown])
-    cells = [
-        (r[0], f"{r[1]:.4f}", f"{r[2]:.4f}", f"{r[3]:.4f}", f"{r[4]:.2f}", f"{r[5]:g}", f"{r[6]:.3e}", r[7], r[8])
-        for r in (rows[i] for i in strongest)
-    ]
-    heads = ("species", "frequency (MHz)", "error", "lg I(300 K)", "E_l (K)", "g_u", "A (1/s)", "upper", "lower")
-    title = "all lines" if len(cells) == len(rows) else f"the {len(cells)} strongest of {len(rows)} lines"
-    return Table(f"{title}, in order of frequency", heads, cells, frozenset({"species"}))
+    columns = {
+        "species": "{species}",
+        "frequency (MHz)": "{frequency_mhz:.4f}",
+        "error": "{error_mhz:.4f}",
+        "lg I(300 K)": "{log_intensity_300k:.4f}",
+        "E_l (K)": "{energy_lower_k:.2f}",
+        "g_u": "{g_upper:g}",
+        "A (1/s)": "{einstein_a_per_s:.3e}",
+        "upper": "{upper}",
+        "lower": "{lower}",
+    }
+    title = "all lines" if len(strongest) == len(rows) else f"the {len(strongest)} strongest of {len(rows)} lines"
+    records = [dict(zip(_COLUMNS, rows[i], strict=True)) for i in strongest]
+    return record_table(f"{title}, in order of frequency", columns, records, {"species"})
 
 
 def write_csv(answer: Listed | LinesInRange, path: Path, report: Report) -> None:
@@ -244,7 +247,7 @@ VERB = Tool(
     request=CatalogueRequest,
     of="catalogue",
     answer=lambda request, work: {ADD: add, LIST: list_species, SHOW: find_lines}[request.action](request, work),
-    show=lambda answer, report: answer.show(),
+    show=lambda answer, report: answer.parts(),
     outputs=(Output("csv", (".csv",), "Write the species (list) or the lines (show) as CSV", write_csv),),
     check=check,
     shown=ErrorsShown,

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import show_facts
+from rotor.reports.screen import Part
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
 from rotor.requests.readers import Text, Whole
@@ -225,11 +225,10 @@ def _intensities(top: Top, highest: int) -> IntensityFile:
     return intensity_file(top, request)
 
 
-def show(answer: Converted, report: Report) -> None:
-    """Print the written constants and their errors."""
-    print(f"{answer.request.source} → {answer.target}: {answer.top.constants.text()}{_further(answer.top)}")
-    if facts := error_facts(report.content.get("errors")):
-        show_facts(facts)
+def show(answer: Converted, report: Report) -> Iterable[Part | None]:
+    """The written constants and their errors."""
+    yield f"{answer.request.source} → {answer.target}: {answer.top.constants.text()}{_further(answer.top)}"
+    yield error_facts(report.content.get("errors"))
 
 
 VERB = Tool(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 
 from rotor.reports.line_tables import first_rows_title
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
 from rotor.reports.top_facts import error_facts, with_option
@@ -220,14 +220,28 @@ def draw(answer: EmissionAnswer, path: Path, report: Report) -> None:
     plot_emission(answer, path, provenance=dict(report.provenance), **report.view)
 
 
-def show(answer: EmissionAnswer, report: Report) -> None:
-    """Print the source, the molecules and the brightest lines."""
+def show(answer: EmissionAnswer, report: Report) -> Iterable[Part | None]:
+    """The source, the molecules and the brightest lines."""
+    request, lines = answer.request, answer.lines
+    first, last = request.range_mhz
+    yield f"{', '.join(request.names)}: brightness temperature, from {first:.10g} to {last:.10g} MHz"
+    yield _facts(answer)
+    if not len(lines):
+        none = "no lines: none is inside the range and deep enough; widen --range or lower --least-depth"
+        yield f"{none}{range_without_unit(report.entries)}\n"
+    yield _table(answer, report.shown.top_lines)
+    cited = "; ".join(
+        f"{name}: {molecule.source if report.sources else short_source(molecule.source)}"
+        + ("" if lines.quanta else f", Q {lines.q_source}")
+        for name, molecule, lines in zip(request.names, request.molecules, answer.emitted, strict=True)
+    )
+    yield [("sources", cited), *error_facts(report.content.get("errors")), *_limits(answer)]
+
+
+def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
     from rotor.quantum.quanta import headings
 
     request, layer = answer.request, answer.request.sources[0]
-    print(
-        f"{', '.join(request.names)}: brightness temperature, from {request.range_mhz[0]:.10g} to {request.range_mhz[1]:.10g} MHz"
-    )
     behind = f"background {layer.background_k:g} K as observed, filling {layer.filling:g}"
     facts = [
         ("source", behind + (f", redshift {layer.redshift:g}" if layer.redshift else "")),
@@ -242,29 +256,11 @@ def show(answer: EmissionAnswer, report: Report) -> None:
         prefix = f"{name}: " if len(request.names) > 1 else ""
         facts += [(title, prefix + text) for title, text in hyperfine_lines(lines.hyperfine)]
     if (peak := answer.peak) is not None:
-        line = f"{request.names[int(answer.lines.molecule[peak.row])]} {answer.lines.upper[peak.row]} – {answer.lines.lower[peak.row]}"
-        facts.append(
-            (
-                "brightest" if peak.brightness_k >= 0 else "deepest",
-                f"{peak.brightness_k:.4g} K at {peak.observed_mhz:.4f} MHz, {line}, τ = {peak.optical_depth:.3g}",
-            )
-        )
-    show_facts(facts)
-    if not len(answer.lines):
-        print(
-            "\nno lines: none is inside the range and deep enough; widen --range or lower --least-depth"
-            + range_without_unit(report.entries)
-        )
-    elif report.shown.top_lines:
-        print()
-        show_table(_table(answer, report.shown.top_lines))
-    print()
-    cited = "; ".join(
-        f"{name}: {molecule.source if report.sources else short_source(molecule.source)}"
-        + ("" if lines.quanta else f", Q {lines.q_source}")
-        for name, molecule, lines in zip(request.names, request.molecules, answer.emitted, strict=True)
-    )
-    show_facts([("sources", cited), *error_facts(report.content.get("errors")), *_limits(answer)])
+        name = request.names[int(answer.lines.molecule[peak.row])]
+        line = f"{name} {answer.lines.upper[peak.row]} – {answer.lines.lower[peak.row]}"
+        text = f"{peak.brightness_k:.4g} K at {peak.observed_mhz:.4f} MHz, {line}, τ = {peak.optical_depth:.3g}"
+        facts.append(("brightest" if peak.brightness_k >= 0 else "deepest", text))
+    return facts
 
 
 def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
@@ -285,29 +281,23 @@ def _table(answer: EmissionAnswer, shown: int) -> Table:
     """The brightest lines in order of frequency."""
     import numpy as np
 
-    lines, names = answer.lines, answer.request.names
-    rows = np.sort(np.argsort(-lines.brightness_k, kind="stable")[:shown]).tolist()
-    cells = [
-        (
-            names[lines.molecule[i]],
-            f"{lines.frequency_mhz[i]:.4f}",
-            f"{lines.observed_mhz[i]:.4f}",
-            lines.upper[i],
-            lines.lower[i],
-            f"{lines.energy_upper_k[i]:.2f}",
-            f"{lines.einstein_a_per_s[i]:.2e}",
-            str(lines.g_upper[i]),
-            f"{lines.optical_depth[i]:.3g}",
-            f"{lines.brightness_k[i]:.4g}",
-            f"{lines.integrated_k_km_s[i]:.4g}",
-        )
-        for i in rows
-    ]
-    title = first_rows_title(len(rows), "brightest line") if len(rows) < len(lines) else "all lines"
-    columns = (
-        "molecule", "at rest (MHz)", "observed (MHz)", "upper", "lower", "E_u (K)", "A (1/s)", "g_u", "τ", "T_B (K)", "∫T_B dv (K km/s)",
-    )  # fmt: skip
-    return Table(f"{title}, in order of frequency; each alone", columns, cells, frozenset({"molecule"}))
+    lines = answer.lines
+    rows = np.sort(np.argsort(-lines.brightness_k, kind="stable")[:shown])
+    columns = {
+        "molecule": "{molecule}",
+        "at rest (MHz)": "{frequency_mhz:.4f}",
+        "observed (MHz)": "{observed_mhz:.4f}",
+        "upper": "{upper}",
+        "lower": "{lower}",
+        "E_u (K)": "{energy_upper_k:.2f}",
+        "A (1/s)": "{einstein_a_per_s:.2e}",
+        "g_u": "{g_upper}",
+        "τ": "{optical_depth:.3g}",
+        "T_B (K)": "{brightness_k:.4g}",
+        "∫T_B dv (K km/s)": "{integrated_k_km_s:.4g}",
+    }
+    title = first_rows_title(len(rows), len(lines), "brightest line")
+    return record_table(f"{title}, in order of frequency; each alone", columns, rows_of(lines, rows), {"molecule"})
 
 
 def results(answer: Any) -> dict[str, Any]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, record_table
 from rotor.requests.readers import INFINITE
 from rotor.verbs.observed_request import ObservedRequest, components_of, fit_choices, sight_of, species_in
 from rotor.verbs.verb import Report, Work
@@ -48,36 +48,36 @@ class Mapped:
             "pixels": self.pixels,
             "converged": int(self.fit.fitted.sum()),
             "reduced_chi_squared": _quantiles(self.fit.reduced_chi_squared)[1],
-            "maps": [
-                {"name": name, "low": low, "median": middle, "high": high, "determined": count}
-                for name, (low, middle, high), count in self._rows()
-            ],
+            "maps": self._rows(),
         }
 
-    def _rows(self) -> list[tuple[str, tuple[float | None, ...], int]]:
-        return [
-            (name, _quantiles(value), int(np.isfinite(error).sum()))
-            for name, value, error in zip(self.fit.names, self.fit.values, self.fit.errors, strict=True)
-        ]
+    def _rows(self) -> list[dict[str, Any]]:
+        rows = []
+        for name, value, error in zip(self.fit.names, self.fit.values, self.fit.errors, strict=True):
+            ends = dict(zip(("low", "median", "high"), _quantiles(value), strict=True))
+            rows.append({"name": name, **ends, "determined": int(np.isfinite(error).sum())})
+        return rows
 
-    def show(self) -> None:
-        """Print the cube, and the range of each map."""
+    def parts(self) -> Iterable[Part]:
+        """The cube, and the range of each map."""
         cube = self.cube
         width, height = cube.noise_k.shape[::-1]
         first, last = cube.frequency_mhz[0], cube.frequency_mhz[-1]
         size = f"{width} by {height} pixels, {len(cube.frequency_mhz)} channels from {first:.6f} to {last:.6f} MHz"
-        show_facts(
-            [
-                ("cube", f"{cube.source}: {size}, frame {cube.frame}"),
-                ("noise", f"{float(np.nanmedian(cube.noise_k)):.4g} K a channel, median of the pixels"),
-                ("fitted", f"{self.pixels} pixels, {int(self.fit.fitted.sum())} of them converged"),
-                ("χ²/ν", f"{_quantiles(self.fit.reduced_chi_squared)[1]:.4g}, median"),
-            ]
-        )
-        print()
-        rows = [(name, *(f"{end:.5g}" for end in ends), str(count)) for name, ends, count in self._rows()]
-        columns = ("parameter", "16 %", "median", "84 %", "determined")
-        show_table(Table("pixels of each map", columns, rows, frozenset({"parameter"})))
+        yield [
+            ("cube", f"{cube.source}: {size}, frame {cube.frame}"),
+            ("noise", f"{float(np.nanmedian(cube.noise_k)):.4g} K a channel, median of the pixels"),
+            ("fitted", f"{self.pixels} pixels, {int(self.fit.fitted.sum())} of them converged"),
+            ("χ²/ν", f"{_quantiles(self.fit.reduced_chi_squared)[1]:.4g}, median"),
+        ]
+        columns = {
+            "parameter": "{name}",
+            "16 %": "{low:.5g}",
+            "median": "{median:.5g}",
+            "84 %": "{high:.5g}",
+            "determined": "{determined}",
+        }
+        yield record_table("pixels of each map", columns, self._rows(), {"parameter"})
 
 
 def _quantiles(values: Any) -> tuple[float | None, ...]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, Table, record_table
 from rotor.verbs import emission_cube
 from rotor.verbs.emission_cell import cell_fit, refuse_telescope
 from rotor.verbs.emission_cube import Mapped
@@ -160,61 +160,50 @@ def draw_corner(answer: Observed, path: Path, _: Report) -> None:
     plot_corner(answer.chain, path)
 
 
-def show(answer: Observed | Mapped, _: Report) -> None:
-    """Print the spectrum and the model, or the fit."""
+def show(answer: Observed | Mapped, _: Report) -> Iterable[Part | None]:
+    """The spectrum and the model, or the fit."""
     if not isinstance(answer, Observed):
-        answer.show()
+        yield from answer.parts()
         return
-    show_facts(spectrum_facts(answer.spectrum))
-    print()
+    yield spectrum_facts(answer.spectrum)
     if answer.fit is None:
-        columns = ("species", "N (1/cm²)", "T_ex (K)", "v (km/s)", "Δv (km/s)")
-        show_table(Table("model", columns, [_component_cells(component) for component in answer.components], LEFT))
+        yield record_table("model", _MODEL, answer.components, LEFT)
     else:
-        _show_fit(answer.fit, answer.needed, answer.chain)
-    if answer.diagrams is not None and answer.diagrams.names:
-        print()
-        show_table(_diagram_table(answer.diagrams.facts()))
+        yield from _fit_parts(answer.fit, answer.needed, answer.chain)
+    if answer.diagrams is not None:
+        title = "rotational diagrams, corrected for optical depth"
+        yield record_table(title, _DIAGRAMS, answer.diagrams.facts(), LEFT)
 
 
-def _diagram_table(rows: Sequence[Any]) -> Table:
-    cells = [
-        (row["species"], str(row["lines"]), f"{row['excitation_k']:.4g} ± {row['excitation_error_k']:.2g}",
-         f"{row['column_per_cm2']:.4g} ± {row['column_error_per_cm2']:.2g}", f"{row['chi_squared']:.3g}")
-        for row in rows
-    ]  # fmt: skip
-    columns = ("species", "lines", "T (K)", "N (1/cm²)", "χ²")
-    return Table("rotational diagrams, corrected for optical depth", columns, cells, LEFT)
+_MODEL = {
+    "species": "{0.species.name}",
+    "N (1/cm²)": "{0.column_per_cm2:.4g}",
+    "T_ex (K)": "{0.excitation_k:.4g}",
+    "v (km/s)": "{0.velocity_km_s:.3f}",
+    "Δv (km/s)": "{0.fwhm_km_s:.3f}",
+}
+_DIAGRAMS = {
+    "species": "{species}",
+    "lines": "{lines}",
+    "T (K)": "{excitation_k:.4g} ± {excitation_error_k:.2g}",
+    "N (1/cm²)": "{column_per_cm2:.4g} ± {column_error_per_cm2:.2g}",
+    "χ²": "{chi_squared:.3g}",
+}
+_NEEDED = {
+    "species": "{0.species}",
+    "Δχ²": "{0.signal:.1f}",
+    "needed": lambda part: "yes" if part.needed else "no",
+    "limit, 3σ (1/cm²)": "{0.limit_per_cm2:.3g}",
+}
 
 
-def _component_cells(component: Component) -> tuple[str, ...]:
-    gas = f"{component.column_per_cm2:.4g}", f"{component.excitation_k:.4g}"
-    return component.species.name, *gas, f"{component.velocity_km_s:.3f}", f"{component.fwhm_km_s:.3f}"
-
-
-def _show_fit(fit: SourceFit, needed: Sequence[Contribution], chain: Any) -> None:
+def _fit_parts(fit: SourceFit, needed: Sequence[Contribution], chain: Any) -> Iterable[Part | None]:
     chi = f"{fit.reduced_chi_squared:.4g}, {fit.degrees_of_freedom} degrees of freedom"
-    show_facts([("fit", fit.minimum.reason), ("χ²/ν", chi)])
-    print()
-    show_table(_parameter_table(fit))
-    if needed:
-        _show_needed(needed)
+    yield [("fit", fit.minimum.reason), ("χ²/ν", chi)]
+    yield _parameter_table(fit)
+    yield record_table("what each species contributes", _NEEDED, needed, LEFT)
     facts = [("undetermined", combination.text) for combination in fit.statistics.undetermined]
-    for section in (facts, [] if chain is None else [("sample", chain.text)]):
-        if section:
-            print()
-            show_facts(section)
-
-
-def _show_needed(needed: Sequence[Contribution]) -> None:
-    print()
-    rows = [(part.species, f"{part.signal:.1f}", "yes" if part.needed else "no", _limit(part)) for part in needed]
-    columns = ("species", "Δχ²", "needed", "limit, 3σ (1/cm²)")
-    show_table(Table("what each species contributes", columns, rows, LEFT))
-
-
-def _limit(contribution: Contribution) -> str:
-    return "" if contribution.limit_per_cm2 is None else f"{contribution.limit_per_cm2:.3g}"
+    yield facts if chain is None else [*facts, ("sample", chain.text)]
 
 
 def _parameter_table(fit: SourceFit) -> Table:

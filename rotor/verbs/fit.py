@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +21,7 @@ from rotor.formats.fit_request import (
     write_fitted_par,
     write_fitted_toml,
 )
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Flag, NameList, Text, Whole
@@ -255,21 +254,19 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
     ]
 
 
-def show(answer: FitAnswer, report: Report) -> None:
-    """Print parameters with errors, statistics and analyses."""
+def show(answer: FitAnswer, report: Report) -> Iterable[Part | None]:
+    """Parameters with errors, statistics and analyses."""
     from rotor.fitting.report import far_off, statistics_text, status_text
 
     fit = answer.fit
-    print(f"{answer.request.title}: {status_text(fit)}")
-    show_table(_parameter_table(fit, answer.spread))
-    print("\n".join(statistics_text(fit)))
-    for what, trials in (("chosen, in this order", answer.steps), ("tried", answer.trials)):
-        if trials:
-            show_table(_trial_table(what, trials))
-    if answer.suggestions:
-        show_table(_suggestion_table(fit, answer.suggestions))
+    yield f"{answer.request.title}: {status_text(fit)}"
+    yield _parameter_table(fit, answer.spread)
+    yield "\n".join(statistics_text(fit))
+    yield _trial_table("chosen, in this order", answer.steps)
+    yield _trial_table("tried", answer.trials)
+    yield _suggestion_table(fit, answer.suggestions)
     close = [] if far_off(fit) else [("lines", "none deviates by more than 3 errors")]
-    show_facts([*close, *error_facts(report.content.get("errors"))])
+    yield [*close, *error_facts(report.content.get("errors"))]
 
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
@@ -300,37 +297,30 @@ def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
     return Table("", columns, rows, frozenset({"parameter"}))
 
 
-def _or_dash(value: float, form: str) -> str:
-    """A number, or a dash if too few lines leave it undefined."""
-    return format(value, form) if math.isfinite(value) else "-"
-
-
 def _trial_table(title: str, trials: Sequence[Trial]) -> Table:
-    columns = ["constant", "step", "F", "by chance", "AICc", "from", "left-one-out rms", "weighted rms", "better"]
-    rows = [
-        [
-            trial.name, "added" if trial.added else "left out", _or_dash(trial.f_ratio, ".3g"), f"{trial.chance:.2g}",
-            _or_dash(trial.aicc, ".1f"),
-            _or_dash(trial.aicc_before, ".1f"), _or_dash(trial.cross_validated, ".4g"), f"{trial.fit.weighted_rms:.4g}",
-            "yes" if trial.better else "no",
-        ]
-        for trial in trials
-    ]  # fmt: skip
-    return Table(title, columns, rows, frozenset({"constant", "step"}))
+    columns = {
+        "constant": "{0.name}",
+        "step": lambda trial: "added" if trial.added else "left out",
+        "F": "{0.f_ratio:.3g}",
+        "by chance": "{0.chance:.2g}",
+        "AICc": "{0.aicc:.1f}",
+        "from": "{0.aicc_before:.1f}",
+        "left-one-out rms": "{0.cross_validated:.4g}",
+        "weighted rms": "{0.fit.weighted_rms:.4g}",
+        "better": lambda trial: "yes" if trial.better else "no",
+    }
+    return record_table(title, columns, trials, {"constant", "step"})
 
 
 def _suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
-    columns = ["upper - lower", "frequency (MHz)", "error", "error of the constant, after/before"]
-    rows = [
-        [
-            f"{fit.lines.label_text(suggestion.upper)} - {fit.lines.label_text(suggestion.lower)}",
-            f"{suggestion.frequency_mhz:.4f}",
-            f"{suggestion.error_mhz:.4f}",
-            f"{suggestion.error_ratio:.4f}",
-        ]
-        for suggestion in suggestions
-    ]
-    return Table("lines that would help most", columns, rows, frozenset({"upper - lower"}))
+    label = fit.lines.label_text
+    columns = {
+        "upper - lower": lambda suggestion: f"{label(suggestion.upper)} - {label(suggestion.lower)}",
+        "frequency (MHz)": "{0.frequency_mhz:.4f}",
+        "error": "{0.error_mhz:.4f}",
+        "error of the constant, after/before": "{0.error_ratio:.4f}",
+    }
+    return record_table("lines that would help most", columns, suggestions, {"upper - lower"})
 
 
 def _stem(text: str) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields, replace
 from math import isnan
@@ -15,7 +15,7 @@ from rotor.checks import NoAnswerError, RunStopped
 from rotor.fluids.request import WATER_G_CM3, FluidAnswer, FluidRequest, NewBox, answer_fluid
 from rotor.fluids.run import Outputs
 from rotor.fluids.settings import Settings
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, declared
 from rotor.requests.fill import Entries, read_fields, read_instance, written_fields
@@ -309,20 +309,32 @@ def _hill(symbols: str) -> str:
     return str(Formula(symbols).format("hill"))
 
 
-def show(answer: FluidAnswer, report: Report) -> None:
-    """Print the run and its means."""
+def show(answer: FluidAnswer, report: Report) -> Iterable[Part | None]:
+    """The run and its means."""
     content, settings = report.content, answer.request.settings
     kinds = ", ".join(f"{kind['count']} {_hill(kind['name'])}" for kind in content["molecules"])
-    degrees = content["degrees"]
-    print(f"{kinds}: {settings.steps} steps of {settings.step_fs:g} fs, {settings.ensemble}, by {content['engine']}")
-    rms, drift = content["conserved_rms_ev"], content["conserved_drift_ev_per_ns"]
+    yield f"{kinds}: {settings.steps} steps of {settings.step_fs:g} fs, {settings.ensemble}, by {content['engine']}"
+    yield [*_facts(content, settings), *error_facts(content.get("errors"))]
+    columns = {
+        "quantity": "{quantity}",
+        "unit": "{unit}",
+        "mean": "{mean:.6g}",
+        "error": "{error:.2g}",
+        "samples": "{effective_samples:.3g}",
+    }
+    title = "all rows, after the equilibration" if content["averaged_share"] == 1 else "second half of the rows"
+    yield record_table(title, columns, content["means"], {"quantity", "unit"})
+
+
+def _facts(content: Mapping[str, Any], settings: Settings) -> list[tuple[str, str]]:
+    degrees, rms, drift = content["degrees"], content["conserved_rms_ev"], content["conserved_drift_ev_per_ns"]
+    motions = (
+        f"{degrees['translation']} of translation, {degrees['rotation']} of rotation; {degrees['removed']} removed"
+    )
     facts = [
         ("model", f"{settings.model}, cutoff {settings.cutoff_angstrom:g} Å, {settings.electrostatics}"),
         ("start", content["start"]),
-        (
-            "degrees",
-            f"{degrees['translation']} of translation, {degrees['rotation']} of rotation; {degrees['removed']} removed",
-        ),
+        ("degrees", motions),
         ("thermometer", content["thermometer"] + _thermometer_error(content, settings)),
         ("conserved", "not known from one row alone" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g} eV/ns"),
     ]
@@ -331,21 +343,7 @@ def show(answer: FluidAnswer, report: Report) -> None:
         facts.insert(1, ("box", f"{edges} Å, {content['density_g_cm3']:.5g} g/cm³"))
     if content["motion_reason"]:
         facts.append(("no motion", content["motion_reason"]))
-    facts += error_facts(content.get("errors"))
-    show_facts(facts)
-    rows = [
-        [
-            mean["quantity"],
-            mean["unit"],
-            f"{mean['mean']:.6g}",
-            *("-" if isnan(x) else f"{x:.{n}g}" for x, n in ((mean["error"], 2), (mean["effective_samples"], 3))),
-        ]
-        for mean in content["means"]
-    ]
-    print()
-    columns = ["quantity", "unit", "mean", "error", "samples"]
-    title = "all rows, after the equilibration" if content["averaged_share"] == 1 else "second half of the rows"
-    show_table(Table(title, columns, rows, frozenset({"quantity", "unit"})))
+    return facts
 
 
 def results(answer: Any) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
 from rotor.reports.progress import counting
-from rotor.reports.screen import Table, evenly, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.fill import Entries
 from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
 from rotor.verbs.molecule import STATES
@@ -59,20 +58,12 @@ def draw(answer: GasAnswer, path: Path, report: Report) -> None:
     plot_gas(answer.test, answer.correlations, path, title=title, plateau=plateau, view=view, provenance=record)
 
 
-def show(answer: GasAnswer, report: Report) -> None:
-    """Print the test of equipartition and the correlation functions."""
-    curves, content, top = answer.correlations, report.content, answer.request.top
-    print(f"{top_facts.heading(top)}, a classical gas")
-    show_facts(_facts(answer, content))
-    print()
-    show_table(_degrees_table(content))
-    if curves is not None:
-        print()
-        show_table(_curves_table(curves))
-    sources = source_facts(top, ("constants",), report.sources)
-    show_facts(
-        [*sources, *top_facts.error_facts(content.get("errors")), *top_facts.left_out_facts(content["left_out"])]
-    )
+def show(answer: GasAnswer, report: Report) -> Iterable[Part | None]:
+    """The test of equipartition and the correlation functions."""
+    content, top = report.content, answer.request.top
+    tables = _degrees_table(content), _curves_table(answer.correlations)
+    title = f"{top_facts.heading(top)}, a classical gas"
+    return top_facts.top_parts(top, _facts(answer, content), tables, ("constants",), report, title)
 
 
 def _facts(answer: GasAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -97,26 +88,28 @@ def _facts(answer: GasAnswer, content: Mapping[str, Any]) -> list[tuple[str, str
 
 
 def _degrees_table(content: Mapping[str, Any]) -> Table:
-    rows = [
-        [
-            d["name"], f"{d['energy_cm']:.4f}", f"{d['expected_cm']:.4f}", f"{d['mean']:.5f}", f"{d['mean_spread']:.5f}",
-            f"{d['sigma']:+.2f}", f"{d['p_value']:.3g}", f"{d['spread']:.4f}", f"{d['ks_p_value']:.3g}",
-        ]
-        for d in content["degrees"]
-    ]  # fmt: skip
-    columns = ("degree", "E (cm-1)", "½kT", "2E/kT", "±", "σ", "p", "spread", "p (KS)")
-    return Table(
-        "mean kinetic energy by degree; spread √2 = 1.4142 expected", columns, rows, left=frozenset({"degree"})
-    )
+    columns = {
+        "degree": "{name}",
+        "E (cm-1)": "{energy_cm:.4f}",
+        "½kT": "{expected_cm:.4f}",
+        "2E/kT": "{mean:.5f}",
+        "±": "{mean_spread:.5f}",
+        "σ": "{sigma:+.2f}",
+        "p": "{p_value:.3g}",
+        "spread": "{spread:.4f}",
+        "p (KS)": "{ks_p_value:.3g}",
+    }
+    title = "mean kinetic energy by degree; spread √2 = 1.4142 expected"
+    return record_table(title, columns, content["degrees"], {"degree"})
 
 
-def _curves_table(curves: Correlations) -> Table:
-    count = len(curves)
-    columns = ("t (ps)", *list(curves.columns)[1:])
-    data = list(curves.columns.values())
-    cells = [[f"{data[0][i]:.4g}", *(f"{column[i]:.5f}" for column in data[1:])] for i in evenly(count, SHOWN)]
-    few = "" if len(cells) == count else f", {len(cells)} of {count} times"
-    return Table(f"correlation functions{few}", columns, cells)
+def _curves_table(curves: Correlations | None) -> Table | None:
+    if curves is None:
+        return None
+    records, few = sampled(curves, SHOWN, "times")
+    first, *names = curves.columns
+    columns = {"t (ps)": f"{{{first}:.4g}}"} | {name: f"{{{name}:.5f}}" for name in names}
+    return record_table(f"correlation functions{few}", columns, records)
 
 
 VERB = Verb(

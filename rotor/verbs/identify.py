@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
@@ -152,62 +152,42 @@ def draw(answer: Identified, path: Path, report: Report) -> None:
     )
 
 
-def show(answer: Identified, report: Report) -> None:
-    """Print the spectrum, the species by evidence and the unidentified lines."""
-    show_facts(spectrum_facts(answer.observed))
+def show(answer: Identified, report: Report) -> Iterable[Part | None]:
+    """The spectrum, the species by evidence and the unidentified lines."""
     identification = answer.identification
     chi = "" if identification.fit is None else f", χ²/ν = {identification.fit.reduced_chi_squared:.3g}"
-    show_facts(
-        [
-            ("candidates", str(identification.candidates)),
-            (
-                "start",
-                f"velocity {identification.velocity_km_s:.2f} km/s, width {identification.fwhm_km_s:.2f} km/s",
-            ),
-            ("species", f"{len(identification.species)}{chi}"),
-            *error_facts(report.content.get("errors")),
-        ]
-    )
-    if identification.species:
-        print()
-        show_table(_species_table(identification))
-        if count := sum(evidence.single_line for evidence in identification.species):
-            print(
-                f"* {counted(count, 'species', 'species')} on a single line: a line of a species that is no candidate may pass for it"
-            )
-    print()
-    if not identification.unidentified:
-        print("no unidentified line above 5 standard deviations")
-        return
-    rows = [
-        (
-            f"{line.frequency_mhz:.3f}",
-            f"{line.peak_k:.3g}",
-            f"{line.deviations:.1f}",
-            ", ".join(line.candidates) or "none",
-        )
-        for line in sorted(identification.unidentified, key=lambda line: line.frequency_mhz)
+    yield spectrum_facts(answer.observed)
+    yield [
+        ("candidates", str(identification.candidates)),
+        ("start", f"velocity {identification.velocity_km_s:.2f} km/s, width {identification.fwhm_km_s:.2f} km/s"),
+        ("species", f"{len(identification.species)}{chi}"),
+        *error_facts(report.content.get("errors")),
     ]
-    heads = ("frequency (MHz)", "T_B (K)", "σ", "candidates with a line there")
-    show_table(Table(f"{len(rows)} unidentified lines", heads, rows, frozenset({"candidates with a line there"})))
+    yield record_table("species by evidence", _SPECIES, identification.species, {"species", "lines seen", "or"})
+    if count := sum(evidence.single_line for evidence in identification.species):
+        single = f"* {counted(count, 'species', 'species')} on a single line"
+        yield f"{single}: a line of a species that is no candidate may pass for it"
+    lines = sorted(identification.unidentified, key=lambda line: line.frequency_mhz)
+    yield record_table(f"{len(lines)} unidentified lines", _UNIDENTIFIED, lines, {"candidates with a line there"})
+    yield "" if lines else "no unidentified line above 5 standard deviations"
 
 
-def _species_table(identification: Identification) -> Table:
-    rows = [
-        (
-            evidence.component.species.name,
-            f"{evidence.signal:.0f}",
-            f"{evidence.visible}/{evidence.expected}{' *' if evidence.single_line else ''}",
-            f"{evidence.component.column_per_cm2:.2e}",
-            f"{evidence.component.excitation_k:.0f}",
-            f"{evidence.component.velocity_km_s:.2f}",
-            f"{evidence.component.fwhm_km_s:.2f}",
-            ", ".join(evidence.rivals),
-        )
-        for evidence in identification.species
-    ]
-    heads = ("species", "Δχ²", "lines seen", "N (1/cm²)", "T (K)", "v (km/s)", "Δv (km/s)", "or")
-    return Table("species by evidence", heads, rows, frozenset({"species", "lines seen", "or"}))
+_SPECIES = {
+    "species": "{0.component.species.name}",
+    "Δχ²": "{0.signal:.0f}",
+    "lines seen": lambda evidence: f"{evidence.visible}/{evidence.expected}{' *' if evidence.single_line else ''}",
+    "N (1/cm²)": "{0.component.column_per_cm2:.2e}",
+    "T (K)": "{0.component.excitation_k:.0f}",
+    "v (km/s)": "{0.component.velocity_km_s:.2f}",
+    "Δv (km/s)": "{0.component.fwhm_km_s:.2f}",
+    "or": lambda evidence: ", ".join(evidence.rivals),
+}
+_UNIDENTIFIED = {
+    "frequency (MHz)": "{0.frequency_mhz:.3f}",
+    "T_B (K)": "{0.peak_k:.3g}",
+    "σ": "{0.deviations:.1f}",
+    "candidates with a line there": lambda line: ", ".join(line.candidates) or "none",
+}
 
 
 VERB = Tool(

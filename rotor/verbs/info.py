@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
-from rotor.reports.screen import Table, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part, Table, record_table
 from rotor.requests.fill import Entries, read_fields
 from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_info
 from rotor.tops.facts import estimated_errors_mhz
@@ -35,20 +34,20 @@ def answer(request: InfoRequest, work: Work) -> InfoAnswer:
     return answer_info(request, sum_progress() if work.progress else None)
 
 
-def show(answer: InfoAnswer, report: Report) -> None:
-    """Print the top, its constants, axes, nuclei, Q(T) and conformers."""
+def show(answer: InfoAnswer, report: Report) -> Iterable[Part | None]:
+    """The top, its constants, axes, nuclei, Q(T) and conformers."""
     top, content = answer.request.top, report.content
-    print(top_facts.heading(top))
-    show_facts(_facts(top, content))
-    conformers = _conformers_table(content.get("conformers", []), top)
     axes, nuclei, q = _axes_table(content), _nuclei_table(top, content), _q_table(content)
-    for table in (_constants_table(top), _states_table(top), axes, nuclei, q, conformers):
-        if table:
-            print()
-            show_table(table)
-    print()
-    sources = source_facts(top, ("constants", "dipole", "polarizability", "spin weights"), report.sources)
-    show_facts([*sources, *top_facts.model_facts(content)])
+    tables = (
+        _constants_table(top),
+        _states_table(top),
+        axes,
+        nuclei,
+        q,
+        _conformers_table(content.get("conformers", []), top),
+    )
+    sources = ("constants", "dipole", "polarizability", "spin weights")
+    return top_facts.top_parts(top, _facts(top, content), tables, sources, report)
 
 
 def _facts(top: Top, content: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -169,17 +168,18 @@ def _reason(source: str) -> str:
 
 
 def _q_table(content: Mapping[str, Any]) -> Table:
-    rows = []
-    for row in content["partition_function"]:
-        has_sum = row["q"] is not None
-        last = "-" if row["jmax"] is None else f"{row['jmax']}"  # None: the classical limit replaced the sum
-        summed = [f"{row['q']:.6g}", last, f"{row['relative_error']:.0e}"] if has_sum else ["-", "-", "-"]
-        remark = "" if has_sum else _reason(row["source"])
-        rows.append([f"{row['temperature_k']:g}", summed[0], f"{row['classical']:.6g}", *summed[1:], remark])
-    columns = ["T (K)", "Q", "Q classical", "J max", "error", "remark"]
-    if not any(row[-1] for row in rows):
-        columns, rows = columns[:-1], [row[:-1] for row in rows]
-    return Table("", columns, rows, frozenset({"remark"}))
+    rows = content["partition_function"]
+    columns: dict[str, Any] = {
+        "T (K)": "{temperature_k:g}",
+        "Q": lambda row: "-" if row["q"] is None else f"{row['q']:.6g}",
+        "Q classical": "{classical:.6g}",
+        # without jmax the classical limit replaced the sum
+        "J max": lambda row: "-" if row["q"] is None or row["jmax"] is None else f"{row['jmax']}",
+        "error": lambda row: "-" if row["q"] is None else f"{row['relative_error']:.0e}",
+    }
+    if any(row["q"] is None for row in rows):
+        columns["remark"] = lambda row: _reason(row["source"]) if row["q"] is None else ""
+    return record_table("", columns, rows, {"remark"})
 
 
 def _conformers_table(records: Sequence[Mapping[str, Any]], top: Top) -> Table | None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from rotor.formats.molecules.isotopologue_request import IsotopologuesAnswer, IsotopologuesRequest, answer_isotopologues
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts, known_digits
 from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.isotopes.isotopologues import Isotopologue
@@ -20,20 +22,16 @@ Examples:
   rotor isotopologues water --site 2=2H --site 3=2H"""
 
 
-def show(answer: IsotopologuesAnswer, report: Report) -> None:
-    """Print the isotopologues and their spin constants if known."""
-    show_table(_table(answer.request.top, answer.family))
-    rows = [
-        [isotopologue.label, _constants_text(isotopologue.top)]
-        for isotopologue in answer.family
-        if isotopologue.top.spin_constants
-    ]
-    if rows:
-        columns = ("isotopologue", "spin constants (MHz)")
-        print()
-        show_table(Table("", columns, rows, frozenset(columns)))
-    print()
-    show_facts(error_facts(report.content.get("errors")))
+def show(answer: IsotopologuesAnswer, report: Report) -> Iterable[Part | None]:
+    """The isotopologues, and their spin constants if known."""
+    with_spins = [isotopologue for isotopologue in answer.family if isotopologue.top.spin_constants]
+    columns = {
+        "isotopologue": "{0.label}",
+        "spin constants (MHz)": lambda isotopologue: _constants_text(isotopologue.top),
+    }
+    yield _table(answer.request.top, answer.family)
+    yield record_table("", columns, with_spins, columns)
+    yield error_facts(report.content.get("errors"))
 
 
 def _constants_text(top: Top) -> str:

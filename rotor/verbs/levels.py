@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,15 +10,18 @@ from typing import Any
 from rotor.quantum.request import LevelsAnswer, LevelsRequest, answer_levels
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title
-from rotor.reports.screen import Table, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Text, Whole, whole_range
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Extra, Output, Report, Shown, Verb, tables
 
-COLUMNS = {"MHz": ("energy_mhz", "{:.4f}"), "cm-1": ("energy_cm", "{:.6f}"), "K": ("energy_k", "{:.6f}")}
+COLUMNS = {
+    "MHz": ("energy_mhz", "{energy:.4f}"),
+    "cm-1": ("energy_cm", "{energy:.6f}"),
+    "K": ("energy_k", "{energy:.6f}"),
+}
 
 EXAMPLES = """\b
 Examples:
@@ -61,17 +64,10 @@ def draw(answer: LevelsAnswer, path: Path, report: Report) -> None:
     plot_levels(answer.table, answer.request.top, path, unit=unit, view=report.view, provenance=dict(report.provenance))
 
 
-def show(answer: LevelsAnswer, report: Report) -> None:
-    """Print constants and the lowest levels."""
-    top = answer.request.top
-    print(top_facts.heading(top))
-    show_facts(_facts(answer, report.content))
-    if len(answer.table) and report.shown.top_levels:
-        print()
-        show_table(_table(answer, report.shown))
-    print()
-    sources = source_facts(top, ("constants", "spin weights"), report.sources)
-    show_facts([*sources, *top_facts.model_facts(report.content)])
+def show(answer: LevelsAnswer, report: Report) -> Iterable[Part | None]:
+    """Constants and the lowest levels."""
+    facts, table = _facts(answer, report.content), _table(answer, report.shown)
+    return top_facts.top_parts(answer.request.top, facts, (table,), ("constants", "spin weights"), report)
 
 
 def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -113,14 +109,21 @@ def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
     order = np.argsort(table.energy_mhz, kind="stable")
     existing = order[table.levels.weight[table.rows[order]] > 0]
     rows = existing[: shown.top_levels]
-    name, form = COLUMNS[shown.unit]
-    energy, columns = getattr(table, name)[rows], table.columns
     labels = table.levels.labels(table.rows[rows])
-    numbers = energy.tolist(), columns["weight"][rows].tolist(), columns["degeneracy"][rows].tolist()
-    cells = [(label, form.format(e), str(weight), str(g)) for label, e, weight, g in zip(labels, *numbers, strict=True)]
-    title = first_rows_title(len(rows), "lowest level") if len(rows) < len(existing) else "all levels"
-    head = (quanta.headings(table.levels.quanta_names), f"E ({shown.unit})", "spin weight", "g")
-    return Table(f"{title}, in order of energy", head, cells)
+    name, form = COLUMNS[shown.unit]
+    energy = getattr(table, name)[rows].tolist()
+    records = [
+        record | {"state": label, "energy": value}
+        for record, label, value in zip(rows_of(table, rows), labels, energy, strict=True)
+    ]
+    columns = {
+        quanta.headings(table.levels.quanta_names): "{state}",
+        f"E ({shown.unit})": form,
+        "spin weight": "{weight}",
+        "g": "{degeneracy}",
+    }
+    title = first_rows_title(len(rows), len(existing), "lowest level")
+    return record_table(f"{title}, in order of energy", columns, records)
 
 
 def results(answer: Any) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -178,22 +179,13 @@ def top_of(reading: Reading) -> Top:
     >>> top_of(Reading(MoleculeInput(constants="B=57.6 GHz", dipole_abc=(0.1, 0.0, 0.0)))).kind
     'linear'
     """
-    inputs = reading.inputs
     _refuse_contradictions(reading)
-    top = _from_source(reading) if inputs.constants is None else _from_constants(reading)
-    if inputs.dipole_abc is not None:
-        abc = inputs.dipole_abc
-        top = reading.within(
-            "dipole_abc", lambda: top.with_dipole(abc, reading.source("dipole_abc", " in principal axes"))
-        )
-    if inputs.dipole is not None:
-        top = reading.within("dipole", lambda: _with_dipole_of_input(top, reading))
-    if inputs.polarizability is not None or inputs.anisotropy is not None:
-        top = _with_polarizability(top, reading)
-    if inputs.spin_weights is not None:
-        weights = inputs.spin_weights
-        top = reading.within("spin_weights", lambda: top.with_weights(dict(weights), reading.source("spin_weights")))
-    top = _with_states(_with_spins(_with_internal_rotation(top, reading), reading), reading)
+    top = _from_source(reading) if reading.inputs.constants is None else _from_constants(reading)
+    for name, step in _STEPS.items():
+        value = getattr(reading.inputs, name)
+        if value is not None:
+            top = reading.within(name, partial(step, top, value, reading))
+    top = _with_states(top, reading)
     from rotor.tops.plausible import implausible
 
     refuse_weights_of_another_kind(top)
@@ -221,6 +213,10 @@ def _refuse_contradictions(reading: Reading) -> None:
     for name, text in _GEOMETRY.items() if inputs.constants is not None else ():
         if getattr(inputs, name):
             raise ValueError(f"{named(name)}: {text}")
+    if inputs.spins is not None and inputs.spin_constants is None:
+        raise ValueError(
+            f"{named('spins')}: states the sizes of the spins in {named('spin_constants')}; give those too"
+        )
 
 
 def _from_constants(reading: Reading) -> Top:
@@ -267,23 +263,11 @@ def _from_source(reading: Reading) -> Top:
             f"{source}: a CSV file is a list of molecules, not a single one: write it into a scene, "
             f"molecule = \"{Path(source).name}\", and start that with 'rotor run'; 'rotor new info' prints a scene"
         )
-    top: object = _named_in_scenes(reading, lambda: read(source, isotopes=",".join(inputs.isotopes) or None))
+    read_top = partial(read, source, isotopes=",".join(inputs.isotopes) or None)
+    top: object = reading.within("source", read_top) if reading.style == "key" else read_top()
     if not isinstance(top, Top):
         raise ValueError(f"{source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
-    if inputs.calculator is not None:
-        calculator, geometry = inputs.calculator, top
-        top = reading.within("calculator", lambda: _refined(geometry, calculator))
-    if inputs.symmetry_tolerance is not None:
-        reach, loose = inputs.symmetry_tolerance, top
-        top = reading.within("symmetry_tolerance", lambda: loose.with_symmetry_within(reach))
-    if inputs.hessian is None:
-        return top
-    rigid = top
-    return reading.within("hessian", lambda: _semirigid(rigid, reading))
-
-
-def _named_in_scenes(reading: Reading, make: Callable[[], T]) -> T:
-    return reading.within("source", make) if reading.style == "key" else make()
+    return top
 
 
 def _geometry(top: Top) -> Molecule:
@@ -292,47 +276,38 @@ def _geometry(top: Top) -> Molecule:
     return top.molecule
 
 
-def _refined(top: Top, name: str) -> Top:
+def _refined(top: Top, name: str, reading: Reading) -> Top:
+    """The top of the geometry that a calculator has refined."""
     from rotor.molecules.optimise import refine
     from rotor.tops.top import Top
 
     return Top.from_molecule(refine(_geometry(top), name))
 
 
-def _semirigid(top: Top, reading: Reading) -> Top:
+def _semirigid(top: Top, hessian: str, reading: Reading) -> Top:
     """The top with quartic distortion from a Hessian: of a file or, by the word "calculator", of the calculator."""
     from rotor.molecules.force_field import force_field_from_calculator, read_hessian
     from rotor.molecules.optimise import calculator_by_name
     from rotor.tops.distortion import semirigid_top
 
-    inputs = reading.inputs
-    if inputs.hessian != "calculator":
-        return semirigid_top(read_hessian(reading.path(str(inputs.hessian)), _geometry(top)))
-    if inputs.calculator is None:
+    if hessian != "calculator":
+        return semirigid_top(read_hessian(reading.path(hessian), _geometry(top)))
+    calculator = reading.inputs.calculator
+    if calculator is None:
         raise ValueError(f"the word 'calculator' needs {reading.named('calculator')}; otherwise give a file")
-    return semirigid_top(force_field_from_calculator(_geometry(top), calculator_by_name(inputs.calculator)))
+    return semirigid_top(force_field_from_calculator(_geometry(top), calculator_by_name(calculator)))
 
 
-def _with_dipole_of_input(top: Top, reading: Reading) -> Top:
+def _with_dipole_of_input(top: Top, dipole: tuple[float, ...], reading: Reading) -> Top:
     import numpy as np
 
     if top.frame is None:
         raise ValueError(f"needs the frame of a geometry; with constants use {reading.named('dipole_abc')}")
-    vector = (top.frame.axes @ np.array(reading.inputs.dipole)).tolist()
+    vector = (top.frame.axes @ np.array(dipole)).tolist()
     return top.with_dipole(vector, reading.source("dipole", " in the frame of the input"))
 
 
-def _with_polarizability(top: Top, reading: Reading) -> Top:
-    inputs = reading.inputs
-    if inputs.anisotropy is not None:
-        anisotropy = inputs.anisotropy
-        return reading.within("anisotropy", lambda: _with_anisotropy(top, anisotropy, reading))
-    numbers = tuple(inputs.polarizability or ())
-    source = reading.source("polarizability", " in principal axes")
-    return reading.within("polarizability", lambda: with_tensor(top, numbers, source))
-
-
-def with_tensor(top: Top, numbers: tuple[float, ...], source: str) -> Top:
+def _with_polarizability(top: Top, numbers: tuple[float, ...], reading: Reading) -> Top:
     """The top with a polarizability (Å³): 2 numbers along and across the axis, 3 on the diagonal, or 6 with ab, ac, bc."""
     text = ",".join(f"{x:g}" for x in numbers)
     if len(numbers) == 2 and top.kind in ("linear", "prolate", "oblate"):
@@ -343,6 +318,7 @@ def with_tensor(top: Top, numbers: tuple[float, ...], source: str) -> Top:
             f"{text!r}: expected aa,bb,cc or aa,bb,cc,ab,ac,bc, or parallel,perpendicular for a linear or symmetric top"
         )
     aa, bb, cc, ab, ac, bc = [*numbers, 0.0, 0.0, 0.0][:6]
+    source = reading.source("polarizability", " in principal axes")
     return top.with_polarizability([[aa, ab, ac], [ab, bb, bc], [ac, bc, cc]], source)
 
 
@@ -360,43 +336,45 @@ def _with_anisotropy(top: Top, anisotropy: float, reading: Reading) -> Top:
     return top.with_polarizability(tensor, how)
 
 
-def _with_spins(top: Top, reading: Reading) -> Top:
-    inputs = reading.inputs
-    if inputs.spin_constants is None:
-        if inputs.spins is not None:
-            named = reading.named
-            raise ValueError(
-                f"{named('spins')}: states the sizes of the spins in {named('spin_constants')}; give those too"
-            )
-        return top
-    from rotor.tops.spins.spin_constants import SpinConstants, parse_coupled, refuse_other_nuclei
+def _with_spins(top: Top, text: str, reading: Reading) -> Top:
+    from rotor.tops.spins.spin_constants import SpinConstants, refuse_other_nuclei
 
-    text, spins = inputs.spin_constants, inputs.spins
-    if spins is not None:
-        reading.within("spins", lambda: parse_coupled(spins))
-
-    def read() -> SpinConstants:
-        constants = SpinConstants.parse(text, spins, reading.source("spin_constants"))
-        refuse_other_nuclei(constants, top.molecule)
-        return constants
-
-    return replace(top, spin_constants=reading.within("spin_constants", read))
+    constants = SpinConstants.parse(text, reading.inputs.spins, reading.source("spin_constants"))
+    refuse_other_nuclei(constants, top.molecule)
+    return replace(top, spin_constants=constants)
 
 
-def _with_internal_rotation(top: Top, reading: Reading) -> Top:
+def _checked_spins(top: Top, text: str, reading: Reading) -> Top:
+    from rotor.tops.spins.spin_constants import parse_coupled
+
+    parse_coupled(text)
+    return top
+
+
+def _with_internal_rotation(top: Top, text: str, reading: Reading) -> Top:
     """The top with internal rotation of a methyl group, from its geometry or from constants."""
-    text = reading.inputs.internal_rotation
-    if text is None:
-        return top
     if text.strip() in ("geometry", "scan"):
         from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
 
-        engine = (reading.inputs.calculator or "mmff") if text.strip() == "scan" else None
-        return reading.within("internal_rotation", lambda: with_internal_rotation(top, engine))
+        return with_internal_rotation(top, (reading.inputs.calculator or "mmff") if text.strip() == "scan" else None)
     from rotor.tops.internal_rotation import InternalRotationConstants
 
-    constants = reading.within("internal_rotation", lambda: InternalRotationConstants.parse(text))
-    return replace(top, internal_rotation=constants)
+    return replace(top, internal_rotation=InternalRotationConstants.parse(text))
+
+
+_STEPS: Mapping[str, Callable[[Top, Any, Reading], Top]] = {
+    "calculator": _refined,
+    "symmetry_tolerance": lambda top, reach, _: top.with_symmetry_within(reach),
+    "hessian": _semirigid,
+    "dipole_abc": lambda top, abc, reading: top.with_dipole(abc, reading.source("dipole_abc", " in principal axes")),
+    "dipole": _with_dipole_of_input,
+    "polarizability": _with_polarizability,
+    "anisotropy": _with_anisotropy,
+    "spin_weights": lambda top, weights, reading: top.with_weights(dict(weights), reading.source("spin_weights")),
+    "internal_rotation": _with_internal_rotation,
+    "spins": _checked_spins,
+    "spin_constants": _with_spins,
+}  # what each input does to the top, in this order
 
 
 def _with_states(top: Top, reading: Reading) -> Top:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import Table, plain, show_facts, show_table
+from rotor.reports.screen import Part, Table, plain
 from rotor.requests.field import declared
 from rotor.requests.readers import Text
 from rotor.verbs.tool import Tool
@@ -59,13 +60,14 @@ def json_of(answer: Molecules, _: Any) -> str:
     return "[\n" + ",\n".join(lines) + "\n]\n"
 
 
-def show(answer: Molecules, _: Any) -> None:
-    """Print the table, or all facts of a single molecule."""
-    if answer.alone:
-        show_facts(_facts(answer.records[0]))
-        return
+def show(answer: Molecules, _: Any) -> Iterable[Part | None]:
+    """The table, or all facts of a single molecule."""
     left = frozenset({"name", "also", "kind", "unverified", "from"})
-    show_table(Table("", _COLUMNS, [_row(record) for record in answer.records], left))
+    yield (
+        _facts(answer.records[0])
+        if answer.alone
+        else Table("", _COLUMNS, [_row(record) for record in answer.records], left)
+    )
 
 
 def _paths(name: str | None) -> list[Path]:

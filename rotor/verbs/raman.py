@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
-from rotor.reports.line_tables import first_rows_title
-from rotor.reports.screen import Table, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.line_tables import first_rows_title, labelled_rows, states_text
+from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OUTPUT, declared
 from rotor.requests.readers import Whole
@@ -49,19 +48,14 @@ def content(answer: RamanAnswer, shown: RamanShown) -> Mapping[str, Any]:
     return {"strongest": answer.strongest(shown.top_lines)}
 
 
-def show(answer: RamanAnswer, report: Report) -> None:
-    """Print constants, conditions and the strongest lines."""
+def show(answer: RamanAnswer, report: Report) -> Iterable[Part | None]:
+    """Constants, conditions and the strongest lines."""
     lines, record = answer.lines, report.content
-    print(top_facts.heading(lines.top))
-    show_facts(_facts(lines, record))
-    if not len(lines):
-        print(f"\nno lines: {answer.why_no_lines}")
-    elif len(record["strongest"]):
-        print()
-        show_table(_table(lines, record["strongest"]))
-    print()
-    tables = ("constants", "polarizability", "spin weights")
-    show_facts([*source_facts(lines.top, tables, report.sources), *top_facts.model_facts(record)])
+    none = "" if len(lines) else f"no lines: {answer.why_no_lines}\n"
+    sources = ("constants", "polarizability", "spin weights")
+    return top_facts.top_parts(
+        lines.top, _facts(lines, record), (none, _table(lines, record["strongest"])), sources, report
+    )
 
 
 def _facts(lines: RamanLines, record: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -85,17 +79,21 @@ def _facts(lines: RamanLines, record: Mapping[str, Any]) -> list[tuple[str, str]
 
 def _table(lines: RamanLines, rows: Any) -> Table:
     """The strongest lines in order of shift."""
-    from rotor.quantum import quanta
-
     selected = lines.where(rows)
-    names = quanta.headings(lines.quanta_names)
-    columns = ("shift (cm-1)", "dσ/dΩ (cm²/sr)", "λ (nm)", "E (cm-1)", "g", "S (Å⁶)", "from", "to")
-    wavenumber = "{:.6f}" if "f" in lines.quanta_names else "{:.4f}"  # hyperfine shifts are about 1e-5 cm⁻¹
-    formats = (wavenumber, "{:.4e}", "{:.4f}", wavenumber, "{}", "{:.5g}")
-    cells = [[form.format(x) for x in column] for form, column in zip(formats, selected.columns.values(), strict=False)]
-    labels = [selected.levels.labels(states) for states in (selected.initial, selected.final)]
-    title = first_rows_title(len(selected), "strongest line") if len(selected) < len(lines) else "all lines"
-    return Table(f"{title}, in order of shift (states: {names})", columns, list(zip(*cells, *labels, strict=True)))
+    digits = 6 if "f" in lines.quanta_names else 4  # hyperfine shifts are about 1e-5 cm⁻¹
+    columns = {
+        "shift (cm-1)": f"{{shift_cm:.{digits}f}}",
+        "dσ/dΩ (cm²/sr)": "{cross_section_cm2_per_sr:.4e}",
+        "λ (nm)": "{wavelength_nm:.4f}",
+        "E (cm-1)": f"{{energy_initial_cm:.{digits}f}}",
+        "g": "{g_initial}",
+        "S (Å⁶)": "{strength_angstrom6:.5g}",
+        "from": "{from}",
+        "to": "{to}",
+    }
+    records = labelled_rows(selected, {"from": selected.initial, "to": selected.final})
+    title = first_rows_title(len(selected), len(lines), "strongest line")
+    return record_table(f"{title}, in order of shift {states_text(lines)}", columns, records)
 
 
 def results(answer: Any) -> dict[str, Any]:

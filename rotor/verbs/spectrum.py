@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
-from rotor.reports.screen import show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part
 from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.fill import Entries, read_fields, read_instance
@@ -196,28 +195,21 @@ def draw(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     plot_spectrum(drawn, path, provenance=report.command, **report.view)
 
 
-def show(answer: SpectrumAnswer, report: Report) -> None:
-    """Print constants, conditions and the strongest lines."""
+def show(answer: SpectrumAnswer, report: Report) -> Iterable[Part | None]:
+    """Constants, conditions and the strongest lines."""
     lines, record = answer.lines, report.content
-    print(
-        top_facts.heading(lines.top)
-        if lines.levels.of_named_constants
-        else f"{lines.top.name}: levels of the file's own parameters"
-    )
-    show_facts(_facts(answer, record))
-    if len(lines) == 0:
-        print(f"\nno lines: {_why_none(answer, report.entries)}")
+    part: Part
+    if not len(lines):
+        part = f"no lines: {_why_none(answer, report.entries)}\n"
     elif record["patterns"] is not None:
         from rotor.quantum.quanta import headings, of_rotation
 
-        print()
-        show_table(patterns_table(record["patterns"], headings(of_rotation(lines.levels.quanta))))
-    elif len(record["strongest"]):
-        print()
-        show_table(lines_table(lines, record["strongest"], record["optical_depth"]))
-    print()
-    sources = source_facts(lines.top, ("constants", "dipole", "spin weights"), report.sources)
-    show_facts([*sources, *top_facts.model_facts(record)])
+        part = patterns_table(record["patterns"], headings(of_rotation(lines.levels.quanta)))
+    else:
+        part = lines_table(lines, record["strongest"], record["optical_depth"])
+    title = "" if lines.levels.of_named_constants else f"{lines.top.name}: levels of the file's own parameters"
+    sources = ("constants", "dipole", "spin weights")
+    return top_facts.top_parts(lines.top, _facts(answer, record), (part,), sources, report, title)
 
 
 def _why_none(answer: SpectrumAnswer, entries: Entries) -> str:

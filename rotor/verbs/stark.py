@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.quantum.fields.stark_request import StarkAnswer, StarkRequest, answer_stark
 from rotor.reports import top_facts
 from rotor.reports.field_maps import accuracy_fact, results_of_map, table_of_states
-from rotor.reports.screen import Table, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part, Table
 from rotor.requests.field import declared_fields
 from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
@@ -111,36 +110,19 @@ def draw_lines(answer: StarkAnswer, path: Path, report: Report) -> None:
     )
 
 
-def show(answer: StarkAnswer, report: Report) -> None:
-    """Print the conditions and the first states."""
+def show(answer: StarkAnswer, report: Report) -> Iterable[Part | None]:
+    """The conditions and the first states."""
     top, content = answer.request.top, report.content
-    print(top_facts.heading(top))
-    show_facts(_facts(top, content))
-    print()
-    show_table(_table(answer.states, mixed=bool(content["field_direction"][0] or content["field_direction"][1])))
-    show_facts([*source_facts(top, ("constants", "dipole"), report.sources), *top_facts.model_facts(content)])
+    table = _table(answer.states, mixed=bool(content["field_direction"][0] or content["field_direction"][1]))
+    return top_facts.top_parts(top, _facts(top, content), (table,), ("constants", "dipole"), report)
 
 
 def _table(states: FieldMap, mixed: bool) -> Table:
     """The first states, by M and block; M is signed if all three components of the dipole act."""
-    first, last = states.fields[0], states.fields[-1]
-
-    def row(rows: slice) -> list[str]:
-        """One row of the printed table."""
-        at, end = rows.start, rows.stop - 1
-        numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end], states.cosines["costheta"][end])
-        m = "mixed" if mixed else f"{states.m[at]:g}"
-        return [str(states.label[at]), m, *(f"{value:.6f}" for value in numbers)]
-
-    names = (
-        "state",
-        "M",
-        f"E at {first:g} kV/cm (MHz)",
-        f"E at {last:g} kV/cm (MHz)",
-        "μ_eff there (D)",
-        "⟨cosθ⟩ there",
-    )
-    return table_of_states(states, names, row)
+    columns: dict[str, Any] = {"M": lambda ends: "mixed"} if mixed else {}
+    columns["μ_eff there (D)"] = lambda ends: f"{states.slope[ends[1]]:.6f}"
+    columns["⟨cosθ⟩ there"] = lambda ends: f"{states.cosines['costheta'][ends[1]]:.6f}"
+    return table_of_states(states, "kV/cm", columns)
 
 
 def _along(direction: list[float]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.checks import NoAnswerError
 from rotor.formats.family_file import FamilyFile, read_family
 from rotor.formats.structure_request import StructureAnswer, StructureRequest, answer_structure
-from rotor.reports.screen import Table, show_facts, show_table
+from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import MOLECULE, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, written_fields
@@ -119,54 +119,43 @@ def failure(answer: StructureAnswer) -> str:
     return f"{unconverged[0].method} has not converged: {unconverged[0].minimum.reason}" if unconverged else ""
 
 
-def show(answer: StructureAnswer, report: Report) -> None:
-    """Print planar moments, coordinates and the values of each method."""
+def show(answer: StructureAnswer, report: Report) -> Iterable[Part | None]:
+    """Planar moments, coordinates and the values of each method."""
     family = answer.request.file.family
-    print(f"{family.name}: {counted(len(family.species), 'isotopologue')}, {family.top.kind} top")
-    if answer.planar:
-        show_table(_planar_table(answer.planar))
+    yield f"{family.name}: {counted(len(family.species), 'isotopologue')}, {family.top.kind} top"
+    yield _planar_table(answer.planar)
     if answer.substitution:
-        show_table(_coordinates_table(answer.substitution))
-        if answer.substitution.values:
-            show_table(_values_table("rs", answer.substitution.values))
+        yield _coordinates_table(answer.substitution)
+        yield _values_table("rs", answer.substitution.values)
     for fit in answer.fitted:
-        show_table(_values_table(fit.method, (*fit.values, *fit.vibrational)))
+        yield _values_table(fit.method, (*fit.values, *fit.vibrational))
         worst = max(fit.moments, key=lambda moment: abs(moment.difference))
-        show_facts(
-            [
-                (
-                    "moments",
-                    f"{len(fit.moments)}, {counted(fit.degrees_of_freedom, 'degree')} of freedom, rms {fit.rms_u_angstrom2:.3g} u Å²",
-                ),
-                ("worst", f"I_{worst.axis} of {worst.species}: obs - calc {worst.difference:+.3g} u Å²"),
-                ("search", fit.minimum.reason),
-            ]
-        )
-        if answer.without.get(fit.method):
-            show_table(_without_table(fit.method, answer.without[fit.method]))
-    print()
-    show_facts(error_facts(report.content.get("errors")))
+        freedom = f"{len(fit.moments)}, {counted(fit.degrees_of_freedom, 'degree')} of freedom"
+        yield [
+            ("moments", f"{freedom}, rms {fit.rms_u_angstrom2:.3g} u Å²"),
+            ("worst", f"I_{worst.axis} of {worst.species}: obs - calc {worst.difference:+.3g} u Å²"),
+            ("search", fit.minimum.reason),
+        ]
+        yield _without_table(fit.method, answer.without.get(fit.method, ()))
+    yield error_facts(report.content.get("errors"))
 
 
 def _planar_table(moments: Sequence[PlanarMoment]) -> Table:
-    rows = [
-        [
-            moment.species,
-            moment.axis,
-            f"{moment.value:.5f}",
-            f"{moment.change:+.5f}",
-            f"{moment.error:.5f}",
-            "doubtful" if moment.doubtful else "",
-        ]
-        for moment in moments
-    ]
-    columns = ["isotopologue", "axis", "P (u Å²)", "from the parent", "error", ""]
-    return Table("planar moments of substitutions in a plane", columns, rows, frozenset({"isotopologue", "axis", ""}))
+    columns = {
+        "isotopologue": "{0.species}",
+        "axis": "{0.axis}",
+        "P (u Å²)": "{0.value:.5f}",
+        "from the parent": "{0.change:+.5f}",
+        "error": "{0.error:.5f}",
+        "": lambda moment: "doubtful" if moment.doubtful else "",
+    }
+    title = "planar moments of substitutions in a plane"
+    return record_table(title, columns, moments, {"isotopologue", "axis", ""})
 
 
 def _without_table(method: str, fits: Sequence[Without]) -> Table:
-    rows = [[fit.species, f"{fit.rms_u_angstrom2:.3g}", f"{fit.chance:.2g}"] for fit in fits]
-    return Table(f"{method} without", ["isotopologue", "rms (u Å²)", "by chance"], rows, frozenset({"isotopologue"}))
+    columns = {"isotopologue": "{0.species}", "rms (u Å²)": "{0.rms_u_angstrom2:.3g}", "by chance": "{0.chance:.2g}"}
+    return record_table(f"{method} without", columns, fits, {"isotopologue"})
 
 
 def _coordinates_table(structure: SubstitutionStructure) -> Table:
@@ -188,8 +177,12 @@ def _coordinate_text(value: float, square: float, error: float, zero_by_symmetry
 
 
 def _values_table(method: str, values: Sequence[Value]) -> Table:
-    rows = [[value.name, _value_text(value.value, value.error), value.unit] for value in values]
-    return Table(method, ["coordinate", "value", "unit"], rows, frozenset({"coordinate", "unit"}))
+    columns = {
+        "coordinate": "{0.name}",
+        "value": lambda value: _value_text(value.value, value.error),
+        "unit": "{0.unit}",
+    }
+    return record_table(method, columns, values, {"coordinate", "unit"})
 
 
 def _value_text(value: float, error: float) -> str:

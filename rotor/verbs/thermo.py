@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
-from rotor.reports.screen import Table, evenly, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import CONDITIONS
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
 from rotor.verbs.subjects import OneMolecule
@@ -49,19 +48,12 @@ def draw(answer: ThermoAnswer, path: Path, report: Report) -> None:
     plot_heat_capacity([Panel(title, {label: smooth})], path, view=report.view, provenance=dict(report.provenance))
 
 
-def show(answer: ThermoAnswer, report: Report) -> None:
-    """Print constants, conditions and the functions by temperature."""
-    functions, content = answer.functions, report.content
-    print(top_facts.heading(functions.top))
-    show_facts(_facts(functions, content))
-    print()
-    show_table(_rotation_table(functions))
-    if functions.gas is not None:
-        print()
-        show_table(_gas_table(functions))
-    print()
-    sources = source_facts(functions.top, ("constants", "spin weights"), report.sources)
-    show_facts([*sources, *top_facts.model_facts(content)])
+def show(answer: ThermoAnswer, report: Report) -> Iterable[Part | None]:
+    """Constants, conditions and the functions by temperature."""
+    functions = answer.functions
+    tables = _rotation_table(functions), _gas_table(functions)
+    facts = _facts(functions, report.content)
+    return top_facts.top_parts(functions.top, facts, tables, ("constants", "spin weights"), report)
 
 
 def _facts(functions: ThermoFunctions, content: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -119,26 +111,39 @@ def _theta_text(theta: Sequence[float]) -> str:
 
 
 def _rotation_table(functions: ThermoFunctions) -> Table:
-    rows = evenly(len(functions), SHOWN)
-    columns = ("T (K)", "Q", "Q classical", "Q corrected", "U (J/mol)", "S (J/mol K)", "Cv/R", "classical", "corrected")
-    formats = ("{:g}", "{:.6g}", "{:.6g}", "{:.6g}", "{:.6g}", "{:.6g}", "{:.6f}", "{:.1f}", "{:.6f}")
-    data = list(functions.columns.values())[: len(columns)]
-    cells = [
-        [form.format(x[i]) if math.isfinite(x[i]) else "-" for form, x in zip(formats, data, strict=True)] for i in rows
-    ]
-    few = "" if len(rows) == len(functions) else f", {len(rows)} of {len(functions)} temperatures"
-    return Table(f"rotation{few}; U from the lowest level, S with nuclear spin as the weights count it", columns, cells)
+    """The functions of rotation at evenly spaced temperatures."""
+    records, few = sampled(functions, SHOWN, "temperatures")
+    columns = {
+        "T (K)": "{temperature_k:g}",
+        "Q": "{q_rot:.6g}",
+        "Q classical": "{q_rot_classical:.6g}",
+        "Q corrected": "{q_rot_corrected:.6g}",
+        "U (J/mol)": "{energy_j_per_mol:.6g}",
+        "S (J/mol K)": "{entropy_j_per_mol_k:.6g}",
+        "Cv/R": "{cv_over_r:.6f}",
+        "classical": "{cv_over_r_classical:.1f}",
+        "corrected": "{cv_over_r_corrected:.6f}",
+    }
+    title = f"rotation{few}; U from the lowest level, S with nuclear spin as the weights count it"
+    return record_table(title, columns, records)
 
 
-def _gas_table(functions: ThermoFunctions) -> Table:
+def _gas_table(functions: ThermoFunctions) -> Table | None:
+    """The functions of the ideal gas, if they are requested."""
     gas = functions.gas
-    assert gas is not None  # the caller checks it
-    data = (gas.cp_j_per_mol_k, gas.entropy_j_per_mol_k, gas.enthalpy_j_per_mol, gas.gibbs_j_per_mol_k)
-    columns = ("T (K)", "Cp (J/mol K)", "S (J/mol K)", "H-H(0) (J/mol)", "-(G-H(0))/T (J/mol K)")
-    cells = [[f"{functions.temperature_k[i]:g}", *(f"{x[i]:.3f}" for x in data)] for i in evenly(len(functions), SHOWN)]
+    if gas is None:
+        return None
+    columns = {
+        "T (K)": "{temperature_k:g}",
+        "Cp (J/mol K)": "{gas_cp_j_per_mol_k:.3f}",
+        "S (J/mol K)": "{gas_entropy_j_per_mol_k:.3f}",
+        "H-H(0) (J/mol)": "{gas_enthalpy_j_per_mol:.3f}",
+        "-(G-H(0))/T (J/mol K)": "{gas_gibbs_j_per_mol_k:.3f}",
+    }
     states = "" if gas.electronic.degeneracies == (1,) else f"{gas.electronic.text}; "
     spin = f"{states}R ln {functions.spin_factor:.6g} of nuclear spin left out of S and G"
-    return Table(f"ideal gas at {gas.pressure_bar:g} bar, {gas.mass_u:.6f} u; {spin}", columns, cells)
+    title = f"ideal gas at {gas.pressure_bar:g} bar, {gas.mass_u:.6f} u; {spin}"
+    return record_table(title, columns, sampled(functions, SHOWN)[0])
 
 
 def results(answer: Any) -> dict[str, Any]:

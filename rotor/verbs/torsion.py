@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +11,7 @@ from rotor import units
 from rotor.formats import write
 from rotor.reports import top_facts
 from rotor.reports.progress import progress_bar
-from rotor.reports.screen import Table, rows_of, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, Work
@@ -51,24 +50,11 @@ def content(answer: TorsionAnswer, shown: Shown) -> Mapping[str, Any]:
     return {"functions": rows_of(answer.functions)}
 
 
-def show(answer: TorsionAnswer, report: Report) -> None:
-    """Print potential, reduced moment, levels and functions by temperature."""
-    print(top_facts.heading(answer.request.top))
-    show_facts(_facts(answer, report.content))
-    print()
-    show_table(_level_table(answer))
-    print()
-    show_table(_thermo_table(answer))
-    print()
-    if answer.classical is not None:
-        show_facts(_classical_facts(answer.classical))
-        print()
-    show_facts(
-        [
-            *source_facts(answer.request.top, ("constants",), report.sources),
-            *top_facts.error_facts(report.content.get("errors")),
-        ]
-    )
+def show(answer: TorsionAnswer, report: Report) -> Iterable[Part | None]:
+    """Potential, reduced moment, levels and functions by temperature."""
+    gas = None if answer.classical is None else _classical_facts(answer.classical)
+    parts = _level_table(answer), _thermo_table(answer), gas
+    return top_facts.top_parts(answer.request.top, _facts(answer, report.content), parts, ("constants",), report)
 
 
 def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -126,35 +112,35 @@ def _terms_text(record: Mapping[str, Any]) -> str:
 
 
 def _level_table(answer: TorsionAnswer) -> Table:
-    columns = answer.levels.columns
-    rows = []
-    for row in range(min(len(answer.levels), SHOWN)):
-        splitting = float(columns["splitting_mhz"][row])
-        hidden = math.isnan(splitting) or (splitting == 0.0 and columns["species"][row] == 0)
-        rows.append(
-            [str(columns["v"][row]), str(columns["species"][row]), str(columns["degeneracy"][row]),
-             f"{columns['energy_cm'][row]:.5f}", f"{columns['above_lowest_cm'][row]:.5f}", "" if hidden else f"{splitting:.4f}"]
-        )  # fmt: skip
+    def splitting(row: Mapping[str, Any]) -> str:
+        hidden = math.isnan(row["splitting_mhz"]) or (row["splitting_mhz"] == 0.0 and row["species"] == 0)
+        return "" if hidden else f"{row['splitting_mhz']:.4f}"
+
+    columns: dict[str, Any] = {
+        "v": "{v}",
+        "σ": "{species}",
+        "g": "{degeneracy}",
+        "E (cm-1)": "{energy_cm:.5f}",
+        "above lowest": "{above_lowest_cm:.5f}",
+        "splitting (MHz)": splitting,
+    }
     title = "levels; E above the foot of the potential; splitting from σ = 0 of the same v, or of a tunnelling pair"
-    return Table(title, ("v", "σ", "g", "E (cm-1)", "above lowest", "splitting (MHz)"), rows)
+    return record_table(title, columns, rows_of(answer.levels, slice(SHOWN)))
 
 
 def _thermo_table(answer: TorsionAnswer) -> Table:
     functions = answer.functions
-    methods = list(dict.fromkeys(functions.method.tolist()))
     exact = functions.of_method("levels")
-    by_method = {name: functions.of_method(name).cv_over_r for name in methods}
-    rows = [
-        [
-            f"{t:g}",
-            f"{math.exp(exact.ln_q[i]):.5g}",
-            f"{exact.entropy_j_per_mol_k[i]:.5g}",
-            *(f"{by_method[name][i]:.5f}" for name in methods),
-        ]
-        for i, t in enumerate(exact.temperature_k.tolist())
-    ]
+    columns: dict[str, Any] = {
+        "T (K)": lambda row: f"{exact.temperature_k[row]:g}",
+        "Q": lambda row: f"{math.exp(exact.ln_q[row]):.5g}",
+        "S (J/mol K)": lambda row: f"{exact.entropy_j_per_mol_k[row]:.5g}",
+    }
+    for method in dict.fromkeys(functions.method.tolist()):
+        heat = functions.of_method(method).cv_over_r
+        columns[method] = lambda row, heat=heat: f"{heat[row]:.5f}"
     title = "thermodynamics: Q from the foot of the potential and S by the levels; C_v/R by the levels and by approximations"
-    return Table(title, ("T (K)", "Q", "S (J/mol K)", *methods), rows)
+    return record_table(title, columns, range(len(exact.temperature_k)))
 
 
 def results(answer: Any) -> dict[str, Any]:

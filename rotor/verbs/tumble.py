@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.classical.driven import DrivenAnswer, DrivenRequest, answer_driven
 from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.reports import top_facts
-from rotor.reports.screen import Table, evenly, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import STATES
 from rotor.verbs.turning_body import TurningBody, build
@@ -19,9 +18,11 @@ from rotor.verbs.verb import PICTURES, Output, Report, Verb, tables
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
+    from rotor.table import Table as Columns
 
 SHOWN = 11  # rows of the motion in the report
 SMALL = 1e-4  # largest component of a column below which numbers are printed with digits instead of decimals
+_ATTITUDE = "qw", "qx", "qy", "qz"
 FEW_TIMES = 10_000  # plain Python takes half a second for them, as long as loading the compiler
 EXAMPLES = """\b
 Examples:
@@ -115,27 +116,23 @@ def _picture_title(request: TumbleRequest) -> str:
     return _heading(request) if top is None else f"{name_of_top(top)}: {top_facts.KINDS[top.kind]}"
 
 
-def show(answer: TumbleAnswer | DrivenAnswer, report: Report) -> None:
-    """Print how the body rotates, and rows of the motion."""
-    if isinstance(answer, DrivenAnswer):
-        _show_driven(answer, report.content)
-        return
+def show(answer: TumbleAnswer | DrivenAnswer, report: Report) -> Iterable[Part | None]:
+    """How the body rotates, and rows of the motion."""
     content = report.content
-    print(f"{_heading(answer.request)}, turning freely")
-    show_facts(_facts(answer.request, content))
-    print()
-    show_table(_axes_table(answer.request, content))
-    print()
-    show_table(_motion_table(answer))
-    top = getattr(answer.request, "top", None)
-    sources = [] if top is None else source_facts(top, ("constants",), report.sources)
-    show_facts([*top_facts.error_facts(content.get("errors")), *sources])
+    if isinstance(answer, DrivenAnswer):
+        return _driven_parts(answer, content)
+    request = answer.request
+    title, facts = f"{_heading(request)}, turning freely", _facts(request, content)
+    tables = _axes_table(request, content), _motion_table(answer)
+    top = getattr(request, "top", None)
+    if top is None:
+        return [title, facts, *tables, top_facts.error_facts(content.get("errors"))]
+    return top_facts.top_parts(top, facts, tables, ("constants",), report, title)
 
 
-def _show_driven(answer: DrivenAnswer, content: Mapping[str, Any]) -> None:
+def _driven_parts(answer: DrivenAnswer, content: Mapping[str, Any]) -> list[Part | None]:
     units = answer.request.units
     names = [type(effect).name or type(effect).__name__ for effect in answer.request.effects]
-    print(f"{_heading(answer.request)}, under {', '.join(names)}")
     energy = f" {units.energy}" if units.energy else ""
     drift = content["energy_drift"]
     last = "not conserved" if drift is None else f"conserved to {drift:.1e} of the largest kinetic one"
@@ -143,10 +140,9 @@ def _show_driven(answer: DrivenAnswer, content: Mapping[str, Any]) -> None:
         *((f"effect {number}", text) for number, text in enumerate(content["effects"], 1)),
         ("method", f"{content['method']}, {content['steps']} steps"),
         ("energy", f"{content['energy_first']:.10g} to {content['energy_last']:.10g}{energy}: {last}"),
+        *top_facts.error_facts(content.get("errors")),
     ]
-    show_facts([*facts, *top_facts.error_facts(content.get("errors"))])
-    print()
-    show_table(_driven_table(answer))
+    return [f"{_heading(answer.request)}, under {', '.join(names)}", facts, _driven_table(answer)]
 
 
 def _facts(request: TumbleRequest, content: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -208,45 +204,39 @@ def _axes_table(request: TumbleRequest, content: Mapping[str, Any]) -> Table:
         "neutral": "a push drifts",
         "none": "no rotation about it",
     }
-    rate, moment = (
-        f"rate (rad{_per(request.units.time)})",
-        "moment" + _bracket(request.units.moment),
-    )
-    rows = [
-        (a["axis"], f"{a['moment']:.8g}", a["kind"], f"{a['rate']:.8g}", fates[a["kind"]])
-        for a in content["fixed_axes"]
-    ]
-    title = "spin about each axis, at this |L|"
-    return Table(title, ("axis", moment, "kind", rate, ""), rows, frozenset({"axis", "kind", ""}))
+    units = request.units
+    columns = {
+        "axis": "{axis}",
+        "moment" + _bracket(units.moment): "{moment:.8g}",
+        "kind": "{kind}",
+        f"rate (rad{_per(units.time)})": "{rate:.8g}",
+        "": lambda row: fates[row["kind"]],
+    }
+    return record_table("spin about each axis, at this |L|", columns, content["fixed_axes"], {"axis", "kind", ""})
 
 
 def _motion_table(answer: TumbleAnswer) -> Table:
-    units, table = answer.request.units, answer.table
-    names = {"t": "t" + _bracket(units.time)}
-    for number, axis in enumerate(answer.request.axes, 1):
-        names[f"m{number}"] = f"L{axis}{_bracket(units.angular_momentum)}"
-    names |= {name: name for name in ("qw", "qx", "qy", "qz")}
-    return _rows(table.columns, names, lambda value, column: _component(value, column))
+    units, columns = answer.request.units, answer.table.columns
+    names = {
+        f"m{number}": f"L{axis}{_bracket(units.angular_momentum)}" for number, axis in enumerate(answer.request.axes, 1)
+    }
+    forms = {name: f"{{{name}:{_form(columns[name])}}}" for name in (*names, *_ATTITUDE)}
+    return _rows(answer.table, units.time, {names.get(name, name): form for name, form in forms.items()})
 
 
 def _driven_table(answer: DrivenAnswer) -> Table:
     units = answer.request.units
-    names = {"t": "t" + _bracket(units.time), "energy": "energy" + _bracket(units.energy)}
-    for number, axis in enumerate(answer.request.axes, 1):
-        names[f"w{number}"] = f"ω{axis}{_bracket('rad/' + units.time if units.time else '')}"
-    names |= {name: name for name in ("qw", "qx", "qy", "qz")}
-    return _rows(answer.table.columns, names, lambda value, column: f"{value:.6f}")
+    rate = _bracket("rad/" + units.time if units.time else "")
+    names = {"energy": "energy" + _bracket(units.energy)}
+    names |= {f"w{number}": f"ω{axis}{rate}" for number, axis in enumerate(answer.request.axes, 1)}
+    columns = {names.get(name, name): f"{{{name}:.6f}}" for name in (*names, *_ATTITUDE)}
+    return _rows(answer.table, units.time, columns)
 
 
-def _rows(columns: Mapping[str, Floats], names: Mapping[str, str], text: Any) -> Table:
+def _rows(motion: Columns, time: str, columns: Mapping[str, str]) -> Table:
     """Evenly spaced rows of a motion."""
-    count = len(columns["t"])
-    cells = [
-        [f"{columns[name][i]:.6g}" if name == "t" else text(columns[name][i], columns[name]) for name in names]
-        for i in evenly(count, SHOWN)
-    ]
-    title = "the motion" if len(cells) == count else f"the motion, {len(cells)} of {count} times"
-    return Table(title, list(names.values()), cells)
+    records, few = sampled(motion, SHOWN, "times")
+    return record_table(f"the motion{few}", {f"t{_bracket(time)}": "{t:.6g}", **columns}, records)
 
 
 def _numbers(values: Any) -> str:
@@ -265,10 +255,9 @@ def _bracket(name: str) -> str:
     return f" ({name})" if name else ""
 
 
-def _component(value: float, column: Floats) -> str:
-    """A number with six decimals, or with six digits if decimals would show nothing (SI units of molecules)."""
-    largest = float(max(abs(column.min()), abs(column.max())))
-    return f"{value:.6g}" if 0 < largest < SMALL else f"{round(value, 6) + 0.0:.6f}"
+def _form(column: Floats) -> str:
+    """Six decimals, or six digits if decimals would show nothing (SI units of molecules)."""
+    return ".6g" if 0 < float(max(abs(column.min()), abs(column.max()))) < SMALL else "z.6f"
 
 
 def results(answer: Any) -> dict[str, Any]:

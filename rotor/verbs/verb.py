@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotor.reports.screen import json_text, json_with_rows, plain
+from rotor.reports.screen import Part, json_text, json_with_rows, plain
 from rotor.requests.field import Field, all_fields, declared
 from rotor.requests.fill import Entries, read_fields, read_instance, renaming, written_fields
 from rotor.requests.readers import Flag
@@ -216,7 +216,7 @@ class Verb:
     results: a few numbers of an answer with rows, by name with units, for the table of a sweep.
     content: further keys of the JSON. notes: remarks on an answer. failure: reason why an answer is not a result.
     outputs: files. withheld: reasons why some of them are not written. stated: keys of the JSON in the provenance of files.
-    show: prints the report. stepwise: whether every step is shown from the start.
+    show: the parts of the report, which are printed with blank lines about tables. stepwise: whether every step is shown from the start.
     drawn: unit of the picture's horizontal axis, None if it cannot be changed. spectral: whether the picture is a spectrum.
     scaled: whether it has --plot-scale. nothing: reason why there is nothing to draw.
     workers: what --workers shares out. short: whether plain Python answers before the compiler would be loaded.
@@ -232,7 +232,7 @@ class Verb:
     answer: Callable[[Any, Work], Any]
     table: Callable[[Any], Table]
     rows: str
-    show: Callable[[Any, Report], None]
+    show: Callable[[Any, Report], Iterable[Part | None]]
     results: Callable[[Any], Mapping[str, Any]] = lambda answer: {}
     outputs: tuple[Output, ...]
     subject: SubjectKind

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.quantum.fields.zeeman_request import ZeemanAnswer, ZeemanRequest, answer_zeeman
 from rotor.reports import top_facts
 from rotor.reports.field_maps import accuracy_fact, results_of_map, table_of_states
-from rotor.reports.screen import Table, show_facts, show_table
-from rotor.reports.sources import source_facts
+from rotor.reports.screen import Part
 from rotor.requests.field import CONDITIONS, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Numbers
@@ -21,7 +20,6 @@ from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Report, Subject, Verb, tables
 
 if TYPE_CHECKING:
-    from rotor.quantum.fields.field_map import FieldMap
     from rotor.tops.magnetic import Tensor
     from rotor.tops.top import Top
 
@@ -121,28 +119,11 @@ def draw(answer: ZeemanAnswer, path: Path, report: Report) -> None:
     plot_zeeman(answer.states, path, title=title, spins=spins, view=report.view, provenance=report.command)
 
 
-def show(answer: ZeemanAnswer, report: Report) -> None:
-    """Print the conditions and the first states."""
-    top = answer.request.top
-    print(top_facts.heading(top))
-    show_facts(_facts(answer, report.content))
-    print()
-    show_table(_table(answer.states))
-    show_facts([*source_facts(top, ("constants",), report.sources), *top_facts.model_facts(report.content)])
-
-
-def _table(states: FieldMap) -> Table:
-    """The first states, by M and block."""
-    first, last = states.fields[0], states.fields[-1]
-
-    def row(rows: slice) -> list[str]:
-        """One row of the table."""
-        at, end = rows.start, rows.stop - 1
-        numbers = (states.energy_mhz[at], states.energy_mhz[end], states.slope[end])
-        return [str(states.label[at]), f"{states.m[at]:g}", *(f"{round(value, 6) + 0.0:.6f}" for value in numbers)]
-
-    names = ("state", "M", f"E at {first:g} T (MHz)", f"E at {last:g} T (MHz)", "moment there (μ_N)")
-    return table_of_states(states, names, row)
+def show(answer: ZeemanAnswer, report: Report) -> Iterable[Part | None]:
+    """The conditions and the first states."""
+    states = answer.states
+    table = table_of_states(states, "T", {"moment there (μ_N)": lambda ends: f"{states.slope[ends[1]]:z.6f}"})
+    return top_facts.top_parts(answer.request.top, _facts(answer, report.content), (table,), ("constants",), report)
 
 
 def _facts(answer: ZeemanAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:

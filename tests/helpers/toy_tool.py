@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from rotor.checks import NoAnswerError
-from rotor.reports.screen import show_facts
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.readers import Text, Whole
 from rotor.verbs.tool import Tool
@@ -51,6 +50,6 @@ VERB = Tool(
     request=CountRequest,
     of="file",
     answer=answer,
-    show=lambda answer, report: show_facts([("words", str(answer.words))]),
+    show=lambda answer, report: [[("words", str(answer.words))]],
     outputs=(Output("out", (".txt",), "The number", lambda answer, path, report: path.write_text(str(answer.words))),),
 )

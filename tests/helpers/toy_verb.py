@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from rotor.reports.screen import show_facts
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import check_fields, declared
 from rotor.requests.knob import Knob, Measure
@@ -100,7 +99,7 @@ VERB = Verb(
     table=lambda answer: answer.table,
     rows="levels",
     results=lambda answer: {"highest_mhz": answer.table.energy_mhz.max()},
-    show=lambda answer, report: show_facts([("levels", str(report.content["levels"]))]),
+    show=lambda answer, report: [[("levels", str(report.content["levels"]))]],
     outputs=(Output("csv", (".csv",), "Write the energies as CSV", example="ring.csv"),),
     subject=OneMolecule(),
     drawn=None,

@@ -14,7 +14,7 @@ from rotor.cli.shared import process
 from rotor.cli.shared.output import Files, answering, at_end, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings, picture_style
 from rotor.reports.progress import elapsed_time
-from rotor.reports.screen import show_facts
+from rotor.reports.screen import show_parts
 from rotor.requests.fill import Entries, renaming
 from rotor.verbs.molecule import is_file
 from rotor.verbs.verb import Place, Report, Subject, Verb, Work, files_of, report_of
@@ -76,13 +76,14 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
 
 def show_answer(verb: Verb, answer: Any, report: Report) -> None:
     """The report of a verb and the files written, with the table of errors where it is requested."""
-    verb.show(answer, report)
+    parts = [*verb.show(answer, report)]
     if report.content.get("files"):
-        show_facts([("files", ", ".join(report.content["files"]))])
+        parts.append([("files", ", ".join(report.content["files"]))])
     if getattr(report.shown, "errors", False):
-        from rotor.reports.error_table import show_errors
+        from rotor.reports.error_table import error_parts
 
-        show_errors(report.content)
+        parts += error_parts(report.content)
+    show_parts(parts)
 
 
 def places_of(verb: Verb) -> set[str]:
