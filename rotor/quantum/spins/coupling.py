@@ -176,64 +176,23 @@ def coefficients(spins: tuple[int, ...], acting: tuple[int, ...], rank: int, bra
     return np.asarray(np.where((left[..., 0] == right[..., 0]), total, 0.0) if rank == 0 else total)
 
 
-def tensor_coefficients(spins: tuple[int, ...], rank: int, bra: Ints, ket: Ints) -> Floats:
-    """⟨p'‖T^K‖p⟩ over ⟨N'‖T^K‖N⟩ of an operator that acts on no spin, such as the dipole.
+def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, bra: Ints, ket: Ints) -> Floats:
+    """⟨p'‖V‖p⟩ over ⟨N'‖T^L‖N⟩, (..., bra patterns, ket patterns), of V = T^L, or of a vector V with the spin in the place `acting`.
 
-    Parameters
-    ----------
-    spins : tuple of int
-        The spins in the order in which they are coupled, doubled.
-    rank : int
-        K of the tensor.
-    bra, ket : (..., patterns, columns) arrays of int
-        Coupling patterns N, J1, ... F of both sides, doubled.
-
-    Returns
-    -------
-    (..., bra patterns, ket patterns) array
-        Pure numbers: the product over the chain of A. R. Edmonds (1957), eq. (7.1.7).
+    The vector is S for L = 0, where T^0 is a plain matrix and not a reduced one, and Σ_q T²_pq S_q for L = 2. Without a spin, as for the
+    dipole, it is the product over the chain of A. R. Edmonds (1957), eq. (7.1.7).
     """
     left, right = bra[..., :, None, :], ket[..., None, :, :]
     total = np.ones(np.broadcast_shapes(left.shape[:-1], right.shape[:-1]))
-    for place, spin in enumerate(spins):
-        total = total * _passed_on(left[..., place : place + 2], right[..., place : place + 2], spin, rank)
-    return np.asarray(total)
-
-
-def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, bra: Ints, ket: Ints) -> Floats:
-    """⟨p'‖V‖p⟩ over ⟨N'‖T^L‖N⟩ of a vector V: T^1 itself, S of one spin (L = 0), or Σ_q T²_pq S_q (L = 2).
-
-    Parameters
-    ----------
-    spins : tuple of int
-        The spins in the order in which they are coupled, doubled.
-    rank : int
-        L of the tensor of the rotation.
-    acting : int or None
-        Place of the spin in V, counted from 0; None for T^1 itself.
-    bra, ket : (patterns, columns) arrays of int
-        Coupling patterns N, J1, ... F of both sides, doubled.
-
-    Returns
-    -------
-    (bra patterns, ket patterns) array
-        Pure numbers.
-
-    Notes
-    -----
-    T^0 is a plain matrix, not a reduced one.
-    """
-    if acting is None:
-        return tensor_coefficients(spins, rank, bra, ket)
-    left, right = bra[:, None, :], ket[None, :, :]
-    alike = left[..., 0] == right[..., 0]
-    total = np.where(alike, np.sqrt(left[..., 0] + 1.0), 0.0) if rank == 0 else np.full(alike.shape, _RECOUPLED[2])
+    if acting is not None:
+        alike = left[..., 0] == right[..., 0]
+        total = total * (np.where(alike, np.sqrt(left[..., 0] + 1.0), 0.0) if rank == 0 else _RECOUPLED[2])
     for place, spin in enumerate(spins):
         pair = left[..., place : place + 2], right[..., place : place + 2]
         if place == acting:
             total = total * _opened(*pair, spin, rank) * reduced_spin(spin, 1)
         else:
-            total = total * _passed_on(*pair, spin, rank if place < acting else 1)
+            total = total * _passed_on(*pair, spin, rank if acting is None or place < acting else 1)
     return np.asarray(total)
 
 

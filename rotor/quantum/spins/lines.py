@@ -4,11 +4,12 @@ A dipole does not act on spins: its element between two functions is that of the
 
     ⟨r' p'‖T^K‖r p⟩ = t(p', p) ⟨r'‖T^K‖r⟩,
 
-see `coupling.tensor_coefficients`. Elements of the rotation are computed once for all F.
+see `coupling.moment_coefficients`. Elements of the rotation are computed once for all F.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +18,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.axial import contracted_tensors
 from rotor.quantum.spins.blocks import Shared, SpinBlock, product
 from rotor.quantum.spins.contraction import by_numbers
-from rotor.quantum.spins.coupling import for_every_f, tensor_coefficients
+from rotor.quantum.spins.coupling import for_every_f, moment_coefficients
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import Tensors, rank_of
@@ -26,23 +27,34 @@ _FEW = 10_000  # with more elements between two F, they are computed one pair of
 ROUND_OFF = 1e-13  # round-off of sums of products of a few coefficients of size 1
 
 
+Acting = list[tuple[SpinPart, SpinPart, Floats]]
+"""Pairs of parts of two blocks with the elements of the rotation between their states."""
+
+
 def amplitudes(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> Floats:
     """Real reduced elements between all states of two blocks, (n_up, n_low); their squares are line strengths."""
     rank = rank_of(tensors)
-    t, acting = _coefficients(up, low, rank), _acting(up, low, tensors, rank)
+    return between_states(up, low, [(_coefficients(up, low, rank), _acting(up, low, tensors, rank))])
+
+
+def between_states(up: SpinBlock, low: SpinBlock, operators: Sequence[tuple[Floats, Acting]]) -> Floats:
+    """Σ t(p', p) ⟨r'|X|r⟩ of operators between all states of two blocks, (n_up, n_low); each with t of all patterns."""
     rows, columns = up.vectors.shape[0], low.vectors.shape[0]
     if rows * columns <= _FEW:
-        whole, single_factors = np.zeros((rows, columns)), t.tolist() if up.single and low.single else None
-        for target, source, element in acting:
-            if single_factors:
-                factor = single_factors[target.patterns.start][source.patterns.start]
-                np.multiply(element, factor, out=whole[target.place, source.place])
-            else:
-                whole[target.place, source.place] = product(t[target.patterns, source.patterns], element)
+        whole = np.zeros((rows, columns))
+        for t, acting in operators:
+            single_factors = t.tolist() if up.single and low.single else None
+            for target, source, element in acting:
+                if single_factors:
+                    factor = single_factors[target.patterns.start][source.patterns.start]
+                    whole[target.place, source.place] += factor * element
+                else:
+                    whole[target.place, source.place] += product(t[target.patterns, source.patterns], element)
         return np.asarray(up.vectors.T @ (whole @ low.vectors))
     moved = np.zeros((rows, low.vectors.shape[1]))
-    for target, source, element in acting:
-        moved[target.place] += acting_on(low.vectors[source.place], t[target.patterns, source.patterns], element)
+    for t, acting in operators:
+        for target, source, element in acting:
+            moved[target.place] += acting_on(low.vectors[source.place], t[target.patterns, source.patterns], element)
     return np.asarray(up.vectors.T @ moved)
 
 
@@ -59,9 +71,6 @@ def acting_on(vectors: Floats, coefficients: Floats, element: Floats) -> Floats:
 def connected(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> bool:
     """Whether the tensors have an element between two blocks."""
     return bool(_acting(up, low, tensors, rank_of(tensors)))
-
-
-Acting = list[tuple[SpinPart, SpinPart, Floats]]
 
 
 @dataclass(frozen=True)
@@ -137,7 +146,7 @@ def _coefficients_of_step(
 ) -> dict[tuple[str, int, int, int], Floats]:
     """t(p', p) between these two F and, where patterns are few, between all F with this difference."""
     if shared.scheme.equivalent or "patterns" not in shared.cache or len(up.patterns) * len(low.patterns) > _FEW:
-        only = _tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
+        only = coefficients_between(shared.scheme, rank, up.patterns, low.patterns)
         return {("tensor", rank, up.twice_f, low.twice_f): only}
     step = up.twice_f - low.twice_f
     by_f = coefficients_of_step(shared.scheme, shared.cache["patterns"], rank, step)
@@ -145,32 +154,18 @@ def _coefficients_of_step(
 
 
 def coefficients_of_step(scheme: Scheme, patterns: dict[int, Ints], rank: int, step: int) -> dict[int, Floats]:
-    """t(p', p) between F' = F + step and F, by F, where both exist.
-
-    Parameters
-    ----------
-    scheme : Scheme
-        Which spins are coupled.
-    patterns : dict of int to (n, columns) array
-        Coupling patterns by doubled F.
-    rank, step : int
-        Rank of the tensor, and the doubled change of F.
-
-    Returns
-    -------
-    dict of int to (n', n) array
-        Pure numbers by doubled F.
-    """
+    """t(p', p) of a tensor between doubled F' = F + step and F, by F, where both have patterns."""
     tables = {f: (patterns[f + step], patterns_of_f) for f, patterns_of_f in patterns.items() if f + step in patterns}
     if scheme.equivalent:
-        return {f: _tensor_coefficients(scheme, rank, *bra_and_ket) for f, bra_and_ket in tables.items()}
-    return for_every_f(tables, lambda bra, ket: tensor_coefficients(scheme.twice, rank, bra, ket))
+        return {f: coefficients_between(scheme, rank, *bra_and_ket) for f, bra_and_ket in tables.items()}
+    return for_every_f(tables, lambda bra, ket: coefficients_between(scheme, rank, bra, ket))
 
 
-def _tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints) -> Floats:
-    """t(p', p) between patterns of two F, with or without a total spin."""
+def coefficients_between(scheme: Scheme, rank: int, bra: Ints, ket: Ints, acting: int | None = None) -> Floats:
+    """t(p', p) between patterns of two F, with or without a total spin, of the vector of a spin if one acts (see `coupling`)."""
     if not scheme.equivalent:
-        return tensor_coefficients(scheme.twice, rank, bra, ket)
+        return moment_coefficients(scheme.twice, rank, acting, bra, ket)
     (up, left), (low, right) = (scheme.recoupling(int(patterns[0, -1])) for patterns in (bra, ket))
-    values = left.T @ tensor_coefficients(scheme.twice, rank, up, low) @ right
+    values = left.T @ moment_coefficients(scheme.twice, rank, acting, up, low) @ right
+    values *= scheme.count_of(() if acting is None else (acting,))
     return np.where(np.abs(values) > ROUND_OFF, values, 0.0)

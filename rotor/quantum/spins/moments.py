@@ -20,8 +20,8 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.spins.blocks import SpinBlock, product
-from rotor.quantum.spins.coupling import moment_coefficients, patterns
+from rotor.quantum.spins.blocks import SpinBlock
+from rotor.quantum.spins.lines import Acting, between_states, coefficients_between
 from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import RotorPart
@@ -50,39 +50,28 @@ class SpinMoments:
         """Whether one of the moments has an element between two blocks."""
         if not abs(up.twice_f - low.twice_f) <= 2 <= up.twice_f + low.twice_f:
             return False
-        return any(
-            self._element(place, target, source) is not None
-            for place in range(len(self.moments))
-            for target in up.parts
-            for source in low.parts
-        )
+        return any(self._acting(place, up, low) for place in range(len(self.moments)))
 
     def _sum(self, up: SpinBlock, low: SpinBlock, kind: tuple[bool, bool]) -> Floats:
         """Sum over moments that interfere with each other: electric or magnetic, real or imaginary."""
-        moved = np.zeros((up.vectors.shape[0], low.vectors.shape[1]))
-        for place, moment in enumerate(self.moments):
-            if (moment.electric, moment.imaginary) == kind:
-                t = self._coefficients(moment, up.twice_f, low.twice_f)
-                for target in up.parts:
-                    for source in low.parts:
-                        element = self._element(place, target, source)
-                        if element is not None:
-                            matrix = product(t[target.patterns, source.patterns], element)
-                            moved[target.place] += matrix @ low.vectors[source.place]
-        return np.asarray(up.vectors.T @ moved)
+        places = (k for k, moment in enumerate(self.moments) if (moment.electric, moment.imaginary) == kind)
+        return between_states(up, low, [(self._coefficients(k, up, low), self._acting(k, up, low)) for k in places])
 
-    def _coefficients(self, moment: Moment, up: int, low: int) -> Floats:
-        """m(p', p) between all patterns of two F."""
-        rank, acting = self._rank(moment), self.scheme.place(moment.spin) if moment.spin else None
-        key = (rank, acting, up, low)
+    def _acting(self, place: int, up: SpinBlock, low: SpinBlock) -> Acting:
+        """Pairs of parts between which a moment acts, with its rotational element."""
+        elements = ((left, right, self._element(place, left, right)) for left in up.parts for right in low.parts)
+        return [(left, right, element) for left, right, element in elements if element is not None]
+
+    def _coefficients(self, place: int, up: SpinBlock, low: SpinBlock) -> Floats:
+        """m(p', p) of a moment between all patterns of two F."""
+        moment = self.moments[place]
+        plain = moment.tensor is None and moment.along_abc is None
+        rank, acting = (0 if plain else 2, self.scheme.place(moment.spin)) if moment.spin else (1, None)
+        key = (rank, acting, up.twice_f, low.twice_f)
         if key not in self._cache:
-            self._cache[key] = _coefficients(self.scheme, rank, acting, up, low)
+            self._cache[key] = coefficients_between(self.scheme, rank, up.patterns, low.patterns, acting)
         coefficients: Floats = self._cache[key]
         return coefficients
-
-    def _rank(self, moment: Moment) -> int:
-        """Rank of the rotational tensor of a moment."""
-        return 1 if not moment.spin else 0 if moment.tensor is None and moment.along_abc is None else 2
 
     def _element(self, place: int, target: SpinPart, source: SpinPart) -> Floats | None:
         """The rotational element of a moment, summed over both signs of K of axial states."""
@@ -196,13 +185,3 @@ def _cosine(moment: Moment, left: RotorPart, right: RotorPart) -> Floats:
     angle = dict(zip(moment.states, moment.cosine, strict=True))
     above, below = angle[left.v] * left.basis.k, angle[right.v] * right.basis.k
     return np.asarray(np.cos(above[:, None] + below))
-
-
-def _coefficients(scheme: Scheme, rank: int, acting: int | None, up: int, low: int) -> Floats:
-    """m(p', p) between all patterns of two F, with or without a total spin."""
-    if not scheme.equivalent:
-        bra, ket = patterns(scheme.twice, up), patterns(scheme.twice, low)
-        return moment_coefficients(scheme.twice, rank, acting, bra, ket)
-    (bra, left), (ket, right) = scheme.recoupling(up), scheme.recoupling(low)
-    values = left.T @ moment_coefficients(scheme.twice, rank, acting, bra, ket) @ right
-    return np.asarray(scheme.count_of(() if acting is None else (acting,)) * values)
