@@ -195,22 +195,9 @@ def linear_blocks(functions: Basis, terms: Mapping[str, Operator]) -> LinearBloc
 def blocks_of_elements(
     names: Sequence[str], labels: Mapping[str, Ints], elements: Elements, needed: NDArray[np.bool_] | None = None
 ) -> LinearBlocks:
-    """The connected parts of elements that are written already.
+    """The connected parts of elements of named terms, both triangles of Hermitian matrices, that have a `needed` function.
 
-    Parameters
-    ----------
-    names : sequence of str
-        The terms.
-    labels : mapping of str to (n,) array
-        Quantum numbers of the functions; inside a block functions are in the order of these.
-    elements : Elements
-        Both triangles of Hermitian matrices.
-    needed : (n,) array of bool, optional
-        Blocks without a needed function are left out.
-
-    Returns
-    -------
-    LinearBlocks
+    Inside a block functions are in the order of their labels.
     """
     count = elements.count
     part = part_numbers(count, elements.rows, elements.columns)

@@ -102,18 +102,7 @@ def contracted_elements(
 ) -> Space:
     """The eigenfunctions of linear blocks of one J each as a space, one sector for each block, in the order of their numbers.
 
-    Parameters
-    ----------
-    solved : SolvedBlocks
-        Over functions with a label J.
-    tensors : mapping of str to (int, Elements)
-        Rank and reduced elements of each tensor.
-    retained : mapping of int to (n,) array, optional
-        By block the ranks of the states to take; all by default.
-
-    Returns
-    -------
-    Space
+    tensors: rank and reduced elements by name. retained: by block the ranks of the states to take; all by default.
     """
     linear = solved.linear
     present = [
@@ -190,20 +179,8 @@ def coupled(
 ) -> CoupledSpace:
     """The product of two spaces, coupled to the doubled total angular momenta `totals`.
 
-    Parameters
-    ----------
-    first, second : Space
-        Factors.
-    scalars : mapping of str to (str, str)
-        Scalar products A·B: the name of each term, and those of A and B.
-    carried : mapping of str to (str or None, str or None, int)
-        Tensors [A × B]^k of the product for later use: A, B (None: the unit operator) and k.
-    totals : sequence of int
-        Twice the total angular momenta.
-
-    Returns
-    -------
-    CoupledSpace
+    scalars: the terms A·B by name, with the names of A and B. carried: tensors [A × B]^k for later use: A, B (None: the unit operator) and
+    k.
     """
     sectors: list[Sector] = []
     rows: dict[Pair, dict[int, int]] = {}

@@ -28,28 +28,9 @@ def parts_of(members: Sequence[tuple[int, WangBlock]]) -> tuple[Part, ...]:
 def names_of_states(
     parts: tuple[Part, ...], matrix: Floats, vectors: Floats, representation: str
 ) -> tuple[Ints, Floats]:
-    """Labels of the states of a coupled block, and their overlaps with the functions that name them.
+    """v, Ka, Kc (n, 3) of the states of a coupled block, and their squared overlaps (n,) with the functions that name them.
 
-    A function is a state of one part, solved by itself; names are given one to one so that the sum of the overlaps is
-    largest.
-
-    Parameters
-    ----------
-    parts : tuple of Part
-        The state v and the Wang block of each range of functions.
-    matrix : (n, n) array
-        The Hamiltonian of the block, MHz.
-    vectors : (n, n) array
-        Its eigenvectors in columns.
-    representation : str
-        Which principal axes are x, y, z.
-
-    Returns
-    -------
-    labels : (n, 3) array
-        v, Ka, Kc of every state.
-    overlaps : (n,) array
-        Squared overlaps, from 0 to 1.
+    A function is a state of one part, solved by itself; names are given one to one so that the sum of the overlaps is largest.
     """
     functions = [np.linalg.eigh(matrix[part.place, part.place]).eigenvectors.T @ vectors[part.place] for part in parts]
     overlaps = np.concatenate(functions) ** 2

@@ -38,28 +38,9 @@ class Model:
 
 
 def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, representation: str) -> Model:
-    """The states and couplings that the effects bring, beside the operators of the top's own state.
+    """The states and couplings that the effects bring, beside the operators of the top's own state v = 0.
 
-    Parameters
-    ----------
-    top : Top
-        Gives the values of the parameters.
-    effects : tuple of QuantumEffect
-        What the Hamiltonian consists of.
-    operators : Operators
-        Coefficients in MHz of the top's own state v = 0, by powers (p, q, n).
-    representation : str
-        Which principal axes are x, y, z: "Ir", "IIIl", ...
-
-    Returns
-    -------
-    Model
-        Operators by state, couplings with their values in MHz, and limits of K.
-
-    Raises
-    ------
-    ValueError
-        For a coupling to a state that no effect defines, and for two effects that define the same state.
+    Raises ValueError for a coupling to a state that no effect defines, and for two effects that define the same state.
     """
     states, couplings = {0: operators}, []
     for effect in effects:
@@ -86,32 +67,10 @@ def extra_states(top: Top, effects: tuple[QuantumEffect, ...]) -> list[State]:
 def coupled_levels(
     top: Top, effects: tuple[QuantumEffect, ...], model: Model, jmin: int, jmax: int, executor: Executor | None = None
 ) -> Levels:
-    """All levels of a coupled calculation, by quantum numbers j, ka, kc and, of several states, v.
+    """All levels of a coupled calculation, by quantum numbers j, ka, kc and, of several states, v; J are spread over `executor`.
 
-    Parameters
-    ----------
-    top : Top
-        Kind, spin weights and constants.
-    effects : tuple of QuantumEffect
-        What the Hamiltonian consists of; the levels remember it.
-    model : Model
-        States and couplings, from `model_of`.
-    jmin, jmax : int
-        Lowest and highest rotational angular momentum.
-    executor : Executor, optional
-        J are spread over it.
-
-    Returns
-    -------
-    Levels
-        Energies in MHz with eigenvectors, labels and mixing: the squared overlap of each state with the function that
-        names it.
-
-    Raises
-    ------
-    ValueError
-        For a Hamiltonian that overflows, a coupling that is not invariant under time reversal, and states that mix
-        levels of different spin weight.
+    Raises ValueError for a Hamiltonian that overflows, a coupling that is not invariant under time reversal, and states that mix levels of
+    different spin weight.
     """
     every_j = range(jmin, jmax + 1)
     pieces = [(model, [j]) for j in every_j] if executor else [(model, every_j)]

@@ -82,21 +82,9 @@ class Tracked(NamedTuple):
 def tracked_blocks(
     blocks: Sequence[NamedBlock], count: int, find: Callable[[int, Ints], tuple[Ints, Ints]], values_mhz: Floats
 ) -> LabelledBlocks:
-    """Labels looked for in the blocks solved at some values.
+    """The blocks, solved at some values, in which labels lie, of which there are `count`.
 
-    Parameters
-    ----------
-    blocks : sequence of NamedBlock
-    count : int
-        Number of labels.
-    find : callable
-        Number of a block and names (n, columns) of its states to places of labels in it, and which states.
-    values_mhz : (parameters,) array
-
-    Returns
-    -------
-    LabelledBlocks
-        Blocks in which labels lie.
+    find: from the number of a block and the names (n, columns) of its states to the places of labels in it, and which states have them.
     """
     tracked, space = list[Tracked](), Workspace()
     for numbers in stack_numbers([block for block, _ in blocks]):

@@ -59,27 +59,10 @@ class LevelModel(ABC):
 
 
 def level_model(constants: Constants, labels: Ints, *, kmax: int | None = None) -> LevelModel:
-    """The model for the labels (levels, 1 to 3): J; J, K; or J, Ka, Kc, after the kind of the constants.
+    """The model for the labels (levels, 1 to 3): J; J, K; or J, Ka, Kc, after the kind of the constants, whose values do not count.
 
-    Parameters
-    ----------
-    constants : Constants
-        Whose names, kind, reduction and representation count; the values are given to `levels`.
-    labels : (levels, k) array
-        Quantum numbers; K of a symmetric top may have a sign, which has no bearing on its energy.
-    kmax : int, optional
-        Basis states of an asymmetric top with K above it are left out, as SPFIT's KNMAX does.
-
-    Returns
-    -------
-    LevelModel
-
-    Raises
-    ------
-    MissingLevelsError
-        For labels that no level has, with the first of them.
-    ValueError
-        For tetrahedral splittings of a spherical top.
+    kmax: basis states of an asymmetric top with K above it are left out, as SPFIT's KNMAX does. Raises MissingLevelsError for labels that
+    no level has, and ValueError for tetrahedral splittings of a spherical top.
     """
     labels = np.atleast_2d(np.asarray(labels, dtype=np.int64))
     width = {"linear": 1, "spherical": 1, "prolate": 2, "oblate": 2}.get(constants.kind, 3)

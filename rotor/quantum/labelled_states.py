@@ -32,32 +32,10 @@ def labelled_states(
     values_mhz: Floats,
     naming: Naming | None = None,
 ) -> LabelledBlocks:
-    """The blocks in which labels lie, for any values of the parameters.
+    """The blocks in which labels J, v, Ka, Kc (n, 4) lie, for any values of the named parameters; states are named at `values_mhz`.
 
-    Parameters
-    ----------
-    top : Top
-        Kind and representation count.
-    effects : sequence of QuantumEffect
-        What the Hamiltonian consists of: operators, states and couplings, no spins.
-    names : sequence of str
-        Parameters of the effects, in the order of the values.
-    labels : (n, 4) array
-        J, v, Ka, Kc.
-    values_mhz : (parameters,) array
-        At which states are named.
-    naming : callable, optional
-        How the states of connected Wang blocks get their names; by overlaps, see `names_of_states`, where it is None.
-
-    Returns
-    -------
-    LabelledBlocks
-        `found` has the places of the labels that are levels.
-
-    Raises
-    ------
-    ValueError
-        For a Hamiltonian that is not finite, or not invariant under time reversal.
+    naming: how the states of connected Wang blocks get their names; by overlaps by default, see `names_of_states`. Raises ValueError for a
+    Hamiltonian that is not finite, or not invariant under time reversal.
     """
     representation, limits, named = representation_of(top), k_limits_of(top, effects), naming or by_overlaps
     of_j = {j: np.flatnonzero(labels[:, 0] == j) for j in distinct(labels[:, 0][labels[:, 0] >= 0]).tolist()}

@@ -128,26 +128,8 @@ def label_value(name: str, value: int, half: bool = False) -> str:
 
 
 def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), width: int = 2) -> list[str]:
-    """Each level as its quantum numbers in a row of text.
+    """Each of the levels `rows` as its quantum numbers in a row of text; `halves` are the doubled columns, `width` the least of a number.
 
-    Parameters
-    ----------
-    quanta : mapping of str to (n,) array of int
-        Quantum numbers by name; half-integers are doubled.
-    rows : (rows,) array of int
-        Indices of the levels.
-    halves : collection of str, optional
-        Names of the doubled columns.
-    width : int, optional
-        Least number of characters of each quantum number.
-
-    Returns
-    -------
-    list of str
-        One text for each row.
-
-    Examples
-    --------
     >>> labels({"j": np.array([4]), "ka": np.array([1]), "kc": np.array([3])}, np.array([0]))
     [' 4  1  3']
     """
@@ -161,20 +143,6 @@ def labels(quanta: Quanta, rows: NDArray[Any], halves: Collection[str] = (), wid
 def line_text(quanta: Quanta, upper: int, lower: int, halves: Collection[str] = ()) -> str:
     r"""A line as a plot names it, upper level first; sums with spins come after both rotational levels, F = F' – F".
 
-    Parameters
-    ----------
-    quanta : dict of str to (levels,) arrays
-    upper, lower : int
-        Rows of the two levels.
-    halves : collection of str
-        Which quanta are stored doubled.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
     >>> quanta = {"n": np.array([1, 2]), "ka": np.array([0, 0]), "kc": np.array([1, 2]), "f": np.array([2, 3])}
     >>> line_text(quanta, 1, 0)
     '$2_{0,2}$ – $1_{0,1}$, $F = 3 – 2$'

@@ -13,34 +13,14 @@ from rotor.quantum.wigner import three_j
 
 
 def coupling(j_low: float, j_up: float, rank: int, q: int, k: ArrayLike) -> Floats:
-    """√((2J'+1)(2J+1)) (-1)^(J'-k') (J' K J; -k' q k) from k to k' = k + q: √(2J+1) ⟨J k K q|J' k'⟩.
+    """√((2J'+1)(2J+1)) (-1)^(J'-k') (J' K J; -k' q k) from k to k' = k + q: √(2J+1) ⟨J k K q|J' k'⟩; 0 where k or k' do not exist.
 
-    Parameters
-    ----------
-    j_low, j_up : float
-        J and J', whole or half-integer.
-    rank : int
-        K of the tensor.
-    q : int
-        Its component in the molecule.
-    k : (...) array
-        Projections of the lower function.
-
-    Returns
-    -------
-    (...) array
-        Pure numbers; 0 where k or k' do not exist.
-
-    Notes
-    -----
     For K ≤ 2 in closed forms: K = 1 as the direction cosines of P. C. Cross, R. M. Hainer and G. W. King, J. Chem.
     Phys. 12, 210 (1944), table I; K = 2 from D. A. Varshalovich, A. N. Moskalev and V. K. Khersonskii, Quantum Theory
     of Angular Momentum, 1988, table 8.4. Else from `three_j`. J' < J and q < 0 follow from
 
         c(J → J', q, k) = (-1)^(J'-J-q) c(J' → J, -q, k+q) = (-1)^(J'-J-K) c(J → J', -q, -k).
 
-    Examples
-    --------
     >>> round(float(coupling(1, 3, 2, 0, 0)) ** 2, 6)  # (3/2) (J+1)(J+2)/(2J+3) of a linear molecule
     1.8
     """
@@ -53,22 +33,7 @@ def coupling(j_low: float, j_up: float, rank: int, q: int, k: ArrayLike) -> Floa
 
 
 def coupling_of_existing(j: float, j_up: float, rank: int, q: int, k: Floats) -> Floats:
-    """`coupling` for k and k + q that exist.
-
-    Parameters
-    ----------
-    j, j_up : float
-        J and J'.
-    rank, q : int
-        Rank and component along the axis of the body.
-    k : (n,) array
-        K of the lower function.
-
-    Returns
-    -------
-    (n,) array
-        Without units.
-    """
+    """`coupling` (n,) for k and k + q that exist."""
     if rank <= 2:
         return closed_coupling(j, int(j_up - j), rank, q, k)
     root = np.sqrt((2.0 * j_up + 1) * (2 * j + 1))
@@ -76,24 +41,7 @@ def coupling_of_existing(j: float, j_up: float, rank: int, q: int, k: Floats) ->
 
 
 def closed_coupling(j: float | Floats, rise: int, rank: int, q: int, k: Floats) -> Floats:
-    """`coupling` of rank 0, 1 or 2 to J' = J + `rise`, for k and k + q that exist.
-
-    Parameters
-    ----------
-    j : int or (n,) array
-        J of the lower function, one for all k or one for each.
-    rise : int
-        J' - J.
-    rank, q : int
-        Rank and component along the axis of the body.
-    k : (n,) array
-        K of the lower function.
-
-    Returns
-    -------
-    (n,) array
-        Without units.
-    """
+    """`coupling` (n,) of rank 0, 1 or 2 to J' = J + `rise`, for k and k + q that exist; one J for all k or one for each."""
     if rise < 0:
         return sign_of(rise - q) * closed_coupling(j + rise, -rise, rank, -q, k + q)
     if q < 0:

@@ -42,18 +42,9 @@ def _is_own(top: Top, effects: Sequence[QuantumEffect]) -> bool:
 def tabulated_line_errors(
     top: Top, levels: Levels, upper: NDArray[np.int32], lower: NDArray[np.int32]
 ) -> Floats | None:
-    """One standard deviation of lines between levels of the top's table; spins count as exact.
+    """One standard deviation (lines,) in MHz of lines between levels of the top's table; spins count as exact.
 
-    Parameters
-    ----------
-    top : the molecule, with its table of levels
-    levels : what was solved
-    upper, lower : rows of levels, (lines,)
-
-    Returns
-    -------
-    (lines,) in MHz, nan where a level is not in the table; None where no table holds for these levels, or where it
-    does not know what errors have in common.
+    nan where a level is not in the table; None where no table holds for these levels, or where it does not know what errors have in common.
     """
     table = top.level_table
     if table is None or table.own_error_mhz is None or not _is_own(top, levels.effects):

@@ -237,20 +237,7 @@ def overlap(up: WangBlock, low: WangBlock, step: int) -> tuple[slice, slice]:
 
 @lru_cache(maxsize=2048)  # some 16 MB at J = 1000; a dipole needs 6 tables for every J
 def wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
-    """`coupling` for K = 0 ... J, times √2 where one of K and K + step is 0.
-
-    Parameters
-    ----------
-    j_low, j_up : int
-        J of the lower and of the upper block.
-    rank, step : int
-        Rank of the tensor, and by how much K changes.
-
-    Returns
-    -------
-    (J + 1,) array
-        Without units; shared and read-only.
-    """
+    """`coupling` for K = 0 ... J, times √2 where one of K and K + step is 0: (J + 1,), shared and read-only."""
     first, last = max(0, -step), min(j_low, j_up - step)
     out = np.zeros(j_low + 1)
     if first <= last:
@@ -276,41 +263,14 @@ def block_elements(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> Floats:
 
 
 def acting_on(vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor) -> Floats:
-    """A tensor times columns over the lower block.
-
-    Parameters
-    ----------
-    vectors : (low.size, n) array
-        Columns over the lower block.
-    up, low : WangBlock
-        The upper and the lower block.
-    tensor : BodyTensor
-        Components in the molecule.
-
-    Returns
-    -------
-    (up.size, n) array
-        Columns over the upper block, in the unit of the tensor.
-    """
+    """A tensor times columns (low.size, n) over the lower block: columns (up.size, n) over the upper one."""
     moved = np.zeros((vectors.shape[1], up.size))
     add_acting_on(moved, vectors, up, low, tensor)
     return moved.T
 
 
 def add_acting_on(zeros: Floats, vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor) -> None:
-    """The same, transposed, into an array of zeros (n, up.size).
-
-    Parameters
-    ----------
-    zeros : (n, up.size) array
-        Receives the columns over the upper block as rows.
-    vectors : (low.size, n) array
-        Columns over the lower block.
-    up, low : WangBlock
-        The upper and the lower block.
-    tensor : BodyTensor
-        Components in the molecule.
-    """
+    """The same, transposed, into an array of zeros (n, up.size)."""
     states = vectors.T
     for number, (source, target, elements) in enumerate(bands_between(up, low, tensor)):
         if number == 0:

@@ -160,29 +160,7 @@ def map_request(
 def projections(
     top: Top, effects: Sequence[QuantumEffect], m_values: Sequence[float] | None, j_highest: int
 ) -> tuple[float, ...]:
-    """|M| of the states, |M_F| of a top with spins, each once.
-
-    Parameters
-    ----------
-    top : Top
-        Kind and nuclei.
-    effects : sequence of QuantumEffect
-        Effects of the Hamiltonian, spins included.
-    m_values : sequence of float or None
-        |M_F|; None for all.
-    j_highest : int
-        Highest N of the free levels in the map.
-
-    Returns
-    -------
-    tuple of float
-        Values in rising order; integers as int.
-
-    Raises
-    ------
-    ValueError
-        For values that do not occur with these spins.
-    """
+    """|M| of the states in rising order, |M_F| of a top with spins; ValueError for values that do not occur with these spins."""
     if not any(effect.spins(top) for effect in effects):
         return checked_m(m_values, j_highest)
     from rotor.quantum.spins import scheme_of

@@ -99,22 +99,8 @@ class ContractedTorsion:
 def contracted_torsion(torsion: Torsion, sigma: int, k_max: int, count: int, waves: int = 10) -> ContractedTorsion:
     """The lowest `count` torsional functions of one species for each K from -k_max to k_max.
 
-    Parameters
-    ----------
-    torsion : Torsion
-        F, ρ and the potential.
-    sigma : int
-        Species: 0, or 1 for the E species of a threefold top (-1 has the same energies with K reversed).
-    k_max : int
-        The largest |K|.
-    count : int
-        n_v, the number of functions for each K.
-    waves : int, optional
-        Free functions exp i(3k + σ)α with k from -waves to waves.
-
-    Returns
-    -------
-    ContractedTorsion
+    sigma: 0, or 1 for the E species of a threefold top (-1 has the same energies with K reversed). waves: the free functions are
+    exp i(3k + σ)α with k from -waves to waves.
     """
     k = np.arange(-k_max, k_max + 1)
     solved = torsional_states(

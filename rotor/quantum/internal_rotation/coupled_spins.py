@@ -161,22 +161,8 @@ def coupled_levels(
 ) -> CoupledLevels:
     """The states of torsion-rotation levels with nuclei.
 
-    Parameters
-    ----------
-    levels : SpeciesLevels
-        The basis: levels with v_t ≤ vt_max.
-    nuclei : Nuclei
-        Spins and their constants.
-    angle : float
-        Angle of ρ from the axis a of the tensors, radians.
-    has_plane : bool
-        Whether the molecule has the plane ab as a mirror.
-    twice_f : array of int, optional
-        Values of 2F to compute, without dipole moments between them. By default all values, with dipole moments.
-
-    Returns
-    -------
-    CoupledLevels
+    angle: of ρ from the axis a of the tensors, radians. has_plane: whether ab is a mirror. twice_f: values of 2F to compute, without dipole
+    moments between them; by default all values, with dipole moments.
     """
     if has_plane:
         nuclei = nuclei.in_plane()

@@ -93,28 +93,9 @@ class HyperfineBlock(MomentBlock):
 def hyperfine_levels(
     top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], nmin: int, nmax: int
 ) -> Levels:
-    """Levels of all species with nuclear spins whose label has N from `nmin` to `nmax`.
+    """Levels with nuclear spins whose N is from `nmin` to `nmax`, labelled by species, vt, n, ka, kc, f1, ... f (half-integers doubled).
 
-    Parameters
-    ----------
-    top : Top
-        Rotational constants and distortion in the frame of the internal rotor.
-    constants : InternalRotationConstants
-        Constants of the internal rotor.
-    effects : tuple of QuantumEffect
-        Rotation, internal rotation, and effects of nuclear spins.
-    nmin, nmax : int
-        Range of N.
-
-    Returns
-    -------
-    Levels
-        Levels labelled by species, vt, n, ka, kc, f1, ... f; half-integers are doubled.
-
-    Raises
-    ------
-    ValueError
-        For electron spins, total spins of like nuclei, and constants with powers of N.
+    Raises ValueError for electron spins, total spins of like nuclei, and constants with powers of N.
     """
     refuse_axes(top)
     model = turning_tops(top, constants)

@@ -131,28 +131,9 @@ class TorsionBlock(MomentBlock):
 def torsion_rotation_levels(
     top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int
 ) -> Levels:
-    """Levels of every species with v_t ≤ vt_max and J from `jmin` to `jmax`.
+    """Levels with v_t ≤ vt_max and J from `jmin` to `jmax`, labelled by species, vt, j, ka, kc; MHz above the minimum of the potential.
 
-    Parameters
-    ----------
-    top : Top
-        Rotational constants and distortion in the rho-axis frame.
-    constants : InternalRotationConstants
-        Constants of the internal rotor.
-    effects : tuple of QuantumEffect
-        Effects of the Hamiltonian, which the table records.
-    jmin, jmax : int
-        Range of J.
-
-    Returns
-    -------
-    Levels
-        Levels labelled by species, vt, j, ka, kc; energies in MHz above the minimum of the torsional potential.
-
-    Raises
-    ------
-    ValueError
-        Unless the top is asymmetric and in the representation Iʳ.
+    Raises ValueError unless the top is asymmetric and in the representation Iʳ.
     """
     refuse_axes(top)
     model = turning_tops(top, constants)

@@ -117,24 +117,9 @@ class RamModel:
         waves: int = 10,
         needed: Ints | None = None,
     ) -> SpeciesBlocks:
-        """The blocks of one species.
+        """The blocks of one species, 0 for A and 1 for E, with J from `jmin` to `jmax` or, of these, the `needed` ones.
 
-        Parameters
-        ----------
-        sigma : int
-            Species: 0 for A, 1 for E.
-        jmax, jmin : int
-            Range of J.
-        count : int, optional
-            n_v, torsional functions retained for each K.
-        waves : int, optional
-            Free functions with k from -waves to waves.
-        needed : array of int, optional
-            Values of J to solve; by default all.
-
-        Returns
-        -------
-        SpeciesBlocks
+        count: n_v, torsional functions retained for each K. waves: k of the free functions runs from -waves to waves.
         """
         torsion = contracted_torsion(self.torsion, sigma, jmax, count, waves)
         functions = TorsionRotation(torsion, jmin, jmax, folded=sigma == 0 and self.has_plane)

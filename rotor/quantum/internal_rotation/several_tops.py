@@ -152,26 +152,10 @@ class SeveralTops:
         waves: int = 10,
         needed: Ints | None = None,
     ) -> SpeciesBlocks:
-        """The blocks of a species.
+        """The blocks of a species, σ = 0, 1 or -1 of each top, with J from `jmin` to `jmax` or, of these, the `needed` ones.
 
-        Parameters
-        ----------
-        species : tuple of int
-            σ of each top: 0, 1 or -1.
-        jmax, jmin : int
-            Range of J.
-        count : int, optional
-            Products of torsional functions retained for each K, the lowest by energy; by default 25 of two tops, 60 of three.
-        each : int, optional
-            Functions of each top that products are made of.
-        waves : int, optional
-            k from -waves to waves of each top.
-        needed : array of int, optional
-            The J that are needed; by default all.
-
-        Returns
-        -------
-        SpeciesBlocks
+        count: products of torsional functions retained for each K, the lowest by energy; by default 25 of two tops, 60 of three. each:
+        functions of each top that products are made of. waves: k of the free functions runs from -waves to waves.
         """
         torsions = self._torsions(species, jmax, each, waves)
         exchanged = bool(self.axis) and species[0] == species[1]
@@ -270,32 +254,15 @@ class SeveralTops:
 
 
 def several_tops(rotation: Mapping[str, float], constants: Mapping[str, float]) -> SeveralTops:
-    """Model of two or three tops from F0, delta, epsilon and the barrier of each.
+    """Model of two or three tops from A, B, C and distortion in principal axes (MHz), and F0_i, delta_i, epsilon_i and the barrier of each.
 
     With the unit vectors λ_i of the axes, B_g = A, B, C and F0_i = ħ²/2I_αi, eliminating the velocities from T gives
 
         ρ_i = (λ_ig B_g/F0_i),    F = M⁻¹,    M_ij = δ_ij/F0_i - Σ_g λ_ig λ_jg B_g/(F0_i F0_j),    T = Σ B_g P_g² + Σ_ij F_ij π_i π_j
 
-    (derived from T = ½ω·Iω + Σ I_αi α'_i λ_i·ω + ½Σ I_αi α'_i²; for one top F = F0/(1 - Σ λ_g ρ_g), as `frames` has it).
+    (derived from T = ½ω·Iω + Σ I_αi α'_i λ_i·ω + ½Σ I_αi α'_i²; for one top F = F0/(1 - Σ λ_g ρ_g), as `frames` has it). Raises ValueError
+    for three tops of which C2 about a principal axis exchanges two.
 
-    Parameters
-    ----------
-    rotation : mapping
-        A, B, C and distortion in principal axes, MHz.
-    constants : mapping
-        F0_1, delta_1, V3_1, F0_2 ..., named as in `rotor.tops.internal_rotation`.
-
-    Returns
-    -------
-    SeveralTops
-
-    Raises
-    ------
-    ValueError
-        For three tops of which C2 about a principal axis exchanges two.
-
-    Examples
-    --------
     >>> tops = {"F0_1": 150e3, "delta_1": 0.5, "V3_1": 9e6, "F0_2": 150e3, "delta_2": 2.6, "V3_2": 9e6}
     >>> model = several_tops({"A": 9000.0, "B": 5000.0, "C": 3400.0}, tops)
     >>> round(model.tops[0].f_mhz), round(model.between["F12"]), round(model.tops[0].rho_abc[0], 6)

@@ -35,20 +35,9 @@ def is_dominated(size: int, count: int) -> bool:
 def dominated_states(lower: Any, chosen: Ints) -> tuple[Floats, Floats] | None:
     """Energies (p,), rising, and vectors (n, p) of the p states with the largest shares in p chosen functions.
 
-    Parameters
-    ----------
-    lower : sparse (n, n) array
-        The lower triangle of a real symmetric matrix in MHz.
-    chosen : (p,) array of int
-        Functions.
+    lower: sparse lower triangle of a real symmetric matrix in MHz. None where all states are to be solved instead: for a small matrix, many
+    functions, and without convergence.
 
-    Returns
-    -------
-    energies, vectors : arrays, or None
-        None where all states are to be solved instead: for a small matrix, many functions, and without convergence.
-
-    Examples
-    --------
     >>> from scipy.sparse import csr_array
     >>> rng = np.random.default_rng(1)
     >>> matrix = rng.normal(size=(200, 200)) + np.diag(np.where(np.arange(200) < 8, 0.0, 1e3) + np.arange(200))

@@ -210,22 +210,8 @@ def plan_of(
 ) -> Plan:
     """Solve the rotation from N = `nmin` to `nmax` and contract each channel to its eigenstates.
 
-    Parameters
-    ----------
-    top : Top
-        Constants and kind.
-    effects : tuple of QuantumEffect
-        All effects of the Hamiltonian, spins included.
-    nmin, nmax : int
-        Lowest and highest N.
-    executor : Executor or None
-        Blocks of different N are solved on it in parallel.
-    exist : callable, optional
-        See `levels.levels_of_f`; functions |N K⟩ that do not exist are left out.
-
-    Returns
-    -------
-    Plan"""
+    Functions |N K⟩ for which `exist` (see `levels.levels_of_f`) is false are left out.
+    """
     without_internal_rotation(top, "levels with spins in a field")
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)

@@ -113,23 +113,9 @@ def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: list[int]) -> Stac
 def operators_of_stacks(
     stacks: Sequence[Stack], reach: int, operators: Sequence[Sequence[Piece]], representation: str
 ) -> list[list[Contracted]]:
-    """Σ value ⟨r'‖X‖r⟩ of each operator between blocks whose N differ by at most `reach`; each pair once, the higher number first.
+    """Σ value ⟨r'‖X‖r⟩ (MHz) of operators, sums of pieces without the conjugates of those between different states, by operator.
 
-    Parameters
-    ----------
-    stacks : sequence of Stack
-        All blocks.
-    reach : int
-        Largest difference of N.
-    operators : sequence of sequence of Piece
-        Sums of pieces with values in MHz, without the conjugates of pieces between different states.
-    representation : str
-        Which principal axes are x, y, z.
-
-    Returns
-    -------
-    list of list of Contracted
-        Elements of each operator in MHz. Coupling coefficients obey c(p', p) = (-1)^(N'-N) c(p, p').
+    Between blocks whose N differ by at most `reach`, each pair once, the higher number first: c(p', p) = (-1)^(N'-N) c(p, p').
     """
     between = [[piece for piece in pieces if piece.bra != piece.ket] for pieces in operators]
     out: list[list[Contracted]] = [[] for _ in operators]
@@ -163,19 +149,9 @@ def powers_of_stacks(stacks: Sequence[Stack], units: Sequence[tuple[int, int, in
 
 
 def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contracted]:
-    """⟨r'‖T‖r⟩ between blocks, for both orders of each pair.
+    """⟨r'‖T‖r⟩ between blocks for both orders of each pair, of tensors of one rank by pairs of states.
 
-    Parameters
-    ----------
-    stacks : sequence of Stack
-        All blocks.
-    tensors : mapping of (int, int) to BodyTensor
-        Tensors by pairs of states, all of one rank.
-
-    Returns
-    -------
-    list of Contracted
-        Elements in the unit of the tensors. A block with itself occurs in both orders; the last entry counts.
+    A block with itself occurs in both orders; the last entry counts.
     """
     rank = rank_of(tensors)
 

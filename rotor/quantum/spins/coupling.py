@@ -134,24 +134,10 @@ _RECOUPLED = {0: 1.0, 2: -sqrt(5 / 3)}
 
 
 def coefficients(spins: tuple[int, ...], acting: tuple[int, ...], rank: int, bra: Ints, ket: Ints) -> Floats:
-    """c(p', p) of T^K(N) with the spins `acting`, (patterns of bra, patterns of ket).
+    """c(p', p) (..., patterns of bra, patterns of ket) of T^K(N), of which T^0 is a plain matrix, with the spins in the places `acting`.
 
-    Parameters
-    ----------
-    spins : tuple of int
-        2S of each spin, in the order of coupling.
-    acting : tuple of int
-        Places of the spins in the operator, from 0: (i,) the vector of one spin (K = 1), (i, i) its quadrupole (K = 2),
-        (i, j) the product of two, coupled to K = 0 (S_i · S_j) or 2; () none.
-    rank : int
-        K of the operator of N. The operator of rank 0 is a plain matrix, not a reduced one.
-    bra, ket : (..., n, 1 + spins) array
-        Patterns, doubled.
-
-    Returns
-    -------
-    (..., n, m) array
-        Pure numbers. T² · [S_i x S_j]² is -√(5/3) [T² x S_i]¹ · S_j, by the recoupling of three tensors to a scalar.
+    acting: (i,) the vector of one spin (K = 1), (i, i) its quadrupole (K = 2), (i, j) the product of two, coupled to K = 0 (S_i · S_j) or
+    2, () none. T² · [S_i x S_j]² is -√(5/3) [T² x S_i]¹ · S_j, by the recoupling of three tensors to a scalar.
     """
     left, right = bra[..., :, None, :], ket[..., None, :, :]
     if not acting:
@@ -234,21 +220,7 @@ def n_dot_s(pattern: Ints, spin: int) -> Floats:
 
 
 def powers_between(spin: int, powers: tuple[int, int], bra: Ints, ket: Ints) -> Floats:
-    """½(bra + ket) of (N·S)^r N^2p of the first spin.
-
-    Parameters
-    ----------
-    spin : int
-        The first spin, doubled.
-    powers : (int, int)
-        r and p.
-    bra, ket : (..., n, columns) array of int
-        Patterns, doubled.
-
-    Returns
-    -------
-    (..., n', n) array
-    """
+    """½(bra + ket) of (N·S)^r N^2p of the first spin (doubled), with `powers` r and p: (..., n', n)."""
     left, right = (_n_dot_s_power(spin, powers, patterns) for patterns in (bra, ket))
     return np.asarray((left[..., :, None] + right[..., None, :]) / 2)
 

@@ -26,22 +26,7 @@ def links_of_stacks(contracted: Iterable[tuple[Sequence[Contracted], Sequence[Ch
 
 
 def families_of(count: int, links: Iterable[Link], classes: int) -> list[list[tuple[int, int]]]:
-    """Members (block, class) that links connect, each family in rising order.
-
-    Parameters
-    ----------
-    count : int
-        Number of blocks.
-    links : iterable of Link
-        Pairs of connected blocks.
-    classes : int
-        1, or 2 with two equivalent spins, or 3.
-
-    Returns
-    -------
-    list of list of (int, int)
-        Each block and class once; families in the order of their lowest member.
-    """
+    """Members (block, class) that links connect, each once, by the lowest one of each; `classes`: number of equivalent spins, or 1."""
     pairs = (
         (i * classes + symmetry_class, k * classes + (symmetry_class ^ changed))
         for i, k, changed in links

@@ -29,23 +29,7 @@ def spin_levels(
 ) -> Levels:
     """All levels of a top with spins whose label has N from `jmin` to `jmax`, labelled by (v), n, k or ka and kc, j, f1, ... f.
 
-    Each F that such an N reaches is solved with all its N, so that no block is truncated.
-
-    Parameters
-    ----------
-    top : Top
-        Constants, kind and spin weights.
-    effects : tuple of QuantumEffect
-        Effects of the Hamiltonian, spins included.
-    jmin, jmax : int
-        Lowest and highest N of the labels.
-    executor : Executor, optional
-        Rotational blocks of different N are solved on it in parallel.
-
-    Returns
-    -------
-    Levels
-        Energies in MHz; half-integer quantum numbers are doubled.
+    Each F that such an N reaches is solved with all its N, so that no block is truncated. Half-integer quantum numbers are doubled.
     """
     total = scheme_of(top, effects).total
     first = max(2 * jmin - total, total % 2)
@@ -60,28 +44,10 @@ def levels_of_f(
     executor: Executor | None = None,
     exist: Exist | None = None,
 ) -> Levels:
-    """The levels of all F in `every_f` whose label has N within `n_range`.
+    """The levels with vectors of all doubled F in `every_f` whose label has N within `n_range`, by default all.
 
-    Parameters
-    ----------
-    top : Top
-        Constants, kind and spin weights.
-    effects : tuple of QuantumEffect
-        What the Hamiltonian consists of.
-    every_f : sequence of int
-        Total angular momenta, doubled.
-    n_range : (int, int), optional
-        Lowest and highest N of the labels; by default all.
-    executor : Executor, optional
-        Rotational blocks of different N are solved on it in parallel.
-    exist : callable, optional
-        Takes labels (n, columns as `SpinBlock.labels`) and returns whether each level exists, (n,) of bool. Blocks without an
-        existing level are not solved. In an axial top v and K decide.
-
-    Returns
-    -------
-    Levels
-        Energies in MHz with eigenvectors and labels.
+    exist: takes labels (n, columns as `SpinBlock.labels`) and returns whether each level exists, (n,) of bool. Blocks without an existing
+    level are not solved. In an axial top v and K decide.
     """
     hold_freed_memory()
     lowest, highest = _range_of_n(top, effects, every_f)
@@ -96,21 +62,7 @@ def levels_of_f(
 def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequence[int]) -> tuple[Levels, Plan]:
     """Basis functions of all F in `every_f`, rotational states times coupling patterns, as levels without spin splitting.
 
-    Parameters
-    ----------
-    top : Top
-        Constants, kind and spin weights.
-    effects : tuple of QuantumEffect
-        What the Hamiltonian consists of.
-    every_f : sequence of int
-        Total angular momenta, doubled.
-
-    Returns
-    -------
-    levels : Levels
-        Labelled as solved levels are, without vectors; each block in the order of its functions.
-    plan : Plan
-        The rotation, operators between its blocks, and the coupling coefficients of these F.
+    They are labelled as solved levels are, without vectors; the plan has the operators and the coupling coefficients of these F.
     """
     lowest, highest = _range_of_n(top, effects, every_f)
     plan = plan_of(top, effects, lowest, highest, None)

@@ -127,24 +127,7 @@ def _by_pairs(
 def linear_blocks_of_spins(
     top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], blocks: Sequence[SpinBlock]
 ) -> list[LinearBlock]:
-    """Linear blocks of solved blocks with spins, over basis functions or the functions that exchange allows.
-
-    Parameters
-    ----------
-    top : Top
-        Constants and kind.
-    effects : sequence of QuantumEffect
-        Effects of the Hamiltonian.
-    names : sequence of str
-        Parameters, in the order of their values.
-    blocks : sequence of SpinBlock
-        Blocks of one calculation.
-
-    Returns
-    -------
-    list of LinearBlock
-        One for each block, in their order.
-    """
+    """Linear blocks of the solved blocks of one calculation, over basis functions or the functions that exchange allows."""
     shared = blocks[0].shared
     units = unit_matrices(
         top, effects, names, shared, {part.number: part.rotor for block in blocks for part in block.parts}

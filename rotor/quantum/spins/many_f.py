@@ -196,28 +196,9 @@ def between(
     up: Group, low: Group, twice_f: Sequence[int], step: int, tables: Tables, coefficients: Floats, frame: Frame,
     space: Workspace,
 ) -> Floats:  # fmt: skip
-    """c(F) ⟨r'‖X‖r⟩ between two groups, with F' = F + step.
+    """c(F) ⟨r'‖X‖r⟩ between two groups with F' = F + step (doubled), (F, columns', states', columns, states), in memory of `space`.
 
-    Parameters
-    ----------
-    up, low : Group
-        Groups of F' and F.
-    twice_f : sequence of int
-        Doubled F, rising.
-    step : int
-        F' - F, doubled.
-    tables : Tables
-        Elements of the rotation.
-    coefficients : (F, patterns', patterns) array
-        Coupling coefficients for all F of the frame.
-    frame : Frame
-        Frame of both groups.
-    space : Workspace
-        Memory of the result, overwritten by the next call.
-
-    Returns
-    -------
-    (F, columns', states', columns, states) array
+    tables: elements of the rotation. coefficients: (F, patterns', patterns) for all F of the frame.
     """
     out = space.array("elements", len(twice_f), up.columns, up.states, low.columns, low.states)
     out.fill(0.0)

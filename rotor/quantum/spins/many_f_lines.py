@@ -53,21 +53,9 @@ def can_be_stacked(blocks: Sequence[object], tensors: Tensors) -> bool:
 
 
 def amplitudes_of_groups(blocks: Sequence[SpinBlock], tensors: Tensors, levels: int) -> Iterator[Rows]:
-    """Real reduced elements between all blocks, (F, n_up, n_low) at a time, each pair of blocks once.
+    """Real reduced elements between all blocks, (F, n_up, n_low) at a time, each pair of blocks once; `levels` is the row of padding.
 
-    Parameters
-    ----------
-    blocks : sequence of SpinBlock
-        Blocks that were solved in groups.
-    tensors : mapping of (int, int) to BodyTensor
-        Tensors by pairs of states, all of one rank.
-    levels : int
-        Number of levels, which is also the row of padding.
-
-    Yields
-    ------
-    Rows
-        Rows of levels and amplitudes, zero beyond a block. The array of amplitudes may be changed; the next step overwrites it.
+    Amplitudes are zero beyond a block. Their array may be changed; the next step overwrites it.
     """
     shared, rank = blocks[0].shared, rank_of(tensors)
     frame: Frame = shared.cache["frame"]

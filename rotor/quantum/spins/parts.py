@@ -56,23 +56,10 @@ def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Fl
 
 
 def labels_by_shares(names: Ints, sizes: Ints, vectors: Floats) -> tuple[Ints, Floats]:
-    """Labels of the states of blocks with equal numbers of states and of sub-blocks.
+    """Labels (blocks, n, 3 + pattern) of the states by rising energy, and weights (blocks, n) of the sub-blocks that give them.
 
-    Parameters
-    ----------
-    names : (blocks, n, 3 + pattern) array
-        Labels of the levels, sub-block by sub-block, see `names_of_tables`.
-    sizes : (blocks, sub-blocks) array
-        Number of levels of each sub-block.
-    vectors : (blocks, n, n) array
-        Eigenvectors in columns, over functions sub-block by sub-block.
-
-    Returns
-    -------
-    labels : (blocks, n, 3 + pattern) array
-        Labels of the states, by rising energy.
-    mixing : (blocks, n) array
-        Weight of the sub-block that labels each state.
+    names, sizes: labels of the levels sub-block by sub-block, and how many each has (`names_of_tables`). vectors: eigenvectors in columns
+    (blocks, n, n) over functions sub-block by sub-block.
     """
     (count, subs), n = sizes.shape, names.shape[1]
     block = np.arange(count)[:, None]

@@ -58,44 +58,14 @@ def pattern_table(scheme: Scheme, first: int, last: int) -> PatternTable:
 
 @lru_cache(maxsize=64)
 def couplings_by_f(scheme: Scheme, channel: Channel, first: int, last: int) -> Floats:
-    """c(p', p) of a channel within each F.
-
-    Parameters
-    ----------
-    scheme : Scheme
-        Order in which the spins are coupled.
-    channel : Channel
-        Acting spins, rank and powers.
-    first, last : int
-        The first and the last F, doubled.
-
-    Returns
-    -------
-    (F, patterns', patterns) array
-        Pure numbers, 0 where an F lacks a pattern; shared and read-only.
-    """
+    """c(p', p) of a channel within each F, (F, patterns', patterns), 0 where an F lacks a pattern; shared and read-only."""
     table = pattern_table(scheme, first, last)
     return _by_f(table, couplings_of(scheme, channel, table.patterns), 0)
 
 
 @lru_cache(maxsize=64)
 def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int) -> Floats:
-    """t(p', p) of a tensor from each F to F + step.
-
-    Parameters
-    ----------
-    scheme : Scheme
-        Order in which the spins are coupled.
-    rank, step : int
-        Rank of the tensor, and the doubled change of F.
-    first, last : int
-        The first and the last F, doubled.
-
-    Returns
-    -------
-    (F, patterns', patterns) array
-        Pure numbers, 0 where there is no F + step or an F lacks a pattern; shared and read-only.
-    """
+    """t(p', p) of a tensor from each F to F + step, (F, patterns', patterns), 0 where there is no F + step; shared and read-only."""
     table = pattern_table(scheme, first, last)
     return _by_f(table, coefficients_of_step(scheme, table.patterns, rank, step), step)
 

@@ -73,29 +73,9 @@ Terms = list[tuple[float, SpinTerm]]
 def solved_rotor(
     top: Top, effects: tuple[QuantumEffect, ...], terms: Terms, nmin: int, nmax: int, executor: Executor | None
 ) -> tuple[list[SolvedBlock], str]:
-    """Solve the rotation from N = `nmin` to `nmax`.
+    """The solved blocks of the rotation from N = `nmin` to `nmax`, and the representation of their functions.
 
     A symmetric top whose terms are all axial has functions |N K⟩, one in each block.
-
-    Parameters
-    ----------
-    top : Top
-        Constants and kind.
-    effects : tuple of QuantumEffect
-        Effects of the Hamiltonian.
-    terms : list of (float, SpinTerm)
-        Terms with spins, each with its value in MHz.
-    nmin, nmax : int
-        Lowest and highest N.
-    executor : Executor or None
-        Blocks of different N are solved on it in parallel.
-
-    Returns
-    -------
-    blocks : list of SolvedBlock
-        Solved blocks, energies in MHz.
-    representation : str
-        Representation of the functions, such as Ir.
     """
     if top.kind in ("prolate", "oblate") and _all_axial(top, effects, terms):
         levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, False, executor))

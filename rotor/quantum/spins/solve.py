@@ -34,22 +34,7 @@ from rotor.quantum.spins.rotor import Channel
 
 
 def solved_blocks(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock]:
-    """Solve the blocks of all F in which a level exists.
-
-    Parameters
-    ----------
-    plan : Plan
-        Solved rotation and operators.
-    every_f : sequence of int
-        Doubled F, rising by 2.
-    exist : callable, optional
-        See `levels.levels_of_f`.
-
-    Returns
-    -------
-    list of SpinBlock
-        Blocks by F, then by the lowest member of each family.
-    """
+    """Solve the blocks of all doubled F in which a level exists (`levels.levels_of_f`): by F, then by the lowest member of each family."""
     scheme = plan.shared.scheme
     if scheme.equivalent == 3:
         from rotor.quantum.spins.three_equivalent import allowed_states, in_wang_functions

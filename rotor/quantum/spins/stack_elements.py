@@ -160,19 +160,7 @@ def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, 
 def _couplings(every_n: tuple[int, ...], rise: int, rank: int, step: int, first_k: int, count: int) -> Floats:
     """`tensors.coupling` from each N to N + rise, over K = first_k, first_k + 2, ..., times √2 where one of K and K + step is 0.
 
-    Parameters
-    ----------
-    every_n : tuple of int
-        N of the lower blocks.
-    rise, rank, step : int
-        Change of N, rank of the tensor, change of K.
-    first_k, count : int
-        The lowest K and the number of K.
-
-    Returns
-    -------
-    (N, K) array
-        Zero where K exceeds N; shared and read-only.
+    (N, K), zero where K exceeds N; shared and read-only.
     """
     n, k = np.array(every_n)[:, None], first_k + 2 * np.arange(count)
     m = n + rise

@@ -28,28 +28,9 @@ from rotor.quantum.wang.j_operators import components
 def written_elements(
     moment: Written, up: Basis, low: Basis, representation: str, conjugate: bool = False
 ) -> Floats | None:
-    """Real elements of a moment between two bases, for an electric moment without the factor i; None where all are zero.
+    """Real elements of a moment, or its Hermitian conjugate, between two bases, of an electric one without the factor i; None for zeros.
 
-    Parameters
-    ----------
-    moment : Written
-        Words along a, b, c.
-    up, low : WangBlock or AxialState
-        Functions of N' (rows) and N (columns); axial states only with K = 0.
-    representation : str
-        Which axes are x, y, z.
-    conjugate : bool, optional
-        Whether the Hermitian conjugate acts.
-
-    Returns
-    -------
-    (up.size, low.size) array or None
-        Reduced elements in the unit of the words.
-
-    Raises
-    ------
-    ValueError
-        For axial states with K > 0, which represent both K and -K.
+    Raises ValueError for axial states with K > 0, which represent both K and -K.
     """
     if abs(up.j - low.j) > 1:
         return None

@@ -64,32 +64,8 @@ def solve_rotation(
 ) -> Levels:
     """Levels of the rotation, and of states v, without spins; see `solve_levels`.
 
-    Parameters
-    ----------
-    top : Top
-        Constants, kind and spin weights.
-    effects : tuple of QuantumEffect
-        Effects of the Hamiltonian.
-    jmin, jmax : int
-        Lowest and highest rotational angular momentum.
-    vectors : bool, optional
-        Whether eigenvectors of an asymmetric top are computed.
-    executor : Executor, optional
-        Solves different J in parallel.
-    in_blocks : bool, optional
-        Solve symmetric tops in Wang blocks too, so that the levels have eigenvectors.
-    below_mhz : float, optional
-        Without vectors, levels above this energy may be missing.
-
-    Returns
-    -------
-    Levels
-        Energies in MHz, exact eigenvalues by the cheapest method.
-
-    Raises
-    ------
-    ValueError
-        For constants that overflow, and as `coupled_levels` for coupled blocks.
+    in_blocks: solve symmetric tops in Wang blocks too, so that the levels have eigenvectors. Raises ValueError for constants that overflow,
+    and as `coupled_levels` for coupled blocks.
     """
     operators, limits = hamiltonian(top, effects), k_limits_of(top, effects)
     if top.kind != "linear":

@@ -23,26 +23,11 @@ _RESIDUAL = 1e-12  # |γ| above this, relative to the largest eigenvalue times t
 def vectors_of_values(
     diagonal: Floats, beside: Floats, values: Floats, matrix: Ints, state: Ints, space: Workspace
 ) -> Floats | None:
-    """Normalised eigenvectors (size, n) of selected states of many matrices.
+    """Normalised eigenvectors (size, n) of selected states of many matrices; None if two eigenvalues are too close, or a division fails.
 
-    Parameters
-    ----------
-    diagonal, beside : (matrices, size) array
-        Elements (i, i) and (i, i + 1); beyond the size of a matrix both are 0.
-    values : (matrices, size) array
-        All eigenvalues, rising, infinite beyond the size of a matrix.
-    matrix, state : (n,) array
-        For each vector, the number of the matrix and of the eigenvalue.
-    space : Workspace
-        Memory of the vectors.
+    diagonal, beside: elements (i, i) and (i, i + 1), (matrices, size), 0 beyond a matrix. values: all eigenvalues, rising, infinite beyond
+    a matrix. matrix, state: of each vector, the number of the matrix and of the eigenvalue.
 
-    Returns
-    -------
-    array or None
-        None if two eigenvalues are too close for separate vectors, or a division fails.
-
-    Examples
-    --------
     >>> matrix = np.zeros((1, 2)), np.array([[1.0, 0.0]])
     >>> vectors = vectors_of_values(*matrix, np.array([[-1.0, 1.0]]), np.array([0]), np.array([1]), Workspace())
     >>> np.round(vectors[:, 0] ** 2, 12).tolist()

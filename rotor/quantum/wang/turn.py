@@ -20,18 +20,8 @@ def order_beyond_the_turn(turning: tuple[Ints, Ints], sizes: Sequence[int], ener
     """Move states beyond the turn of the diagonal to the end of their block, ordered by mean K, in place.
 
     Constants that describe K up to 20 may shift states of K = 60 down among lower K, where the distortion series diverges. These states are
-    mostly beyond the turn; the other states are labelled by rank among themselves.
-
-    Parameters
-    ----------
-    turning : (array, array)
-        Result of `turned` for the diagonals, with the sign that makes them rise in a molecule.
-    sizes : sequence of int
-        Number of states of each block.
-    energies : (blocks, size) array
-        Energies, rising.
-    vectors : (blocks, size, size) array
-        Eigenvectors in columns.
+    mostly beyond the turn; the other states are labelled by rank among themselves. turning: from `turned`, for the diagonals with the sign
+    that makes them rise in a molecule. energies (blocks, size) rise; vectors (blocks, size, size) stand in columns.
     """
     blocks, turn = turning
     for b in blocks.tolist():
