@@ -29,16 +29,22 @@ _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _STARTING = threading.Lock()  # guards os.environ, which all threads share
 _METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # a fork after imports is not safe on macOS
 _COMMON = (
+    "rotor.scenes.structures",
     "rotor.scenes.sweep.run",
     "rotor.formats.read_write",
     "rotor.formats.tables",
     "rotor.quantum.estimates.budgets",
+    "rotor.quantum.effects.of_top",
+    "rotor.tops.plausible",
 )
 _SMILES_MODULES = (
     "rdkit.Chem",
     "rdkit.Chem.rdDistGeom",
     "rdkit.Chem.rdForceFieldHelpers",
     "rotor.molecules.readers.smiles",
+    "rotor.molecules.readers.read",
+    "rotor.molecules.symmetry.point_group",
+    "rotor.tops.spins.spin_statistics",
 )
 _KIND = re.compile(r"""\bkind"?\s*[=:]\s*["'](\w+)["']""")
 
