@@ -100,7 +100,7 @@ KNMIN, KNMAX, sign and digits of SPIND, sign of NVIB, signs of couplings, weight
 tests/oracles/kinds, and 14 of each of 19 kinds of published files with other random constants, with 48 more of the terms of l-doubled
 states and of linear and spherical tops. Before repairs 29 more differed or were refused: quantum numbers of a spinless file whose SPIND has
 the other sign, a linear molecule in the oblate basis, a dipole of a spherical top, constants that do not follow A ≥ B ≥ C, parameters of
-spins that SPIND does not name (left out, with a note), DIAG below 0 (refused with `--as-spcat`), .egy lists of 10,000
+spins that SPIND does not name (left out, with a note), DIAG below 0 (refused with `--as-spcat` then), .egy lists of 10,000
 levels or of more than six quanta, line 2 whose full columns abut, CHR in apostrophes. Of the four variations of ch2cl2_2quad that have 1 to
 5 intensities off by 2e-4 to 1.3e-3 of LGINT each is equal in every line to the program in long double. A public file of ClONO2 (one spin
 3/2, chi_ab, N to 101; 79,032 lines) has 2,200 lines off between levels that coincide, the program in long double 1,516 and with fused
@@ -308,7 +308,8 @@ def option_rows() -> list[str]:
     )
     rows.append("| DIAG 0 to 5: the names of levels | yes |")
     rows.append(
-        "| DIAG below 0: diagonal elements in place of eigenvalues | no: refused with --as-spcat, else eigenvalues and a note |"
+        "| DIAG below 0: diagonal elements in place of eigenvalues | yes, with a note; fits, and symmetric tops with "
+        "spins or several states: eigenvalues and a note, refused with --as-spcat |"
     )
     return [*rows, "| IXX: elements with ΔN ≠ 0, ΔJ ≠ 0, ... left out | yes |"]
 

@@ -113,8 +113,9 @@ def _split(answer: Any, number: int, splittings: Sequence[Limit], opaque: float)
         else:
             remaining *= _gaussian((limit.size_mhz or 0.0) / width)
     names = ", ".join(limit.name for limit in splittings)
+    left = math.exp(-peak.optical_depth * remaining)  # of the background behind the line
     return ErrorTerm(
-        opaque * math.exp(-peak.optical_depth) * math.expm1(peak.optical_depth * (1 - remaining)),
+        opaque * left * -math.expm1(-peak.optical_depth * (1 - remaining)),
         f"{names}: {100 * (1 - remaining):.2g} % of the depth split off the centre of the line",
         f"{splittings[0].name} in the calculation",
     )

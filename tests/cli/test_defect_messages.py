@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import time
 from pathlib import Path
@@ -192,3 +193,13 @@ def test_a_dipole_along_a_fourth_axis_is_refused(call, options, code):
     assert str(code) in err
     assert "defect" not in err
     assert not Path("x.cat").exists()
+
+
+def test_a_line_of_a_large_depth_has_an_error_of_its_brightness(call):
+    """exp of the optical depth ended in an OverflowError; of a line that is opaque in every component nothing is lost."""
+    words = "emission HCN --range 80:98GHz --column 2e17 --excitation 20 --width 1 --json -"
+    code, out, err = call(*words.split())
+    assert code == 0, err
+    left_out = json.loads(out)["errors"]["model"]
+    assert "% of the depth split off" in left_out["from"]
+    assert 0 < left_out["value"] < 1e-6

@@ -40,6 +40,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
     species_pairs,
     symmetric_part,
 )
+from rotor.formats.spcat.hamiltonian.undiagonalized import is_undiagonalized, without_diagonalization
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.connected import connected_parts
@@ -91,6 +92,8 @@ class Group:
             )
         if self.effect.pairs:
             levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
+        elif is_undiagonalized(levels, self.diag):
+            levels = without_diagonalization(levels)
         else:
             levels = named_by(levels, self.diag, self.oblate, self.diagonal(levels.jmax))
         return replace(levels, weight=self._weights(levels))

@@ -22,13 +22,13 @@ from rotor.formats.spcat.hamiltonian.codes import is_linear
 from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
 from rotor.formats.spcat.hamiltonian.states import is_plain, states_of
 from rotor.formats.spcat.model import FOLD, common_weight, top_of
-from rotor.formats.spcat.predict_states import levels_of_files, predicted, refuse_undiagonalized
+from rotor.formats.spcat.predict_states import levels_of_files, predicted
 from rotor.formats.spcat.prediction_notes import note_of_qrot, notes_of_full_basis
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
-from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, Options, ParameterFile, note_of_npar, read_par
+from rotor.formats.spcat.text.par import Options, ParameterFile, note_of_npar, read_par
 from rotor.formats.spcat.variances import constants_covariance
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
@@ -115,7 +115,7 @@ def predict(
     own_q : bool, optional
         Sum the partition function over all levels, independent of FEND and KNMAX, instead of using QROT.
     as_spcat : bool, optional
-        Reproduce SPCAT's numbers even where it errs: QROT below 1, some moments. DIAG below 0 is then refused.
+        Reproduce SPCAT's numbers even where it errs: QROT below 1, some moments.
     full_basis : bool, optional
         Ignore KNMIN and KNMAX: the basis has all K up to N. By default K runs from KNMIN to KNMAX.
 
@@ -157,7 +157,7 @@ def predict(
     if as_spcat and 0 < request.qrot < 1:
         request = replace(request, qrot=1.0)
         intensities = replace(intensities, request=request)
-    others_names = options.diag in BY_DIAG and options.spind > 0 and not is_linear(options)
+    others_names = (options.diag in BY_DIAG or options.diag < 0) and options.spind > 0 and not is_linear(options)
     is_cut = not full_basis and options.knmax < request.fend and not is_linear(options)
     top = None if is_cut or others_names else _named_top(parameters, intensities)
     if top is None:
@@ -166,8 +166,6 @@ def predict(
         )
         return Prediction(listed, lines_of_states, q, request, (*notes, *further), listing)
 
-    if as_spcat and top.kind == "asymmetric":
-        refuse_undiagonalized(options.diag)
     top = replace(top, covariance=constants_covariance(parameters))
     common = common_weight(options)
     q = summed_q(top, options, request.temperature_k).q if own_q else request.qrot
@@ -275,8 +273,6 @@ def _notes(parameters: ParameterFile, top: Top, request: Request) -> list[str]:
     options, notes = parameters.options[0], note_of_npar(parameters)
     if not is_linear(options):  # a KNMAX below FEND is here only where it is lifted
         notes += notes_of_full_basis(states_of(parameters), request.fend)
-    if top.kind == "asymmetric" and options.diag < 0:
-        notes.append(UNDIAGONALIZED_NOTE)
     if top.kind == "asymmetric" and options.diag == 0:
         j = _diagonal_rolls_over(top, request.fend)
         if j is not None:

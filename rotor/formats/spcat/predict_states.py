@@ -27,7 +27,9 @@ from rotor.formats.spcat.file_model import Group, groups_of, line_names
 from rotor.formats.spcat.file_quanta import Format, format_of
 from rotor.formats.spcat.hamiltonian.codes import constants_of, split_code
 from rotor.formats.spcat.hamiltonian.states import states_of
+from rotor.formats.spcat.hamiltonian.undiagonalized import is_undiagonalized
 from rotor.formats.spcat.prediction_notes import (
+    note_of_diagonal_elements,
     notes_of_basis,
     notes_of_diagonal,
     notes_of_files,
@@ -93,14 +95,13 @@ def predicted(
     """
     request = intensities.request
     groups = _groups_to_solve(parameters, intensities, as_spcat, full_basis)
-    if as_spcat and any(group.spins or group.top.kind == "asymmetric" for group in groups):
-        refuse_undiagonalized(parameters.options[0].diag)
     form = format_of(parameters, groups)
     q = request.qrot
     if own_q:
         q = summed_q(groups_of(parameters, intensities, full_basis=True), request.temperature_k).q
     groups = _with_levels(groups, request)
     solved = _solved(groups, request, form)
+    notes = notes_of_files(parameters, intensities, as_spcat) + _notes_without_diagonalization(solved, as_spcat)
     transitions = [transitions_of(group, levels, request, q) for group, levels in solved]
     spreads = _spreads(solved, parameters)
     listed = [
@@ -111,7 +112,6 @@ def predicted(
     listed_catalogue = as_catalogue(
         pieces, form, request.tag, 2 if all(s.linear for g in groups for s in g.states) else 3
     )
-    notes = notes_of_files(parameters, intensities, as_spcat)
     if any(state.is_cut for group in groups for state in group.states):
         notes += notes_of_basis(groups, _groups_to_solve(parameters, intensities, as_spcat, True), request)
     notes += notes_of_diagonal(groups, parameters.options[0].diag, _highest_n(parameters, request))
@@ -135,13 +135,25 @@ def _level_list(
     return as_level_list(solved, form, spreads, blocks_of(parameters, [group for group, _ in solved]))
 
 
-def refuse_undiagonalized(diag: int) -> None:
-    """Raise ValueError for DIAG below 0, which requests diagonal elements instead of eigenvalues."""
-    if diag < 0:
+def _notes_without_diagonalization(solved: list[tuple[Group, Levels]], as_spcat: bool) -> list[str]:
+    """The notes of groups with DIAG below 0, whose levels are diagonal elements in place of eigenvalues.
+
+    Raises ValueError with `as_spcat` for a group whose basis is not one of Wang functions, and which therefore has eigenvalues.
+    """
+    listed = [
+        is_undiagonalized(levels, group.diag) for group, levels in solved if group.diag < 0 and not _is_diagonal(group)
+    ]
+    if as_spcat and not all(listed):
         raise ValueError(
-            f"DIAG = {diag}: diagonal elements in place of eigenvalues, which is read but not computed; give DIAG = 0, or leave "
-            "--as-spcat out for eigenvalues"
+            "DIAG below 0: diagonal elements in place of eigenvalues, which are computed for asymmetric tops and states over Wang "
+            "functions alone; give DIAG = 0, or leave --as-spcat out for eigenvalues"
         )
+    return [note_of_diagonal_elements(undiagonalized) for undiagonalized in dict.fromkeys(listed)]
+
+
+def _is_diagonal(group: Group) -> bool:
+    """Whether a single state of a symmetric or linear top without spins has no elements off the diagonal."""
+    return group.top.kind != "asymmetric" and len(group.states) == 1 and not group.spins
 
 
 def _solved(groups: list[Group], request: Request, form: Format) -> list[tuple[Group, Levels]]:

@@ -26,10 +26,7 @@ from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, ParameterFile, not
 
 def notes_of_files(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes that follow from the files without their levels."""
-    notes = [*note_of_npar(parameters), *left_out(parameters)]
-    if parameters.options[0].diag < 0 and not as_spcat:
-        notes.append(UNDIAGONALIZED_NOTE)
-    return notes + _notes_of_moments(parameters, intensities, as_spcat)
+    return [*note_of_npar(parameters), *left_out(parameters), *_notes_of_moments(parameters, intensities, as_spcat)]
 
 
 def note_of_qrot(request: Request, as_spcat: bool) -> list[str]:
@@ -145,6 +142,16 @@ def _energies(groups: Iterable[Group], twice_f: int) -> tuple[dict[tuple[int, ..
         energies |= dict(zip(map(tuple, labels.tolist()), levels.energy_mhz[exist].tolist(), strict=True))
         count += int(levels.components[exist].sum())
     return energies, count
+
+
+def note_of_diagonal_elements(undiagonalized: bool) -> str:
+    """The note for DIAG below 0: whether the levels are diagonal elements, as in SPCAT, or eigenvalues."""
+    if not undiagonalized:
+        return UNDIAGONALIZED_NOTE
+    return (
+        "DIAG is below 0: the energies are diagonal elements of the Hamiltonian over the functions of the file, as in SPCAT, and each "
+        "level is one function; DIAG = 0 has eigenvalues"
+    )
 
 
 def notes_of_diagonal(groups: Iterable[Group], diag: int, highest_n: int) -> list[str]:

@@ -102,14 +102,6 @@ def test_spins_that_spind_does_not_name():
         )  # the same numbers
 
 
-def test_diagonal_elements_are_refused_or_noted():
-    for option in (b"a -1 -1 0 60 0 1 1 1 0 1 -1", b"a 1 1 0 60 0 1 1 1 0 1 -1"):
-        file = read_par(TOP.replace(b"a -1 -1 0 60 0 1 1 1 0 1 0", option))
-        with pytest.raises(ValueError, match="DIAG = -1: diagonal elements"):
-            predict(file, read_int(REQUEST), as_spcat=True)
-        assert any("DIAG is below 0" in note for note in predict(file, read_int(REQUEST)).notes)
-
-
 def test_levels_with_more_than_six_quanta_have_all_of_them():
     """As the program writes them: the number of the pattern in brackets, then N, Ka, Kc, v, F1, ... F."""
     file = read_par((KINDS / "patterns_of_i_tot" / "patterns_of_i_tot.var").read_bytes())
