@@ -35,9 +35,10 @@ def _calls(par, request) -> int:
     return int(pstats.Stats(profile).total_calls)  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("name", ["fso3", "oc33s", "h2coh", "patterns_of_i_tot", "ch3cn_quad"])
+@pytest.mark.parametrize("name", ["fso3", "oc33s", "h2coh", "patterns_of_i_tot", "ch3cn_quad", "euler_series"])
 def test_errors_cost_no_more_calls_than_the_prediction_does(name: str):
-    """Calls with errors over those without: 2.5, 1.7, 3.9, 3.3 and 1.7 where derivatives were made block by block."""
+    """Calls with errors over those without: 2.5, 1.7, 3.9, 3.3 and 1.7 where derivatives were made block by block; 2.3 for series where each
+    operator was made for the levels and again for their derivatives."""
     par, request = _files(name)
     held = replace(par, parameters=tuple(replace(p, error=1e-37) for p in par.parameters), rest="")
     par = replace(par, parameters=tuple(replace(p, error=max(p.error, abs(p.value) * 1e-4)) for p in par.parameters))
@@ -103,3 +104,24 @@ def test_derivatives_are_differences(name: str):
                 expected = slopes[order, column][alone]
                 # second order: (1 MHz)^2/100 MHz; round-off of energies of 1e7 MHz
                 assert difference[alone] == pytest.approx(expected, abs=0.02 * size + 1e-8 / step)
+
+
+def test_an_operator_of_a_series_is_made_once_for_each_n(monkeypatch):
+    """Levels and their derivatives share the operators; the derivatives made all of them again, and took 2.3 times the prediction."""
+    from rotor.formats.spcat.hamiltonian import series
+
+    made = []
+    original = series.JOperator
+
+    def counted(j, bands):
+        made.append(j)
+        return original(j, bands)
+
+    monkeypatch.setattr(series, "JOperator", counted)
+    par, request = _files("euler_series")
+    counts = []
+    for error in (1e-37, 1e-3):
+        made.clear()
+        predict(replace(par, parameters=tuple(replace(p, error=error) for p in par.parameters), rest=""), request)
+        counts.append(len(made))
+    assert counts[0] == counts[1] > 0

@@ -6,9 +6,9 @@ For files with one state and no spin see `codes.constants_of`, which gives named
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -38,13 +38,14 @@ from rotor.quantum.spins.operators import EVERY_STATE, BetweenSpecies, ByElement
 from rotor.quantum.spins.terms import SpinTerm
 from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.quantum.wang.basis import wang_blocks
-from rotor.quantum.wang.j_operators import between_species
+from rotor.quantum.wang.j_operators import JOperator, between_species
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 Vector = tuple[float, float, float]
+_STORED_TO = 100  # J; the operators of a higher J take too much memory together
 
 
 class CodedLine(NamedTuple):
@@ -215,6 +216,20 @@ def real_lines(
     return acting, list(dict.fromkeys(reasons))
 
 
+def _stored(of: OperatorOfJ) -> OperatorOfJ:
+    """The operator, stored for each J up to `_STORED_TO` at its first use."""
+    stored: dict[tuple[int, str], JOperator] = {}
+
+    def operator(j: int, representation: str) -> JOperator:
+        if j > _STORED_TO:
+            return of(j, representation)
+        if (j, representation) not in stored:
+            stored[j, representation] = of(j, representation)
+        return stored[j, representation]
+
+    return operator
+
+
 @dataclass(frozen=True, eq=False)
 class FileEffect(QuantumEffect):
     """The parameter lines of a file for a group of its states, which are numbered here from 0.
@@ -255,6 +270,10 @@ class FileEffect(QuantumEffect):
                     out.append((line, states))
         return tuple(out)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields; stored operators are functions, which no other process can receive."""
+        return {attribute.name: getattr(self, attribute.name) for attribute in fields(self)}
+
     def parameters(self, top: Top) -> dict[str, float]:
         """Values in MHz by code and number of the line."""
         return {line.name: line.value for line, _ in self._group_lines}
@@ -280,6 +299,11 @@ class FileEffect(QuantumEffect):
 
     def couplings(self, top: Top) -> tuple[Coupling, ...]:
         """Interactions of states, and operators of one state that have no powers (p, q, n)."""
+        return self._couplings
+
+    @cached_property
+    def _couplings(self) -> tuple[Coupling, ...]:
+        """The couplings; levels and their derivatives share the operator of each J."""
         couplings = []
         for line, states in self._group_lines:
             operator = line.operator
@@ -296,7 +320,8 @@ class FileEffect(QuantumEffect):
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
                 couplings.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
-        return tuple(self._restricted(coupling) for coupling in couplings)
+        restricted = (self._restricted(coupling) for coupling in couplings)
+        return tuple(replace(coupling, operator=_stored(coupling.operator)) for coupling in restricted)
 
     def _restricted(self, coupling: Coupling) -> Coupling:
         """A coupling without elements between levels of unequal weights."""

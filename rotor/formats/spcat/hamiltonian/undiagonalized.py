@@ -6,7 +6,6 @@ A solved block has all its eigenvectors c and energies E, so that <i|H|i> = sum 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -14,9 +13,6 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.labels import functions_of, renamed
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
-
-SolvedOrSpinBlock = TypeVar("SolvedOrSpinBlock", SolvedBlock, SpinBlock)
-
 
 def is_undiagonalized(levels: Levels, diag: int) -> bool:
     """Whether DIAG is below 0 and the levels are those of blocks over Wang functions, so that their functions can be listed."""
@@ -35,7 +31,7 @@ def without_diagonalization(levels: Levels) -> Levels:
     return replace(named, energy_mhz=energies, blocks=blocks)
 
 
-def _functions_as_states(block: SolvedOrSpinBlock, representation: str) -> tuple[SolvedOrSpinBlock, Ints]:
+def _functions_as_states(block: SolvedBlock | SpinBlock, representation: str) -> tuple[SolvedBlock | SpinBlock, Ints]:
     """A block whose states are its functions, and their labels.
 
     The rows of the eigenvectors are rotational states where spins are added. With functions F = T R of rows R, amplitudes A = T V and
@@ -46,6 +42,7 @@ def _functions_as_states(block: SolvedOrSpinBlock, representation: str) -> tuple
     order = np.argsort(diagonal, kind="stable")
     vectors = (block.vectors @ functions.amplitudes.T)[:, order]
     names = functions.names[order]
-    changed = {"group": None} if isinstance(block, SpinBlock) else {}
+    if isinstance(block, SpinBlock):
+        return replace(block, energies_mhz=diagonal[order], vectors=vectors, labels=names, group=None), names
     labels = None if block.labels is None else names
-    return replace(block, energies_mhz=diagonal[order], vectors=vectors, labels=labels, **changed), names
+    return replace(block, energies_mhz=diagonal[order], vectors=vectors, labels=labels), names
