@@ -3,12 +3,8 @@
     ∂E_i/∂c = ⟨i|∂H/∂c|i⟩
 
 (H. Hellmann, Einführung in die Quantenchemie (1937) 285; R. P. Feynman, Phys. Rev. 56 (1939) 340), where ∂H/∂c is a sum of
-terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊. With real coefficients a_K of a state over all K of one parity, a_{-K} = ± a_K, and
-W_K = a_K a_{K+2n} ⟨K+2n|J₊^2n|K⟩,
-
-    ⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ = X^p Σ_K W_K [(K+2n)^2q + K^2q]       (n > 0),      X^p Σ_K a_K² K^2q   (n = 0).
-
-The states of all blocks are computed together, one row for each.
+terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊. Their elements over Wang functions are those of fits (`label_blocks.unit_diagonals`); the states of
+blocks of like size are computed together.
 """
 
 from __future__ import annotations
@@ -23,7 +19,8 @@ from rotor.arrays import Floats, Workspace, distinct
 from rotor.quantum.basis.state_elements import linear_blocks_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
-from rotor.quantum.levels import Levels, MomentBlock
+from rotor.quantum.label_blocks import unit_diagonals
+from rotor.quantum.levels import Levels, MomentBlock, SolvedBlock
 from rotor.quantum.linear_stacks import LinearStack, stack_numbers
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
@@ -34,7 +31,8 @@ if TYPE_CHECKING:
 
 Rows = NDArray[np.integer]
 
-_AT_ONCE = 1 << 22  # coefficients in memory at a time: 32 MB
+_AT_ONCE = 1 << 18  # coefficients in memory at a time: 2 MB, which stay in the cache of a core
+_LIKE, _SMALL = 1.5, 8  # largest ratio of sizes of blocks whose vectors share an array, and sizes that all do
 
 
 def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = None, rows: Rows | None = None) -> Floats:
@@ -172,7 +170,8 @@ def term_expectations(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Fl
     j = levels.rotational[rows].astype(float)
     x = j * (j + 1)
     if "kc" in levels.quanta:
-        by_k = _expectations_of_blocks(levels, [(q, n) for _, q, n in terms], rows)
+        units = list(dict.fromkeys((q, n) for _, q, n in terms))
+        by_k = _expectations_of_blocks(levels, units, rows)[:, [units.index((q, n)) for _, q, n in terms]]
     else:
         k = levels.quanta["k"][rows].astype(float) if "k" in levels.quanta else np.zeros_like(j)
         by_k = np.stack([k ** (2 * q) for _, q, _ in terms], axis=1)
@@ -180,76 +179,38 @@ def term_expectations(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Fl
 
 
 def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows) -> Floats:
-    """⟨½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms), in pieces of bounded memory."""
+    """⟨½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms) of states of Wang blocks."""
     if not levels.blocks:
         raise ValueError("these levels were solved without vectors; solve them with vectors=True")
-    out = np.empty((len(rows), len(terms)))
-    for odd in (0, 1):
-        for chosen in _pieces(levels, rows, odd):
-            out[chosen] = _expectations_of_parity(levels, terms, rows[chosen], odd)
-    return out
+    starts = np.array([block.start for block in levels.blocks])
+    numbers = distinct(np.searchsorted(starts, rows, side="right") - 1)
+    blocks = sorted((levels.blocks[i] for i in numbers.tolist()), key=lambda block: block.basis.size)
+    out = np.empty((len(levels), len(terms)))
+    for alike in _of_like_size(blocks):
+        sizes = [block.basis.size for block in alike]
+        diagonals = unit_diagonals([block.basis for block in alike], sizes, terms)
+        vectors = np.zeros((len(alike), sizes[-1], sizes[-1]))
+        for place, block in enumerate(alike):
+            vectors[place, : sizes[place], : sizes[place]] = block.vectors
+        total = np.zeros((len(alike), sizes[-1], len(terms)))
+        for d, diagonal in enumerate(diagonals[: sizes[-1]]):
+            pairs = vectors[:, : sizes[-1] - d] * vectors[:, d:]
+            total += (2.0 if d else 1.0) * np.matmul(pairs.swapaxes(1, 2), diagonal[:, : sizes[-1] - d])
+        for place, block in enumerate(alike):
+            out[block.start : block.start + sizes[place]] = total[place, : sizes[place]]
+    return out[rows]
 
 
-def _pieces(levels: Levels, rows: Rows, odd: int) -> Iterator[NDArray[np.intp]]:
-    """Places in `rows` of the states with even or odd K, in pieces of bounded size."""
-    parities = np.repeat([b.basis.first_k % 2 for b in levels.blocks], [b.basis.size for b in levels.blocks])
-    places = np.flatnonzero(parities[rows] == odd)
-    step = max(1, _AT_ONCE // (levels.jmax // 2 + 1))
-    for start in range(0, len(places), step):
-        yield places[start : start + step]
-
-
-def _expectations_of_parity(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows, odd: int) -> Floats:
-    """⟨½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms) of states with K of one parity."""
-    margin = 2 * max((n for _, n in terms), default=0)  # K starts at -margin + odd, to include pairs across K = 0
-    states = _signed_coefficients(levels, rows, odd, margin)
-    k: Floats = odd - margin + 2 * np.arange(states.shape[1], dtype=np.float64)
-    j = levels.rotational[rows].astype(float)
-
-    out = np.empty((len(rows), len(terms)))
-    for n in {n for _, n in terms}:
-        weights = _pair_weights(states, j, k, n)
-        columns = [i for i, (_, order) in enumerate(terms) if order == n]
-        low, high = k[: len(k) - n] ** 2, (k[: len(k) - n] + 2 * n) ** 2
-        powers = np.stack([0.5 * (low ** terms[i][0] + high ** terms[i][0]) for i in columns], axis=1)
-        out[:, columns] = weights @ powers
-    return out
-
-
-def _pair_weights(states: Floats, j: Floats, k: Floats, n: int) -> Floats:
-    """a_K a_{K+2n} ⟨K+2n|J₊^2n|K⟩ (rows, K), with factors that count mirror images and both ladder operators.
-
-    K and -K-2n form one pair, so that K > -n counts twice; K = -n is its own image.
-    """
-    low = k[: len(k) - n]
-    weights = states[:, : len(low)] * states[:, n:]
-    if n:
-        step = j[:, None]
-        squared = np.ones_like(weights)
-        for i in range(2 * n):
-            squared *= np.maximum((step - low - i) * (step + low + i + 1), 0.0)
-        weights *= 2 * np.sqrt(squared)
-    return weights * np.where(low > -n, 2.0, np.where(low == -n, 1.0, 0.0))
-
-
-def _signed_coefficients(levels: Levels, rows: Rows, odd: int, margin: int) -> Floats:
-    """a_K of states over K = odd - margin, ..., zero beyond each J: (a_K = v_K/√2, a_0 = v_0, a_{-K} = s a_K)."""
-    starts = np.array([b.start for b in levels.blocks])
-    block_of = np.searchsorted(starts, rows, side="right") - 1
-    highest = int(levels.rotational[rows].max(initial=0))
-    zero = margin // 2  # place of K = odd
-    out = np.zeros((len(rows), zero + highest // 2 + 1))
-    signs = np.array([b.basis.sign for b in levels.blocks])[block_of]
-
-    order = np.argsort(block_of, kind="stable")
-    cuts = np.flatnonzero(np.diff(block_of[order])) + 1
-    for places in np.split(order, cuts) if len(rows) else ():
-        block = levels.blocks[block_of[places[0]]]
-        first = zero + block.basis.first_k // 2
-        out[places, first : first + block.basis.size] = block.vectors[:, rows[places] - block.start].T
-
-    out[:, zero + (1 - odd) :] *= np.sqrt(0.5)
-    mirrored = zero + np.arange(1, zero + 1) - odd  # places of K = 2 - odd, ... behind K = -2 + odd, ...
-    inside = mirrored < out.shape[1]
-    out[:, zero - 1 - np.flatnonzero(inside)] = signs[:, None] * out[:, mirrored[inside]]
-    return out
+def _of_like_size(blocks: Sequence[SolvedBlock]) -> Iterator[Sequence[SolvedBlock]]:
+    """Blocks in order of size, in pieces of similar size and bounded memory."""
+    start = 0
+    while start < len(blocks):
+        stop, largest = start + 1, max(_LIKE * blocks[start].basis.size, _SMALL)
+        while (
+            stop < len(blocks)
+            and blocks[stop].basis.size <= largest
+            and (stop - start + 1) * blocks[stop].basis.size ** 2 <= _AT_ONCE
+        ):
+            stop += 1
+        yield blocks[start:stop]
+        start = stop
