@@ -23,8 +23,7 @@ from typing import Any
 import numpy as np
 
 from rotor.scenes.accuracy import unit_of
-from rotor.scenes.kind import kind_of
-from rotor.scenes.numerics import numerics_of
+from rotor.scenes.numerics import answering, numerics_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene_file import parse_scene
 
@@ -220,14 +219,13 @@ def _intensities(scene: Any, request: Any, answer: Any) -> Reference:
 
 
 def _map(scene: Any, request: Any, answer: Any) -> Reference:
-    kind = kind_of(scene)
     finer = replace(request, tolerance_mhz=1e-9, jmax=answer.states.jmax + FINER_J)
-    exact = kind.verb.answer(finer, _work(kind))
+    exact = answering(scene.kind)(finer)
     return maximum(answer.states.energy_mhz, exact.states.energy_mhz), f"J max {answer.states.jmax + FINER_J}"
 
 
 def _thermo(scene: Any, request: Any, answer: Any) -> Reference:
-    exact = kind_of(scene).verb.answer(replace(request, relative_error=1e-13), _work(kind_of(scene)))
+    exact = answering(scene.kind)(replace(request, relative_error=1e-13))
     names = ("q_rot", "energy_j_per_mol", "cv_over_r")
     pairs = [[getattr(result.functions, name) for result in (answer, exact)] for name in names]
     return max(float(np.abs(a / b - 1).max()) for a, b in pairs), "sums to 1e-13"
@@ -235,7 +233,7 @@ def _thermo(scene: Any, request: Any, answer: Any) -> Reference:
 
 def _align(scene: Any, request: Any, answer: Any) -> Reference:
     finer = replace(request, tolerance=1e-9, jmax=None)
-    exact = kind_of(scene).verb.answer(finer, _work(kind_of(scene)))
+    exact = answering(scene.kind)(finer)
     return maximum(answer.trace.cosines["cos2theta"], exact.trace.cosines["cos2theta"]), "a tolerance of 1e-9"
 
 
@@ -291,7 +289,7 @@ def _gas(scene: Any, request: Any, answer: Any) -> Reference:
 
 def _emission(scene: Any, request: Any, answer: Any) -> Reference:
     finer = replace(request, least_depth=1e-3 * request.least_depth)
-    exact = kind_of(scene).verb.answer(finer, _work(kind_of(scene)))
+    exact = answering(scene.kind)(finer)
     grid = exact.spectrum.frequency_mhz
     interpolated = np.interp(grid, answer.spectrum.frequency_mhz, answer.spectrum.brightness_k)
     return maximum(interpolated, exact.spectrum.brightness_k), "lines of a thousandth of the depth"
@@ -323,13 +321,6 @@ _REFERENCES: dict[str, Callable[..., Reference]] = {
     "levels": _levels, "spectrum": _intensities, "raman": _levels, "stark": _map, "zeeman": _map, "thermo": _thermo, "align": _align,
     "tumble": _tumble, "gas": _gas, "emission": _emission, "fit": _fit, "torsion": _torsion, "fluid": _fluid,
 }  # fmt: skip
-
-
-def _work(kind: Any) -> Any:
-    from rotor.requests.fill import Entries
-    from rotor.verbs.verb import Work
-
-    return Work(shown=kind.verb.read_shown(Entries()))
 
 
 def coarser_of(scene: Any, request: Any, answer: Any) -> tuple[str, Any] | None:
@@ -373,16 +364,15 @@ def measured(number: int, kind: str, goal: str, body: str, folder: Path) -> Meas
     result = run_scene(scene, folder=folder, out=folder)
     reached = result.reached
     assert reached is not None
-    work = _work(kind_of(scene))
-    answer_of = kind_of(scene).verb.answer
-    seconds, _ = timed(lambda: answer_of(result.request, work))
+    answer_of = answering(scene.kind)
+    seconds, _ = timed(lambda: answer_of(result.request))
     actual, against = reference_of(scene, result)
     coarse = None if "nothing cheaper" in reached.how else coarser_of(scene, result.request, result.answer)
     words, error, coarse_seconds = "-", None, None
     if coarse is not None:
         words, request = coarse
         try:
-            coarse_seconds, answer = timed(lambda: answer_of(request, work))
+            coarse_seconds, answer = timed(lambda: answer_of(request))
             error = max(numerics_of(kind).goals[reached.unit].error(answer), 0.0)
             if kind == "tumble":
                 error = answer.errors.numerical

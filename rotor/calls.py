@@ -131,7 +131,7 @@ class Result:
 
     def scene(self, folder: str | os.PathLike[str] = ".") -> Any:
         """The scene that repeats the calculation; `rotor.write_scene` writes it. folder: of the scene, for names of files."""
-        from rotor.scenes.structures import saved_scene
+        from rotor.scenes.saved import saved_scene
 
         return saved_scene(self.verb, self.request, self.subject, Path(folder), {}, self.entries)
 

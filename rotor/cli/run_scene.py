@@ -21,7 +21,7 @@ from rotor.requests.fill import Entries
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Place, report_of
+from rotor.verbs.verb import Place
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -83,7 +83,7 @@ class Options:
 def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -> None:
     """Run a scene, write the files that it names, and report; a sweep resumes where it stopped."""
     from rotor.cli.shared.runner import refuse_overwriting
-    from rotor.scenes.run import refuse_outside
+    from rotor.scenes.outputs import refuse_outside
     from rotor.scenes.scene_file import read_scene
     from rotor.scenes.sweep import is_sweep
 
@@ -164,15 +164,14 @@ def _single(scene: Scene, options: Options, files: Files, pool: Executor | None,
 
 def _deliver(result: SceneResult, options: Options, files: Files, command: str) -> None:
     """Print the report of the verb, then files and seconds of the run."""
-    from rotor.plots.view import WHOLE
     from rotor.reports.error_table import error_parts
-    from rotor.scenes.structures import entries_of
-    from rotor.verbs.verb import verb_of
+    from rotor.scenes.calculation import Calculation
 
-    scene, verb = result.scene, verb_of(result.scene.kind)
+    scene, calculation = result.scene, Calculation(result.scene)
+    verb = calculation.verb
     head = {"command": command, "input": options.scene, "scene": options.scene, "kind_of_scene": scene.kind}
     with answering():
-        report = report_of(verb, result.answer, head, entries_of(scene, verb), WHOLE)
+        report = calculation.report(result.answer, head)
     content = {**report.content, **_run_facts(result)}
 
     def show() -> None:

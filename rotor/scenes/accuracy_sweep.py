@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.requests.knob import Setting, Sweep, Sweeps
-from rotor.scenes.kind import kind_of
+from rotor.scenes.calculation import Calculation
 from rotor.scenes.numerics import sweeps_of
 from rotor.scenes.scene import Scene
 from rotor.table import Table
@@ -97,12 +97,10 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
     """
     if scene.sweep:
         raise ValueError("sweep: the knobs of one point are swept; give the scene without its sweep")
-    request = kind_of(scene).request(scene, folder)
-    if getattr(scene, "accuracy", None) is not None:
-        from rotor.scenes.accuracy import chosen
-
-        request = chosen(scene, request).request
-    return sweeps_of(scene.kind, request)
+    calculation = Calculation(scene, folder)
+    request = calculation.request()
+    choice = calculation.choice(request)
+    return sweeps_of(scene.kind, request if choice is None else choice.request)
 
 
 def work_precision(

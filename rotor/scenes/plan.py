@@ -11,9 +11,9 @@ import msgspec
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, plan_of_whole, timed
-from rotor.scenes.kind import NoResultError, kind_of
+from rotor.scenes.calculation import Calculation, NoResultError
 from rotor.scenes.numerics import answering, numerics_of
-from rotor.scenes.run import answer_as_run, choice_of, output_paths
+from rotor.scenes.outputs import checked_paths
 from rotor.scenes.scene import Scene
 from rotor.verbs.verb import verb_of
 
@@ -50,22 +50,25 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".", out: str | os.Pa
     """
     if scene.sweep:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
-    output_paths(scene, out)
-    kind = kind_of(scene)
-    request = kind.request(scene, folder)
-    with kind.naming():
-        plan, choice = _plan(scene, request)
+    checked_paths(scene, out)
+    calculation = Calculation(scene, folder)
+    request = calculation.request()
+    with calculation.verb.naming("key"):
+        plan, choice = _plan(calculation, request)
         if plan.seconds <= SHORT_RUN and plan.memory_mb <= SMALL_MB:
-            plan = _with_outcome(plan, scene, request, choice)
+            plan = _with_outcome(plan, calculation, request, choice)
     return plan
 
 
-def _with_outcome(plan: Plan, scene: Scene, request: Any, choice: Choice | None) -> Plan:
+def _with_outcome(plan: Plan, calculation: Calculation, request: Any, choice: Choice | None) -> Plan:
     """The plan with a warning if the run has no result, or with coarser settings that would do; ValueError as in a run."""
+    scene: Any = calculation.scene
+    bare = replace(calculation, scene=msgspec.structs.replace(scene, outputs=type(scene.outputs)()))
     try:
-        answer = answer_as_run(scene, request, choice)
+        answer = bare.answer(request if choice is None else choice.request)
     except NoResultError as reason:
         return replace(plan, parts=(*plan.parts, ("warning", f"no result: {reason}")))
+    calculation.reached(answer, choice)
     enough = "" if choice is not None else coarser_settings(scene, request, getattr(answer, "errors", None))
     return replace(plan, parts=(*plan.parts, ("enough", enough))) if enough else plan
 
@@ -94,17 +97,18 @@ def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> 
     return f'accuracy = "{enough}" would do, a tenth of {size}: {uncertain.source}'
 
 
-def _plan(scene: Scene, request: Any) -> tuple[Plan, Choice | None]:
+def _plan(calculation: Calculation, request: Any) -> tuple[Plan, Choice | None]:
     """The plan, and the settings for the accuracy of the scene; None without an accuracy, or if only the run finds the settings."""
     from rotor.scenes.accuracy import accuracy_of, unit_of
 
+    scene = calculation.scene
     goal, numerics = accuracy_of(scene), numerics_of(scene.kind)
     if goal is None:
         return plan_of_request(scene.kind, request), None
     if numerics.planned is not None and unit_of(scene) == next(iter(numerics.goals)):
         return numerics.planned(scene, request, goal)
     choices: list[Choice | None] = []
-    search = timed(lambda: choices.append(choice_of(scene, request)), LONG_SEARCH)
+    search = timed(lambda: choices.append(calculation.choice(request)), LONG_SEARCH)
     choice = choices[-1]
     assert choice is not None  # the scene has an accuracy
     plan, parts = plan_of_request(scene.kind, choice.request), [("accuracy", choice.how)]

@@ -1,6 +1,7 @@
 """A scene: a simulation as one object, with the content of a scene file (`rotor.scenes.scene_file`).
 
-No physics is imported here: a scene is data, checked for names and types; requests check the values.
+No physics is imported here: a scene is data, checked for names and types; requests check the values. What computes a scene is
+imported by name when it runs.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,7 +20,6 @@ from msgspec import Struct, field
 
 from rotor.scenes.choice import Accuracy
 from rotor.scenes.sections import MoleculeSection
-from rotor.scenes.verbs import VERBS
 from rotor.verbs.scene_tables import entries_before, tables_of
 from rotor.verbs.tables import described
 from rotor.verbs.verb import SCENE_VERBS, verb_of
@@ -56,12 +57,14 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
         executor: Executor | None = None,
     ) -> SceneResult:
         """Run the scene, see `rotor.scenes.run.run_scene`."""
-        result: SceneResult = VERBS["run"](self, folder=folder, out=out, executor=executor)
+        result: SceneResult = import_module("rotor.scenes.run").run_scene(
+            self, folder=folder, out=out, executor=executor
+        )
         return result
 
     def plan(self, *, folder: str | os.PathLike[str] = ".") -> Plan:
         """Plan of the scene with neglected effects, see `rotor.scenes.plan.plan_of`."""
-        plan: Plan = VERBS["plan"](self, folder)
+        plan: Plan = import_module("rotor.scenes.plan").plan_of(self, folder)
         return plan
 
 

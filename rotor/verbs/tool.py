@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -45,6 +46,10 @@ class Tool(Verb):
         request = read_instance(self.request, entries)
         source = getattr(request, self.of, "")
         return request, Subject(text=source if isinstance(source, str) else " ".join(source), note=place.note)
+
+    def naming(self, style: str) -> AbstractContextManager[None]:
+        """No context: the request was checked when it was read."""
+        return nullcontext()
 
     def json(self, answer: Any, content: Mapping[str, Any]) -> str:
         """The JSON text."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
@@ -341,6 +342,11 @@ class Verb:
                 return self.build(self, entries, subject), subject
             values = read_fields(self.request, entries, subject)
             return self.request(**subject.values, **values), subject
+
+    def naming(self, style: str) -> AbstractContextManager[None]:
+        """Context in which a ValueError that names a field of the request names its key or its option."""
+        names = {field.name: field.key if style == "key" else field.flag for field in self.fields.values()}
+        return renaming({name: text for name, text in names.items() if text})
 
     def read_shown(self, entries: Entries) -> Any:
         """The display options."""

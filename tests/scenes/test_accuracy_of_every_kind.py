@@ -81,12 +81,12 @@ def test_the_intensity_of_all_lines_is_within_what_is_stated(kind, body, accurac
 
 def test_a_cut_is_lowered_where_it_leaves_out_too_much():
     """The accuracy of one that is given by hand is refused instead."""
-    from rotor.scenes.kind import kind_of
+    from rotor.scenes.calculation import Calculation
     from rotor.spectra.numerics import RAMAN
 
     choose_cut = RAMAN.goals["%"].choose
     scene = parse_scene(HEAD.format("raman", "2e-4 %") + 'molecule = "N2"\n')
-    request = kind_of(scene).request(scene, ".")
+    request = Calculation(scene).request()
     assert choose_cut(scene, request, 1e-3).request.min_relative == request.min_relative
     lowered = choose_cut(scene, request, 8e-5)
     assert lowered.request.min_relative < request.min_relative
@@ -103,13 +103,13 @@ def test_a_decade_coarser_misses(folder):
     from dataclasses import replace
 
     from rotor.formats.fit_request import answer_fit
-    from rotor.scenes.kind import kind_of
-    from rotor.scenes.run import choice_of
+    from rotor.scenes.calculation import Calculation
     from rotor.spectra.emission_request import answer_emission
 
     def taken(kind, accuracy, body):
         scene = parse_scene(HEAD.format(kind, accuracy) + body)
-        return choice_of(scene, kind_of(scene).request(scene, ".")).request
+        calculation = Calculation(scene)
+        return calculation.choice(calculation.request()).request
 
     (folder / "l.csv").write_text(LINES_OF_CO)
     for accuracy, kelvin in (("100 mK", 0.1), ("1 mK", 1e-3), ("0.05 mK", 5e-5)):

@@ -21,7 +21,7 @@ from rotor.fluids.request import answer_fluid
 from rotor.geometry.rotations import distance
 from rotor.quantum.hyperfine_method import used_method
 from rotor.scenes.accuracy import accuracy_of, unit_of
-from rotor.scenes.kind import kind_of
+from rotor.scenes.calculation import Calculation
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import (
     AlignScene,
@@ -312,7 +312,7 @@ BOX = FluidConditions(model="spce", molecules=27, steps=40, every=1)
 def test_the_bound_of_a_fluid_covers_other_boxes():
     """Root mean squares of the conserved energy with other velocities are below the bound."""
     scene = FluidScene(conditions=BOX, numerics=FluidNumerics(cutoff="4 Å"), accuracy="1 K")
-    request = with_box(kind_of(scene).request(scene, "."))
+    request = with_box(Calculation(scene).request())
     bound, computed = conserved_bound_k(request, 2.0), []
     for seed in range(50, 62):
         other = replace(request, settings=replace(request.settings, seed=seed))
@@ -329,7 +329,7 @@ def test_the_step_of_a_fluid():
     assert result.reached.error <= 1.0 == result.reached.asked
     assert 1.0 < result.request.settings.step_fs < 4.0
     coarser = replace(result.request.settings, step_fs=2 * result.request.settings.step_fs, steps=20)
-    request = kind_of(scene).request(scene, ".")
+    request = Calculation(scene).request()
     assert (
         conserved_k(answer_fluid(replace(request, settings=coarser), progress=lambda *_: None)) > 1.0
     )  # it would miss

@@ -10,7 +10,7 @@ import pytest
 from places import ORACLES
 
 from rotor.scenes.accuracy_sweep import work_precision
-from rotor.scenes.kind import NoResultError
+from rotor.scenes.calculation import NoResultError
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import EmissionScene, FitScene

@@ -15,7 +15,7 @@ from rotor.cli.shared.output import Files, answering, at_end, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings, picture_style
 from rotor.reports.progress import elapsed_time
 from rotor.reports.screen import show_parts
-from rotor.requests.fill import Entries, renaming
+from rotor.requests.fill import Entries
 from rotor.verbs.molecule import is_file
 from rotor.verbs.verb import Place, Report, Subject, Verb, Work, files_of, report_of
 
@@ -51,7 +51,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     process.begin_work()
     head = {"command": str(context.obj), "input": subject.text}
     with picture_style(there), working(verb, there.get("workers", 1)) as executor:
-        with answering() if verb.sound else naming(verb):
+        with answering() if verb.sound else verb.naming("option"):
             work = Work(executor, shown, outputs, note, True, head, view, at_end)
             with nullcontext() if verb.stepwise else elapsed_time("computing"):
                 answer = verb.answer(request, work)
@@ -68,7 +68,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
             named = {name: value for name, value in there.items() if name not in left_out}
             writers["--save-scene"] = scene_writer(verb, request, subject, entries, named)
         show = partial(show_answer, verb, answer, report)
-        with naming(verb):
+        with verb.naming("option"):
             deliver(files, writers, lambda: verb.json(answer, report.content), show)
         if reason := verb.failure(answer):
             raise NoAnswerError(reason)
@@ -192,14 +192,6 @@ def refuse_nothing_to_draw(verb: Verb, answer: Any, files: Files) -> None:
         raise NoAnswerError(f"{drawn[0]}: {reason}")
 
 
-@contextmanager
-def naming(verb: Verb) -> Iterator[None]:
-    """Inside, a ValueError that names a field of the request names its option; a tool has checked its own when it was made."""
-    fields = verb.fields.values() if verb.has_scenes else ()
-    with renaming({field.name: field.flag for field in fields if field.flag}):
-        yield
-
-
 def working(verb: Verb, workers: Any) -> Any:
     """The executor that --workers asks for; None of a verb that has no such option."""
     if not verb.workers:
@@ -223,8 +215,8 @@ def scene_writer(verb: Verb, request: Any, subject: Subject, entries: Entries, t
 
     def write(path: Path) -> None:
         """The scene as text."""
+        from rotor.scenes.saved import saved_scene
         from rotor.scenes.scene_file import write_scene
-        from rotor.scenes.structures import saved_scene
 
         folder = Path(typed["save_scene"]).parent
         write_scene(saved_scene(verb, request, subject, folder, outputs, entries), path)

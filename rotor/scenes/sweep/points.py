@@ -19,7 +19,7 @@ from typing import Any
 
 import msgspec
 
-from rotor.scenes.run import output_paths, suffixes_of
+from rotor.scenes.outputs import check_path, checked_paths, suffixes_of
 from rotor.scenes.scene import Scene, molecule_of
 from rotor.scenes.scene_file import scene_of
 from rotor.scenes.sweep.molecule_list import is_list, list_entries
@@ -254,13 +254,9 @@ def put(content: dict[str, Any], name: str, value: Any) -> None:
 def check_first(points: Points, out: str | os.PathLike[str]) -> None:
     """Check what all points share: the swept names, the folders and suffixes of the files that are written."""
     first = next(iter(points))
-    output_paths(first.scene, out)
+    checked_paths(first.scene, out)
     for name, text in points.combined.items():
-        target = Path(out) / text
-        if not target.name.lower().endswith(f".{name}"):
-            raise ValueError(f"outputs.{name}: {text}: the name must end in .{name}")
-        if not target.parent.is_dir():
-            raise ValueError(f"outputs.{name}: {target}: there is no folder {target.parent}; make it first")
+        check_path(f"outputs.{name}: {Path(out) / text}", Path(out) / text, (f".{name}",))
 
 
 def cell(value: Any) -> Any:

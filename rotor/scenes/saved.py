@@ -1,4 +1,4 @@
-"""Entries of a verb from a scene, and the scene of an answered request."""
+"""The scene of an answered request."""
 
 from __future__ import annotations
 
@@ -6,20 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
-from rotor.requests.fill import Entries, flattened, nested
+from rotor.requests.fill import Entries, nested
 from rotor.scenes.scene import KINDS
 from rotor.scenes.scene_file import scene_of
 from rotor.verbs.scene_tables import keyed
 from rotor.verbs.verb import Verb
-
-
-def entries_of(scene: Any, verb: Verb) -> Entries:
-    """Values of a scene by key, without defaults."""
-    content: dict[str, Any] = msgspec.to_builtins(scene)
-    tables = verb.subject.tables(content)
-    return Entries(flattened(tables, [*keyed(verb), *verb.subject.tables_read]), "key")
 
 
 def saved_scene(

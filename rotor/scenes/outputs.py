@@ -1,0 +1,76 @@
+"""The files that a scene names in [outputs]: their paths, and the checks before anything is computed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from rotor.scenes.scene import Scene, within
+from rotor.verbs.verb import verb_of
+
+Where = str | os.PathLike[str]
+
+
+def suffixes_of(kind: str) -> dict[str, tuple[str, ...]]:
+    """Allowed suffixes of the outputs of a kind of scene."""
+    outputs = verb_of(kind).outputs
+    return {output.name: output.suffixes for output in outputs if output.scene} | {"json": (".json",)}
+
+
+def names_of(scene: Scene) -> dict[str, list[str]]:
+    """The names of files in a scene, by output."""
+    named = {name: getattr(scene.outputs, name, None) for name in suffixes_of(scene.kind)}  # type: ignore[attr-defined]
+    return {
+        name: value if isinstance(value, list) else [value] for name, value in named.items() if value not in (None, [])
+    }
+
+
+def paths_of(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
+    """The files that a scene names, in the folder `out`."""
+    return {name: tuple(Path(within(out, text)) for text in texts) for name, texts in names_of(scene).items()}
+
+
+def checked_paths(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
+    """The files that a scene writes.
+
+    Raises ValueError for a wrong suffix, a missing folder, and one file for two outputs.
+    """
+    targets, suffixes = paths_of(scene, out), suffixes_of(scene.kind)
+    for name, paths in targets.items():
+        for path in paths:
+            check_path(f"outputs.{name}: {path}", path, suffixes[name])
+    resolved = [path.resolve() for paths in targets.values() for path in paths]
+    for path in resolved:
+        if resolved.count(path) > 1:
+            raise ValueError(f"outputs: {path.name}: two outputs write this file; give another name")
+    return targets
+
+
+def check_path(name: str, path: Path, suffixes: tuple[str, ...]) -> None:
+    """Raise ValueError, with the name, for a wrong suffix, a missing folder, and a file that cannot be written."""
+    if not path.name.lower().endswith(suffixes):
+        raise ValueError(f"{name}: the name must end in {' or '.join(suffixes)}")
+    if not path.parent.is_dir():
+        raise ValueError(f"{name}: there is no folder {path.parent}; make it first")
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        raise ValueError(f"{name}: cannot be written; give another name")
+
+
+def refuse_outside(scene: Scene, out: Where) -> None:
+    """Refuse outputs outside the folder `out`, so that a scene from elsewhere cannot replace other files.
+
+    >>> from rotor.scenes.scene import LevelsScene
+    >>> from rotor.scenes.sections import LevelsOutputs
+    >>> refuse_outside(LevelsScene(molecule="CO", outputs=LevelsOutputs(csv="../a.csv")), "results")
+    Traceback (most recent call last):
+        ...
+    ValueError: outputs.csv: ../a.csv: lies outside the folder results; name a file inside it, or give another folder as --out
+    """
+    inside = Path(os.path.abspath(out))
+    for name, texts in names_of(scene).items():
+        for text in texts:
+            if not Path(os.path.abspath(within(out, text))).is_relative_to(inside):
+                raise ValueError(
+                    f"outputs.{name}: {text}: lies outside the folder {os.fspath(out)}; name a file inside it, or give "
+                    "another folder as --out"
+                )
