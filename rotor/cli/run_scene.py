@@ -100,7 +100,7 @@ def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -
     refuse_outside(scene, options.out)
     files = Files()
     files.ask_json(typed.get("json"))
-    refuse_overwriting(files.paths, {"scene": options.scene})
+    refuse_overwriting(files, {"scene": options.scene})
     process.begin_work()
     with _workers(options) as pool:
         if swept:

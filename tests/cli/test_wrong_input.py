@@ -9,6 +9,7 @@ import pytest
 from places import ORACLES
 
 from rotor.cli.shared.options import folded
+from rotor.cli.shared.output import Files
 from rotor.cli.shared.runner import refuse_overwriting
 
 CASE = ORACLES / "ocs"
@@ -110,7 +111,7 @@ def test_the_message_names_what_is_wrong(files, words, said):
 def test_a_title_may_be_the_name_of_a_file(files):
     """A title is a text: the name of the picture that is drawn again is no input."""
     Path("a.png").touch()
-    written = {"--plot": Path("a.png")}
+    written = Files({"plot": (Path("a.png"),)}, {"plot": "--plot"})
     refuse_overwriting(written, {"source": "water"})
     with pytest.raises(ValueError, match=r"--plot a\.png: is an input"):
         refuse_overwriting(written, {"source": "a.png"})

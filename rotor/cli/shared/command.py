@@ -12,7 +12,8 @@ from typing import Any
 import typer
 
 from rotor.cli.shared.options import PlainCommand
-from rotor.requests.field import NUMERICS, OUTPUT, PANELS, PICTURE, REQUIRED, Field
+from rotor.cli.shared.plot_options import PLOT_NAMES, picture_fields
+from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, Field
 from rotor.requests.readers import Flag
 from rotor.verbs.verb import Extra, Output, Verb
 
@@ -51,7 +52,7 @@ def parameters_of(verb: Verb) -> list[Parameter]:
     if verb.has_scenes:
         parameters.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
     if any(output.name == "plot" for output in verb.outputs):
-        parameters += [Parameter(*words, PICTURE) for words in _PICTURE if words[0] not in _left_out(verb)]
+        parameters += [_input(field) for name, field in picture_fields().items() if name not in _left_out(verb)]
     if verb.spread:
         parameters.append(
             Parameter("workers", "--workers", f"Processes over which {verb.spread} are spread", "N", NUMERICS)
@@ -61,18 +62,8 @@ def parameters_of(verb: Verb) -> list[Parameter]:
 
 def _left_out(verb: Verb) -> set[str]:
     if verb.drawn is None:
-        return {words[0] for words in _PICTURE} - {"style"}
+        return {*PLOT_NAMES} - {"style"}
     return ({"plot_unit"} if not verb.spectral else set()) | (set() if verb.scaled else {"plot_scale"})
-
-
-_PICTURE = (
-    ("plot_unit", "--plot-unit", "Unit of the picture's frequency axis: MHz, GHz, THz or cm-1", "UNIT"),
-    ("plot_title", "--plot-title", "Title of the picture", "TEXT"),
-    ("plot_range", "--plot-range", "Range of the horizontal axis, in its unit", "A:B"),
-    ("plot_vertical", "--plot-vertical", "Range of the vertical axis, in its unit", "A:B"),
-    ("plot_scale", "--plot-scale", "Vertical axis: linear or log", "NAME"),
-    ("style", "--style", "Style of the picture: a name of matplotlib's, or an .mplstyle file", "STYLE"),
-)
 
 
 def _input(field: Field) -> Parameter:

@@ -46,24 +46,35 @@ def note(text: str) -> None:
 
 @dataclass(frozen=True)
 class Files:
-    """Files asked for, by option: checked before any work is done, written together after all of it."""
+    """Files asked for, by the name of the output: checked before any work is done, written together after all of it.
 
-    paths: dict[str, Path] = field(default_factory=dict)
-    screen: set[str] = field(default_factory=set)  # options whose text goes to standard output: --json -
+    flags: their options. growing: outputs that are written during the work. on_screen: whether the JSON goes to standard output.
+    """
+
+    paths: dict[str, tuple[Path, ...]] = field(default_factory=dict)
+    flags: dict[str, str] = field(default_factory=dict)
+    growing: set[str] = field(default_factory=set)
+    on_screen: set[str] = field(default_factory=set)
 
     @property
     def names(self) -> list[str]:
-        """The paths written, as texts."""
-        return [str(path) for path in self.paths.values()]
+        """The paths written, as texts; those written during the work first."""
+        ordered = sorted(self.paths, key=lambda name: name not in self.growing)
+        return [str(path) for name in ordered for path in self.paths[name]]
+
+    @property
+    def pending(self) -> list[str]:
+        """The outputs that are written after the work."""
+        return [name for name in self.paths if name not in self.growing]
 
     def ask_json(self, path: str | None) -> None:
         """Remember where the JSON goes: to a file, to standard output (`-`), or nowhere."""
         if path == "-":
-            self.screen.add("--json")
+            self.on_screen.add("json")
         else:
-            self.ask("--json", path, (".json",))
+            self.ask("json", "--json", path, (".json",))
 
-    def ask(self, option: str, path: str | None, suffixes: Sequence[str]) -> None:
+    def ask(self, name: str, option: str, path: str | None, suffixes: Sequence[str]) -> None:
         """Remember a file to write; ValueError for a suffix that the option does not write, or no folder to write in."""
         if path is None:
             return
@@ -77,13 +88,14 @@ class Files:
             raise ValueError(f"{option} {path}: there is no folder {target.parent}; make it first")
         if not os.access(target.parent, os.W_OK):
             raise ValueError(f"{option} {path}: cannot write in {target.parent}: no permission")
-        if any(end == _resolved(option, other) for other in self.paths.values()):
+        if any(end == _resolved(option, other) for others in self.paths.values() for other in others):
             raise ValueError(f"{option} {path}: another option writes the same file")
         _HELD.enter_context(locked_file(end))
-        self.paths[option] = target
+        self.paths[name] = (*self.paths.get(name, ()), target)
+        self.flags[name] = option
 
     def write(self, writers: Mapping[str, Writer]) -> list[str]:
-        """Make every file in a folder beside its place by the writer of its option, then rename: all appear, or none.
+        """Make every file in a folder beside its place by the writer of its output, then rename: all appear, or none.
 
         Returns why files are left out whose format cannot hold the result.
         """
@@ -92,7 +104,8 @@ class Files:
         left_out = list[str]()
         with ExitStack() as stack:
             moves: list[tuple[Path, Path]] = []
-            for option, target in self.paths.items():
+            for name, target in ((output, path) for output in self.pending for path in self.paths[output]):
+                option = self.flags[name]
                 try:
                     folder = stack.enter_context(unfinished_folder(target.parent))
                 except OSError as error:
@@ -101,7 +114,7 @@ class Files:
                     raise ValueError(f"{option} {target}: cannot write in {target.parent}: {error.strerror}") from None
                 try:
                     with naming(target):
-                        writers[option](folder / target.name)
+                        writers[name](folder / target.name)
                 except DoesNotFitError as error:
                     left_out.append(f"{option}: {target} is not written: {error}")
                     continue
@@ -125,8 +138,8 @@ def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str]
 
     Raises NoAnswerError at the end for files whose format cannot hold the result.
     """
-    left_out = files.write({**writers, "--json": lambda path: write_text(path, json())})
-    if "--json" in files.screen:
+    left_out = files.write({**writers, "json": lambda path: write_text(path, json())})
+    if files.on_screen:
         print(json(), end="")
     else:
         show()

@@ -2,49 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import require_one_of
-from rotor.plots.view import Limits, View
+from rotor.plots.view import View
+from rotor.requests.field import PICTURE, Field
+from rotor.requests.fill import renaming
+from rotor.requests.readers import Custom, Range, Reader, Text
 
 if TYPE_CHECKING:
     from rotor.verbs.verb import Verb
 
-SCALES = {"linear": False, "log": True}
 UNITS = ("MHz", "GHz", "THz", "cm-1")
-AXES = ("plot_unit", "plot_title", "plot_range", "plot_vertical", "plot_scale")
-PLOT_NAMES = (*AXES, "style")
 
 
-def _refuse_without_plot(named: Sequence[str], drawn: bool) -> None:
-    if named and not drawn:
-        raise ValueError(f"--{named[0].replace('_', '-')}: expected with --plot, the file of the picture")
+def picture_fields(unit: str = "") -> dict[str, Field]:
+    """The options of a picture, by name; unit: of its horizontal axis."""
+    formula = Custom(lambda text: text.replace("$", r"\$"))  # matplotlib takes dollar signs for formulas
+    log = Custom(lambda text: Text(("linear", "log")).read(text) == "log", metavar="NAME")
+    rows: tuple[tuple[str, Reader, str], ...] = (
+        ("plot_unit", Text(UNITS, "UNIT"), "Unit of the picture's frequency axis: MHz, GHz, THz or cm-1"),
+        ("plot_title", formula, "Title of the picture"),
+        ("plot_range", Range(unit), "Range of the horizontal axis, in its unit"),
+        ("plot_vertical", Range(""), "Range of the vertical axis, in its unit"),
+        ("plot_scale", log, "Vertical axis: linear or log"),
+        ("style", Text(metavar="STYLE"), "Style of the picture: a name of matplotlib's, or an .mplstyle file"),
+    )
+    return {name: Field(reader, help_, name=name, panel=PICTURE) for name, reader, help_ in rows}
 
 
-def _limits(name: str, text: str, unit: str) -> Limits:
-    from rotor.units import parse_range
-
-    try:
-        return parse_range(text, unit)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
+PLOT_NAMES = tuple(picture_fields())
 
 
 def picture_settings(verb: Verb, typed: Mapping[str, Any], drawn: bool) -> Any:
     """The view of a verb's picture from what was typed; drawn: whether there is a picture. Settings by name of a spectrum."""
-    _refuse_without_plot([name for name in PLOT_NAMES if name in typed], drawn)
-    texts = {name: text for name, text in typed.items() if name in AXES}
-    unit, range_ = ("MHz", "range_mhz") if verb.spectral else (verb.drawn or "", "horizontal")
-    readers: dict[str, tuple[str, Callable[[str], Any]]] = {
-        "plot_unit": ("unit", lambda text: require_one_of("--plot-unit", text, UNITS)),
-        "plot_title": ("title", lambda text: text.replace("$", r"\$")),  # matplotlib takes dollar signs for formulas
-        "plot_range": (range_, lambda text: _limits("--plot-range", text, unit)),
-        "plot_vertical": ("vertical", lambda text: _limits("--plot-vertical", text, "")),
-        "plot_scale": ("log", lambda text: SCALES[require_one_of("--plot-scale", text, SCALES)]),
+    across, unit = ("range_mhz", "MHz") if verb.spectral else ("horizontal", verb.drawn or "")
+    fields = {name: field for name, field in picture_fields(unit).items() if name in typed}
+    if fields and not drawn:
+        raise ValueError(f"{next(iter(fields.values())).flag}: expected with --plot, the file of the picture")
+    names = ("unit", "title", across, "vertical", "log")
+    settings = {
+        setting: fields[name].read(typed[name], "option")
+        for name, setting in zip(PLOT_NAMES, names, strict=False)
+        if name in fields
     }
-    settings = {readers[name][0]: readers[name][1](text) for name, text in texts.items()}
     return settings if verb.spectral else View(**settings)
 
 
@@ -55,8 +57,6 @@ def picture_style(typed: Mapping[str, Any]) -> Iterator[None]:
         if "style" in typed:
             from rotor.plots.picture import users_style
 
-            try:
+            with renaming({"style": "--style"}):
                 stack.enter_context(users_style(typed["style"]))
-            except ValueError as error:
-                raise ValueError(f"--{error}") from None
         yield

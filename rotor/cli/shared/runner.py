@@ -33,17 +33,15 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     entries, there = Entries(with_extras(verb, inputs), "option"), with_files(verb, there)
     shown = verb.read_shown(entries)
     with as_typed(verb, there):
-        files, growing = files_of_options(verb, there), files_of_options(verb, there, grows=True)
-        if written := {**files.paths, **growing.paths}:
-            refuse_overwriting(written, inputs)
-    view = picture_settings(verb, there, "--plot" in files.paths)
+        files = files_of_options(verb, there)
+        refuse_overwriting(files, inputs)
+    view = picture_settings(verb, there, "plot" in files.paths)
     request, subject = verb.read(entries, Place(".", note))
     if missing := next((output.flag for output in verb.outputs if output.required and output.name not in there), ""):
         raise ValueError(f"{missing} is missing; --help shows what the command takes")
-    outputs = by_name(verb, files, growing)
+    outputs = {**files.paths}
     request = request if verb.adapt is None else verb.adapt(request, outputs, entries)
-    if "--json" in files.screen:
-        outputs["json"] = ()
+    outputs |= dict.fromkeys(files.on_screen, ())
     if verb.check is not None:
         verb.check(request, outputs, shown)
     if verb.short(request):
@@ -61,12 +59,11 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         for text in verb.notes(answer):
             note(text)
         withhold(verb, answer, files)
-        report.content["files"] = [*growing.names, *files.names]  # type: ignore[index]
-        writers = {verb.output(name).flag: write for name, write in files_of(verb, answer, report).items()}
-        if "--save-scene" in files.paths:
-            left_out = outputs.keys() - by_name(verb, files, growing).keys()
-            named = {name: value for name, value in there.items() if name not in left_out}
-            writers["--save-scene"] = scene_writer(verb, request, subject, entries, named)
+        report.content["files"] = files.names  # type: ignore[index]
+        writers = files_of(verb, answer, report)
+        if "save_scene" in files.paths:
+            named = {name: there[name] for name in files.paths}
+            writers["save_scene"] = scene_writer(verb, request, subject, entries, named)
         show = partial(show_answer, verb, answer, report)
         with verb.naming("option"):
             deliver(files, writers, lambda: verb.json(answer, report.content), show)
@@ -121,8 +118,8 @@ def as_typed(verb: Verb, typed: Mapping[str, Any]) -> Iterator[None]:
 def withhold(verb: Verb, answer: Any, files: Files) -> None:
     """Leave out the files that are not written, with a note."""
     reasons: dict[str, list[str]] = {}
-    for name, reason in verb.withheld(answer, list(by_name(verb, files))).items():
-        reasons.setdefault(reason, []).append(files.paths.pop(verb.output(name).flag).name)
+    for name, reason in verb.withheld(answer, files.pending).items():
+        reasons.setdefault(reason, []).extend(path.name for path in files.paths.pop(name))
     for reason, names in reasons.items():
         note(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not written: {reason}")
 
@@ -146,50 +143,38 @@ def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
     return values
 
 
-def files_of_options(verb: Verb, typed: Mapping[str, Any], grows: bool = False) -> Files:
-    """The files to write when all is done, each with a suffix that can be written; or those that grow while the answer is made."""
-    files = Files()
+def files_of_options(verb: Verb, typed: Mapping[str, Any]) -> Files:
+    """The files to write, each with a suffix that can be written."""
+    files = Files(growing={output.name for output in verb.outputs if output.grows})
     for output in verb.outputs:
-        for number, path in enumerate(_paths(typed.get(output.name)) if output.grows == grows else ()):
-            files.ask(output.flag + " " * number, path, output.suffixes)
-    if not grows:
-        files.ask("--save-scene", typed.get("save_scene"), (".toml",))
-        files.ask_json(typed.get("json"))
+        paths = typed.get(output.name, ())
+        for path in paths if isinstance(paths, tuple) else (paths,):
+            files.ask(output.name, output.flag, path, output.suffixes)
+    files.ask("save_scene", "--save-scene", typed.get("save_scene"), (".toml",))
+    files.ask_json(typed.get("json"))
     return files
 
 
-def refuse_overwriting(written: Mapping[str, Path], typed: Mapping[str, Any]) -> None:
-    """ValueError where a file that one option writes is a file that another option, or the source, names as what is read.
+def refuse_overwriting(files: Files, typed: Mapping[str, Any]) -> None:
+    """ValueError where a file to write is a file that another option, or the source, names as what is read.
 
-    written: by option. typed: everything that may name a file that is read.
+    typed: everything that may name a file that is read.
     """
     texts = [text for value in typed.values() for text in (value if isinstance(value, tuple) else (value,))]
-    inputs = {os.path.realpath(text) for text in texts if isinstance(text, str) and is_file(text)}
-    for name, path in written.items():
-        if os.path.realpath(path) in inputs:
-            raise ValueError(f"{name} {path}: is an input of this command; give another name")
-
-
-def by_name(verb: Verb, *groups: Files) -> dict[str, tuple[Path, ...]]:
-    """The paths of files by the names of their outputs."""
-    names = {"--save-scene": "save_scene", "--json": "json", **{output.flag: output.name for output in verb.outputs}}
-    paths_by_name: dict[str, tuple[Path, ...]] = {}
-    for files in groups:
-        for option, path in files.paths.items():
-            name = names[option.strip()]
-            paths_by_name[name] = (*paths_by_name.get(name, ()), path)
-    return paths_by_name
-
-
-def _paths(value: Any) -> tuple[str, ...]:
-    return () if value is None else value if isinstance(value, tuple) else (value,)
+    inputs = (
+        {os.path.realpath(text) for text in texts if isinstance(text, str) and is_file(text)} if files.paths else ()
+    )
+    for name, paths in files.paths.items():
+        for path in paths:
+            if os.path.realpath(path) in inputs:
+                raise ValueError(f"{files.flags[name]} {path}: is an input of this command; give another name")
 
 
 def refuse_nothing_to_draw(verb: Verb, answer: Any, files: Files) -> None:
     """NoAnswerError where a picture or a profile is asked for and there is nothing to show in it."""
-    drawn = [name for name in ("--plot", "--profile-csv") if name in files.paths]
+    drawn = [name for name in ("plot", "profile_csv") if name in files.paths]
     if drawn and (reason := verb.nothing(answer)):
-        raise NoAnswerError(f"{drawn[0]}: {reason}")
+        raise NoAnswerError(f"{files.flags[drawn[0]]}: {reason}")
 
 
 def working(verb: Verb, workers: Any) -> Any:
