@@ -18,7 +18,7 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import Field
 from rotor.requests.fill import Entries
 from rotor.table import Table, html_of_errors
-from rotor.verbs.verb import Place, Subject, Verb, Work, files_of, report_of, verb_of
+from rotor.verbs.verb import Place, Subject, Verb, Work, file_writer, report_of, verb_of
 
 EXAMPLES = {
     "spectrum": (
@@ -121,13 +121,14 @@ class Result:
         from rotor.formats.atomic_write import write_together
 
         target = Path(path)
-        outputs = [output for output in self.verb.outputs if target.name.endswith(output.suffixes) and not output.grows]
+        files = [output for output in self.verb.outputs if not output.grows or output.name == "csv"]
+        outputs = [output for output in files if target.name.endswith(output.suffixes)]
         if not outputs:
-            suffixes = ", ".join(dict.fromkeys(suffix for output in self.verb.outputs for suffix in output.suffixes))
+            suffixes = ", ".join(dict.fromkeys(suffix for output in files for suffix in output.suffixes))
             raise ValueError(f"{target.name}: {self.verb.name} writes files that end in {suffixes}")
         head = {"command": f"rotor.{self.verb.name}", "input": self.subject.text}
         report = report_of(self.verb, self.answer, head, self.entries)
-        write_together({target: files_of(self.verb, self.answer, report)[outputs[0].name]})
+        write_together({target: file_writer(self.verb, outputs[0], self.answer, report)})
 
     def scene(self, folder: str | os.PathLike[str] = ".") -> Any:
         """The scene that repeats the calculation; `rotor.write_scene` writes it. folder: of the scene, for names of files."""

@@ -38,11 +38,11 @@ def plot_assignment(
         For another suffix, and for an empty view.
     """
     checked_suffix(path)
-    title = view.title or f"{answer.request.peaks.source or 'spectrum'}: {len(answer.species)} species"
-    save(assignment_figure(answer, title, view), path, title, dict(provenance or {}))
+    figure = assignment_figure(answer, view.title or "", view)
+    save(figure, path, figure.axes[0].get_title("left"), dict(provenance or {}))
 
 
-def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> Any:
+def assignment_figure(answer: AssignAnswer, title: str = "", view: View = WHOLE) -> Any:
     """A matplotlib figure of peaks and mirrored predictions, with unexplained peaks below."""
     with styled():
         figure = new_figure((9.0, 5.5))
@@ -61,7 +61,8 @@ def assignment_figure(answer: AssignAnswer, title: str, view: View = WHOLE) -> A
         upper.set_ylabel("Intensity")
         lower.set_ylabel("Unexplained")
         lower.set_xlabel("Frequency (MHz)")
-        upper.set_title(title, loc="left")
+        count = f"{answer.request.peaks.source or 'spectrum'}: {len(answer.species)} species"
+        upper.set_title(title or count, loc="left")
         figure.legend(*upper.get_legend_handles_labels(), fontsize=7, loc="outside lower right", ncols=2)
         show_part(upper, view)
         if view.horizontal is not None:

@@ -11,13 +11,17 @@ import numpy as np
 
 from rotor.alignment.align import AlignmentTrace
 from rotor.alignment.request import AlignAnswer
+from rotor.assignment.answer import AssignAnswer
 from rotor.classical.free.free_motion import FreeMotion
 from rotor.classical.gas.ensembles import Correlations
 from rotor.classical.tumble import PERIODS, TumbleAnswer
+from rotor.fitting.fit import Fit
 from rotor.fluids.request import FluidAnswer
+from rotor.formats.fit_request import FitAnswer
 from rotor.formats.spcat.compare import Comparison
 from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.plots.picture import save, users_style, wrap_titles
+from rotor.formats.structure_request import StructureAnswer
+from rotor.plots.picture import name_text, save, users_style, wrap_titles
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.stark_request import StarkAnswer
 from rotor.quantum.fields.zeeman_request import ZeemanAnswer
@@ -33,6 +37,7 @@ from rotor.statistics.equipartition import Equipartition
 from rotor.thermodynamics.classical_gas import GasAnswer
 from rotor.thermodynamics.functions import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer
+from rotor.thermodynamics.torsion_request import TorsionAnswer
 
 ONE_PANEL = (
     Lines,
@@ -56,11 +61,11 @@ def plot(
     style: str | os.PathLike[str] | None = None,
     **options: Any,
 ) -> Any:
-    """A matplotlib figure of lines, spectra, levels, motions, thermodynamic functions and gases, or of an answer with them.
+    """A matplotlib figure of lines, spectra, levels, motions, thermodynamic functions, gases and fits, or of an answer with them.
 
     Parameters
     ----------
-    thing : Lines, Spectrum, RamanLines, Levels, FreeMotion, ThermoFunctions, Correlations, Equipartition, Catalogue
+    thing : Lines, Spectrum, RamanLines, Levels, FreeMotion, ThermoFunctions, Correlations, Equipartition, Catalogue, Fit
         What to draw: one of these, or the answer to a request for one of them.
     path : path, optional
         A .png, .pdf or .svg file to write.
@@ -261,6 +266,37 @@ def _(thing: ZeemanAnswer, **options: Any) -> Any:
     return zeeman_figure(thing.states, spins=len(thing.request.spin_g), **options)
 
 
+@_figure.register
+def _(thing: Fit, **options: Any) -> Any:
+    from rotor.plots.fit import fit_figure
+
+    return fit_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: AssignAnswer, **options: Any) -> Any:
+    from rotor.plots.assign import assignment_figure
+
+    return assignment_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: TorsionAnswer, **options: Any) -> Any:
+    from rotor.plots.torsion import torsion_figure
+
+    return torsion_figure(thing, **options)
+
+
+@_figure.register
+def _(thing: StructureAnswer, **options: Any) -> Any:
+    from rotor.plots.structure import structure_figure
+
+    molecule, values, method = thing.geometry
+    title = f"{name_text(thing.request.file.family.name)}, {method}"
+    return structure_figure(molecule, **({"values": values, "title": title} | options))
+
+
+_figure.register(FitAnswer, _drawn_by_attribute("fit"))
 _figure.register(StarkAnswer, _drawn_by_attribute("states"))
 _figure.register(RamanAnswer, _drawn_by_attribute("lines"))
 _figure.register(ThermoAnswer, _drawn_by_attribute("functions"))

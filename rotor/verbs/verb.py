@@ -406,18 +406,18 @@ def check_early(structure: type, entries: Entries) -> None:
 
 def files_of(verb: Verb, answer: Any, report: Report) -> dict[str, Callable[[Path], None]]:
     """Functions that write the files of a verb, by output."""
+    return {output.name: file_writer(verb, output, answer, report) for output in verb.outputs if not output.grows}
 
-    def writer(output: Output) -> Callable[[Path], None]:
-        """Write by the output's function, or write its table."""
-        if (by_function := output.write) is not None:
-            return lambda path: by_function(answer, path, report)
 
-        def rows(path: Path) -> None:
-            """Write the table."""
-            from rotor.formats import write
+def file_writer(verb: Verb, output: Output, answer: Any, report: Report) -> Callable[[Path], None]:
+    """A function that writes an output by its function, or writes its table."""
+    if (by_function := output.write) is not None:
+        return lambda path: by_function(answer, path, report)
 
-            write((output.of or verb.table)(answer), path, settings=dict(report.provenance))
+    def rows(path: Path) -> None:
+        """Write the table."""
+        from rotor.formats import write
 
-        return rows
+        write((output.of or verb.table)(answer), path, settings=dict(report.provenance))
 
-    return {output.name: writer(output) for output in verb.outputs if not output.grows}
+    return rows

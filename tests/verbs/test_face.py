@@ -1,5 +1,6 @@
 """The public face: a function for each verb, names that have moved, and what a result gives."""
 
+import ast
 import doctest
 import inspect
 import json
@@ -92,6 +93,38 @@ def test_a_result_has_tables_files_pictures_and_its_scene(folder):
     assert list(spectrum.plan().counts.values()) == [5]
     assert spectrum.errors.numerical < 1e-6
     assert spectrum.plot() is not None
+
+
+DRAWN = set(rotor.VERBS) - {"info", "isotopologues"}  # the verbs with --plot
+
+
+@pytest.mark.parametrize("verb", rotor.VERBS)
+def test_each_result_is_drawn_written_and_shown(verb, folder):
+    """By the call of the example of each function."""
+    result = eval(first_call(EXAMPLES[verb][0]), {"rotor": rotor})
+    assert (verb in DRAWN) == any(output.name == "plot" for output in verb_of(verb).outputs)
+    if verb in DRAWN:
+        assert result.plot("a.png").axes
+        assert (folder / "a.png").stat().st_size > 1000
+    else:
+        with pytest.raises(ValueError, match="there is no picture of a"):
+            result.plot()
+    result.write("a.csv")
+    assert len((folder / "a.csv").read_text().splitlines()) == len(result.table) + 1
+    assert len(result.to_pandas()) == len(result.to_polars()) == len(result.table)
+    assert "<table>" in result._repr_html_()
+    assert len(repr(result).splitlines()) <= 10
+    assert result.errors.line()
+    if verb not in ("assign", "fit", "structure"):  # of numbers, which a scene has in a file
+        assert len(rotor.run_scene(result.scene()).table) == len(result.table)
+        assert result.plan().seconds >= 0
+
+
+def first_call(text):
+    """The call at the start of an expression or inside `len(...)`, up to its closing bracket."""
+    nodes = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call)]
+    verbs = [node for node in nodes if ast.unparse(node.func) in {f"rotor.{verb}" for verb in rotor.VERBS}]
+    return ast.get_source_segment(text, verbs[0])
 
 
 @pytest.mark.parametrize("name", sorted(api.MOVED))
