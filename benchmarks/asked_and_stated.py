@@ -23,9 +23,9 @@ from typing import Any
 import numpy as np
 
 from rotor.scenes.accuracy import unit_of
-from rotor.scenes.numerics import answering, numerics_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene_file import parse_scene
+from rotor.verbs.verb import verb_of
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results" / "asked_and_stated.json"
@@ -220,12 +220,12 @@ def _intensities(scene: Any, request: Any, answer: Any) -> Reference:
 
 def _map(scene: Any, request: Any, answer: Any) -> Reference:
     finer = replace(request, tolerance_mhz=1e-9, jmax=answer.states.jmax + FINER_J)
-    exact = answering(scene.kind)(finer)
+    exact = verb_of(scene.kind).compute(finer)
     return maximum(answer.states.energy_mhz, exact.states.energy_mhz), f"J max {answer.states.jmax + FINER_J}"
 
 
 def _thermo(scene: Any, request: Any, answer: Any) -> Reference:
-    exact = answering(scene.kind)(replace(request, relative_error=1e-13))
+    exact = verb_of(scene.kind).compute(replace(request, relative_error=1e-13))
     names = ("q_rot", "energy_j_per_mol", "cv_over_r")
     pairs = [[getattr(result.functions, name) for result in (answer, exact)] for name in names]
     return max(float(np.abs(a / b - 1).max()) for a, b in pairs), "sums to 1e-13"
@@ -233,7 +233,7 @@ def _thermo(scene: Any, request: Any, answer: Any) -> Reference:
 
 def _align(scene: Any, request: Any, answer: Any) -> Reference:
     finer = replace(request, tolerance=1e-9, jmax=None)
-    exact = answering(scene.kind)(finer)
+    exact = verb_of(scene.kind).compute(finer)
     return maximum(answer.trace.cosines["cos2theta"], exact.trace.cosines["cos2theta"]), "a tolerance of 1e-9"
 
 
@@ -289,7 +289,7 @@ def _gas(scene: Any, request: Any, answer: Any) -> Reference:
 
 def _emission(scene: Any, request: Any, answer: Any) -> Reference:
     finer = replace(request, least_depth=1e-3 * request.least_depth)
-    exact = answering(scene.kind)(finer)
+    exact = verb_of(scene.kind).compute(finer)
     grid = exact.spectrum.frequency_mhz
     interpolated = np.interp(grid, answer.spectrum.frequency_mhz, answer.spectrum.brightness_k)
     return maximum(interpolated, exact.spectrum.brightness_k), "lines of a thousandth of the depth"
@@ -364,7 +364,7 @@ def measured(number: int, kind: str, goal: str, body: str, folder: Path) -> Meas
     result = run_scene(scene, folder=folder, out=folder)
     reached = result.reached
     assert reached is not None
-    answer_of = answering(scene.kind)
+    answer_of = verb_of(scene.kind).compute
     seconds, _ = timed(lambda: answer_of(result.request))
     actual, against = reference_of(scene, result)
     coarse = None if "nothing cheaper" in reached.how else coarser_of(scene, result.request, result.answer)
@@ -373,7 +373,7 @@ def measured(number: int, kind: str, goal: str, body: str, folder: Path) -> Meas
         words, request = coarse
         try:
             coarse_seconds, answer = timed(lambda: answer_of(request))
-            error = max(numerics_of(kind).goals[reached.unit].error(answer), 0.0)
+            error = max(verb_of(kind).load_numerics().goals[reached.unit].error(answer), 0.0)
             if kind == "tumble":
                 error = answer.errors.numerical
         except ValueError as reason:

@@ -28,8 +28,8 @@ from rotor.requests.field import Field
 from rotor.requests.knob import NOTHING_CHEAPER, Choice, knobs_of_fields
 from rotor.requests.readers import Quantity
 from rotor.scenes.choice import Accuracy, Reached, TotalAccuracy
-from rotor.scenes.numerics import answering, numerics_of
 from rotor.scenes.scene import Scene
+from rotor.verbs.verb import verb_of
 
 CONVERTED = ("MHz", "K", "Å")  # units of an accuracy for which others may stand
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -45,7 +45,7 @@ def accuracy_of(scene: Scene) -> float | None:
     stated = accuracy_text(scene)
     if stated is None:
         return None
-    goals, unit, text = numerics_of(scene.kind).goals, unit_of(scene), str(stated).strip()
+    goals, unit, text = verb_of(scene.kind).load_numerics().goals, unit_of(scene), str(stated).strip()
     if unit not in goals:
         units = ", or ".join(f"{unit} of the {goal.of}" for unit, goal in goals.items())
         raise ValueError(f"accuracy: {stated!r}: expected a unit: {units}")
@@ -72,7 +72,7 @@ def unit_of(scene: Scene) -> str:
     >>> [unit_of(GasScene(molecule="water", accuracy=text)) for text in ("1 K", "0.1 %", 0.02)]
     ['K', '%', '']
     """
-    numerics, text = numerics_of(scene.kind), str(accuracy_text(scene)).strip()
+    numerics, text = verb_of(scene.kind).load_numerics(), str(accuracy_text(scene)).strip()
     first = next(iter(numerics.goals))
     if text.endswith("%"):
         unit = numerics.percent(scene)
@@ -87,11 +87,11 @@ def chosen(scene: Scene, request: Any) -> Choice:
     """
     goal, unit = accuracy_of(scene), unit_of(scene)
     assert goal is not None
-    if by_kind := numerics_of(scene.kind).goals[unit].choose:
+    if by_kind := verb_of(scene.kind).load_numerics().goals[unit].choose:
         return by_kind(scene, request, goal)
     for field, knob in knobs_of_fields(request) if unit != "%" else ():
         if knob.least is not None or knob.tried:
-            return knob.choose(field, request, goal, answering(scene.kind))
+            return knob.choose(field, request, goal, verb_of(scene.kind).compute)
     return Choice(request, NOTHING_CHEAPER)
 
 
@@ -100,7 +100,7 @@ def reached(scene: Scene, answer: Any, choice: Choice) -> Reached:
     goal = accuracy_of(scene)
     assert goal is not None
     unit = unit_of(scene)
-    error = max(numerics_of(scene.kind).goals[unit].error(answer), choice.error)
+    error = max(verb_of(scene.kind).load_numerics().goals[unit].error(answer), choice.error)
     if error > goal:
         raise out_of_reach(goal, error, unit, choice.how)
     if isinstance(getattr(scene, "accuracy", None), TotalAccuracy):

@@ -21,9 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.requests.knob import Setting, Sweep, Sweeps
+from rotor.requests.knob import Setting, Sweep, Sweeps, knobs_of_fields
 from rotor.scenes.calculation import Calculation
-from rotor.scenes.numerics import sweeps_of
 from rotor.scenes.scene import Scene
 from rotor.table import Table
 
@@ -100,7 +99,10 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
     calculation = Calculation(scene, folder)
     request = calculation.request()
     choice = calculation.choice(request)
-    return sweeps_of(scene.kind, request if choice is None else choice.request)
+    request, verb = request if choice is None else choice.request, calculation.verb
+    declared = [knob.sweep(field, request, verb.compute) for field, knob in knobs_of_fields(request)]
+    further = verb.load_numerics().sweeps(request)
+    return Sweeps((*declared, *further.knobs), further.remarks)
 
 
 def work_precision(

@@ -12,7 +12,6 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, plan_of_whole, timed
 from rotor.scenes.calculation import Calculation, NoResultError
-from rotor.scenes.numerics import answering, numerics_of
 from rotor.scenes.outputs import checked_paths
 from rotor.scenes.scene import Scene
 from rotor.verbs.verb import verb_of
@@ -80,7 +79,7 @@ def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> 
     """
     from rotor.scenes.accuracy import chosen
 
-    goals = numerics_of(scene.kind).goals
+    goals = verb_of(scene.kind).load_numerics().goals
     if errors is None or errors.numerical is None or errors.unit not in goals or goals[errors.unit].choose is not None:
         return ""
     uncertain = max((errors.model, errors.data), key=lambda term: term.value or 0.0)
@@ -102,7 +101,7 @@ def _plan(calculation: Calculation, request: Any) -> tuple[Plan, Choice | None]:
     from rotor.scenes.accuracy import accuracy_of, unit_of
 
     scene = calculation.scene
-    goal, numerics = accuracy_of(scene), numerics_of(scene.kind)
+    goal, numerics = accuracy_of(scene), verb_of(scene.kind).load_numerics()
     if goal is None:
         return plan_of_request(scene.kind, request), None
     if numerics.planned is not None and unit_of(scene) == next(iter(numerics.goals)):
@@ -122,10 +121,12 @@ def _plan(calculation: Calculation, request: Any) -> tuple[Plan, Choice | None]:
 
 def plan_of_request(kind: str, request: Any) -> Plan:
     """The plan of a request; from a complete run if its kind declares no plan."""
-    if plan := numerics_of(kind).plan:
+    verb = verb_of(kind)
+    if plan := verb.load_numerics().plan:
         return plan(request)
-    answer, table = answering(kind), verb_of(kind).table
-    return plan_of_whole(kind, lambda: answer(request), lambda result: {"counts": {"rows": len(table(result))}})
+    return plan_of_whole(
+        kind, lambda: verb.compute(request), lambda answer: {"counts": {"rows": len(verb.table(answer))}}
+    )
 
 
 def _checked(rounding: float, goal: float, choice: Choice) -> float:

@@ -24,6 +24,8 @@ from rotor.version import version
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
+    from rotor.requests.numerics import Numerics
+
 
 PICTURES = (".png", ".pdf", ".svg")
 Note = Callable[[str], None]
@@ -265,12 +267,17 @@ class Verb:
     instead: str = ""
     has_scenes: ClassVar[bool] = True
 
-    def load_numerics(self) -> Any:
+    def load_numerics(self) -> Numerics:
         """Accuracy goals, sweeps and plan; by default those of the knobs alone."""
         from rotor.requests.numerics import Numerics
 
         module, _, name = self.numerics.partition(":")
-        return getattr(import_module(module), name) if module else Numerics()
+        numerics: Numerics = getattr(import_module(module), name) if module else Numerics()
+        return numerics
+
+    def compute(self, request: Any) -> Any:
+        """The answer to a request, with default display options."""
+        return self.answer(request, Work(shown=self.read_shown(Entries())))
 
     @property
     def has_json(self) -> bool:

@@ -65,9 +65,8 @@ def test_the_intensity_of_all_lines_is_within_what_is_stated(kind, body, accurac
     """Against lists without a cut."""
     from dataclasses import replace
 
-    from rotor.scenes.numerics import verb_of
     from rotor.scenes.run import run_scene
-    from rotor.verbs.verb import Work
+    from rotor.verbs.verb import Work, verb_of
 
     result = run_scene(parse_scene(HEAD.format(kind, accuracy) + body))
     name, column = {

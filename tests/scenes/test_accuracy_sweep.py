@@ -12,7 +12,7 @@ from places import PROJECT
 
 from rotor.quantum.estimates.accuracy import energies_like, to_order
 from rotor.requests.knob import Measure, Setting, Sweep
-from rotor.scenes import accuracy_sweep, numerics
+from rotor.scenes import accuracy_sweep
 from rotor.scenes.accuracy_panels import panels_of
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, sweep, work_precision
 from rotor.scenes.scene import (
@@ -202,7 +202,7 @@ def test_raman_lines():
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_the_numerics_of_every_kind_can_be_loaded(kind):
-    entry = numerics.numerics_of(kind)
+    entry = verb_of(kind).load_numerics()
     assert entry.goals
     assert all(callable(goal.error) for goal in entry.goals.values())
     assert callable(entry.plan or verb_of(kind).answer)
