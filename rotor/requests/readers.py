@@ -43,6 +43,21 @@ class Reader:
         return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+class Listed(Reader):
+    """Several values, which a scene holds as a list. item: type of each."""
+
+    item: Any = str
+    between = ","
+
+    def write(self, value: Any) -> list[Any]:
+        """The values as a list."""
+        return [self.item(part) for part in value]
+
+    def show(self, value: Any) -> str:
+        """The values between commas."""
+        return self.between.join(f"{part:g}" if isinstance(part, float) else str(part) for part in value)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Text(Reader):
     """A text. words: the allowed words; any text if empty."""
@@ -181,7 +196,7 @@ def check_temperature(value: float, text: str) -> None:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Grid(Reader):
+class Grid(Listed):
     """Numbers in a unit, from start:stop:count, a text with commas, or a list. points: the count if the text gives none."""
 
     unit: str = ""
@@ -190,6 +205,7 @@ class Grid(Reader):
     each: Quantity | None = None
     metavar: str = "GRID"
     scene_type = list[float] | str
+    item = float
 
     def read(self, raw: Any) -> tuple[float, ...]:
         """The numbers."""
@@ -215,10 +231,6 @@ class Grid(Reader):
         if text.count(":") == 2 and count.isdecimal() and (len(count) > 18 or int(count) > self.most_points):
             raise ValueError(f"{text!r}: at most {self.most_points} numbers; ask for fewer")
         return tuple(parse_grid(text, self.unit, self.points).tolist())
-
-    def write(self, value: Any) -> list[float]:
-        """The numbers as a list."""
-        return [float(number) for number in value]
 
     def show(self, value: Any) -> str:
         """Count, first and last number."""
@@ -251,7 +263,7 @@ class Range(Reader):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Numbers(Reader):
+class Numbers(Listed):
     """Numbers in a unit, from a text with commas or a list. counts: allowed lengths; any length if empty."""
 
     unit: str = ""
@@ -259,6 +271,7 @@ class Numbers(Reader):
     example: str = "0,0,1"
     metavar: str = "LIST"
     scene_type = list[float]
+    item = float
 
     def read(self, raw: Any) -> tuple[float, ...]:
         """The numbers."""
@@ -272,41 +285,26 @@ class Numbers(Reader):
             raise ValueError(f"{raw!r}: expected {count + ' ' if count else ''}finite numbers, such as {self.example}")
         return values
 
-    def write(self, value: Any) -> list[float]:
-        """The numbers as a list."""
-        return [float(number) for number in value]
-
-    def show(self, value: Any) -> str:
-        """The numbers between commas."""
-        return ",".join(f"{number:g}" for number in value)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Names(Reader):
+class Names(Listed):
     """Texts: an option that may be repeated, a list in a scene."""
 
     metavar: str = "NAME"
     scene_type = list[str]
     many: bool = True
+    between = ", "
 
     def read(self, raw: Any) -> tuple[str, ...]:
         """The texts."""
         return (raw,) if isinstance(raw, str) else tuple(raw)
-
-    def write(self, value: Any) -> list[str]:
-        """The texts as a list."""
-        return list(value)
-
-    def show(self, value: Any) -> str:
-        """The texts between commas."""
-        return ", ".join(value)
 
 
 _COMMAS = re.compile(r",(?![^()\[\]]*[)\]])")  # commas inside brackets belong to a name
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class NameList(Reader):
+class NameList(Listed):
     """Distinct names, from a text with commas or a list. words: the allowed names; any if empty. Commas in brackets belong to a name."""
 
     words: Collection[str] = ()
@@ -324,14 +322,6 @@ class NameList(Reader):
         if twice:
             raise ValueError(f"{raw!r}: {twice} is named twice; once is enough")
         return tuple(names)
-
-    def write(self, value: Any) -> list[str]:
-        """The names as a list."""
-        return list(value)
-
-    def show(self, value: Any) -> str:
-        """The names between commas."""
-        return ",".join(value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -41,8 +41,7 @@ class Calculation:
     @cached_property
     def verb(self) -> Verb:
         """The verb of the scene's kind; no other verb is imported."""
-        verb: Verb = verb_of(self.scene.kind)
-        return verb
+        return verb_of(self.scene.kind)
 
     @cached_property
     def entries(self) -> Entries:

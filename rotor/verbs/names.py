@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 _ORDER = (
     "spectrum", "levels", "raman", "thermo", "tumble", "gas", "fluid", "stark", "zeeman", "align", "fit", "emission",
@@ -21,8 +19,3 @@ def declared_verbs() -> tuple[str, ...]:
 
 
 SCENE_VERBS = tuple(dict.fromkeys((*_ORDER, *declared_verbs())))  # kinds of scene
-
-
-def verb_of(name: str) -> Any:
-    """The `rotor.verbs.verb.Verb` of this name; only its module is imported."""
-    return import_module(f"rotor.verbs.{name}").VERB

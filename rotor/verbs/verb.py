@@ -18,7 +18,6 @@ from rotor.requests.readers import Flag
 from rotor.table import Table
 from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
 from rotor.verbs.names import declared_verbs as declared_verbs
-from rotor.verbs.names import verb_of as verb_of
 from rotor.version import version
 
 if TYPE_CHECKING:
@@ -379,6 +378,12 @@ class Verb:
     def output(self, name: str) -> Output:
         """A file by its name."""
         return next(output for output in self.outputs if output.name == name)
+
+
+def verb_of(name: str) -> Verb:
+    """The verb of this name; only its module is imported."""
+    verb: Verb = import_module(f"rotor.verbs.{name}").VERB
+    return verb
 
 
 def report_of(

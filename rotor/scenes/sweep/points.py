@@ -51,9 +51,8 @@ class Axis:
 
 @dataclass(frozen=True)
 class Point:
-    """One point of a sweep: its place in the order, the values by dotted name, and the tables of its scene."""
+    """One point of a sweep: the values by dotted name, and the tables of its scene."""
 
-    number: int
     values: Mapping[str, Any]
     content: Mapping[str, Any]
 
@@ -75,7 +74,7 @@ class Points:
         return math.prod(len(axis.values) for axis in self.axes)
 
     def __iter__(self) -> Iterator[Point]:
-        for number, indices in enumerate(self._indices()):
+        for indices in self._indices():
             content = deepcopy(dict(self.base))
             for axis, i in zip(self.axes, indices, strict=True):
                 put(content, axis.name, axis.values[i])
@@ -87,7 +86,7 @@ class Points:
                     [named(text, words) for text in texts] if isinstance(texts, list) else named(texts, words)
                 )
             shown = {axis.name: axis.shown[i] for axis, i in zip(self.axes, indices, strict=True)}
-            yield Point(number, shown, content)
+            yield Point(shown, content)
 
     def _indices(self) -> Iterator[tuple[int, ...]]:
         return itertools.product(*(range(len(axis.values)) for axis in self.axes))

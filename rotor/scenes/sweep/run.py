@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ from rotor.checks import NoAnswerError
 from rotor.formats.atomic_write import FULL
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import Scene, SceneResult
-from rotor.scenes.scene_file import scene_of, scene_text
+from rotor.scenes.scene_file import scene_text
 from rotor.scenes.sweep.combined import KEY_LENGTH, CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
-from rotor.scenes.sweep.points import check_first, points, text_of
+from rotor.scenes.sweep.points import Point, check_first, points
 from rotor.scenes.sweep.record import Record, appended, read_records
 from rotor.scenes.sweep.result import SweepResult
 from rotor.temporary import locked_file
@@ -34,8 +34,7 @@ class Job:
     """A point on its way to a worker."""
 
     key: str
-    values: Mapping[str, Any]
-    content: Mapping[str, Any]
+    point: Point
     folder: str
     out: str
     combined: tuple[str, ...]
@@ -107,14 +106,7 @@ def run_sweep(
                     finished += 1
                     progress(finished, len(every))
                 else:
-                    yield Job(
-                        key,
-                        point.values,
-                        point.content,
-                        os.fspath(folder),
-                        os.fspath(out),
-                        tuple(every.combined.values()),
-                    )
+                    yield Job(key, point, os.fspath(folder), os.fspath(out), tuple(every.combined.values()))
             if joined is not None and executor is not None:  # while others compute
                 joined.load()
 
@@ -183,12 +175,11 @@ def run_point(job: Job) -> Record:
     """
     start = time.perf_counter()
     try:
-        scene = scene_of(job.content, f"sweep {text_of(job.values)}")
-        result = run_scene(scene, folder=job.folder, out=job.out)
+        result = run_scene(job.point.scene, folder=job.folder, out=job.out)
         files = [str(path.resolve()) for path in result.files]
         joined = CombinedFile.of(job.combined, job.out)
         if joined is not None:
-            joined.write_part(job.key, job.values, result.table)
+            joined.write_part(job.key, job.point.values, result.table)
         results = _results(result)
     except (ValueError, NoAnswerError) as error:
         return _failed(job, str(error), time.perf_counter() - start)
@@ -200,7 +191,7 @@ def run_point(job: Job) -> Record:
         return _failed(job, f"{type(error).__name__}: {error}; this is a defect", time.perf_counter() - start)
     return {
         "key": job.key,
-        "values": dict(job.values),
+        "values": dict(job.point.values),
         "rows": len(result.table),
         "seconds": round(result.seconds, 6),
         "files": files,
@@ -216,4 +207,4 @@ def _results(result: SceneResult) -> dict[str, Any]:
 
 
 def _failed(job: Job, reason: str, seconds: float) -> Record:
-    return {"key": job.key, "values": dict(job.values), "seconds": round(seconds, 6), "error": reason}
+    return {"key": job.key, "values": dict(job.point.values), "seconds": round(seconds, 6), "error": reason}
