@@ -14,7 +14,7 @@ import typer
 
 from rotor import cli
 from rotor.requests.field import PANELS, Field
-from rotor.verbs.names import declared_verbs, verb_of
+from rotor.verbs.verb import declared_verbs, verb_of
 
 EVERYWHERE = {"--json", "--save-scene", "--errors", "--sources", "--help", "--help-all"}
 PAGE = Path(__file__).parent / "options.md"

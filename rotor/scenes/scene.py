@@ -19,7 +19,6 @@ import msgspec
 from msgspec import Struct, field
 
 from rotor.scenes.choice import Accuracy
-from rotor.scenes.sections import MoleculeSection
 from rotor.verbs.scene_tables import entries_before, tables_of
 from rotor.verbs.tables import described
 from rotor.verbs.verb import SCENE_VERBS, verb_of
@@ -130,16 +129,6 @@ def __getattr__(name: str) -> Any:
     if name.endswith("Scene") and kind in SCENE_VERBS and name == f"{kind.capitalize()}Scene":
         return KINDS[kind]
     raise AttributeError(f"module 'rotor.scenes.scene' has no attribute {name!r}")
-
-
-def molecule_of(scene: Scene) -> MoleculeSection | None:
-    """The molecule of a scene as a table (a plain name is its source); None if the scene has none.
-
-    >>> molecule_of(KINDS["thermo"](molecule="water")).source
-    'water'
-    """
-    molecule = getattr(scene, "molecule", None)
-    return MoleculeSection(source=molecule) if isinstance(molecule, str) else molecule
 
 
 def within(folder: str | os.PathLike[str], name: str) -> str:

@@ -222,7 +222,7 @@ def test_a_sweep_goes_on_where_a_worker_is_killed(folder, monkeypatch):
             self.pool = pool
 
         def submit(self, function, job):
-            return self.pool.submit(_end_this_process if job.values["observables.jmax"] == 3 else function, job)
+            return self.pool.submit(_end_this_process if job.point.values["observables.jmax"] == 3 else function, job)
 
     with worker_processes(2) as pool:
         result = run_sweep(scene, record="r", executor=Deadly(pool))

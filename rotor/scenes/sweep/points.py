@@ -20,7 +20,7 @@ from typing import Any
 import msgspec
 
 from rotor.scenes.outputs import check_path, checked_paths, suffixes_of
-from rotor.scenes.scene import Scene, molecule_of
+from rotor.scenes.scene import Scene
 from rotor.scenes.scene_file import scene_of
 from rotor.scenes.sweep.molecule_list import is_list, list_entries
 
@@ -120,8 +120,8 @@ def is_sweep(scene: Scene, folder: str | os.PathLike[str] = ".") -> bool:
 
 def _listed(scene: Scene, folder: str | os.PathLike[str]) -> str | None:
     """The list of molecules that stands in place of the molecule of a scene."""
-    molecule = molecule_of(scene)
-    source = None if molecule is None else molecule.source
+    molecule = getattr(scene, "molecule", None)
+    source = molecule if isinstance(molecule, str) else getattr(molecule, "source", None)
     return source if source is not None and is_list(source, folder) else None
 
 
