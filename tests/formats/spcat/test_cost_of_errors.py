@@ -37,8 +37,8 @@ def _calls(par, request) -> int:
 
 @pytest.mark.parametrize("name", ["fso3", "oc33s", "h2coh", "patterns_of_i_tot", "ch3cn_quad", "euler_series"])
 def test_errors_cost_no_more_calls_than_the_prediction_does(name: str):
-    """Calls with errors over those without: 2.5, 1.7, 3.9, 3.3 and 1.7 where derivatives were made block by block; 2.3 for series where each
-    operator was made for the levels and again for their derivatives."""
+    """Calls with errors over those without: 2.5, 1.7, 3.9, 3.3 and 1.7 where derivatives were made block by block; 2.3 for series where
+    each operator was made for the levels and again for their derivatives."""
     par, request = _files(name)
     held = replace(par, parameters=tuple(replace(p, error=1e-37) for p in par.parameters), rest="")
     par = replace(par, parameters=tuple(replace(p, error=max(p.error, abs(p.value) * 1e-4)) for p in par.parameters))

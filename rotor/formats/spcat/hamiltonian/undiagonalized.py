@@ -14,6 +14,7 @@ from rotor.formats.spcat.hamiltonian.labels import functions_of, renamed
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
 
+
 def is_undiagonalized(levels: Levels, diag: int) -> bool:
     """Whether DIAG is below 0 and the levels are those of blocks over Wang functions, so that their functions can be listed."""
     whole = all(getattr(block, "allowed", None) is None for block in levels.blocks)
