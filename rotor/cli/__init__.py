@@ -208,6 +208,8 @@ def _usage_text(error: Exception) -> str:
     text = str(error.format_message())  # type: ignore[attr-defined]
     if text.startswith("No such command") and text.endswith("."):  # with a guess, the text ends with a question mark
         return f"{text.rstrip('.')}; --help lists the commands"
+    if text.startswith("No such option: --constants"):
+        return "No such option: --constants; this verb needs the atoms: a name, a file, or 'SMILES:...'"
     extra = text.removeprefix("Got unexpected extra argument(s) ").removeprefix("Got unexpected extra argument ")
     if extra == text:
         return text

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from rotor.arrays import Floats
 from rotor.assignment.peak_finding import peaks_of_spectrum
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.formats.packed import first_bytes, load
+from rotor.formats.spectra.axis import AXIS_UNITS
 
 EQUAL_STEPS = 0.02  # largest relative spread of the steps of a grid
 LEAST_GRID = 64  # fewest points of a grid
@@ -21,8 +23,8 @@ _FITS = b"SIMPLE  ="
 def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | None = None) -> PeakList:
     """The peaks of a file.
 
-    A .csv file, packed or not, has two or three columns: frequency in MHz, intensity, and the standard error of the frequency; a heading is
-    optional. A .npy file has the same as columns or rows. Frequencies in equal steps are a spectrum, whose peaks are found; FITS is one
+    A .csv file, packed or not, has two or three columns: frequency, intensity, and the standard error of the frequency; a heading is
+    optional. Frequencies are in MHz, or in the unit of their heading (frequency_ghz, f (cm-1)). A .npy file has the same as columns or rows. Frequencies in equal steps are a spectrum, whose peaks are found; FITS is one
     always.
 
     Parameters
@@ -87,7 +89,7 @@ def _from_npy(name: str) -> Floats:
 
 def _from_csv(path: Path) -> Floats:
     text, name = load(path)
-    rows, heading = list[list[float]](), True
+    rows, heading, factor = list[list[float]](), True, 1.0
     lines = text.decode("utf-8", "replace").splitlines()
     for number, row in enumerate(csv.reader(line.replace(";", ",") for line in lines), 1):
         cells = [cell.strip() for cell in row if cell.strip()]
@@ -97,7 +99,7 @@ def _from_csv(path: Path) -> Floats:
             values = [float(cell) for cell in cells[:3]]
         except ValueError:
             if heading and not rows:
-                heading = False
+                heading, factor = False, _unit_of_heading(cells[0])
                 continue
             raise ValueError(
                 f"{name}, line {number}: {','.join(cells)[:60]!r}: expected two or three numbers"
@@ -109,4 +111,12 @@ def _from_csv(path: Path) -> Floats:
         rows.append(values)
     if not rows:
         raise ValueError(f"{name}: no numbers in it; expected frequency, intensity[, error] in each line")
-    return np.array(rows)
+    columns = np.array(rows)
+    columns[:, [0, 2][: columns.shape[1] - 1]] *= factor
+    return columns
+
+
+def _unit_of_heading(text: str) -> float:
+    """MHz for each unit of frequency that ends a heading such as frequency_ghz or "f (GHz)"; 1 without a unit."""
+    unit = re.search(r"(?:^|[^a-z])([kmgt]?hz|cm-1|cm\^-1|1/cm)\W*$", text.casefold())
+    return AXIS_UNITS[unit[1]] if unit else 1.0

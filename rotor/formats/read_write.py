@@ -102,8 +102,11 @@ def _meaning(word: str) -> Path | str:
 
         from rotor.formats.molecules.library import names
 
-        near = difflib.get_close_matches(word, [*names(), *_g2_names()], n=3)
-        meant = f"did you mean {', '.join(dict.fromkeys(near))}? " if near else ""
+        known = dict.fromkeys([*names(), *_g2_names()])
+        typed = word.casefold().replace("0", "o")  # a zero for the letter O, another case
+        alike = [name for name in known if name.casefold() == typed]
+        near = dict.fromkeys([*alike, *difflib.get_close_matches(word, known, n=3)])
+        meant = f"did you mean {', '.join(list(near)[:3])}? " if near else ""
         raise ValueError(
             f"{word!r} is no file here, no molecule of the library ('rotor molecules' lists it) and none of ASE's g2 set; "
             f"{meant}a SMILES is written 'SMILES:...'"

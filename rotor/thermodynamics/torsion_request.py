@@ -37,6 +37,12 @@ TABLE = "table"
 SAME_WELLS = 0.05  # largest difference between the well probabilities of the two components of a tunnelling doublet
 SHARED = 0.75  # largest probability in one well for a component of a tunnelling doublet
 _TERM = re.compile(r"([VW])(\d+)\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zµ][^\s,=]*)?(?=[\s,]|$)")
+_CM_PER_KJ_PER_MOL = units.CM_PER_EV / units.KJ_PER_MOL_EV
+_MOLAR_UNITS = {
+    "kJ/mol": _CM_PER_KJ_PER_MOL,
+    "kcal/mol": 4.184 * _CM_PER_KJ_PER_MOL,
+    "meV": 1e-3 * units.CM_PER_EV,
+}  # in cm-1
 Progress = Callable[[int, int], object]
 
 
@@ -74,7 +80,13 @@ class TorsionRequest:
         common=True, example="V3=400 cm-1",
     )  # fmt: skip
     points: int = declared(POINTS, Whole(6, 720), "Angles of a scan, in a whole turn", "numerics.points", knob=ANGLES)
-    vmax: int = declared(3, Whole(0, 200), "Highest torsional level", "numerics.vmax", common=True)
+    vmax: int = declared(
+        3,
+        Whole(0, 200),
+        "Highest level v of each symmetry species; without symmetry, of each well",
+        "numerics.vmax",
+        common=True,
+    )
     temperatures_k: Sequence[float] = declared(
         TEMPERATURES_K, Grid("K", each=Quantity("K", above=0)), "Temperatures: 10:1000K:100 or 10,20,50 K", "conditions.temperature",
         common=True, example="10:1000K:100",
@@ -409,9 +421,18 @@ def given_terms(text: str, rotation: BondRotation) -> TorsionalPotential:
             raise ValueError(
                 f"potential: {match[1]}{n}: the bond has {fold} equal positions in a turn; expected n = {fold}, {2 * fold}, ..."
             )
-        value = units.parse_quantity(f"{match[3]} {match[4] or unit}", "cm-1")
-        tables[match[1]][n] = value * units.MHZ_PER_CM
+        tables[match[1]][n] = _energy_mhz(match[3], match[4] or unit)
     return TorsionalPotential(tables["V"], tables["W"])
+
+
+def _energy_mhz(number: str, unit: str) -> float:
+    """An energy in MHz; barriers are also published in kJ/mol and kcal/mol."""
+    if unit in _MOLAR_UNITS:
+        return float(number.replace("−", "-")) * _MOLAR_UNITS[unit] * units.MHZ_PER_CM
+    try:
+        return units.parse_quantity(f"{number} {unit}", "cm-1") * units.MHZ_PER_CM
+    except ValueError as error:
+        raise ValueError(f"potential: {error}, {', '.join(_MOLAR_UNITS)}") from None
 
 
 def table_barrier(rotation: BondRotation) -> tuple[TorsionalPotential, str]:

@@ -59,7 +59,8 @@ def show(answer: TorsionAnswer, report: Report) -> Iterable[Part | None]:
 
 def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
     low, high = record["reduced_moment_range_u_angstrom2"]
-    spread = f", {low:.6g} to {high:.6g} over a turn" if high - low > 1e-6 * high else ""
+    turn = f"a turn of {record['symmetry_number']} equal positions" if answer.scan is None else "the relaxed scan"
+    spread = f" of the geometry; {low:.6g} to {high:.6g} over {turn}" if high - low > 1e-6 * high else ""
     wells = [f"{well['angle_degrees']:.4g}° ({round(well['energy_cm'], 6):.4g} cm⁻¹)" for well in record["wells"]]
     quanta = sorted({round(well["harmonic_cm"], 1) for well in record["wells"]})
     harmonic = ", ".join(f"{quantum:g}" for quantum in quanta)

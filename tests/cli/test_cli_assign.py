@@ -132,3 +132,18 @@ def test_an_array_that_is_no_list_of_peaks_is_refused(call: Call, array: np.ndar
     code, _, error = call("assign", "peaks.npy")
     assert code == 2
     assert f"an array of shape {array.shape}; two or three columns or rows of numbers are needed" in error
+
+
+@pytest.mark.parametrize(
+    ("heading", "factor"),
+    [("frequency_mhz,intensity", 1.0), ("frequency_ghz,intensity", 1e-3), ("f (cm-1),I", 1 / 29979.2458), ("f,I", 1.0)],
+)
+def test_a_heading_has_the_unit_of_the_frequencies(folder, heading, factor):
+    """A column frequency_ghz was read as MHz and refused."""
+    frequencies = [8100.25, 8211.5, 9301.125, 10007.5]
+    rows = [f"{f * factor!r},{n + 1},{0.01 * factor!r}" for n, f in enumerate(frequencies)]
+    Path("p.csv").write_text("\n".join([f"{heading},error", *rows]) + "\n")
+    peaks = read_peaks("p.csv")
+    np.testing.assert_allclose(peaks.frequency_mhz, frequencies, rtol=1e-12)
+    np.testing.assert_allclose(peaks.uncertainty_mhz, 0.01, rtol=1e-9)
+    assert peaks.intensity.tolist() == [1, 2, 3, 4]

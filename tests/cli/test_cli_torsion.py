@@ -86,3 +86,21 @@ def test_spin_weights_of_a_turning_group_are_not_called_missing(call):
     assert code == 0
     assert "by torsional species, from the nuclei of the turning groups" in out
     assert "not given" not in out
+
+
+@pytest.mark.parametrize(
+    ("potential", "cm"), [("V3=1 kcal/mol", 349.7551), ("V3=4.184 kJ/mol", 349.7551), ("V3=10 meV", 80.65544)]
+)
+def test_a_barrier_in_units_of_chemistry(call, potential, cm):
+    """1 kcal/mol = 4.184 kJ/mol; NIST's table of conversion factors has 1 kJ/mol = 83.593 cm-1. Refused before."""
+    code, out, _ = call("torsion", "CH3OH", "--bond", "1-2", "--potential", potential, "--json", "-")
+    assert code == 0
+    assert json.loads(out)["barrier_cm"] == pytest.approx(cm, rel=1e-6)
+
+
+def test_moments_of_the_geometry_and_over_a_turn(call):
+    """0.6348, and 0.6350 to 0.6356 over a turn: the second is the mean of three positions, which the geometry has within 0.03 %."""
+    _, out, _ = call("torsion", "CH3OH", "--bond", "1-2", "--potential", "V3=373 cm-1")
+    assert "u Å² of the geometry; 0.635004 to 0.635623 over a turn of 3 equal positions" in " ".join(out.split())
+    _, out, _ = call("torsion", "CH3OH", "--bond", "1-2")
+    assert "over the relaxed scan" in " ".join(out.split())

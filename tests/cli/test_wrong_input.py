@@ -141,3 +141,30 @@ def test_a_list_where_a_single_molecule_is_needed(call, folder):
     assert err.startswith("error: list.csv: a CSV file is a list of molecules")
     assert 'molecule = "list.csv"' in err
     assert "rotor run" in err
+
+
+FAMILY = 'name = "OCS"\n[[isotopologue]]\nconstants = "B=6081.492 MHz"\n[[isotopologue]]\nisotopes = "S=34S"\nconstants = "B=5932.8 MHz"\n'
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("info H20", "did you mean H2O, "),
+        ("info h2o", "did you mean H2O? "),
+        ("info family.toml", "family.toml: a family of isotopologues, not one molecule; rotor structure reads it"),
+        (
+            "isotopologues --constants B=1GHz",
+            "No such option: --constants; this verb needs the atoms: a name, a file, or ",
+        ),
+        (
+            "torsion CH3OH --bond 1-2 --potential V3=4foo",
+            "use one of Hz, kHz, MHz, GHz, THz, cm-1, K, kJ/mol, kcal/mol, meV",
+        ),
+    ],
+)
+def test_a_remedy_that_does(files, words, said):
+    """H20 was answered with H2, a family with an unknown key, constants of isotopologues with --spin-constants."""
+    Path("family.toml").write_text(FAMILY)
+    code, out, err = files(*words.split())
+    assert (code, out) == (2, "")
+    assert said in err

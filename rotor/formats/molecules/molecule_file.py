@@ -252,6 +252,8 @@ def parse_molecule_file(
     'B=57635.96804 D=0.1835 MHz'
     """
     content = parse_toml(text, where)
+    if "isotopologue" in content:
+        raise ValueError(f"{where}: a family of isotopologues, not one molecule; rotor structure reads it")
     refuse_unknown_keys(content, ("name", "names", *_TABLES), where)
     tables = {name: TableReader(where, name, content[name]) for name in _TABLES if name in content}
     if not {"geometry", "constants"} & tables.keys():

@@ -20,7 +20,7 @@ from rotor.observed.spectrum import ABSORBANCE, JANSKY_PER_BEAM, KELVIN, VOLT
 RADIO, OPTICAL, RELATIVISTIC = "radio", "optical", "relativistic"
 CONVENTIONS = (RADIO, OPTICAL, RELATIVISTIC)
 _C_KM_S = units.SPEED_OF_LIGHT_M_PER_S / 1e3
-_AXIS_UNITS = {
+AXIS_UNITS = {
     "hz": 1e-6, "khz": 1e-3, "mhz": 1.0, "ghz": 1e3, "thz": 1e6, "cm-1": units.MHZ_PER_CM,
     "cm^-1": units.MHZ_PER_CM, "1/cm": units.MHZ_PER_CM,
 }  # fmt: skip
@@ -83,8 +83,8 @@ def axis_mhz(values: Any, unit: str, where: str, choices: ReadChoices, rest_mhz:
     """A spectral axis in MHz; ValueError unless its unit is of frequency, velocity (with a rest frequency) or length."""
     text = " ".join(unit.lower().split())
     numbers = np.asarray(values, dtype=np.float64)
-    if text in _AXIS_UNITS:
-        return np.asarray(numbers * _AXIS_UNITS[text])
+    if text in AXIS_UNITS:
+        return np.asarray(numbers * AXIS_UNITS[text])
     if text in _VELOCITY_UNITS:
         rest = choices.rest_mhz or rest_mhz
         if rest is None:
@@ -92,7 +92,7 @@ def axis_mhz(values: Any, unit: str, where: str, choices: ReadChoices, rest_mhz:
         return frequency_of_velocity(numbers * _VELOCITY_UNITS[text], rest, choices.convention or RADIO)
     if text in _LENGTH_UNITS:
         return np.asarray(units.SPEED_OF_LIGHT_M_PER_S * 1e-6 / (numbers * _LENGTH_UNITS[text]))
-    accepted = ", ".join([*_AXIS_UNITS, *list(_VELOCITY_UNITS)[:2], *_LENGTH_UNITS])
+    accepted = ", ".join([*AXIS_UNITS, *list(_VELOCITY_UNITS)[:2], *_LENGTH_UNITS])
     raise ValueError(f"{where}: spectral axis in {unit!r}; known units are {accepted}")
 
 
