@@ -16,18 +16,18 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import AxialBlock
-from rotor.quantum.fields.block_states import BlockStates, basis_order, count_of, enough_states, solve_blocks
+from rotor.quantum.fields.block_states import BlockStates, basis_order, count_of, solve_blocks
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.chains import TOGETHER
 from rotor.quantum.fields.map_request import MapRequest, over, terms_over
-from rotor.quantum.fields.solver import DENSE, SPANNED, Terms, at_fields, derivatives, expectation, spanning
+from rotor.quantum.fields.solver import DENSE, SPANNED, Terms, at_fields, derivatives, expectation, spanned_states
 from rotor.table import Table
 
 Of = TypeVar("Of")
@@ -136,22 +136,6 @@ class FieldMap(Table):
         raise ValueError(
             f"no state {label!r} with M = {m}; there are {', '.join(f'{name!r} M={value}' for name, value in present)}"
         )
-
-
-class _Solved(NamedTuple):
-    """States of a block: energies, slopes -dE/dx in MHz, edge populations (fields, states), cosines by name, free rows (states,).
-
-    error: bound of the truncation error (fields, states), MHz. round_off: of an energy, MHz.
-    """
-
-    energies: Floats
-    slopes: Floats
-    edge: Floats
-    cosines: dict[str, Floats]
-    rows: Ints
-    block: FieldBlock
-    error: Floats
-    round_off: float
 
 
 def field_map(request: MapRequest, jmax: int | None = None, executor: Executor | None = None) -> FieldMap:
@@ -300,30 +284,11 @@ def _lowest_jmax(request: MapRequest) -> int:
     raise ValueError(f"levels beyond J = {HIGHEST_J} lie among those up to J = {request.j_highest}; follow fewer")
 
 
-def _solve(request: MapRequest, jmax: int, blocks: Sequence[FieldBlock]) -> list[_Solved]:
-    """The states of blocks at all fields."""
-    terms = [request.matrices(block) for block in blocks]
-    solved = solve_blocks(request, list(zip(blocks, terms, strict=True)), request.fields, jmax)
-    return [_measured(request, jmax, *pair) for pair in zip(terms, solved, strict=True)]
-
-
 def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
     """Whether all blocks are chains small enough for one sweep, which takes milliseconds and gains nothing from other processes."""
     states = sum(count_of(request, block, block.free_order) for block in blocks)
     chains = all(isinstance(block, AxialBlock) for block in blocks)
     return chains and max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
-
-
-def _measured(request: MapRequest, jmax: int, terms: Terms, states: BlockStates) -> _Solved:
-    """Slopes, cosines and leakage of the states of a block."""
-    block, fields, vectors = states.block, request.fields, states.vectors
-    slopes = -derivatives(terms_over(terms, states.places), fields, vectors)
-    cosines = {
-        name: expectation(over(block.dense(operator), states.places), vectors)
-        for name, operator in request.observables.items()
-    }
-    edge = (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1)
-    return _Solved(states.energies, slopes, edge, cosines, states.rows, block, states.error, _round_off(terms, fields))
 
 
 def _round_off(terms: Terms, fields: Floats) -> float:
@@ -337,91 +302,68 @@ def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> Fie
     """The map with J max of the basis, by block and rank."""
     blocks = blocks_of_map(request, jmax)
     if executor is None or _is_small(request, blocks):
-        solved = _solve(request, jmax, blocks)
+        parts = _columns(request, jmax, blocks)
     else:
-        apart = executor.map(partial(_solve, request, jmax), [[block] for block in blocks])
-        solved = [states for block_states in apart for states in block_states]
-    fields, rows, numbers = request.fields, [], []
-    named = [None if request.diabatic_gap_mhz is None else _diabatic_ranks(request, jmax, each) for each in solved]
-    for number, (each, names) in enumerate(zip(solved, named, strict=True)):
-        ours = each.block.levels.j[each.rows] <= request.j_highest
-        listed = ours if names is None else ours | ours[names].any(axis=0)
-        ranks = np.flatnonzero(listed).tolist()
-        rows += [(each, rank) for rank in ranks]
-        numbers += [number] * len(ranks)
-
-    def column(pick: Callable[[_Solved, int], Floats]) -> Floats:
-        return np.concatenate([pick(each, rank) for each, rank in rows])
-
-    def repeated(pick: Callable[[_Solved, int], Any]) -> NDArray[Any]:
-        return np.repeat([pick(each, rank) for each, rank in rows], len(fields))
-
-    cosines = list(solved[0].cosines) if solved else []
-    return FieldMap(
-        field=np.tile(fields, len(rows)),
-        m=repeated(lambda each, rank: each.block.m),
-        block=repeated(lambda each, rank: each.block.label),
-        rank=repeated(lambda each, rank: rank),
-        energy_mhz=column(lambda each, rank: each.energies[:, rank]),
-        label=repeated(lambda each, rank: each.block.levels.label(int(each.rows[rank]))),
-        slope=column(lambda each, rank: each.slopes[:, rank]) / request.kind.slope_mhz,
-        cosines={name: np.concatenate([each.cosines[name][:, rank] for each, rank in rows]) for name in cosines},
-        edge_population=column(lambda each, rank: each.edge[:, rank]),
-        copies=repeated(lambda each, rank: each.block.copies),
-        free_row=repeated(lambda each, rank: each.rows[rank]),
-        free_mhz=repeated(lambda each, rank: each.block.levels.energy_mhz[each.rows[rank]]),
-        weight=repeated(lambda each, rank: each.block.levels.weight[each.rows[rank]]),
-        jmax=jmax,
-        truncation_mhz=column(partial(_truncation, request)),
-        round_off_mhz=repeated(lambda each, rank: each.round_off),
-        block_number=np.repeat(np.array(numbers, dtype=np.int64), len(fields)),
-        request=request,
-        diabatic_label=_diabatic_labels(solved, named, rows),
-    )
+        apart = executor.map(partial(_columns, request, jmax), [[block] for block in blocks])
+        parts = [columns for columns_of_block in apart for columns in columns_of_block]
+    whole: dict[str, Any] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    cosines = {name: whole.pop(name) for name in request.observables}
+    numbers = np.repeat(np.arange(len(parts)), [len(part["field"]) for part in parts])
+    return FieldMap(**whole, cosines=cosines, jmax=jmax, block_number=numbers, request=request)
 
 
-def _truncation(request: MapRequest, solved: _Solved, rank: int) -> Floats:
-    """Bound of the truncation error (fields,); NaN for states listed only for their diabatic label."""
-    is_followed = solved.block.levels.j[solved.rows[rank]] <= request.j_highest
-    return solved.error[:, rank] if is_followed else np.full(len(solved.error), np.nan)
+def _columns(request: MapRequest, jmax: int, blocks: Sequence[FieldBlock]) -> list[dict[str, NDArray[Any]]]:
+    """Columns of a map for each block."""
+    terms = [request.matrices(block) for block in blocks]
+    solved = solve_blocks(request, list(zip(blocks, terms, strict=True)), request.fields, jmax)
+    return [_columns_of(request, jmax, *pair) for pair in zip(terms, solved, strict=True)]
 
 
-def _diabatic_ranks(request: MapRequest, jmax: int, states_of_block: _Solved) -> Ints:
-    """The rank whose label each state of a block has at each field, (fields, states)."""
+def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockStates) -> dict[str, NDArray[Any]]:
+    """Columns of the states of a block; the truncation error is NaN for states listed only for their diabatic label."""
+    block, fields, vectors = states.block, request.fields, states.vectors
+    inside, levels = terms_over(terms, states.places), block.levels
+    labels = np.array([levels.label(int(row)) for row in states.rows])
+    followed = states.j <= request.j_highest
+    by_field = {
+        "energy_mhz": states.energies,
+        "slope": -derivatives(inside, fields, vectors) / request.kind.slope_mhz,
+        "edge_population": (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1),
+        "truncation_mhz": np.where(followed, states.error, np.nan),
+    }
+    for name, operator in request.observables.items():
+        by_field[name] = expectation(over(block.dense(operator), states.places), vectors)
+    listed = followed
+    if request.diabatic_gap_mhz is not None:
+        ranks = _diabatic_ranks(request, inside, len(labels), request.diabatic_gap_mhz)
+        listed, by_field["diabatic_label"] = followed | followed[ranks].any(axis=0), labels[ranks]
+    by_state = {
+        "rank": np.arange(len(labels)),
+        "label": labels,
+        "free_row": states.rows,
+        "free_mhz": levels.energy_mhz[states.rows],
+        "weight": levels.weight[states.rows],
+    }
+    of_block = {"m": block.m, "block": block.label, "copies": block.copies, "round_off_mhz": _round_off(terms, fields)}
+    count = int(listed.sum())
+    return {
+        "field": np.tile(fields, count),
+        **{name: np.full(count * len(fields), value) for name, value in of_block.items()},
+        **{name: np.repeat(values[listed], len(fields)) for name, values in by_state.items()},
+        **{name: values[:, listed].T.ravel() for name, values in by_field.items()},
+    }
+
+
+def _diabatic_ranks(request: MapRequest, terms: Terms, count: int, gap_mhz: float) -> Ints:
+    """The rank whose label each of the lowest states of a block has at each field, (fields, states)."""
     from rotor.quantum.fields.diabatic import diabatic_ranks
 
-    count, gap = states_of_block.energies.shape[1], request.diabatic_gap_mhz or 0.0
-    return diabatic_ranks(
-        partial(_energies_and_slopes, _small(request, jmax, states_of_block.block, count), count),
-        request.fields,
-        count,
-        gap,
-    )
-
-
-def _diabatic_labels(
-    solved: Sequence[_Solved], named: Sequence[Ints | None], rows: list[tuple[_Solved, int]]
-) -> NDArray[np.str_] | None:
-    """Diabatic labels of all rows of a map, or None."""
-    if not rows or named[0] is None:
-        return None
-    labels_of_block = {}
-    for each, names in zip(solved, named, strict=True):
-        labels = np.array([each.block.levels.label(int(row)) for row in each.rows])
-        labels_of_block[id(each)] = labels[names]
-    return np.concatenate([labels_of_block[id(each)][:, rank] for each, rank in rows])
-
-
-def _small(request: MapRequest, jmax: int, block: FieldBlock, count: int) -> Terms:
-    """The Hamiltonian of a block in a small basis for its lowest states at all fields."""
-    terms = request.matrices(block)
-    order = basis_order(block, jmax)
-    terms = terms_over(terms, enough_states(terms, order, count, request.fields, request.tolerance_mhz)[0])
-    if len(terms[0]) <= DENSE:
-        return terms
-    fields = np.linspace(request.fields[0], request.fields[-1], SPANNED)
-    basis = spanning(terms, fields, count, request.tolerance_mhz)
-    return terms if basis is None else tuple(basis.conj().T @ term @ basis for term in terms)
+    if len(terms[0]) > DENSE:  # a small basis for these states at all fields
+        fields = np.linspace(request.fields[0], request.fields[-1], SPANNED)
+        spanned = spanned_states(terms, fields, count, request.tolerance_mhz)
+        if spanned is not None:
+            terms = tuple(spanned[0].conj().T @ term @ spanned[0] for term in terms)
+    return diabatic_ranks(partial(_energies_and_slopes, terms, count), request.fields, count, gap_mhz)
 
 
 def _energies_and_slopes(terms: Terms, count: int, fields: Floats) -> tuple[Floats, Floats]:

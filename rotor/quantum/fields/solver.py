@@ -56,7 +56,7 @@ def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float 
     """The lowest `count` states of Σ x^n H_n at many fields x.
 
     Small matrices are solved for all fields at once, large ones one by one or, at many fields, in a basis of eigenvectors at a few fields
-    (`reduced_basis`).
+    (`spanned_states`).
 
     Parameters
     ----------
@@ -87,7 +87,10 @@ def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float 
         solved = np.linalg.eigh(at_fields(terms, fields))
         return _exact(np.asarray(solved.eigenvalues[:, :count], dtype=np.float64), solved.eigenvectors[:, :, :count])
     if len(fields) >= 3 * FIRST_ANCHORS and tolerance_mhz > 0 and count + BUFFER < size // 4:
-        return reduced_basis(terms, fields, count, tolerance_mhz)
+        spanned = spanned_states(terms, fields, count, tolerance_mhz)
+        if spanned is None or spanned[1][2].max() > tolerance_mhz:  # dependent directions were left out
+            return _each(terms, fields, count)
+        return spanned[1]
     return _each(terms, fields, count)
 
 
@@ -122,43 +125,14 @@ def _lowest(matrix: Matrix, count: int) -> tuple[Floats, Matrix]:
     return energies, vectors
 
 
-def reduced_basis(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> tuple[Floats, Matrix, Floats]:
-    """The lowest states at many fields from full solutions at a few.
-
-    If no small basis is found, or its error exceeds the tolerance, each field is solved in full.
-
-    Parameters
-    ----------
-    terms : tuple of (n, n) arrays
-        H_0, H_1, ... in MHz per power of the unit of the field.
-    fields : (f,) array
-        Values of the field.
-    count : int
-        How many states.
-    tolerance_mhz : float
-        Largest error of an energy, estimated as |residual|²/gap.
-
-    Returns
-    -------
-    energies : (f, count) array
-        MHz, rising.
-    vectors : (f, n, count) array
-        Eigenvectors in columns.
-    error : (f, count) array
-        |residual|²/gap, MHz.
-    """
-    spanned = _spanned(terms, fields, count, tolerance_mhz)
-    if spanned is None or spanned[1][2].max() > tolerance_mhz:  # dependent directions were left out
-        return _each(terms, fields, count)
-    return spanned[1]
-
-
-def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> Matrix | None:
-    """A basis for the lowest states at all fields, from eigenvectors at a few of them.
+def spanned_states(
+    terms: Terms, fields: Floats, count: int, tolerance_mhz: float
+) -> tuple[Matrix, tuple[Floats, Matrix, Floats]] | None:
+    """A basis for the lowest states at all fields, from eigenvectors at a few of them, and the states in it.
 
     The eigenvectors at some fields, a few more than requested, span a small space for the fields between. The error of an energy is
     |residual|²/gap, where the gap reaches to the highest of the further states. The field with the largest error is solved in full and
-    added, until the error is below a tenth of the tolerance at all fields.
+    added, until the error is below a tenth of the tolerance, first between full solutions, then at all fields.
 
     Parameters
     ----------
@@ -173,17 +147,13 @@ def spanning(terms: Terms, fields: Floats, count: int, tolerance_mhz: float) -> 
 
     Returns
     -------
-    (n, r) array or None
-        Orthonormal columns; None if there would be more than half the size of the matrix.
+    basis : (n, r) array
+        Orthonormal columns.
+    states : tuple
+        Energies (f, count) in MHz, eigenvectors (f, n, count) in columns, and errors (f, count) in MHz.
+    None
+        Instead of both, if the basis would have more than half the size of the matrix.
     """
-    spanned = _spanned(terms, fields, count, tolerance_mhz)
-    return None if spanned is None else spanned[0]
-
-
-def _spanned(
-    terms: Terms, fields: Floats, count: int, tolerance_mhz: float
-) -> tuple[Matrix, tuple[Floats, Matrix, Floats]] | None:
-    """The basis, and the states in it at all fields; errors are tested between full solutions first, then at all fields."""
     anchors = np.unique(np.linspace(0, len(fields) - 1, FIRST_ANCHORS).astype(int)).tolist()
     full = [_lowest(at_fields(terms, fields[place : place + 1])[0], count + BUFFER)[1] for place in anchors]
     while True:
