@@ -19,7 +19,7 @@ from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.quantum.moments import Moment
-    from rotor.quantum.spins.terms import Spin, SpinTerm
+    from rotor.quantum.spins.scheme import Spin, SpinTerm
     from rotor.quantum.states import Coupling, OperatorOfJ, State
     from rotor.quantum.wang.j_operators import JOperator
     from rotor.tops.top import Top

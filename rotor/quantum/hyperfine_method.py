@@ -11,7 +11,7 @@ from rotor.quantum.levels import Used
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import Levels
-    from rotor.quantum.spins.terms import Spin
+    from rotor.quantum.spins.scheme import Spin
     from rotor.tops.top import Top
 
 METHODS = ("auto", "exact", "N-diagonal", "first-order")

@@ -8,8 +8,7 @@ import pytest
 from rotor.quantum.spins.blocks import coefficients_of
 from rotor.quantum.spins.couplings_alone import coupling_alone
 from rotor.quantum.spins.rotor import Channel
-from rotor.quantum.spins.scheme import Scheme
-from rotor.quantum.spins.terms import Spin
+from rotor.quantum.spins.scheme import Scheme, Spin
 
 HIGHEST = 6
 THREE = Scheme((Spin("S", 1, True), Spin("14N", 2), Spin("35Cl", 3)))

@@ -7,10 +7,12 @@ import time
 import numpy as np
 import pytest
 
+from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.estimates.derivatives import level_derivatives, term_expectations
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
+from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 
 A_SET = Constants(
@@ -124,3 +126,19 @@ def test_a_fit_can_afford_it():
     start = time.perf_counter()
     level_derivatives(top, levels, None, rows)
     assert time.perf_counter() - start < 0.2
+
+
+@pytest.mark.parametrize(
+    ("constants", "spins"),
+    [
+        ("A=30000 B=9200 C=9200 DJ=0.004 DJK=0.2 MHz", "chi_aa(14N)=-4.2 C_aa(14N)=0.01 MHz"),
+        ("A=9000 B=9000 C=5000 MHz", "chi_cc(14N)=-4.2 MHz"),
+    ],
+)
+def test_energies_of_an_axial_top_with_spins_are_sums_of_constants_times_derivatives(constants, spins):
+    """Levels up to a J max: of the blocks of the highest F some states alone."""
+    top = Top.from_constants(constants, spin_constants=SpinConstants.parse(spins))
+    levels = solve_levels(top, 6, effects=effects_of(top, True))
+    assert len({block.vectors.shape[1] - len(block.vectors) for block in levels.blocks}) > 1
+    values = [value for effect in levels.effects for value in effect.parameters(top).values()]
+    assert np.allclose(level_derivatives(top, levels) @ values, levels.energy_mhz, rtol=1e-12, atol=1e-7)

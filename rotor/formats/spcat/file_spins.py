@@ -14,7 +14,7 @@ from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.formats.spcat.hamiltonian.symmetry import exchange_of, halved_across
 from rotor.formats.spcat.text.par import Options
 from rotor.quantum.spins.operators import ByElements
-from rotor.quantum.spins.terms import Spin
+from rotor.quantum.spins.scheme import Spin
 
 
 def with_their_spins(lines: list[CodedLine], states: tuple[StateOptions, ...]) -> tuple[list[CodedLine], list[str]]:

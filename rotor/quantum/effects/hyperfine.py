@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from rotor.quantum.effects.spin_effect import TRACELESS, SpinEffect, Symbol, parse_name, traceless_of
 from rotor.quantum.spins.operators import Cosines
-from rotor.quantum.spins.terms import Spin
+from rotor.quantum.spins.scheme import Spin
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

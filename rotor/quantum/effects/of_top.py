@@ -46,7 +46,7 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     from rotor.quantum.effects.spin_effect import parse_name
     from rotor.quantum.effects.spin_rotation import SpinRotation
     from rotor.quantum.effects.spin_spin import SpinSpin
-    from rotor.quantum.spins.terms import Spin
+    from rotor.quantum.spins.scheme import Spin
 
     kinds: tuple[type[SpinEffect], ...] = (NuclearQuadrupole, SpinRotation, SpinSpin)
     spins = tuple(

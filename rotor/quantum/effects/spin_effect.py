@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.spins.operators import EVERY_STATE, Matrix, Rotor
-from rotor.quantum.spins.terms import Spin, SpinTerm
+from rotor.quantum.spins.scheme import Spin, SpinTerm
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -24,7 +24,7 @@ from rotor.quantum.internal_rotation.levels import REPRESENTATION, turned_by
 from rotor.quantum.operators.algebra import Operator, half_anticommutator
 from rotor.quantum.operators.rotation import body_tensor, j_x, j_y, j_z
 from rotor.quantum.spins.operators import Cosines, CosinesWithN
-from rotor.quantum.spins.terms import Spin, SpinTerm
+from rotor.quantum.spins.scheme import Spin, SpinTerm
 from rotor.quantum.tensors import spherical_components
 
 if TYPE_CHECKING:

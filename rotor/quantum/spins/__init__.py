@@ -6,7 +6,6 @@ Levels (`levels`) are solved F by F (`blocks`) over the eigenstates of the rotat
 `lines` has elements of dipoles between them, and derivatives; `scheme` the spins themselves.
 """
 
-from rotor.quantum.spins.scheme import Scheme, scheme_of
-from rotor.quantum.spins.terms import Spin, SpinTerm
+from rotor.quantum.spins.scheme import Scheme, Spin, SpinTerm, scheme_of
 
 __all__ = ["Scheme", "Spin", "SpinTerm", "scheme_of"]

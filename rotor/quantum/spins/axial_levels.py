@@ -96,7 +96,7 @@ def axial_derivatives(
     top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], blocks: Sequence[SpinBlock], count: int
 ) -> Floats:
     """∂E/∂c (count, parameters) of the states of spin blocks, by rows of the levels."""
-    shared, out = blocks[0].shared, np.zeros((count, len(names)))
+    shared, out = blocks[0].shared, np.zeros((count + 1, len(names)))  # the last row takes the padding
     twice_f = [block.twice_f for block in blocks]
     places = pattern_table(shared.scheme, min(twice_f), max(twice_f)).places
     stacks = shared.stacks
@@ -111,11 +111,17 @@ def axial_derivatives(
     pieces = [channels[column][channel] for column, channel in acting]
     spins = operators_of_axial_stacks(stacks, _REACH, pieces, shared.representation)
     for which, functions in by_size([(block.twice_f, block.parts) for block in blocks], places):
-        vectors = np.stack([blocks[i].vectors for i in which])
+        vectors = np.zeros((len(which), *2 * functions.numbers.shape[1:]))
+        rows = np.full(functions.numbers.shape, count)
+        for place, block in enumerate(
+            blocks[i] for i in which
+        ):  # some states only, where labels beyond a range of N are left out
+            states = len(block.energies_mhz)
+            vectors[place, :, :states] = block.vectors
+            rows[place, :states] = block.start + np.arange(states)
         slopes = np.matmul((vectors**2).transpose(0, 2, 1), along[functions.numbers])
         for (column, channel), contracted in zip(acting, spins, strict=True):
             whole = whole_of_lower(tables.matrices(contracted, [channel], functions))
             slopes[:, :, column] += (np.matmul(whole, vectors) * vectors).sum(axis=1)
-        rows = np.array([blocks[i].start for i in which])[:, None] + np.arange(vectors.shape[2])
         out[rows] = slopes
-    return out
+    return out[:-1]

@@ -16,8 +16,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor, is_axial, summed
-from rotor.quantum.spins.scheme import Scheme, scheme_of
-from rotor.quantum.spins.terms import SpinTerm
+from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
 from rotor.quantum.tabulated import as_tabulated
 from rotor.quantum.wang.basis import WangBlock, names_of
 from rotor.quantum.wang.rotation import hamiltonian, solve_rotation

@@ -35,7 +35,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.operators import EVERY_STATE, BetweenSpecies, ByElements, Cosines, CosinesWithN, HalfTurned
-from rotor.quantum.spins.terms import SpinTerm
+from rotor.quantum.spins.scheme import SpinTerm
 from rotor.quantum.states import Coupling, OperatorOfJ, State
 from rotor.quantum.wang.basis import wang_blocks
 from rotor.quantum.wang.j_operators import JOperator, between_species

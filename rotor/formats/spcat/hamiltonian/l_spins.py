@@ -18,7 +18,7 @@ from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor
 from rotor.quantum.spins.parts import assigned
-from rotor.quantum.spins.terms import SpinTerm
+from rotor.quantum.spins.scheme import SpinTerm
 
 
 def spin_terms_with_pairs(

@@ -38,8 +38,7 @@ from rotor.quantum.effects.spin_effect import ParameterName, parse_name
 from rotor.quantum.effects.spin_rotation import SpinRotation
 from rotor.quantum.effects.spin_spin import SpinSpin
 from rotor.quantum.spins.operators import Cosines, CosinesWithN
-from rotor.quantum.spins.scheme import Scheme, scheme_of
-from rotor.quantum.spins.terms import SpinTerm
+from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 
