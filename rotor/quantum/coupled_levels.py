@@ -1,6 +1,10 @@
 """Interacting states: levels of all states v whose Wang blocks couplings connect.
 
-The matrices are those of `basis.state_elements`, which fits and derivatives have too, with one parameter: H itself.
+Of each J the Wang blocks of all states are the vertices of a graph, whose edges are the operators that connect two of them;
+every connected part is one matrix, real in functions with the factors of `j_operators.phase`, and is solved whole. A
+level is named after the function of one state and one Wang block, solved by itself, that it overlaps with; names are given one to
+one, so that the sum of all these overlaps is largest. The matrices are those of `basis.state_elements`, which fits and derivatives have
+too, with one parameter: H itself.
 """
 
 from __future__ import annotations
@@ -11,13 +15,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.state_elements import StateElements, StateTerms
 from rotor.quantum.connected import connected_parts
-from rotor.quantum.coupled import names_of_states, parts_of
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.levels import Levels, SolvedBlock, placed, weights_by_state
+from rotor.quantum.one_to_one import one_to_one
 from rotor.quantum.states import Coupling, OperatorOfJ, State
-from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
+from rotor.quantum.wang.basis import Part, WangBlock, limited, names_of, parts_of, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator
 from rotor.tops.operators import Operators
 
@@ -173,3 +178,25 @@ def _by_states(couplings: Iterable[tuple[float, Coupling]]) -> dict[tuple[int, i
     for value, coupling in couplings:
         by_states.setdefault((coupling.bra, coupling.ket), []).append((value, coupling))
     return by_states
+
+
+def names_of_states(
+    parts: tuple[Part, ...], matrix: Floats, vectors: Floats, representation: str
+) -> tuple[Ints, Floats]:
+    """v, Ka, Kc (n, 3) of the states of a coupled block, and their squared overlaps (n,) with the functions that name them.
+
+    A function is a state of one part, solved by itself; names are given one to one so that the sum of the overlaps is largest.
+    """
+    functions = [np.linalg.eigh(matrix[part.place, part.place]).eigenvectors.T @ vectors[part.place] for part in parts]
+    overlaps = np.concatenate(functions) ** 2
+    of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(vectors.shape[1])
+    return names_of_functions(parts, representation)[of_state], overlaps[of_state, np.arange(vectors.shape[1])]
+
+
+def names_of_functions(parts: tuple[Part, ...], representation: str) -> Ints:
+    """v, Ka, Kc (n, 3) of the states of the parts, each solved by itself, one part behind the other."""
+    names = np.empty((parts[-1].place.stop, 3), dtype=np.int64)
+    for part in parts:
+        names[part.place, 0] = part.v
+        names[part.place, 1], names[part.place, 2] = names_of(part.basis, representation)
+    return names

@@ -14,10 +14,10 @@ import numpy as np
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.basis.state_elements import StateElements, StateTerms, Vertex
 from rotor.quantum.connected import connected_parts
-from rotor.quantum.coupled import names_of_functions, names_of_states, parts_of
+from rotor.quantum.coupled_levels import names_of_functions, names_of_states
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.label_tracking import Follows, LabelledBlocks, NamedBlock, NamedFunctions, Naming, tracked_blocks
-from rotor.quantum.wang.basis import WangBlock, limited, wang_blocks
+from rotor.quantum.wang.basis import WangBlock, limited, parts_of, wang_blocks
 from rotor.quantum.wang.rotation import representation_of
 
 if TYPE_CHECKING:

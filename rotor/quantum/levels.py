@@ -7,7 +7,7 @@ Nothing outside this folder computes a row from quantum numbers: `Levels.find` a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -140,6 +140,17 @@ class SolvedBlock(Block):
     def alone(self) -> bool:
         """Whether it is a Wang block that nothing couples with others."""
         return self.labels is None
+
+    def elements(self, low: SolvedBlock, between: Callable[[Any, Any], Floats | None]) -> Floats | None:
+        """⟨r'|X|r⟩ (n_up, n_low) between the states of two blocks from the elements of X between their parts; None where it is zero."""
+        total: Floats | None = None
+        for left in self.parts:
+            for right in low.parts:
+                element = between(left, right)
+                if element is not None and element.any():
+                    moved = self.vectors[left.place].T @ element @ low.vectors[right.place]
+                    total = moved if total is None else total + moved
+        return total
 
 
 def placed(blocks: Iterable[Any]) -> Iterator[Any]:

@@ -13,6 +13,8 @@ more products for the states that are asked for. `blocks` finds the blocks of an
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -61,25 +63,19 @@ class SolvedStack(NamedTuple):
     vectors: Floats
 
 
-class LinearStack(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class LinearStack:
     """Blocks of like size, in order of size, side by side, padded with elements that are 0.
 
-    size, sizes : of the largest block, of each
-    runs : of blocks of one size the first, the one behind the last, and the size
-    offsets (blocks + 1,) : where each matrix begins, all of them one behind the other
-    places (blocks, elements) : in all matrices, the place behind them where padded
-    diagonal : the places of all diagonals
+    sizes : of each block
+    places (blocks, elements) : in all matrices, one behind the other, the place behind them where padded
     rows, columns (blocks, elements) : as of the blocks, counted through all of them, `size` for each
     half, factors, mix, parameters : half is 1 on the diagonal, else 1/2, and factors are those of the blocks over it; padded parameters
     are the one behind all, whose value is 0
     """
 
-    size: int
     sizes: Ints
-    runs: tuple[tuple[int, int, int], ...]
-    offsets: Ints
     places: Ints
-    diagonal: Ints
     rows: Ints
     columns: Ints
     half: Floats
@@ -90,7 +86,7 @@ class LinearStack(NamedTuple):
     @classmethod
     def of(cls, blocks: Sequence[LinearBlock]) -> LinearStack:
         sizes = np.array([block.size for block in blocks])
-        count, size, offsets = len(blocks), int(sizes[-1]), np.cumsum([0, *(sizes**2).tolist()])
+        count, offsets = len(blocks), np.cumsum([0, *(sizes**2).tolist()])
         most, units = max(len(b.rows) for b in blocks), max(b.factors.shape[1] for b in blocks)
         acting = max(len(b.parameters) for b in blocks)
         places, half = np.full((count, most), offsets[-1]), np.ones((count, most))
@@ -105,13 +101,30 @@ class LinearStack(NamedTuple):
             factors[b, :n, : block.factors.shape[1]] = block.factors / half[b, :n, None]
             mix[b, : block.mix.shape[0], : block.mix.shape[1]] = block.mix
             parameters[b, : len(block.parameters)] = block.parameters
-        diagonal = np.concatenate([start + np.arange(n) * (n + 1) for start, n in zip(offsets, sizes, strict=False)])
-        first = size * np.arange(count)[:, None]
-        bounds = [0, *(1 + np.flatnonzero(np.diff(sizes))).tolist(), count]
-        runs = tuple((i, k, int(sizes[i])) for i, k in pairwise(bounds))
-        return cls(
-            size, sizes, runs, offsets, places, diagonal, rows + first, columns + first, half, factors, mix, parameters,
-        )  # fmt: skip
+        first = int(sizes[-1]) * np.arange(count)[:, None]
+        return cls(sizes, places, rows + first, columns + first, half, factors, mix, parameters)
+
+    @property
+    def size(self) -> int:
+        """Size of the largest block."""
+        return int(self.sizes[-1])
+
+    @cached_property
+    def offsets(self) -> Ints:
+        """Where each matrix begins, all of them one behind the other, and where the last one ends: (blocks + 1,)."""
+        return np.cumsum([0, *(self.sizes**2).tolist()])
+
+    @cached_property
+    def runs(self) -> tuple[tuple[int, int, int], ...]:
+        """Of the blocks of each size the first, the one behind the last, and the size."""
+        bounds = [0, *(1 + np.flatnonzero(np.diff(self.sizes))).tolist(), len(self.sizes)]
+        return tuple((i, k, int(self.sizes[i])) for i, k in pairwise(bounds))
+
+    @cached_property
+    def _diagonal(self) -> Ints:
+        """The places of all diagonals."""
+        starts = zip(self.offsets, self.sizes, strict=False)
+        return np.concatenate([start + np.arange(n) * (n + 1) for start, n in starts])
 
     def solved(self, values_mhz: Floats, space: Workspace) -> SolvedStack:
         """A number is taken off each diagonal for the sake of digits, and added to the energies."""
@@ -125,7 +138,7 @@ class LinearStack(NamedTuple):
         if not np.isfinite(whole.sum()):
             raise ValueError("a block of the Hamiltonian is not finite with these constants")
         zero = whole[self.offsets[:-1]]
-        whole[self.diagonal] -= np.repeat(zero, self.sizes)
+        whole[self._diagonal] -= np.repeat(zero, self.sizes)
         energies = np.full((count, size), np.nan)
         vectors = space.array("vectors", count, size, size)
         vectors[:, self.runs[0][2] :, :] = vectors[:, :, self.runs[0][2] :] = 0.0

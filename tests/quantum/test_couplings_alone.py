@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotor.quantum.spins.blocks import coefficients_of
-from rotor.quantum.spins.couplings_alone import coupling_alone
+from rotor.quantum.spins.neglected import coupling_alone
 from rotor.quantum.spins.rotor import Channel
 from rotor.quantum.spins.scheme import Scheme, Spin
 

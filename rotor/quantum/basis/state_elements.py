@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.coupled import NOTHING, parts_of
 from rotor.quantum.effect import QuantumEffect, couplings_of
 from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, numbered
 from rotor.quantum.states import OperatorOfJ, State
-from rotor.quantum.wang.basis import Part, WangBlock
+from rotor.quantum.wang.basis import NOTHING, Part, WangBlock, parts_of
 from rotor.quantum.wang.j_operators import JOperator, between_blocks
 from rotor.tops.operators import Operators, Powers
 

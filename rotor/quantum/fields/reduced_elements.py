@@ -141,16 +141,13 @@ def _spin_moments(magnet: Magnet, states: Sequence[int], shared: Shared) -> Spin
     return SpinMoments(tuple(moments), scheme, shared.representation)
 
 
-def _rotational_moment(g: Floats, up: AnyBlock, low: AnyBlock, representation: str) -> Floats | None:
+def _rotational_moment(g: Floats, up: SolvedBlock, low: SolvedBlock, representation: str) -> Floats | None:
     """Elements of ½ Σ g_ij {Φ_i, N_j} between solved blocks of the rotation."""
     from rotor.quantum.spins.operators import CosinesWithN
 
     rotor = CosinesWithN(_matrix(g))
-    total: Floats | None = None
-    for left in up.parts:
-        for right in low.parts:
-            elements = rotor.elements(left.basis, right.basis, representation) if left.v == right.v else None
-            if elements is not None:
-                moved = up.vectors[left.place].T @ elements @ low.vectors[right.place]
-                total = moved if total is None else total + moved
-    return total
+
+    def between(left: Any, right: Any) -> Floats | None:
+        return rotor.elements(left.basis, right.basis, representation) if left.v == right.v else None
+
+    return up.elements(low, between)

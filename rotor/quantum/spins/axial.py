@@ -86,7 +86,7 @@ def _higher_first(up: Stack, low: Stack, pairs: Pairs, k: Ints) -> tuple[Pairs, 
 
 def _axial_k(stack: Stack) -> Ints:
     """K of the functions of a stack."""
-    return np.array([part.basis.axial_k for part in stack.sections[0].parts])  # type: ignore[union-attr]
+    return np.array([part.basis.axial_k for part in stack.sections[0].parts])
 
 
 def _values(pieces: Sequence[Piece], states: tuple[int, int], pairs: Pairs, k: Ints, representation: str) -> Floats:

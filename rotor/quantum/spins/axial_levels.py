@@ -15,8 +15,9 @@ from rotor.quantum.spins.blocks import Member, Plan, SpinBlock, States, diagonal
 from rotor.quantum.spins.contraction import Contracted
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.pattern_tables import PatternTable, couplings_by_f, pattern_table
-from rotor.quantum.spins.rotor import Channel, RotorPart, parameter_channels
+from rotor.quantum.spins.rotor import Channel, parameter_channels
 from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.wang.basis import Part
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
@@ -56,7 +57,7 @@ def by_size(
 class AxialTables:
     """Matrices of sums of channels over the functions of blocks: closed forms by pairs of solved blocks, coefficients by F."""
 
-    def __init__(self, functions: Sequence[RotorPart], scheme: Scheme, twice_f: tuple[int, int]) -> None:
+    def __init__(self, functions: Sequence[Part], scheme: Scheme, twice_f: tuple[int, int]) -> None:
         self._n = np.array([part.basis.j for part in functions])
         self._v = np.array([part.v for part in functions])
         self._scheme, self._range = scheme, twice_f

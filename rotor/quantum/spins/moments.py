@@ -24,11 +24,10 @@ from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.lines import Acting, between_states, coefficients_between
 from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
-from rotor.quantum.spins.rotor import RotorPart
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.spins.written_moments import written_elements
 from rotor.quantum.tensors import BodyTensor, body_tensor
-from rotor.quantum.wang.basis import WangBlock, character
+from rotor.quantum.wang.basis import Part, WangBlock, character
 
 
 @dataclass(frozen=True)
@@ -83,22 +82,20 @@ class SpinMoments:
 
     def _block_element(self, moment: Moment, up: SolvedBlock, low: SolvedBlock) -> Floats | None:
         """The element of a moment between the eigenstates of two rotational blocks; None where it is zero."""
-        total: Floats | None = None
-        for left in up.parts:
-            for right in low.parts:
-                if (left.v, right.v) not in (moment.states, moment.states[::-1]):
-                    continue
-                element = self._between(moment, left, right)
-                if element is not None and element.any():
-                    value = moment.value_debye * _order(moment, left, right)
-                    moved = up.vectors[left.place].T @ (value * element) @ low.vectors[right.place]
-                    total = moved if total is None else total + moved
+
+        def between(left: Part, right: Part) -> Floats | None:
+            if (left.v, right.v) not in (moment.states, moment.states[::-1]):
+                return None
+            element = self._between(moment, left, right)
+            return None if element is None else moment.value_debye * _order(moment, left, right) * element
+
+        total = up.elements(low, between)
         first, second = up.parts[0].basis, low.parts[0].basis
         if total is not None and isinstance(first, AxialState) and (first.axial_k or second.k[0]):
             return np.asarray(sqrt(2.0) * total)
         return total
 
-    def _between(self, moment: Moment, left: RotorPart, right: RotorPart) -> Floats | None:
+    def _between(self, moment: Moment, left: Part, right: Part) -> Floats | None:
         """The element of a moment between the functions of two parts; None where it is zero."""
         up, low = left.basis, right.basis
         if moment.written is not None:
@@ -160,7 +157,7 @@ def _stretch(up: int, low: int) -> float:
     return sqrt(max(0.375 * ((up + low + 1) ** 2 - 4) * (1 - (up - low) ** 2 / 4), 0.0))
 
 
-def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
+def _factor(powers: str, left: Part, right: Part) -> Floats:
     """Factor of an element from powers of N² and Nz². A commutator changes sign with the order of states; the lower F is the bra."""
     m, n = left.basis.j * (left.basis.j + 1.0), right.basis.j * (right.basis.j + 1.0)
     if powers == "K":
@@ -171,14 +168,14 @@ def _factor(powers: str, left: RotorPart, right: RotorPart) -> Floats:
     )
 
 
-def _order(moment: Moment, left: RotorPart, right: RotorPart) -> int:
+def _order(moment: Moment, left: Part, right: Part) -> int:
     """Sign of a moment that depends on the order of its states; with a half turn there is a further i · i = -1."""
     if not moment.by_order or left.v == right.v:
         return 1
     return -1 if (left.v < right.v) == bool(moment.turned) else 1
 
 
-def _cosine(moment: Moment, left: RotorPart, right: RotorPart) -> Floats:
+def _cosine(moment: Moment, left: Part, right: Part) -> Floats:
     """cos(α'K' + αK). It holds for functions of |K| too: with ΔK = 0 or 1 either both K have one sign or one of them is 0."""
     if moment.cosine is None:
         return np.ones(1)

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.coupled_levels import names_of_functions
 from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Basis, Rotor, is_axial, summed
+from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Rotor, is_axial, summed
 from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
 from rotor.quantum.tabulated import as_tabulated
-from rotor.quantum.wang.basis import WangBlock, names_of
+from rotor.quantum.wang.basis import Part
 from rotor.quantum.wang.rotation import hamiltonian, solve_rotation
 
 if TYPE_CHECKING:
@@ -26,15 +27,6 @@ if TYPE_CHECKING:
 
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
-
-
-class RotorPart(NamedTuple):
-    """Functions of one state v within a block (a Wang block, or |N K⟩ of a symmetric top), and their places."""
-
-    v: int
-    basis: Basis
-    place: slice
-    names: Ints  # v, Ka and Kc of the functions in order of energy, (size, 3); v, K and 0 of |N K⟩
 
 
 class Channel(NamedTuple):
@@ -84,10 +76,10 @@ def solved_rotor(
     levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True))
     representation = str(levels.representation)
     if "ka" not in levels.quanta or not levels.blocks[0].alone:
-        return [_with_names(block, representation) for block in levels.blocks], representation
+        return [_named(b, names_of_functions(b.parts, representation)) for b in levels.blocks], representation
     # labels of states in order of energy, as labels of functions are
     names = np.column_stack([np.zeros(len(levels), dtype=np.int64), levels.quanta["ka"], levels.quanta["kc"]])
-    return [_single_state_block(block, names) for block in levels.blocks], representation
+    return [_named(block, names[block.start :]) for block in levels.blocks], representation
 
 
 def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bool:
@@ -108,31 +100,18 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
 
 def _axial_blocks(v: Ints, n: Ints, k: Ints, energies_mhz: Floats) -> list[SolvedBlock]:
     """A block of one function for each level; their arrays are views of shared ones."""
-    names, alone, vector = np.column_stack([v, k, np.zeros_like(k)]), slice(0, 1), np.ones((1, 1))
+    names, vector = np.column_stack([v, k, np.zeros_like(k)]), np.ones((1, 1))
     rows = enumerate(zip(v.tolist(), n.tolist(), k.tolist(), strict=True))
     return [
-        SolvedBlock((RotorPart(state, AxialState(m, q), alone, names[i : i + 1]),), energies_mhz[i : i + 1], vector)
+        SolvedBlock((Part(state, AxialState(m, q), 0, names[i : i + 1]),), energies_mhz[i : i + 1], vector)
         for i, (state, m, q) in rows
     ]
 
 
-def _single_state_block(block: SolvedBlock, names: Ints) -> SolvedBlock:
-    """A Wang block with the names of its functions, which those of levels (n, 3) have."""
-    size = block.basis.size
-    part = RotorPart(0, block.basis, slice(0, size), names[block.start : block.start + size])
-    return SolvedBlock((part,), block.energies_mhz, block.vectors)
-
-
-def _with_names(block: SolvedBlock, representation: str) -> SolvedBlock:
-    """A solved block with the names of its functions."""
-    parts = (RotorPart(p.v, p.basis, p.place, _names(p.v, p.basis, representation)) for p in block.parts)
-    return SolvedBlock(tuple(parts), block.energies_mhz, block.vectors)
-
-
-def _names(v: int, basis: WangBlock, representation: str) -> Ints:
-    """v, Ka and Kc of the functions of a Wang block."""
-    ka, kc = names_of(basis, representation)
-    return np.column_stack([np.full(len(ka), v), ka, kc])
+def _named(block: SolvedBlock, names: Ints) -> SolvedBlock:
+    """A solved block whose parts have the names (size, 3) of their functions."""
+    parts = tuple(part._replace(names=names[part.place]) for part in block.parts)
+    return SolvedBlock(parts, block.energies_mhz, block.vectors)
 
 
 def valued_terms(top: Top, effects: Iterable[QuantumEffect]) -> Terms:

@@ -11,10 +11,9 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor, Scalar, axis_tensor, factors_with_n, tensor_of
-from rotor.quantum.spins.rotor import RotorPart
 from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.tensors import BodyTensor, overlap
-from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.wang.basis import Part, WangBlock
 
 MOST_RANK = 2  # highest rank with closed forms for many N at once
 
@@ -25,7 +24,7 @@ class Section(NamedTuple):
     v: int
     basis: WangBlock
     rows: slice
-    parts: tuple[RotorPart, ...]
+    parts: tuple[Part, ...]
 
 
 class Pairs(NamedTuple):

@@ -27,9 +27,9 @@ from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.blocks import Member, Plan, States, coefficients_of, diagonalised
 from rotor.quantum.spins.contraction import stacks_of
 from rotor.quantum.spins.parts import SpinPart
-from rotor.quantum.spins.rotor import ALONE, Channel, RotorPart
+from rotor.quantum.spins.rotor import ALONE, Channel
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
-from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.quantum.wang.j_operators import phase
 from rotor.tops.operators import axes_of
 
@@ -146,7 +146,7 @@ def _rows(parts: list[SpinPart]) -> list[Row]:
     return out
 
 
-def _wang(part: RotorPart) -> WangBlock:
+def _wang(part: Part) -> WangBlock:
     """The Wang functions of a part; ValueError for a linear molecule."""
     if not isinstance(part.basis, WangBlock):
         raise ValueError("three equivalent nuclei need functions with K and a sign; a linear molecule has none")
@@ -201,7 +201,7 @@ def _along(plan: Plan) -> int:
     return 1 if axis == "a" else 2
 
 
-def _names_of_sub_block(part: RotorPart, chosen: Ints, pattern: Ints, residue: int) -> Ints:
+def _names_of_sub_block(part: Part, chosen: Ints, pattern: Ints, residue: int) -> Ints:
     """v, Ka, Kc and the pattern; in labels x stands for E with K = 3n + 2, y for E with K = 3n + 1."""
     names = part.names[np.asarray(chosen, dtype=bool)]
     named = pattern.copy()

@@ -11,7 +11,8 @@ In any representation (-1)^Ka and (-1)^Kc are the characters under C2a and C2c, 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,17 +38,33 @@ class WangBlock(NamedTuple):
         return self.first_k + 2 * np.arange(self.size)
 
 
+NOTHING = 1e-13  # of an operator's largest element: what is smaller between two blocks is round-off of zero
+
+
 class Part(NamedTuple):
-    """The functions of one state v and one Wang block, from `start` on in a block."""
+    """The functions of one state v and one Wang block, or |N K⟩ of an axial top, from `start` on in a block.
+
+    names: beside spins, v, Ka and Kc of the functions in order of energy, (size, 3); v, K and 0 of |N K⟩.
+    """
 
     v: int
-    basis: WangBlock
+    basis: Any
     start: int
+    names: Any = None
 
     @property
     def place(self) -> slice:
         """Places of the functions in the block."""
         return slice(self.start, self.start + self.basis.size)
+
+
+def parts_of(members: Iterable[tuple[int, WangBlock]]) -> tuple[Part, ...]:
+    """The parts of a block, one behind the other, from the state v and the Wang block of each."""
+    parts, start = [], 0
+    for v, basis in members:
+        parts.append(Part(v, basis, start))
+        start += basis.size
+    return tuple(parts)
 
 
 def _parity(character: int) -> str:

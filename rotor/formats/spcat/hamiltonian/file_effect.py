@@ -30,14 +30,13 @@ from rotor.formats.spcat.hamiltonian.series import (
 from rotor.formats.spcat.hamiltonian.spin_operators import plain_of_j
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
 from rotor.formats.spcat.text.par import Options, ParameterFile
-from rotor.quantum.coupled import NOTHING
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.operators import EVERY_STATE, BetweenSpecies, ByElements, Cosines, CosinesWithN, HalfTurned
 from rotor.quantum.spins.scheme import SpinTerm
 from rotor.quantum.states import Coupling, OperatorOfJ, State
-from rotor.quantum.wang.basis import wang_blocks
+from rotor.quantum.wang.basis import NOTHING, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator, between_species
 from rotor.tops.operators import Operators
 
