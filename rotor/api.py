@@ -26,7 +26,6 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.alignment.pulse import GaussianPulse as GaussianPulse
     from rotor.alignment.pulse import Kick as Kick
     from rotor.alignment.pulse import elliptical as elliptical
-    from rotor.alignment.qutip_objects import LinearObjects as LinearObjects
     from rotor.alignment.qutip_objects import block_objects as block_objects
     from rotor.alignment.qutip_objects import linear_objects as linear_objects
     from rotor.alignment.qutip_objects import solve_windows as solve_windows
@@ -186,7 +185,6 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.quantum.spins import Spin as Spin
     from rotor.scenes.scene import SpectrumScene as SpectrumScene
     from rotor.scenes.sections import SpectrumConditions as SpectrumConditions
-    from rotor.spectra.classical_band import band_from_correlation as band_from_correlation
     from rotor.spectra.classical_band import classical_band as classical_band
     from rotor.spectra.classical_band import compare_bands as compare_bands
     from rotor.spectra.classical_band import dipole_band_area as dipole_band_area

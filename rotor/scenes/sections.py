@@ -12,15 +12,9 @@ from rotor.verbs.subjects import molecule_section
 
 MoleculeSection: Any = molecule_section()
 
-_SHARED = {
-    "QuantumEffects": "SpectrumEffects", "VibrationSection": "SpectrumVibration", "BasisNumerics": "SpectrumNumerics",
-    "FieldEffects": "StarkEffects", "BodySection": "TumbleBody",
-}  # fmt: skip  # tables that several kinds share
-
 
 def __getattr__(name: str) -> Any:
     """Structures by name: `RamanConditions` is the table [conditions] of raman."""
-    name = _SHARED.get(name, name)
     if name == "EmittingMolecule":
         from rotor.verbs.emission import emitting_molecule
 

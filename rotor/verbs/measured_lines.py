@@ -13,7 +13,7 @@ from rotor.requests.fill import Entries, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
-from rotor.verbs.subjects import beside, optional_molecule, saved_molecule, with_molecule_table
+from rotor.verbs.subjects import beside, optional_molecule, saved_molecule
 from rotor.verbs.verb import Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
@@ -143,10 +143,6 @@ class MeasuredLines(SubjectKind):
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
         """The key `molecule`, which a .par file makes superfluous."""
         return [optional_molecule("start of the fit; not needed with a .par file")]
-
-    def tables(self, content: dict[str, Any]) -> dict[str, Any]:
-        """The tables of a scene; a plain name of a molecule is its source."""
-        return with_molecule_table(content)
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The files of the lines, and the starting top."""

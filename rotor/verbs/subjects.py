@@ -52,10 +52,6 @@ class OneMolecule(SubjectKind):
 
         return [("molecule", _molecule_type(), NODEFAULT)]
 
-    def tables(self, content: dict[str, Any]) -> dict[str, Any]:
-        """The tables of a scene; a plain name of a molecule is its source."""
-        return with_molecule_table(content)
-
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs of the molecule, with files relative to the folder of the scene."""
         return saved_molecule(subject.molecules[0], folder)
@@ -71,12 +67,6 @@ def top_of_word(
     values = {"molecule.source": source, "molecule.isotopes": tuple(isotopes) or None}
     reading = Reading(read_molecule(Entries(values, "option")), "option", ".", note)
     return prepare(top_of(reading), reading)
-
-
-def with_molecule_table(content: dict[str, Any]) -> dict[str, Any]:
-    """The tables of a scene; a plain name of a molecule becomes the source of its table."""
-    molecule = content.get("molecule")
-    return content | {"molecule": {"source": molecule}} if isinstance(molecule, str) else content
 
 
 def _molecule_type() -> Any:

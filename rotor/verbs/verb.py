@@ -198,8 +198,9 @@ class SubjectKind:
     tables_read: tuple[str, ...] = ()  # keys read as a whole
 
     def tables(self, content: dict[str, Any]) -> dict[str, Any]:
-        """The tables of a scene in the form that the subject's inputs expect."""
-        return content
+        """The tables of a scene; a plain name of a molecule becomes the source of its table."""
+        molecule = content.get("molecule")
+        return content | {"molecule": {"source": molecule}} if isinstance(molecule, str) else content
 
 
 NOTHING = SubjectKind()

@@ -31,8 +31,6 @@ from rotor.scenes.scene import (
 )
 from rotor.scenes.scene_file import write_scene
 from rotor.scenes.sections import (
-    BasisNumerics,
-    BodySection,
     EmissionConditions,
     EmittingMolecule,
     FitLines,
@@ -45,9 +43,11 @@ from rotor.scenes.sections import (
     LinearDragSection,
     MoleculeSection,
     SpectrumConditions,
+    SpectrumNumerics,
     SpectrumObservables,
     StarkConditions,
     ThermoConditions,
+    TumbleBody,
     TumbleConditions,
 )
 from rotor.verbs.verb import verb_of
@@ -96,7 +96,7 @@ def test_lines_lose_intensity_by_a_cut_and_by_j_max():
     rod = MoleculeSection(constants="B=6000 D=0.001 MHz", dipole_abc=[1, 0, 0])
     seen = SpectrumObservables(min_lgint="none")
     table = work_precision(
-        SpectrumScene(molecule=rod, conditions=JET, observables=seen, numerics=BasisNumerics(jmax=12))
+        SpectrumScene(molecule=rod, conditions=JET, observables=seen, numerics=SpectrumNumerics(jmax=12))
     )
     for knob in ("numerics.jmax", "observables.min_lgint"):
         lost = list(errors(table, knob).values())
@@ -139,7 +139,7 @@ def test_a_partition_function_reaches_each_error():
 
 @pytest.mark.slow
 def test_the_step_of_a_splitting_has_its_order():
-    rod = BodySection(moments=[2.0, 2.0, 0.1], angular_velocity=[0.0, 0.0, 1.0], attitude=[0.8, 0.6, 0.0, 0.0])
+    rod = TumbleBody(moments=[2.0, 2.0, 0.1], angular_velocity=[0.0, 0.0, 1.0], attitude=[0.8, 0.6, 0.0, 0.0])
     weight = GravityAboutPivotSection(mass=1.0, centre=[0.0, 0.0, 1.0], gravity=[0.0, 0.0, -9.8])
     table = work_precision(
         TumbleScene(body=rod, effects=[weight], conditions=TumbleConditions(times=[0.0, 1.0, 2.0])), limit_seconds=20
@@ -154,7 +154,7 @@ def test_the_step_of_a_splitting_has_its_order():
 
 
 def test_kinds_without_a_knob_say_so():
-    racket = BodySection(moments=[1.0, 2.0, 3.0], angular_velocity=[0.1, 1.0, 0.1])
+    racket = TumbleBody(moments=[1.0, 2.0, 3.0], angular_velocity=[0.1, 1.0, 0.1])
     table = work_precision(TumbleScene(body=racket))
     assert len(table) == 0
     assert "exact: nothing cheaper" in table.remarks[0]
@@ -268,7 +268,7 @@ def test_the_command(call, folder):
 
 
 def test_the_command_where_nothing_can_be_swept(call, folder):
-    write_scene(TumbleScene(body=BodySection(moments=[1.0, 2.0, 3.0], angular_velocity=[0.1, 1.0, 0.1])), "s.toml")
+    write_scene(TumbleScene(body=TumbleBody(moments=[1.0, 2.0, 3.0], angular_velocity=[0.1, 1.0, 0.1])), "s.toml")
     assert "exact: nothing cheaper" in call("accuracy", "s.toml")[1]
     code, _, said = call("accuracy", "s.toml", "--plot", "a.png")
     assert code == 2
@@ -283,7 +283,7 @@ def test_a_sweep_over_values_is_refused():
 
 
 def test_an_interrupt_prints_what_there_is(call, folder, monkeypatch):
-    write_scene(SpectrumScene(molecule="HC3N", conditions=JET, numerics=BasisNumerics(jmax=5)), "s.toml")
+    write_scene(SpectrumScene(molecule="HC3N", conditions=JET, numerics=SpectrumNumerics(jmax=5)), "s.toml")
     true, count = accuracy_sweep.sweep, []
 
     def second_time(*arguments):

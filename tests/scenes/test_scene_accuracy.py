@@ -38,8 +38,6 @@ from rotor.scenes.scene_file import write_scene
 from rotor.scenes.sections import (
     AlignConditions,
     AlignNumerics,
-    BasisNumerics,
-    BodySection,
     FluidConditions,
     FluidNumerics,
     GasNumerics,
@@ -49,12 +47,14 @@ from rotor.scenes.sections import (
     LinearDragSection,
     MoleculeSection,
     PeriodicDriveSection,
-    QuantumEffects,
     SpectrumConditions,
+    SpectrumEffects,
+    SpectrumNumerics,
     StarkConditions,
     StarkNumerics,
     ThermoConditions,
     ThermoNumerics,
+    TumbleBody,
     TumbleConditions,
     TumbleNumerics,
 )
@@ -132,7 +132,7 @@ def test_a_partition_function():
     assert max(error, result.reached.error) <= 1e-3 == result.reached.asked
 
 
-BODY = BodySection(moments=[1.0, 2.0, 3.0], angular_velocity=[0.2, 1.0, 0.1])
+BODY = TumbleBody(moments=[1.0, 2.0, 3.0], angular_velocity=[0.2, 1.0, 0.1])
 DRIVEN = [
     PeriodicDriveSection(amplitude=[0.1, 0.0, 0.2], angular_frequency=1.3),
     LinearDragSection(coefficients=[0.1, 0.1, 0.1]),
@@ -171,7 +171,7 @@ NITROGEN = MoleculeSection(constants="A=9.2 B=3 C=2.5 GHz", dipole_abc=[1, 0, 0]
 
 
 def test_spins_are_taken_where_they_are_larger_than_what_is_asked_for():
-    few = BasisNumerics(jmax=2)
+    few = SpectrumNumerics(jmax=2)
     known = run_scene(SpectrumScene(molecule=NITROGEN, conditions=JET, numerics=few, accuracy="1 kHz"))
     assert "f" in known.table.quanta_names
     assert "with spins" in known.reached.how
@@ -191,7 +191,7 @@ TWO = MoleculeSection(
 @pytest.mark.parametrize(("goal", "method"), [("20 MHz", "first-order"), ("1 kHz", "exact")])
 def test_several_spins_by_the_cheapest_method(goal, method):
     """What is stated covers the difference from exact lines; what is too much to be left out stays."""
-    few = BasisNumerics(jmax=2)
+    few = SpectrumNumerics(jmax=2)
     scene = SpectrumScene(molecule=TWO, conditions=JET, numerics=few, accuracy=goal)
     result = run_scene(scene)
     exact = run_scene(SpectrumScene(molecule=TWO, conditions=JET, numerics=few))
@@ -241,7 +241,7 @@ REFUSED = [
         StarkScene(molecule="OCS", accuracy="1 kHz", numerics=StarkNumerics(tolerance="1 MHz")),
         "accuracy and numerics.tolerance: give one of them",
     ),
-    (SpectrumScene(molecule="SO2", accuracy="1e-15 MHz", numerics=BasisNumerics(jmax=20)), "cannot be given: the error here is"),
+    (SpectrumScene(molecule="SO2", accuracy="1e-15 MHz", numerics=SpectrumNumerics(jmax=20)), "cannot be given: the error here is"),
     (TumbleScene(body=BODY, effects=DRIVEN, conditions=TIMES, accuracy="1e-17 rad"), "cannot be given"),
 ]  # fmt: skip
 
@@ -266,7 +266,7 @@ def test_levels_with_spins_that_are_known():
     fine = run_scene(LevelsScene(molecule=NITROGEN, observables=few, accuracy="1 kHz"))
     assert "f" in fine.table.columns
     coarse = run_scene(
-        LevelsScene(molecule=NITROGEN, observables=few, effects=QuantumEffects(hyperfine=False), accuracy="10 MHz")
+        LevelsScene(molecule=NITROGEN, observables=few, effects=SpectrumEffects(hyperfine=False), accuracy="10 MHz")
     )
     assert coarse.reached.error > 1.0  # MHz: the spins are left out
 

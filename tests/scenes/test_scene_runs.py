@@ -31,21 +31,21 @@ from rotor.scenes.scene import (
 from rotor.scenes.scene_file import parse_scene, read_scene, write_scene
 from rotor.scenes.sections import (
     AlignConditions,
-    BodySection,
     FluidConditions,
     GasObservables,
     GaussianSection,
     LevelsObservables,
     LevelsOutputs,
     MoleculeSection,
-    QuantumEffects,
     SpectrumConditions,
+    SpectrumEffects,
     SpectrumObservables,
     SpectrumOutputs,
+    SpectrumVibration,
     StarkConditions,
     StarkObservables,
+    TumbleBody,
     TumbleConditions,
-    VibrationSection,
     ZeemanConditions,
     ZeemanMagnetic,
     ZeemanObservables,
@@ -147,7 +147,7 @@ def test_what_a_scene_asks_for_is_what_the_library_answers():
         molecule="OCS",
         conditions=SpectrumConditions(temperature="150 K", range="10:400GHz"),
         observables=SpectrumObservables(min_lgint=-6.5),
-        vibration=VibrationSection(fundamentals="859,520x2,2062"),
+        vibration=SpectrumVibration(fundamentals="859,520x2,2062"),
     )
     lines = run_scene(scene).table
     direct = rotor.api.line_list(
@@ -160,7 +160,7 @@ def test_what_a_scene_asks_for_is_what_the_library_answers():
 
 def test_effects_are_those_named():
     observables = LevelsObservables(jmax=4)
-    rigid = run_scene(LevelsScene(molecule="CO", effects=QuantumEffects(distortion=False), observables=observables))
+    rigid = run_scene(LevelsScene(molecule="CO", effects=SpectrumEffects(distortion=False), observables=observables))
     assert [type(effect) for effect in rigid.request.effects] == [Rigid]
     b = rotor.read("CO").constants["B"]
     j = np.arange(5)
@@ -206,7 +206,7 @@ def test_the_command_reports_a_scene(call, folder, kind):
 
 
 def test_a_body_by_its_angular_velocity():
-    scene = TumbleScene(body=BodySection(moments=[0.3, 0.35, 0.4], angular_velocity=[0.1, 15.0, 0.1]))
+    scene = TumbleScene(body=TumbleBody(moments=[0.3, 0.35, 0.4], angular_velocity=[0.1, 15.0, 0.1]))
     assert run_scene(scene).answer.facts()["period"] == pytest.approx(
         12.3349458093386, abs=1e-9
     )  # its closed form, 12 digits
@@ -224,7 +224,7 @@ BAD = [
     (LevelsScene(molecule="water", observables=LevelsObservables(jmax=-1)), "observables.jmax: -1"),
     (LevelsScene(molecule="nonesuch"), "molecule.source: 'nonesuch' is no file here"),
     (TumbleScene(), "molecule, body: give one of them"),
-    (TumbleScene(body=BodySection(moments=[1, 2], angular_velocity=[1, 2, 3])), "expected three numbers"),
+    (TumbleScene(body=TumbleBody(moments=[1, 2], angular_velocity=[1, 2, 3])), "expected three numbers"),
     (FluidScene(conditions=FluidConditions()), "conditions: give either molecules"),
     (AlignScene(molecule="OCS", pulses=[GaussianSection(peak="1 T", fwhm=1)]), "pulses[0].peak: '1 T'"),
     (AlignScene(molecule="OCS", pulses=[GaussianSection(peak=1e10, fwhm=1, axis="up")]), "pulses[0].axis: 'up'"),

@@ -22,7 +22,7 @@ import rotor
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import LevelsScene, SpectrumScene
 from rotor.scenes.scene_file import parse_scene, write_scene
-from rotor.scenes.sections import BasisNumerics, LevelsObservables, LevelsOutputs, MoleculeSection
+from rotor.scenes.sections import LevelsObservables, LevelsOutputs, MoleculeSection, SpectrumNumerics
 from rotor.scenes.sweep import points, run_sweep
 from rotor.scenes.sweep.combined import CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
@@ -359,7 +359,9 @@ def test_a_stopped_sweep_keeps_the_rows_of_its_points(folder):
 
 
 def test_the_summary_shows_results(folder):
-    result = run_sweep(SpectrumScene(molecule="CO", numerics=BasisNumerics(jmax=3), sweep={"molecule": ["CO", "HCl"]}))
+    result = run_sweep(
+        SpectrumScene(molecule="CO", numerics=SpectrumNumerics(jmax=3), sweep={"molecule": ["CO", "HCl"]})
+    )
     columns = result.columns
     for row, name in enumerate(("CO", "HCl")):
         lines = rotor.api.line_list(rotor.read(name), jmax=3)

@@ -34,7 +34,8 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     shown = verb.read_shown(entries)
     with as_typed(verb, there):
         files = files_of_options(verb, there)
-        refuse_overwriting(files, inputs)
+        if files.paths:
+            refuse_overwriting(files, inputs)
     view = picture_settings(verb, there, "plot" in files.paths)
     request, subject = verb.read(entries, Place(".", note))
     if missing := next((output.flag for output in verb.outputs if output.required and output.name not in there), ""):
@@ -161,9 +162,7 @@ def refuse_overwriting(files: Files, typed: Mapping[str, Any]) -> None:
     typed: everything that may name a file that is read.
     """
     texts = [text for value in typed.values() for text in (value if isinstance(value, tuple) else (value,))]
-    inputs = (
-        {os.path.realpath(text) for text in texts if isinstance(text, str) and is_file(text)} if files.paths else ()
-    )
+    inputs = {os.path.realpath(text) for text in texts if isinstance(text, str) and is_file(text)}
     for name, paths in files.paths.items():
         for path in paths:
             if os.path.realpath(path) in inputs:
