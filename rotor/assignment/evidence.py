@@ -35,6 +35,12 @@ def probability_of_isotopologue(grown: Grown) -> float:
     return float(1 / (1 + np.exp(-np.clip((grown.evidence - MIDDLE_OF_ISOTOPOLOGUES) / 2.0, -50, 50))))
 
 
+def differs(species: Grown, other: Grown) -> bool:
+    """Whether A, B, C of two species differ by more than five standard errors."""
+    variances = np.diag(species.covariance)[:3] + np.diag(other.covariance)[:3]
+    return bool((np.abs(species.constants[:3] - other.constants[:3]) > 5 * np.sqrt(variances)).any())
+
+
 def word(p: float) -> str:
     """certain from 0.99, likely from 0.5 on, else not found.
 

@@ -142,7 +142,7 @@ def grow(field: Field, start: Candidate, rounds: int = ROUNDS) -> Grown | None:
     prior = prior_weight(field, constants, sizes)
     slopes = slopes_of(field, start.family.lines, constants)
     covariance = np.asarray(np.linalg.inv(slopes.T @ slopes / FIRST_MHZ**2 + prior), dtype=np.float64)
-    return _grown(field, constants, covariance, prior, FIRST_MHZ, start, rounds)
+    return grown_from(field, constants, covariance, prior, FIRST_MHZ, start, rounds)
 
 
 def regrown(field: Field, species: Grown) -> Grown:
@@ -164,11 +164,11 @@ def grown_anew(field: Field, species: Grown) -> list[Grown]:
     grown = []
     for factor in LARGER:
         covariance = np.asarray(np.linalg.inv(np.linalg.inv(species.covariance) / factor**2 + prior), dtype=np.float64)
-        grown.append(_grown(field, species.constants, covariance, prior, sigma0, begin, ROUNDS))
+        grown.append(grown_from(field, species.constants, covariance, prior, sigma0, begin, ROUNDS))
     return [species for species in grown if species is not None]
 
 
-def _grown(
+def grown_from(
     field: Field, constants: Floats, covariance: Floats, prior: Floats, sigma0: float, start: Candidate, rounds: int
 ) -> Grown | None:
     """Rounds of matching and refitting until no line is added."""

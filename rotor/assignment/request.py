@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
+from rotor.assignment.confirmation import confirmed
 from rotor.assignment.doublets import with_centres
-from rotor.assignment.evidence import probability, probability_of_isotopologue, word
+from rotor.assignment.evidence import NOT_FOUND, differs, probability, probability_of_isotopologue, word
 from rotor.assignment.families import MOST, SAMPLES, Bounds, Family, families
 from rotor.assignment.growth import Grown, grown_anew
 from rotor.assignment.guesses import guess_values
@@ -231,17 +232,13 @@ class _Search:
             centres, members = with_centres(peaks, alone=True)
             doublets = self._as_doublets(centres, rivals) if excess_scatter(rivals[0], peaks) else []
             if doublets:
-                self._add(centres, rows[members], doublets)
-            else:
-                self._add(peaks, np.column_stack([rows, rows]), rivals)
-            return True
+                return self._add(centres, rows[members], doublets)
+            return self._add(peaks, np.column_stack([rows, rows]), rivals)
         if not self.species and self.request.species == 1 and len(peaks) > 2000:
             return False
         centres, members = with_centres(peaks)
         rivals = self._rivals(centres, NEXT_STAGES) if len(centres) > len(peaks) else []
-        if rivals:
-            self._add(centres, rows[members], rivals)
-        return bool(rivals)
+        return bool(rivals) and self._add(centres, rows[members], rivals)
 
     def _stages(self) -> tuple[Stage, ...]:
         """Families and peaks to try for the next species."""
@@ -265,22 +262,26 @@ class _Search:
                 grown for grown in next_species(seen, families_of(guess), stages, self.clock) if guess.allows(grown)
             ]
         rivals.sort(key=lambda grown: -grown.evidence)
-        return rivals if rivals and word(probability(rivals[0])) != "not found" else []
+        return rivals if rivals and word(probability(rivals[0])) != NOT_FOUND else []
 
-    def _add(self, peaks: PeakList, members: Ints, rivals: list[Grown], isotopologue: str = "") -> None:
-        """Accept the first of the rivals and remove the peaks that it explains."""
-        best = rivals[0]
+    def _add(self, peaks: PeakList, members: Ints, rivals: list[Grown], isotopologue: str = "") -> bool:
+        """Accept the first of the rivals if it is likely, and remove the peaks that it explains; whether it was accepted."""
+        first = rivals[0]
         seen = Field(peaks, self.table, self.request.root_bounds, self.request.temperatures)
-        refined = refine(best, peaks, self.table)
-        twins = tuple(
-            (other.constants[:3], other.evidence) for other in rivals[1:] if other.evidence > best.evidence - 10
-        )
+        best = first if isotopologue else confirmed(seen, first)
+        twins = [other for other in rivals[1:] if other.evidence > first.evidence - 10 and differs(first, other)]
         p = probability_of_isotopologue(best) if isotopologue else probability(best)
+        p /= 1 + sum(float(np.exp(other.evidence - first.evidence)) for other in twins)
+        if word(p) == NOT_FOUND:
+            return False
+        refined = refine(best, peaks, self.table)
+        others = tuple((other.constants[:3], other.evidence) for other in twins)
         self.species.append(
-            AssignedSpecies(best, refined, members[best.peak], strength(seen, best), p, twins, isotopologue)
+            AssignedSpecies(best, refined, members[best.peak], strength(seen, best), p, others, isotopologue)
         )
         mask = explained(seen, best)
         self.left[members[mask].ravel()] = False
+        return True
 
     def _strong_left(self) -> int:
         """Number of the strongest peaks without a species."""
@@ -310,8 +311,8 @@ class _Search:
             peaks = self.request.peaks.where(self.left)
             pairs = find_isotopologues(peaks, constants, waiting, self.table, self.clock.over)
             for isotopologue, grown in pairs:
-                if self.left[rows[grown.peak]].mean() > LEAST_LEFT:
-                    self._add(peaks, np.column_stack([rows, rows]), [grown], isotopologue.label)
+                free = self.left[rows[grown.peak]].mean() > LEAST_LEFT
+                if free and self._add(peaks, np.column_stack([rows, rows]), [grown], isotopologue.label):
                     waiting.remove(isotopologue)
             if not pairs:
                 break

@@ -30,7 +30,10 @@ SOFTNESS = (
 )
 SPREAD = 0.6  # standard deviation of ln intensity about the model: response of the instrument, saturation
 DETECTED = 0.95  # probability that a line above the threshold is in the list
-STRIDE = 4  # grid points of κ between tests for a crossing
+STRIDE, FEWEST_POINTS = (
+    4,
+    12,
+)  # grid points of κ between tests for a crossing; least number of tests if the bounds are narrow
 SAME = 3e-4  # relative difference below which roots are the same
 
 
@@ -105,7 +108,7 @@ def roots_of(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
         np.ascontiguousarray((energies[:, upper] - energies[:, lower]).T), field.jj[upper] - field.jj[lower], table.kappa[points],
         energies[:, further] - energies[:, below], field.jj[further] - field.jj[below],
         field.peaks.frequency_mhz[seeds], field.peaks.log_intensity[seeds], field.near, low, high, BIN_MHZ, NEAR_MHZ, 2 * SOFTNESS, RATIO,
-        field.bounds.array, need, STRIDE, out,
+        field.bounds.array, need, min(STRIDE, max(1, len(energies) // FEWEST_POINTS)), out,
     )  # fmt: skip
     return out[:count]
 

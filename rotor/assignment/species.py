@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.assignment import _kernels
 from rotor.assignment.families import Bounds, Family
-from rotor.assignment.growth import LEAST_RATIO, Grown, grow, predict, regrown
+from rotor.assignment.growth import LEAST_RATIO, Grown, grow, predict, regrown, slopes_of
 from rotor.assignment.rigid_table import RigidTable
 from rotor.assignment.search import Candidate, Field, alike, quick_ratios, ranked, roots_of
 
@@ -45,7 +45,7 @@ class Stage:
     last: int
 
 
-FIRST_STAGES = (Stage(60, 0, 150), Stage(60, 150, 600), Stage(110, 0, 220), Stage(60, 600, 1200))
+FIRST_STAGES = (Stage(60, 0, 150), Stage(60, 150, 600), Stage(110, 0, 60))
 STRONG_STAGES = (
     Stage(60, 0, 120),
     Stage(60, 120, 420),
@@ -130,9 +130,8 @@ def compiled(table: RigidTable) -> bool:
 
     peaks = peak_list([9000.0, 9500.0, 10000.0, 10100.0, 11000.0], np.ones(5), 0.1)
     seen = Field(peaks, table, Bounds(np.array([2.0e3, 500, 400]), np.array([4.0e3, 2e3, 2e3])), np.array([2.0, 4.0]))
-    family = _lowest_a_lines(seen, 5)
-    if family is None:
-        return False
+    low = _lowest_a_lines(seen)
+    family = Family(0, low[table.quanta[table.upper[low], 0] == 5], low[:0], 0.0)
     roots_of(seen, family, seen.seeds(5), 1)
     candidate = Candidate(np.array([3000.0, 1050.0, 950.0]), family, 0.0, 2.0)
     quick_ratios(seen, candidate.constants[None, :], np.zeros(1, dtype=np.int64))
@@ -172,27 +171,56 @@ def aliases(seen: Field, grown: Grown) -> list[Candidate]:
 
 
 def multiples(seen: Field, grown: Grown) -> list[Candidate]:
-    """Candidates whose a-type R branches coincide with the same peaks if J is multiplied by a ratio r.
+    """Candidates whose a-type R branches have the same peaks, with J multiplied by a ratio r.
 
     B' = B/r, C' = C/r and A' - ½(B'+C') = r (A - ½(B+C)) preserve the splitting of K = 1, (B-C) J, and the shift of K = 0,
-    (B-C)² J³/8(A - ½(B+C)) (second order, J. K. Bragg and S. Golden, Phys. Rev. 75, 735 (1949)). Within some per cent of these
-    constants, the lines of K = 0 and 1 are matched to the strongest peaks.
+    (B-C)² J³/8(A - ½(B+C)) (second order, J. K. Bragg and S. Golden, Phys. Rev. 75, 735 (1949)). The lines of K = 0 and 1 of the species
+    give A', B', C' by least squares.
     """
-    if not grown.ratios[0] > LEAST_RATIO:
-        return []
+    low = _lowest_a_lines(seen)
+    known = np.flatnonzero(np.isin(grown.rows, low))
+    upper = seen.table.quanta[seen.table.upper]
+    rows, f = grown.rows[known], seen.peaks.frequency_mhz[grown.peak[known]]
     a, b, c = grown.constants[:3]
-    mean, out, seeds = (b + c) / 2, list[Candidate](), seen.seeds(2 * FIRST_STAGES[0].seeds)
+    mean, tops, families = (b + c) / 2, list[Floats](), list[Family]()
     for ratio in MULTIPLES:
         top = np.array([ratio * (a - mean) + mean / ratio, b / ratio, c / ratio])
-        if top[0] <= top[1] or (top < seen.bounds.low).any() or (top > seen.bounds.high).any():
+        places = [_multiple_row(low, upper, row, ratio) for row in rows.tolist()]
+        present = np.array([place >= 0 for place in places], dtype=bool)
+        lines = np.array(places, dtype=np.int64)[present]
+        if top[0] <= top[1] or len({(upper[line, 1], upper[line, 2] - upper[line, 0]) for line in lines.tolist()}) < 3:
             continue
-        narrow = replace(seen, bounds=Bounds(top * (0.9, 0.999, 0.999), top * (1.1, 1.001, 1.001)))
-        middle = round(sum(seen.peaks.band_mhz) / 2 / (top[1] + top[2]))
-        for j in (middle - 1, middle, middle + 1):
-            family = _lowest_a_lines(seen, j)
-            if family is not None:
-                out += ranked(narrow, family, roots_of(narrow, family, seeds, 0), FAINT)[:2]
-    return sorted(out, key=lambda candidate: -candidate.ratio)[:MOST_ALIASES]
+        top = _fitted_top(seen, top, lines, f[present])
+        if (top > seen.bounds.low).all() and (top < seen.bounds.high).all() and top[0] > top[1] > top[2]:
+            tops.append(top)
+            families.append(Family(0, lines, lines[:0], 0.0))
+    if not tops:
+        return []
+    ratios, temperatures = quick_ratios(seen, np.array(tops), np.zeros(len(tops), dtype=np.int64))
+    each = zip(tops, families, ratios.tolist(), temperatures.tolist(), strict=True)
+    return [Candidate(*values) for values in each if values[2] > FAINT]
+
+
+def _multiple_row(low: Ints, upper: Ints, row: int, ratio: float) -> int:
+    """The line with J of the upper level multiplied by a ratio and the same Ka and Kc - J; -1 without one."""
+    j, ka, kc = upper[row].tolist()
+    changed = round(ratio * j)
+    if abs(changed - ratio * j) > 1e-9:
+        return -1
+    same = low[(upper[low] == (changed, ka, kc - j + changed)).all(axis=1)]
+    return int(same[0]) if len(same) else -1
+
+
+def _fitted_top(seen: Field, top: Floats, lines: Ints, frequency: Floats) -> Floats:
+    """A, B, C near `top` from lines with their frequencies, by least squares."""
+    constants, energy = np.concatenate([top, np.zeros(5)]), np.empty(len(seen.jj))
+    for _ in range(3):
+        if not constants[0] > constants[1] > constants[2] > 0:
+            break
+        _kernels.level_energies(seen.table.levels, seen.table.theta, seen.jj, constants, energy)
+        residual = frequency - (energy[seen.table.upper[lines]] - energy[seen.table.lower[lines]])
+        constants[:3] += np.linalg.lstsq(slopes_of(seen, lines, constants)[:, :3], residual, rcond=None)[0]
+    return constants[:3]
 
 
 def shifts(seen: Field, grown: Grown) -> list[Candidate]:
@@ -252,19 +280,13 @@ def _shifted(seen: Field, start: Floats, present: NDArray[np.bool_], slow: Ints)
     return out[:MOST_ALIASES]
 
 
-def _lowest_a_lines(seen: Field, j: int) -> Family | None:
-    """The a-type lines J ← J-1 with Ka = 0 and 1."""
+def _lowest_a_lines(seen: Field) -> Ints:
+    """Rows of the a-type lines J ← J-1 with Ka = 0 and 1."""
     table = seen.table
     upper, lower = table.quanta[table.upper], table.quanta[table.lower]
-    chosen = (
-        (table.kind == 0)
-        & (upper[:, 0] == j)
-        & (lower[:, 0] == j - 1)
-        & (upper[:, 1] <= 1)
-        & (upper[:, 1] == lower[:, 1])
+    return np.flatnonzero(
+        (table.kind == 0) & (upper[:, 0] == lower[:, 0] + 1) & (upper[:, 1] <= 1) & (upper[:, 1] == lower[:, 1])
     )
-    rows = np.flatnonzero(chosen)
-    return Family(0, rows, np.zeros(0, dtype=np.int64), 0.0) if len(rows) == 3 else None
 
 
 def explained(seen: Field, grown: Grown) -> NDArray[np.bool_]:
