@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, record_table
@@ -18,6 +18,12 @@ def accuracy_fact(content: Mapping[str, Any]) -> tuple[str, str]:
     accuracy = f"J max {content['jmax']}; energies to {content['accuracy_mhz']:.1e} MHz"
     rounding = f"round-off {content['round_off_mhz']:.1e} MHz of it"
     return "numerical error", f"{accuracy}, {rounding}; edge population {content['edge_population']:.1e}"
+
+
+def refuse_picture_of_one_field(fields: Sequence[float], outputs: Collection[str]) -> None:
+    """Refuse a picture of a single field."""
+    if "plot" in outputs and len(fields) < 2:
+        raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
 
 
 def table_of_states(states: FieldMap, unit: str, columns: Mapping[str, Callable[[Any], str]]) -> Table:

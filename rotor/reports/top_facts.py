@@ -127,6 +127,13 @@ def constants_text(top: Top) -> str:
     return text + (f" ({form_text(constants)})" if more and constants.reduction else "")
 
 
+def rigid_fact(top: Top) -> tuple[str, str]:
+    """A, B, C of a top whose motion is computed without distortion."""
+    constants = zip("ABC", top.rotational_constants_mhz, strict=True)
+    rigid = ", ".join(f"{name} {value:.10g}" for name, value in constants if math.isfinite(value))
+    return "rigid top", f"{rigid} MHz, distortion neglected"
+
+
 def known_digits(value: float, error: float | None, digits: int = 12) -> str:
     """Number rounded to two uncertain digits of its error; with `digits` digits if no error is estimated.
 

@@ -23,11 +23,23 @@ if TYPE_CHECKING:
 
 FIELDS = all_fields(AlignRequest)
 _TEXTS = {
-    "--pulse": ("gaussian", ("peak", "fwhm", "centre")),
-    "--switched": ("switched", ("peak", "rise", "plateau", "fall", "start")),
-    "--kick": ("kick", ("fluence", "time")),
-    "--thz": ("thz", ("peak", "fwhm", "frequency", "centre")),
-}  # shape of the pulse and order of its numbers, by option
+    "--pulse": (
+        "gaussian",
+        ("peak", "fwhm", "centre"),
+        'Gaussian pulse: peak intensity, full width at half maximum[, time]: "1e13 W/cm2, 1 ps"; repeatable',
+    ),
+    "--switched": (
+        "switched",
+        ("peak", "rise", "plateau", "fall", "start"),
+        'Switched pulse: "1e12 W/cm2, RISE, PLATEAU, FALL[, START]" (ps); repeatable',
+    ),
+    "--kick": ("kick", ("fluence", "time"), 'Kick without duration: "0.5 J/cm2[, TIME]"; repeatable'),
+    "--thz": (
+        "thz",
+        ("peak", "fwhm", "frequency", "centre"),
+        'Field on the dipole: "100 kV/cm, 1 ps[, 0.3 THz[, TIME]]": peak, width of its envelope, frequency; repeatable',
+    ),
+}  # shape of the pulse, order of its numbers and help, by option
 
 EXAMPLES = """\b
 Examples:
@@ -73,7 +85,7 @@ def _named(option: str, make: Any) -> Any:
 
 def _pulse_of_text(text: str, option: str, axis: Axis) -> Pulse:
     """A pulse from numbers separated by commas."""
-    shape, keys = _TEXTS[option]
+    shape, keys, _ = _TEXTS[option]
     fields: dict[str, Any] = {field.key: field for field in all_fields(SHAPES[shape]).values()}
     parts = [part.strip() for part in text.split(",")]
     least, units = sum(fields[key].default is REQUIRED for key in keys), [fields[key].reader.unit for key in keys]
@@ -207,7 +219,6 @@ VERB = Verb(
     examples=EXAMPLES,
     request=AlignRequest,
     answer=lambda request, work: answer_align(request, work.executor),
-    table=lambda answer: answer.table,
     results=results,
     rows="trace",
     show=show,
@@ -220,39 +231,11 @@ VERB = Verb(
     scaled=False,
     workers="blocks of initial states",
     extras=(
-        Extra(
-            "--pulse",
-            "TEXT",
-            'Gaussian pulse: peak intensity, full width at half maximum[, time]: "1e13 W/cm2, 1 ps"; repeatable',
-            panel=CONDITIONS,
-            common=True,
-            many=True,
-        ),
-        Extra(
-            "--switched",
-            "TEXT",
-            'Switched pulse: "1e12 W/cm2, RISE, PLATEAU, FALL[, START]" (ps); repeatable',
-            panel=CONDITIONS,
-            common=True,
-            many=True,
-        ),
-        Extra(
-            "--kick",
-            "TEXT",
-            'Kick without duration: "0.5 J/cm2[, TIME]"; repeatable',
-            panel=CONDITIONS,
-            common=True,
-            many=True,
+        *(
+            Extra(option, "TEXT", help_, panel=CONDITIONS, common=True, many=True)
+            for option, (_, _, help_) in _TEXTS.items()
         ),
         Extra("--pulse-table", "FILE", "Pulse from a CSV with columns t_ps and intensity_w_per_cm2", panel=CONDITIONS),
-        Extra(
-            "--thz",
-            "TEXT",
-            'Field on the dipole: "100 kV/cm, 1 ps[, 0.3 THz[, TIME]]": peak, width of its envelope, frequency; repeatable',
-            panel=CONDITIONS,
-            common=True,
-            many=True,
-        ),
         Extra(
             "--polarization",
             "NAME",

@@ -14,9 +14,9 @@ from rotor.fitting.publication import value_text
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OBSERVABLES, all_fields, declared
-from rotor.requests.fill import Entries, read_instance, written_fields
+from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom, Range, Text
-from rotor.verbs.subjects import beside
+from rotor.verbs.subjects import saved_inputs
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Subject, SubjectKind, Verb
 
 EXAMPLES = """\b
@@ -91,8 +91,7 @@ class SpectrumFile(SubjectKind):
         """The inputs, with files relative to the folder of the scene."""
         if not isinstance(subject.molecules[0].source, str):
             raise ValueError("a scene cannot hold the numbers of a spectrum; give a file")
-        content = written_fields(subject.molecules[0])
-        return {key: beside(value, folder) if isinstance(value, str) else value for key, value in content.items()}
+        return saved_inputs(subject.molecules[0], folder)
 
 
 def draw(answer: AssignAnswer, path: Path, report: Report) -> None:
@@ -183,7 +182,6 @@ VERB = Verb(
     examples=EXAMPLES,
     request=AssignRequest,
     answer=lambda request, work: answer_assign(request),
-    table=lambda answer: answer.table,
     results=results,
     rows="assignments",
     numerics="rotor.assignment.numerics:ASSIGN",

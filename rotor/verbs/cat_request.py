@@ -23,11 +23,7 @@ class CatRequest:
         INFINITE, Range("MHz"), "First and last frequency (MHz)", option="--range"
     )
     min_lgint: float | None = declared(
-        None,
-        Quantity(least=-300, most=300),
-        "Least log10 of the intensity in nm² MHz",
-        option="--min-lgint",
-        none="none",
+        None, Quantity(least=-300, most=300), "Least log10 of the intensity in nm² MHz", none="none"
     )
     measured: str | None = declared(None, Text(metavar="FILE"), "Catalogue whose measured lines are merged in")
     compare: str | None = declared(

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.formats.provenance import write_beside
 from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
+from rotor.table import Table as Columns
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import ErrorsShown, Output, Report, Work
-from rotor.version import version
+from rotor.verbs.verb import ErrorsShown, Output, Work
 
 if TYPE_CHECKING:
     from rotor.requests.budget import ErrorBudget
-    from rotor.table import Table as Columns
 
 ADD, LIST, SHOW = ACTIONS = ("add", "list", "show")
 EXAMPLES = """\b
@@ -129,34 +125,48 @@ def list_species(request: CatalogueRequest, work: Work) -> Listed:
         return Listed(request.catalogue, catalogue.species(), len(catalogue))
 
 
+@dataclass(frozen=True, repr=False)
+class StoredLines(Columns):
+    """Lines of a catalogue, in order of frequency."""
+
+    data: dict[str, Any]
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """The columns by name."""
+        return self.data
+
+
 @dataclass(frozen=True)
 class LinesInRange:
     """Lines of a range, in order of frequency."""
 
     request: CatalogueRequest
-    rows: list[tuple[Any, ...]]
+    table: StoredLines
     species: int
 
     def facts(self) -> dict[str, Any]:
         """A record for each line."""
-        lines = [dict(zip(_COLUMNS, row, strict=True)) for row in self.rows]
-        return {"catalogue": self.request.catalogue, "lines": lines, "errors": self.errors.as_json()}
+        return {
+            "catalogue": self.request.catalogue,
+            "lines": rows_of(self.table),
+            "errors": self.errors.as_json(),
+        }
 
     @property
     def errors(self) -> ErrorBudget:
         """Error budget of the frequencies, from the errors in their sources."""
-        import numpy as np
-
         from rotor.formats.spcat.catalogue_budget import stored_budget
 
-        return stored_budget(*np.array([row[1:4] for row in self.rows], dtype=np.float64).reshape(-1, 3).T)
+        names = ("frequency_mhz", "error_mhz", "log_intensity_300k")
+        return stored_budget(*(self.table.columns[name] for name in names))
 
     def parts(self) -> Iterable[Part]:
         """The strongest lines at 300 K, in order of frequency."""
-        count = f"{len(self.rows)} of {self.species} species"
+        count = f"{len(self.table)} of {self.species} species"
         errors = error_facts(self.errors.as_json())
         yield [("catalogue", self.request.catalogue), ("lines", count), *errors]
-        yield _table(self.rows, self.request.top_lines)
+        yield _table(self.table, self.request.top_lines)
 
 
 def find_lines(request: CatalogueRequest, work: Work) -> LinesInRange:
@@ -165,45 +175,35 @@ def find_lines(request: CatalogueRequest, work: Work) -> LinesInRange:
 
     with LineCatalogue(request.catalogue) as catalogue:
         species = catalogue.species_between(*request.range_mhz, list(request.words))
-    return LinesInRange(request, _line_rows(species), len(species))
+    return LinesInRange(request, _stored_lines(species), len(species))
 
 
-_COLUMNS = (
-    "species",
-    "frequency_mhz",
-    "error_mhz",
-    "log_intensity_300k",
-    "energy_lower_k",
-    "g_upper",
-    "einstein_a_per_s",
-    "upper",
-    "lower",
-)
-
-
-def _line_rows(species: Sequence[Any]) -> list[tuple[Any, ...]]:
-    """A row for each line, in order of frequency."""
+def _stored_lines(species: Sequence[Any]) -> StoredLines:
+    """The lines of all species, in order of frequency."""
     import numpy as np
 
-    rows: list[tuple[Any, ...]] = []
-    for lines in species:
+    def intensity(lines: Any) -> Any:
         low, high = lines.partition.range_k
-        intensity = np.log10(lines.intensity_nm2_mhz(min(max(300.0, low), high)))
-        numbers = (
-            lines.frequency_mhz,
-            lines.error_mhz,
-            intensity,
-            lines.energy_lower_k,
-            lines.g_upper,
-            lines.einstein_a_per_s,
-        )
-        texts = (lines.upper.tolist(), lines.lower.tolist())
-        rows += [(lines.name, *row) for row in zip(*(column.tolist() for column in numbers), *texts, strict=True)]
-    return sorted(rows, key=lambda row: row[1])
+        return np.log10(lines.intensity_nm2_mhz(min(max(300.0, low), high)))
+
+    columns = {
+        "species": [np.full(len(lines), lines.name) for lines in species],
+        "frequency_mhz": [lines.frequency_mhz for lines in species],
+        "error_mhz": [lines.error_mhz for lines in species],
+        "log_intensity_300k": [intensity(lines) for lines in species],
+        **{
+            name: [getattr(lines, name) for lines in species]
+            for name in ("energy_lower_k", "g_upper", "einstein_a_per_s", "upper", "lower")
+        },
+    }
+    joined = {name: np.concatenate(parts) if parts else np.zeros(0) for name, parts in columns.items()}
+    order = np.argsort(joined["frequency_mhz"], kind="stable")
+    return StoredLines({name: column[order] for name, column in joined.items()})
 
 
-def _table(rows: Sequence[tuple[Any, ...]], shown: int) -> Table:
-    strongest = sorted(sorted(range(len(rows)), key=lambda i: -rows[i][3])[:shown])
+def _table(lines: StoredLines, shown: int) -> Table:
+    import numpy as np
+
     columns = {
         "species": "{species}",
         "frequency (MHz)": "{frequency_mhz:.4f}",
@@ -215,23 +215,9 @@ def _table(rows: Sequence[tuple[Any, ...]], shown: int) -> Table:
         "upper": "{upper}",
         "lower": "{lower}",
     }
-    title = "all lines" if len(strongest) == len(rows) else f"the {len(strongest)} strongest of {len(rows)} lines"
-    records = [dict(zip(_COLUMNS, rows[i], strict=True)) for i in strongest]
-    return record_table(f"{title}, in order of frequency", columns, records, {"species"})
-
-
-def write_csv(answer: Listed | LinesInRange, path: Path, report: Report) -> None:
-    """Write the species or the lines as CSV."""
-    if isinstance(answer, Listed):
-        from rotor.formats import write
-
-        write(answer.table, path)
-        return
-    with path.open("w", encoding="utf-8", newline="") as handle:
-        writer = csv.writer(handle, lineterminator="\n")
-        writer.writerow(_COLUMNS)
-        writer.writerows(answer.rows)
-    write_beside(path, {"program": "rotor", "version": version(), **report.provenance})
+    strongest = np.sort(np.argsort(-lines.columns["log_intensity_300k"], kind="stable")[:shown])
+    title = "all lines" if len(strongest) == len(lines) else f"the {len(strongest)} strongest of {len(lines)} lines"
+    return record_table(f"{title}, in order of frequency", columns, rows_of(lines, strongest), {"species"})
 
 
 def check(request: CatalogueRequest, outputs: Any, _: Any) -> None:
@@ -247,8 +233,9 @@ VERB = Tool(
     request=CatalogueRequest,
     of="catalogue",
     answer=lambda request, work: {ADD: add, LIST: list_species, SHOW: find_lines}[request.action](request, work),
+    table=lambda answer: answer.table,
     show=lambda answer, report: answer.parts(),
-    outputs=(Output("csv", (".csv",), "Write the species (list) or the lines (show) as CSV", write_csv),),
+    outputs=(Output("csv", (".csv",), "Write the species (list) or the lines (show) as CSV"),),
     check=check,
     shown=ErrorsShown,
     stepwise=True,

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import msgspec
+from msgspec import NODEFAULT
 
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, rows_of
@@ -32,7 +33,7 @@ from rotor.verbs.molecule import (
 )
 from rotor.verbs.observed_file import SeveralInput, is_catalogue
 from rotor.verbs.subjects import beside, saved_molecule
-from rotor.verbs.tables import Section, described, entries_of
+from rotor.verbs.tables import defined, described, entries_of
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb, tables
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ class SeveralMolecules(SubjectKind):
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
         """The list of molecules."""
         structure: Any = emitting_molecule()
-        return [("molecules", Annotated[list[structure], described("one or more")], msgspec.NODEFAULT)]
+        return [("molecules", Annotated[list[structure], described("one or more")], NODEFAULT)]
 
     def saved(self, request: EmissionRequest, subject: Subject, folder: Path) -> dict[str, Any]:
         """The tables of the molecules."""
@@ -163,20 +164,11 @@ class SeveralMolecules(SubjectKind):
         return {"molecules": tables}
 
 
+@cache
 def emitting_molecule() -> Any:
     """Structure of a molecule in the scene's list; made once, since msgspec identifies structures by class."""
     fields: tuple[Field, ...] = (*FIELDS.values(), *all_fields(EmitterInput).values())
-    if not _STRUCTURE:
-        _STRUCTURE.append(
-            msgspec.defstruct(
-                "EmittingMolecule", entries_of(fields), bases=(Section,), frozen=True, kw_only=True, forbid_unknown_fields=True,
-                omit_defaults=True, module=__name__,
-            )
-        )  # fmt: skip
-    return _STRUCTURE[0]
-
-
-_STRUCTURE: list[Any] = []
+    return defined("EmittingMolecule", entries_of(fields), "A molecule of the source.")
 
 
 def _read_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, EmitterInput]:

@@ -59,39 +59,25 @@ class FitShown(ErrorsShown):
         common=True,
     )
     choose: tuple[str, ...] | None = declared(
-        None,
-        NameList(),
-        "Build the model from these constants, one at a time",
-        option="--choose",
-        panel=OBSERVABLES,
-        common=True,
+        None, NameList(), "Build the model from these constants, one at a time", panel=OBSERVABLES, common=True
     )
     all_orders: bool = declared(
-        False,
-        Flag(),
-        "With --choose: constants of all orders compete from the first step",
-        option="--all-orders",
-        panel=OBSERVABLES,
+        False, Flag(), "With --choose: constants of all orders compete from the first step", panel=OBSERVABLES
     )
     suggest: str | None = declared(
         None,
         Text(metavar="NAME"),
         "Unmeasured lines that would best determine this constant",
-        option="--suggest",
         panel=OBSERVABLES,
         common=True,
     )
     bootstrap: int = declared(
-        0,
-        Whole(0, MOST_SAMPLES),
-        "Also errors from N bootstrap samples of the lines",
-        option="--bootstrap",
-        panel=NUMERICS,
+        0, Whole(0, MOST_SAMPLES), "Also errors from N bootstrap samples of the lines", panel=NUMERICS
     )
-    seed: int = declared(0, Whole(0), "Seed of the bootstrap", option="--seed", panel=NUMERICS)
+    seed: int = declared(0, Whole(0), "Seed of the bootstrap", panel=NUMERICS)
     table_errors: str = declared(
         "stated", Text(("stated", "scatter"), "NAME"), "Errors in the table: from the stated errors of the lines, or from their scatter",
-        option="--table-errors", panel=OUTPUT,
+        panel=OUTPUT,
     )  # fmt: skip
 
 

@@ -189,7 +189,7 @@ class FluidShown(Shown):
     checkpoint_every: int = declared(
         1000, Whole(1), "Steps between checkpoints", "outputs.checkpoint_every", panel=OUTPUT
     )
-    resume: bool = declared(False, Flag(), "Continue from the checkpoint", option="--resume", panel=OUTPUT)
+    resume: bool = declared(False, Flag(), "Continue from the checkpoint", panel=OUTPUT)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -68,13 +67,11 @@ def show(answer: GasAnswer, report: Report) -> Iterable[Part | None]:
 
 def _facts(answer: GasAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
     top, test = answer.request.top, answer.test
-    a, b, c = top.rotational_constants_mhz
-    rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))
     count = content["degrees_of_freedom"]
     drawn = f"{content['molecules']} molecules at {content['temperature_k']:g} K, seed {content['seed']}"
     left_out = "" if top.mass_u is not None else "; translations are left out: the mass is not known"
     facts = [
-        ("rigid top", f"{rigid} MHz, distortion neglected"),
+        top_facts.rigid_fact(top),
         ("drawn", f"{drawn}; moved freely for {content['tested_at_ps']:.4g} ps, exactly"),
         ("degrees", f"{count['translation']} translations, {count['rotation']} rotations a molecule{left_out}"),
         ("test", str(test)),

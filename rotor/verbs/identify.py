@@ -37,9 +37,7 @@ class IdentifyRequest:
     """The spectrum, the candidates, and settings of the search."""
 
     file: str = declared(REQUIRED, Text(), "Spectrum: FITS or text", option="FILE")
-    catalogue: tuple[str, ...] = declared(
-        (), Names("FILE"), "Local catalogue, folder of .cat, or .cat; repeatable", option="--catalogue"
-    )
+    catalogue: tuple[str, ...] = declared((), Names("FILE"), "Local catalogue, folder of .cat, or .cat; repeatable")
     range_mhz: tuple[float, float] = declared(INFINITE, Range("MHz"), "Range of frequencies (MHz)", option="--range")
     velocity_km_s: float | None = declared(
         None,

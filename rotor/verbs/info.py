@@ -211,7 +211,6 @@ VERB = Verb(
     examples=EXAMPLES,
     request=InfoRequest,
     answer=answer,
-    table=lambda answer: answer.table,
     results=results,
     rows="partition_function",
     records=lambda answer: None,

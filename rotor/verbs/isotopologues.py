@@ -88,7 +88,6 @@ VERB = Verb(
     examples=EXAMPLES,
     request=IsotopologuesRequest,
     answer=lambda request, work: answer_isotopologues(request),
-    table=lambda answer: answer.table,
     results=lambda answer: {"isotopologues": len(answer.table)},
     rows="isotopologues",
     records=lambda answer: None,

@@ -37,11 +37,7 @@ class LevelsShown(Shown):
     """Display options of `levels`."""
 
     unit: str = declared(
-        "cm-1",
-        Text(tuple(COLUMNS), "UNIT"),
-        "Unit of the table and the diagram: MHz, cm-1 or K",
-        option="--unit",
-        panel=OUTPUT,
+        "cm-1", Text(tuple(COLUMNS), "UNIT"), "Unit of the table and the diagram: MHz, cm-1 or K", panel=OUTPUT
     )
     top_levels: int = declared(60, Whole(0), "Number of lowest levels shown", option="--top", panel=OUTPUT)
 
@@ -138,7 +134,6 @@ VERB = Verb(
     examples=EXAMPLES,
     request=LevelsRequest,
     answer=lambda request, work: answer_levels(request, work.executor),
-    table=lambda answer: answer.table,
     results=results,
     rows="levels",
     show=show,

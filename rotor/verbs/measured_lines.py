@@ -13,7 +13,7 @@ from rotor.requests.fill import Entries, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
-from rotor.verbs.subjects import beside, optional_molecule, saved_molecule
+from rotor.verbs.subjects import optional_molecule, saved_inputs, saved_molecule
 from rotor.verbs.verb import Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
@@ -177,9 +177,8 @@ class MeasuredLines(SubjectKind):
         lines, molecule = subject.molecules
         if not isinstance(lines.source, str):
             raise ValueError("a scene cannot hold lines; give a file")
-        content = {key: beside(value, folder) for key, value in written_fields(lines).items()}
         start = {} if molecule is None else saved_molecule(molecule, folder)
-        return {**content, **start, **written_fields(subject.values["inputs"])}
+        return {**saved_inputs(lines, folder), **start, **written_fields(subject.values["inputs"])}
 
 
 def _path(name: Any, called: str, place: Place) -> Any:

@@ -29,7 +29,7 @@ class SeveralInput:
         (), Names(), "Molecules: names, files, SMILES:..., .cat files of JPL and CDMS", option="SOURCE"
     )
     partition: str | None = declared(
-        None, Text(metavar="FILE"), "Q(T) of .cat files: a catdir.cat, or T=Q pairs: 300=108.87,75=27.46", option="--partition",
+        None, Text(metavar="FILE"), "Q(T) of .cat files: a catdir.cat, or T=Q pairs: 300=108.87,75=27.46",
         panel=CONDITIONS,
     )  # fmt: skip
 

@@ -51,27 +51,23 @@ class SpectrumShown(Shown):
 
     resolution: float | None = declared(
         None, Quantity("MHz", above=0, metavar="D"), "Show components of a rotational line closer than this (MHz) as one line",
-        option="--resolution", panel=OBSERVABLES,
+        panel=OBSERVABLES,
     )  # fmt: skip
     as_spcat: bool = declared(
-        False, Flag(), "For an .int file: results of SPCAT, also where SPCAT errs (notes say where)", option="--as-spcat",
+        False, Flag(), "For an .int file: results of SPCAT, also where SPCAT errs (notes say where)",
         panel=OBSERVABLES,
     )  # fmt: skip
     full_basis: bool = declared(
-        False,
-        Flag(),
-        "For an .int file: every K in the basis, ignoring KNMIN and KNMAX",
-        option="--full-basis",
-        panel=OBSERVABLES,
+        False, Flag(), "For an .int file: every K in the basis, ignoring KNMIN and KNMAX", panel=OBSERVABLES
     )
     over: str | None = declared(
         None, Text(metavar="FILE"), "Compare with a measured spectrum or its peaks (.csv, .npy, FITS): --plot draws both",
-        option="--over", panel=OBSERVABLES,
+        panel=OBSERVABLES,
     )  # fmt: skip
     top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
     tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag", panel=OUTPUT)
     hitran_id: tuple[int, int] | None = declared(
-        None, Custom(_hitran_numbers, metavar="M:I"), "HITRAN's numbers of molecule and isotopologue, such as 5:1", option="--hitran-id",
+        None, Custom(_hitran_numbers, metavar="M:I"), "HITRAN's numbers of molecule and isotopologue, such as 5:1",
         panel=OUTPUT,
     )  # fmt: skip
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.fields.stark_request import StarkAnswer, StarkRequest, answer_stark
 from rotor.reports import top_facts
-from rotor.reports.field_maps import accuracy_fact, results_of_map, table_of_states
+from rotor.reports.field_maps import accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
 from rotor.reports.screen import Part, Table
 from rotor.requests.field import declared_fields
 from rotor.requests.fill import Entries
@@ -18,7 +18,7 @@ from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.table import counted
 from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, Writer, tables
+from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, tables
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
@@ -60,8 +60,7 @@ def prepare(top: Top, reading: Reading, entries: Entries) -> Top:
 
 def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) -> None:
     """Refuse a picture of a single field, and inputs that no requested file depends on."""
-    if "plot" in outputs and len(request.fields_kv_per_cm) < 2:
-        raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
+    refuse_picture_of_one_field(request.fields_kv_per_cm, outputs)
     for name, field in declared_fields(FieldSample).items():
         files = OUTPUTS_OF_SAMPLE[name]
         if getattr(shown, name) != field.default and not files & set(outputs):
@@ -69,8 +68,8 @@ def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) 
             raise ValueError(f"{field.option}: does not change the map itself; expected with {names}")
 
 
-def _further(name: str) -> Writer:
-    """Function that writes a table derived from the map."""
+def _further(name: str, what: str) -> Output:
+    """File of a table derived from the map."""
 
     def write_table(answer: StarkAnswer, path: Path, report: Report) -> None:
         """Write the table."""
@@ -78,7 +77,7 @@ def _further(name: str) -> Writer:
 
         write(_derived_table(name, answer, report), path, settings=dict(report.provenance))
 
-    return write_table
+    return Output(name, (".csv",), f"Write {what} as CSV", write_table, scene=False)
 
 
 def _derived_table(name: str, answer: StarkAnswer, report: Report) -> Any:
@@ -144,7 +143,6 @@ def _facts(top: Top, content: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [*facts, accuracy_fact(content)]
 
 
-_CSV = (".csv",)
 VERB = Verb(
     name="stark",
     about="Levels in a static electric field: energies, labels, effective dipoles and cosines for all M; lines and mixtures.",
@@ -158,32 +156,12 @@ VERB = Verb(
     outputs=(
         *tables("the map", "out"),
         Output("plot", PICTURES, "Draw the map (.png, .pdf, .svg)", draw, "out.png"),
-        Output("lines", _CSV, "Write the lines in every field, resolved in M, as CSV", _further("lines"), scene=False),
+        _further("lines", "the lines in every field, resolved in M,"),
         Output("lobes", PICTURES, "Draw the lines against the field (.png, .pdf, .svg)", draw_lines, scene=False),
-        Output(
-            "spectrum", _CSV, "Write the cross section at the highest field as CSV", _further("spectrum"), scene=False
-        ),
-        Output(
-            "coefficients",
-            _CSV,
-            "Write Stark coefficients of the states, or of --line, as CSV",
-            _further("coefficients"),
-            scene=False,
-        ),
-        Output(
-            "mixture",
-            _CSV,
-            "Write means of the thermal mixture against the field as CSV",
-            _further("mixture"),
-            scene=False,
-        ),
-        Output(
-            "deflection",
-            _CSV,
-            "Write effective dipoles, one column for each state, as CSV",
-            _further("deflection"),
-            scene=False,
-        ),
+        _further("spectrum", "the cross section at the highest field"),
+        _further("coefficients", "Stark coefficients of the states, or of --line,"),
+        _further("mixture", "means of the thermal mixture against the field"),
+        _further("deflection", "effective dipoles, one column for each state,"),
     ),
     subject=OneMolecule(("anisotropy", "spin_weights", "calculator", "hessian", *STATES), prepare),
     shown=StarkShown,

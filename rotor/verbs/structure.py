@@ -15,11 +15,11 @@ from rotor.formats.structure_request import StructureAnswer, StructureRequest, a
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import MOLECULE, all_fields, declared
-from rotor.requests.fill import Entries, read_instance, written_fields
+from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom
 from rotor.structures.family import Family
 from rotor.table import counted
-from rotor.verbs.subjects import beside
+from rotor.verbs.subjects import saved_inputs
 from rotor.verbs.verb import (
     PICTURES,
     ErrorsShown,
@@ -84,7 +84,7 @@ class Isotopologues(SubjectKind):
         """The file, relative to the folder of the scene."""
         if isinstance(subject.molecules[0].source, Family):
             raise ValueError("a scene cannot hold a family; give a file")
-        return {key: beside(value, folder) for key, value in written_fields(subject.molecules[0]).items()}
+        return saved_inputs(subject.molecules[0], folder)
 
 
 def _geometry(answer: StructureAnswer) -> Any:
@@ -205,7 +205,6 @@ VERB = Verb(
     examples=EXAMPLES,
     request=StructureRequest,
     answer=lambda request, work: answer_structure(request),
-    table=lambda answer: answer.table,
     results=results,
     rows="rs",
     records=lambda answer: None,

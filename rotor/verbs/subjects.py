@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from rotor.requests.field import Field
-from rotor.requests.fill import Entries, written_fields
+from rotor.requests.field import Field, all_fields
+from rotor.requests.fill import Entries, read_instance, written_fields
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
 from rotor.verbs.verb import Note, Place, Subject, SubjectKind
 
@@ -27,24 +28,39 @@ def unprepared(top: Top, reading: Reading, entries: Entries) -> Top:
 
 @dataclass(frozen=True)
 class OneMolecule(SubjectKind):
-    """A molecule. without: inputs for which the verb has no option. prepare: adds to the top what the verb needs."""
+    """A molecule.
+
+    without: inputs for which the verb has no option. prepare: adds to the top what the verb needs.
+    further: dataclass of further inputs of the verb.
+    """
 
     without: tuple[str, ...] = ()
     prepare: Callable[[Top, Reading, Entries], Top] = unprepared
+    further: type | None = None
 
-    fields = {field.identity: field for field in FIELDS.values()}  # noqa: RUF012
+    @cached_property
+    def fields(self) -> Mapping[str, Field]:  # type: ignore[override]
+        """The inputs of a molecule, and further ones."""
+        return {**{field.identity: field for field in FIELDS.values()}, **self._further_fields}
+
+    @property
+    def _further_fields(self) -> Mapping[str, Field]:
+        return {} if self.further is None else all_fields(self.further)
 
     @property
     def options(self) -> Mapping[str, Field]:
-        """The inputs of a molecule for which the verb has options."""
-        return {field.identity: field for name, field in FIELDS.items() if name not in self.without}
+        """The inputs for which the verb has options."""
+        kept = {field.identity: field for name, field in FIELDS.items() if name not in self.without}
+        return {**kept, **self._further_fields}
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read the molecule and prepare its top."""
         molecule = read_molecule(entries)
         reading = Reading(molecule, entries.style, place.folder, place.note)
         top = self.prepare(top_of(reading), reading, entries)
-        return Subject({"top": top}, (molecule,), str(molecule.source or molecule.constants or ""), place.note)
+        text = str(molecule.source or molecule.constants or "")
+        further = None if self.further is None else read_instance(self.further, entries)
+        return Subject({"top": top}, (molecule,), text, place.note, further=further)
 
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
         """The key `molecule`: a name, a file, SMILES:... or a table."""
@@ -53,8 +69,15 @@ class OneMolecule(SubjectKind):
         return [("molecule", _molecule_type(), NODEFAULT)]
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The inputs of the molecule, with files relative to the folder of the scene."""
-        return saved_molecule(subject.molecules[0], folder)
+        """The inputs as entered, with files relative to the folder of the scene."""
+        further = {} if subject.further is None else written_fields(subject.further)
+        return {**saved_molecule(subject.molecules[0], folder), **further}
+
+
+def saved_inputs(inputs: Any, folder: Path) -> dict[str, Any]:
+    """Inputs by key, with files relative to the folder of the scene."""
+    content = written_fields(inputs)
+    return {key: beside(value, folder) if isinstance(value, str) else value for key, value in content.items()}
 
 
 def top_of_word(

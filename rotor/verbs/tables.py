@@ -56,11 +56,8 @@ def structures_of(choices: Choices) -> dict[str, Any]:
     for name, kind in choices.load().items():
         title = "".join(word.capitalize() for word in name.split())
         entries = entries_of(tuple(all_fields(kind).values()))
-        structures[name] = msgspec.defstruct(
-            f"{title}Section", entries, bases=(Section,), frozen=True, kw_only=True, tag=name, tag_field=choices.word,
-            forbid_unknown_fields=True, omit_defaults=True, module=__name__,
-        )  # fmt: skip
-        structures[name].__doc__ = (kind.__doc__ or "").splitlines()[0]
+        about = (kind.__doc__ or "").splitlines()[0]
+        structures[name] = defined(f"{title}Section", entries, about, tag=name, tag_field=choices.word)
     return structures
 
 
@@ -79,11 +76,14 @@ def entries_of(inputs: tuple[Field, ...]) -> list[Any]:
 
 def _structure(table: str, entries: list[Any], owner: str) -> Any:
     name = owner.capitalize() + table.rpartition(".")[2].capitalize()
-    structure = msgspec.defstruct(
-        name, entries, bases=(Section,), frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True,
-        module=__name__,
-    )  # fmt: skip
-    structure.__doc__ = TITLES.get(table, "Settings.")
+    return defined(name, entries, TITLES.get(table, "Settings."))
+
+
+def defined(name: str, entries: list[Any], about: str, **tag: Any) -> Any:
+    """The structure of a table with these keys. tag: key and value that tell it from others."""
+    settings: dict[str, Any] = {"frozen": True, "kw_only": True, "forbid_unknown_fields": True, "omit_defaults": True}
+    structure = msgspec.defstruct(name, entries, bases=(Section,), module=__name__, **settings, **tag)
+    structure.__doc__ = about
     return structure
 
 

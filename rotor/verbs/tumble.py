@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -149,9 +148,7 @@ def _facts(request: TumbleRequest, content: Mapping[str, Any]) -> list[tuple[str
     units, facts = request.units, []
     top = getattr(request, "top", None)
     if top is not None:
-        a, b, c = top.rotational_constants_mhz
-        rigid = ", ".join(f"{n} {x:.10g}" for n, x in zip("ABC", (a, b, c), strict=True) if math.isfinite(x))
-        facts.append(("rigid top", f"{rigid} MHz, distortion neglected"))
+        facts.append(top_facts.rigid_fact(top))
     if request.named is not None:
         facts.append(("body", f"{request.named.text}; assumed sizes"))
     size = f"{content['angular_momentum_size']:.8g}{_unit(units.angular_momentum)}"
@@ -273,7 +270,6 @@ VERB = Verb(
     examples=EXAMPLES,
     request=MotionInput,
     answer=lambda request, work: answer(request),
-    table=lambda answer: answer.table,
     results=results,
     rows="motion",
     show=show,

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.requests.field import all_fields
 from rotor.requests.fill import Entries, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, Grid, Quantity
 from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL
@@ -50,12 +49,7 @@ class Body:
 class TurningBody(OneMolecule):
     """A molecule, an everyday body or bare moments."""
 
-    fields = {**OneMolecule.fields, **all_fields(BodyInput)}  # noqa: RUF012
-
-    @property
-    def options(self) -> Any:
-        """The inputs of the molecule and of the body."""
-        return {**super().options, **all_fields(BodyInput)}
+    further: type = BodyInput
 
     def scene_fields(self) -> list[tuple[str, Any, Any]]:
         """The key `molecule`; a body may replace it."""

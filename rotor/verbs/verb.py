@@ -47,7 +47,7 @@ class Subject:
     """The molecule or other object that a verb computes.
 
     values: fields of the request. molecules: their inputs. text: as typed. note: takes remarks.
-    departures: for each of several molecules, the inputs in which it differs from the conditions.
+    departures: for each of several molecules, the inputs in which it differs from the conditions. further: further inputs as entered.
     """
 
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -55,6 +55,7 @@ class Subject:
     text: str = ""
     note: Note = silent
     departures: tuple[Mapping[str, Any], ...] = ()
+    further: Any = None
 
     @property
     def top(self) -> Any:
@@ -139,14 +140,14 @@ class Output:
 class ErrorsShown:
     """Options of all verbs."""
 
-    errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", option="--errors")
+    errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Shown(ErrorsShown):
     """Options of verbs whose report ends with sources."""
 
-    sources: bool = declared(False, Flag(), "Print the sources of the numbers in full", option="--sources")
+    sources: bool = declared(False, Flag(), "Print the sources of the numbers in full")
 
 
 def no_notes(answer: Any) -> Iterable[str]:
@@ -215,7 +216,8 @@ class Verb:
     extras: options that set several fields; read_extras: reads them together.
     build: makes the request if its fields alone do not. adapt: changes the request for the requested files.
     check: refuses a request that does not fit these files.
-    answer: computes a request. table: of an answer; rows: its key in the JSON; records: rows of the JSON if not the table.
+    answer: computes a request. table: of an answer, by default its `table`; rows: its key in the JSON.
+    records: rows of the JSON if not the table.
     results: a few numbers of an answer with rows, by name with units, for the table of a sweep.
     content: further keys of the JSON. notes: remarks on an answer. failure: reason why an answer is not a result.
     outputs: files. withheld: reasons why some of them are not written. stated: keys of the JSON in the provenance of files.
@@ -233,12 +235,12 @@ class Verb:
     examples: str
     request: type
     answer: Callable[[Any, Work], Any]
-    table: Callable[[Any], Table]
     rows: str
     show: Callable[[Any, Report], Iterable[Part | None]]
     results: Callable[[Any], Mapping[str, Any]] = lambda answer: {}
     outputs: tuple[Output, ...]
     subject: SubjectKind
+    table: Callable[[Any], Table] = lambda answer: answer.table
     shown: type = Shown
     content: Callable[[Any, Any], Mapping[str, Any]] = lambda answer, shown: {}
     notes: Callable[[Any], Iterable[str]] = no_notes

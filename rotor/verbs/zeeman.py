@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.fields.zeeman_request import ZeemanAnswer, ZeemanRequest, answer_zeeman
 from rotor.reports import top_facts
-from rotor.reports.field_maps import accuracy_fact, results_of_map, table_of_states
+from rotor.reports.field_maps import accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
 from rotor.reports.screen import Part
-from rotor.requests.field import CONDITIONS, all_fields, declared
+from rotor.requests.field import CONDITIONS, declared, names_of
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Numbers
 from rotor.table import counted
-from rotor.verbs.molecule import FIELDS, STATES, Reading
+from rotor.verbs.molecule import STATES, Reading
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Subject, Verb, tables
+from rotor.verbs.verb import PICTURES, Output, Report, Verb, tables
 
 if TYPE_CHECKING:
     from rotor.tops.magnetic import Tensor
@@ -45,45 +45,12 @@ class MagneticInput:
     )  # fmt: skip
 
 
-_MAGNETIC = {field.identity: field for field in all_fields(MagneticInput).values()}
-
-
-class MagneticMolecule(OneMolecule):
-    """A molecule with its rotational g and magnetisability tensors."""
-
-    fields = {**{field.identity: field for field in FIELDS.values()}, **_MAGNETIC}  # noqa: RUF012
-
-    @property
-    def options(self) -> Mapping[str, Any]:
-        """Inputs of the molecule, and its magnetic tensors."""
-        return {**super().options, **_MAGNETIC}
-
-    def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
-        """The inputs of the molecule, and tensors that the user gave."""
-        magnetic = subject.values["top"].magnetic
-        stated = {"magnetic.g": _numbers(magnetic.g), "magnetic.magnetisability": _numbers(magnetic.magnetisability)}
-        typed = magnetic.source.startswith("given")
-        tensors = {name: value for name, value in stated.items() if value is not None and typed}
-        return {**super().saved(request, subject, folder), **tensors}
-
-
-def _numbers(tensor: Tensor | None) -> list[float] | None:
-    """aa, bb, cc, with ab, ac, bc if one of them is not 0."""
-    if tensor is None:
-        return None
-    (aa, ab, ac), (_, bb, bc), (_, _, cc) = tensor
-    mixed = [ab, ac, bc]
-    return [aa, bb, cc, *(mixed if any(mixed) else [])]
-
-
 def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
     """The top with the tensors of the inputs, else with those of its file."""
     from rotor.tops.magnetic import MagneticTensors, tensor_for
 
-    magnetic, called = (
-        read_instance(MagneticInput, entries),
-        {field.name: field.called(entries.style) for field in _MAGNETIC.values()},
-    )
+    magnetic = read_instance(MagneticInput, entries)
+    called = dict(names_of(MagneticInput, entries.style))
 
     def tensor(name: str) -> Tensor | None:
         numbers = getattr(magnetic, name)
@@ -102,12 +69,6 @@ def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
             "symmetric top, or the single g of a linear top"
         )
     return top if chi is None else replace(top, magnetic=replace(top.magnetic, magnetisability=chi))
-
-
-def check(request: ZeemanRequest, outputs: Mapping[str, Any], shown: Any) -> None:
-    """Refuse a picture of a single field."""
-    if "plot" in outputs and len(request.fields_tesla) < 2:
-        raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
 
 
 def draw(answer: ZeemanAnswer, path: Path, report: Report) -> None:
@@ -160,15 +121,16 @@ VERB = Verb(
         *tables("the map", "out"),
         Output("plot", PICTURES, "Draw the map (.png, .pdf, .svg)", draw, "out.png"),
     ),
-    subject=MagneticMolecule(
+    subject=OneMolecule(
         ("dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "calculator", "hessian", *STATES),
         with_tensors,
+        MagneticInput,
     ),
     stated=("g_abc", "magnetisability_abc", "nuclear_g"),
     drawn="T",
     scaled=False,
     workers="blocks of states",
-    check=check,
+    check=lambda request, outputs, shown: refuse_picture_of_one_field(request.fields_tesla, outputs),
     sound=False,
     numerics="rotor.quantum.fields.numerics:ZEEMAN",
     accuracy="of the energies",
