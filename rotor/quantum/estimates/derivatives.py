@@ -86,9 +86,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
         return _derivatives_of_spherical(top, levels, names, rows)
     if any(not block.alone for block in levels.blocks):
         return _derivatives_of_coupled(top, levels, names, rows)
-    if "v" in levels.quanta:
-        return _derivatives_of_uncoupled(top, levels, names, rows)
-    return _sums_of_terms(levels, [by_name[name] for name in names], rows)
+    return _derivatives_of_uncoupled(top, levels, names, rows)
 
 
 def _sums_of_terms(levels: Levels, operators: Sequence[Operators], rows: Rows) -> Floats:
@@ -102,12 +100,12 @@ def _sums_of_terms(levels: Levels, operators: Sequence[Operators], rows: Rows) -
 
 
 def _derivatives_of_uncoupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
-    """Derivatives of levels of uncoupled states, in closed form: each parameter acts in its state only."""
+    """Derivatives of levels of one state or of uncoupled ones, in closed form: each parameter acts in its state only."""
     terms = {0: parameter_operators(top, levels.effects)}
     terms |= {state.v: state.terms for effect in levels.effects for state in effect.states(top)}
-    out, v = np.zeros((len(rows), len(names))), levels.quanta["v"][rows]
+    out, v = np.zeros((len(rows), len(names))), levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
     for number, by_name in terms.items():
-        here = v == number
+        here = v[rows] == number
         out[here] = _sums_of_terms(levels, [by_name.get(name, {}) for name in names], rows[here])
     return out
 

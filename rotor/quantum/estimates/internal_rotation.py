@@ -24,6 +24,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.quantum.torsion import TorsionalPotential, torsional_states
 
 A_SPECIES, E_SPECIES = 0, 1  # σ
 _WAVES = 16  # |k| of exp i(3k + σ)α: enough for |ρ| K up to 21 and V3 of a thousand F
@@ -71,21 +72,16 @@ def rotor_of_moments(top_moment: float, cosines: Floats, moments: Floats, barrie
     return InternalRotor(free, barrier_mhz, (float(rho[0]), float(rho[1]), float(rho[2])))
 
 
-def torsional_states(rotor: InternalRotor, k: Floats, species: int) -> tuple[Floats, Floats]:
+def lowest_torsion(rotor: InternalRotor, k: Floats, species: int) -> tuple[Floats, Floats]:
     """Energies (n,) in MHz and vectors (n, waves) of the lowest torsional state at each K (n,).
 
     >>> free = InternalRotor(150_000.0, 0.0, (0.0, 0.0, 0.0))
-    >>> torsional_states(free, np.zeros(1), E_SPECIES)[0].tolist()  # F m² of m = 1
+    >>> lowest_torsion(free, np.zeros(1), E_SPECIES)[0].tolist()  # F m² of m = 1
     [150000.0]
     """
-    m = 3.0 * np.arange(-_WAVES, _WAVES + 1) + species
-    shift = float(np.linalg.norm(rotor.rho)) * k
-    matrix = np.zeros((len(k), len(m), len(m)))
-    rows = np.arange(len(m))
-    matrix[:, rows, rows] = rotor.f_mhz * (m[None, :] - shift[:, None]) ** 2 + rotor.barrier_mhz / 2
-    matrix[:, rows[1:], rows[:-1]] = matrix[:, rows[:-1], rows[1:]] = -rotor.barrier_mhz / 4
-    energies, vectors = np.linalg.eigh(matrix)
-    return energies[:, 0], _same_signs(vectors[:, :, 0])
+    potential, shifts = TorsionalPotential({3: rotor.barrier_mhz}), float(np.linalg.norm(rotor.rho)) * k
+    solved = torsional_states(rotor.f_mhz, potential, shifts=shifts, species=species, fold=3, waves=_WAVES, count=1)
+    return solved.energies[:, 0], _same_signs(solved.vectors[:, :, 0])
 
 
 def _same_signs(vectors: Floats) -> Floats:
@@ -140,7 +136,7 @@ def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRot
     p_z, p_x = np.diag(k), np.diag(step, 1) + np.diag(step, -1)
     p = (p_x, 1j * (p_z @ p_x - p_x @ p_z), p_z)
     rotation = sum(tensor[a, b] * (p[a] @ p[b] + p[b] @ p[a]) / 2 for a in range(3) for b in range(3))
-    energies, vectors = torsional_states(rotor, k, species)
+    energies, vectors = lowest_torsion(rotor, k, species)
     eigenvalues, states = np.linalg.eigh(rotation * (vectors @ vectors.T) + np.diag(energies))
     by_k = eigenvalues[np.argsort(k**2 @ np.abs(states) ** 2, kind="stable")]
     return np.concatenate([by_k[:1], np.sort(by_k[1:].reshape(j, 2), axis=1).ravel()])

@@ -18,7 +18,7 @@ from rotor.arrays import Floats
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import Levels, MomentBlock, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.reduced import AnyBlock, amplitudes, connected_pairs, wang_amplitudes
+from rotor.quantum.reduced import AnyBlock, amplitudes, connected_pairs, pairs_where, wang_amplitudes
 from rotor.quantum.tensors import Tensors
 
 if TYPE_CHECKING:
@@ -67,18 +67,18 @@ class ReducedElements:
 
     def _connected(self, operator: FieldOperator) -> Iterator[Pair]:
         """Pairs of blocks between which the operator has elements."""
+        number = {block.start: i for i, block in enumerate(self.blocks)}
+
+        def acts(up: AnyBlock, low: AnyBlock) -> bool:
+            return self.between(operator, number[up.start], number[low.start]) is not None
+
         if isinstance(operator, Contraction):
             tensors = self._tensors_of(operator)
-            number = {block.start: i for i, block in enumerate(self.blocks)}
-            for up, low in connected_pairs(self.blocks, tensors) if tensors else ():
-                yield number[up.start], number[low.start]
-            return
-        total = [block.twice_total for block in self.blocks]
-        for low, first in enumerate(total):
-            for up, second in enumerate(total):
-                near = second == first + 2 or (second == first and up >= low)
-                if near and self.between(operator, up, low) is not None:
-                    yield up, low
+            pairs = connected_pairs(self.blocks, tensors) if tensors else iter(())
+        else:
+            pairs = pairs_where(self.blocks, operator.rank, acts)
+        for up, low in pairs:
+            yield number[up.start], number[low.start]
 
     def _tensors_of(self, operator: Contraction) -> Tensors:
         """Spherical tensors of a contraction, computed once."""
