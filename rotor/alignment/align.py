@@ -23,7 +23,7 @@ from rotor.alignment import observables as observe
 from rotor.alignment import propagate
 from rotor.alignment.acting import contractions_of, guessed_jmax
 from rotor.alignment.carry import EDGE, Outcome, Plan, Problem, Task, run, tasks_of
-from rotor.alignment.ensemble import Ensemble, ground_level, one_level, thermal
+from rotor.alignment.ensemble import Ensemble, ground_level, single_level, thermal
 from rotor.alignment.observables import Harmonics
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
 from rotor.alignment.steps import Pilot, pilot_of
@@ -251,7 +251,7 @@ def _ensemble(
     if state is not None:
         if temperature_k:
             raise ValueError("give a temperature or a state, not both")
-        return one_level(top, state, m)
+        return single_level(top, state, m)
     if m is not None:
         raise ValueError(f"m: {m} belongs to one state: give the state too")
     return thermal(top, temperature_k, tolerance) if temperature_k else ground_level(top)

@@ -60,7 +60,7 @@ class Ensemble:
         return np.where(here, 1.0 / states, 0.0)
 
 
-def one_level(top: Top, state: Mapping[str, int], m: int | None = None) -> Ensemble:
+def single_level(top: Top, state: Mapping[str, int], m: int | None = None) -> Ensemble:
     """The ensemble of a single level, named by quantum numbers (j; j, k; j, ka, kc), with one |M| or equal populations of all M.
 
     Raises ValueError for wrong names, a level that does not exist, and an M above J.
@@ -86,7 +86,7 @@ def ground_level(top: Top) -> Ensemble:
     levels = solve_levels(one_state(top, "alignment"), 4)
     existing = np.flatnonzero(levels.weight > 0)
     row = int(existing[np.argmin(levels.energy_mhz[existing])])
-    return one_level(top, {name: int(column[row]) for name, column in levels.quanta.items()})
+    return single_level(top, {name: int(column[row]) for name, column in levels.quanta.items()})
 
 
 def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:

@@ -42,7 +42,7 @@ def is_compiled(request: DrivenRequest) -> bool:
     return system_of(request.moments, request.effects).compiled is not None
 
 
-def some_steps(request: DrivenRequest) -> tuple[int, int]:
+def timed_steps(request: DrivenRequest) -> tuple[int, int]:
     """Number of steps of the first timed part, and factor for the second."""
     first_steps = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
     return first_steps, MORE_COMPILED if is_compiled(request) else MORE_PLAIN
@@ -85,7 +85,7 @@ def _fastest_rate(request: DrivenRequest) -> float:
 
 def expected_steps(request: DrivenRequest) -> int:
     """Expected number of steps of a motion: counted if few, otherwise estimated from its first part; see the head of this module."""
-    part, (first_steps, more) = first_share(request), some_steps(request)
+    part, (first_steps, more) = first_share(request), timed_steps(request)
     whole = steps_of(request, part)
     if whole / part < first_steps * more:
         return steps_of(request, 1.0)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.classical.driven import answer_driven
-from rotor.classical.motion_steps import beginning, expected_steps, first_share, is_compiled, some_steps, steps_of
+from rotor.classical.motion_steps import beginning, expected_steps, first_share, is_compiled, steps_of, timed_steps
 from rotor.classical.step_errors import MOST_CALLED, MOST_STEPS, apart
 from rotor.classical.tolerance_search import FINER, Planned, choose_tolerance, planned_tolerance
 from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
@@ -161,7 +161,7 @@ def _stepping(request: DrivenRequest, steps: int) -> str:
 
 def _seconds_of_steps(request: DrivenRequest, steps: int) -> float:
     """Processor time of a driven motion, from two timed parts: the first steps run in Python, the others compiled."""
-    first_steps, more = some_steps(request)
+    first_steps, more = timed_steps(request)
     if steps < more * first_steps:
         return timed(lambda: steps_of(request, 1.0))
     counts, seconds = [], []

@@ -277,12 +277,12 @@ def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) 
     for _ in range(2):  # project twice: the first projection loses digits by cancellation
         columns = columns - basis @ (basis.T @ columns)
     products, along = columns.T @ columns, columns.T @ fit.residuals
-    own_size = np.diag(products).copy()
-    seen = own_size > _MADE_UP
-    alone = np.where(seen, along**2 / np.where(seen, own_size, 1.0), 0.0)
-    determinant = np.outer(own_size, own_size) - products**2
-    both = np.outer(along**2, own_size) + np.outer(own_size, along**2) - 2 * np.outer(along, along) * products
-    apart = determinant > 1e-6 * np.outer(own_size, own_size)
+    squared_norms = np.diag(products).copy()
+    seen = squared_norms > _MADE_UP
+    alone = np.where(seen, along**2 / np.where(seen, squared_norms, 1.0), 0.0)
+    determinant = np.outer(squared_norms, squared_norms) - products**2
+    both = np.outer(along**2, squared_norms) + np.outer(squared_norms, along**2) - 2 * np.outer(along, along) * products
+    apart = determinant > 1e-6 * np.outer(squared_norms, squared_norms)
     apart &= np.outer(seen, seen)
     return alone, np.where(apart, both / np.where(apart, determinant, 1.0), 0.0)
 

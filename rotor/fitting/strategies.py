@@ -122,7 +122,7 @@ def _searched(search: Search, progress: Progress | None) -> Minimum:
         left = limit - len(first.iterations)
         first = _continued(first, _minimised(search, first.parameters, progress, left))
     if first.converged and "v" in search.lines.names:
-        first = _with_one_as_at_the_start(search, first, progress)
+        first = _with_a_reset_parameter(search, first, progress)
     return first
 
 
@@ -185,7 +185,7 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
     return first
 
 
-def _with_one_as_at_the_start(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
+def _with_a_reset_parameter(search: Search, first: Minimum, progress: Progress | None) -> Minimum:
     """Restart from a minimum with one parameter reset to its start; return the better minimum.
 
     Two couplings of the same states act through a square, (G + F)², so that χ² has two similar minima along one of them. The few

@@ -225,8 +225,8 @@ def answer_fluid(
         A ValueError too: a run that stopped on its way.
     """
     outputs = outputs or Outputs()
-    own_engine = request.engine == "rotor"
-    if not own_engine and (outputs.checkpoint or resume):
+    built_in = request.engine == "rotor"
+    if not built_in and (outputs.checkpoint or resume):
         raise ValueError(f"engine {request.engine}: checkpoints are written by the engine rotor alone")
     atoms = box_of(request, relaxed=not resume)
     settings = request.settings
@@ -235,14 +235,14 @@ def answer_fluid(
     equilibration = None
     if not resume and request.equilibration_ps != 0:
         atoms = atoms if isinstance(request.box, NewBox) else _with_calculator(atoms, settings, request.threads)
-        if not own_engine:
+        if not built_in:
             from rotor.fluids.engines.follow import check_engine
 
             check_engine(request.engine, atoms, settings, outputs, request.threads)
         with progress_bar(0, progress) as shown:
             equilibration = equilibrate(atoms, settings, request.equilibration_ps, shown)
         start += f"; {equilibration.text}"
-    if not own_engine:
+    if not built_in:
         from rotor.fluids.engines.follow import follow_engine
 
         record = follow_engine(request.engine, atoms, settings, outputs, request.threads, on_start)

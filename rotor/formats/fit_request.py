@@ -230,7 +230,7 @@ def fit_of_lines(
     fitted = parameters(begin, names, ties=ties, priors_mhz=priors)
     has_prior = np.isfinite(fitted.prior)  # constants with an a-priori value start there
     begin, moved = beside_zero(
-        begin, [name for name, has_one in zip(fitted.names, has_prior, strict=True) if not has_one], read
+        begin, [name for name, is_held in zip(fitted.names, has_prior, strict=True) if not is_held], read
     )
     if moved:
         fitted = parameters(begin, names, ties=ties, priors_mhz=priors)

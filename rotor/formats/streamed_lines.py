@@ -49,8 +49,8 @@ class StreamedList:
 
     path: Path
     lines: int
-    pieces_made: int
-    pieces_found: int
+    pieces_computed: int
+    pieces_reused: int
     jmax: int
     q: float
 
@@ -61,8 +61,8 @@ class SortedLines:
 
     file: Path
     count: int
-    pieces_made: int
-    pieces_found: int
+    pieces_computed: int
+    pieces_reused: int
     plan: _Plan
     record: Mapping[str, Any]
     memory_mb: int
@@ -217,7 +217,7 @@ def stream_lines(
         lines.write(target, tag)
         lines.remove()
     return StreamedList(
-        target, lines.count, lines.pieces_made, lines.pieces_found, lines.plan.jmax, lines.plan.partition.q
+        target, lines.count, lines.pieces_computed, lines.pieces_reused, lines.plan.jmax, lines.plan.partition.q
     )
 
 

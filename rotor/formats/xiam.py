@@ -130,7 +130,7 @@ def _top(name: str, settings: dict[str, int], values: dict[str, float]) -> Top:
     }
     constants = Constants(**numbers, reduction=reduction, representation="Ir")
     internal = InternalRotationConstants(
-        _one_top(values) if tops == 1 else _several_tops(values, tops), "PAM", vt_max=0, source="file of XIAM"
+        _single_top(values) if tops == 1 else _several_tops(values, tops), "PAM", vt_max=0, source="file of XIAM"
     )
     dipole = tuple(values.get(key, 0.0) for key in DIPOLE)
     top = Top.from_constants(
@@ -157,7 +157,7 @@ def _spin(settings: dict[str, int], values: dict[str, float]) -> SpinConstants |
     )
 
 
-def _one_top(values: dict[str, float]) -> dict[str, float]:
+def _single_top(values: dict[str, float]) -> dict[str, float]:
     """F0, delta and barriers of one top with its axis in the plane ab."""
     constants = _constants_of_top(values, "")
     turn = constants.pop("epsilon", 0.0)

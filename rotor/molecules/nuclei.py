@@ -117,10 +117,10 @@ def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
     >>> isotope("D").mass_u, isotope("2H").spin
     (2.014101777844, 1.0)
     """
-    element, own_number = _split(symbol)
-    if own_number is not None and mass_number not in (None, own_number):
+    element, number_in_symbol = _split(symbol)
+    if number_in_symbol is not None and mass_number not in (None, number_in_symbol):
         raise ValueError(f"isotope {symbol!r} with mass number {mass_number}: the two differ; give one of them")
-    expected = own_number if own_number is not None else mass_number
+    expected = number_in_symbol if number_in_symbol is not None else mass_number
     isotopes = _isotopes(element)
     if expected is None:
         return max(isotopes.values(), key=lambda candidate: (candidate.abundance, candidate.half_life_s))

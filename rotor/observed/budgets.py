@@ -39,11 +39,11 @@ def _statistics(fit: SourceFit | None) -> ErrorTerm:
     """The largest relative standard error of a column density."""
     if fit is None:
         return ErrorTerm(None, "no species is found")
-    columns = [one for one in fit.parameters if one["parameter"] == COLUMN]
-    unknown = [one["name"] for one in columns if not one["determined"]]
+    columns = [row for row in fit.parameters if row["parameter"] == COLUMN]
+    unknown = [row["name"] for row in columns if not row["determined"]]
     if unknown or not columns:
         return ErrorTerm(None, f"not determined by this spectrum: {', '.join(unknown) or COLUMN}")
-    errors = [100 * one["error"] / one["value"] for one in columns]
+    errors = [100 * row["error"] / row["value"] for row in columns]
     largest = max(errors)
     if not math.isfinite(largest):
         return ErrorTerm(None, "a column density without an error")

@@ -82,12 +82,12 @@ class DegreeTest:
 class Equipartition(Table):
     """Test of all degrees of freedom.
 
-    kt: in the unit of the energies, given or estimated from the data (`kt_given`). chi2, chi2_degrees, chi2_p: Σ z². ks_p: of
+    kt: in the unit of the energies, given or estimated from the data (`kt_fixed`). chi2, chi2_degrees, chi2_p: Σ z². ks_p: of
     the worst distribution. p_value: of both tests together. failing: degrees rejected by Holm's rule.
     """
 
     kt: float
-    kt_given: bool
+    kt_fixed: bool
     confidence: float
     degrees: tuple[DegreeTest, ...]
     chi2: float
@@ -399,12 +399,12 @@ def _kolmogorov_smirnov(ratios: Floats) -> tuple[float, float]:
     return distance, float(kolmogorov((math.sqrt(n) + 0.12 + 0.11 / math.sqrt(n)) * distance))
 
 
-def _family(kt: float, kt_given: bool, confidence: float, degrees: tuple[DegreeTest, ...]) -> Equipartition:
+def _family(kt: float, kt_fixed: bool, confidence: float, degrees: tuple[DegreeTest, ...]) -> Equipartition:
     from scipy.special import gammaincc
 
-    free = len(degrees) if kt_given else len(degrees) - 1
+    free = len(degrees) if kt_fixed else len(degrees) - 1
     sigmas = np.array([degree.sigma for degree in degrees])
-    chi2 = float(np.sum(sigmas**2)) if kt_given else _homogeneity(degrees)
+    chi2 = float(np.sum(sigmas**2)) if kt_fixed else _homogeneity(degrees)
     chi2_p = float(gammaincc(0.5 * free, 0.5 * chi2))
     smallest = min(degree.ks_p_value for degree in degrees)
     ks_p = -math.expm1(len(degrees) * math.log1p(-smallest)) if smallest < 1.0 else 1.0
@@ -412,7 +412,7 @@ def _family(kt: float, kt_given: bool, confidence: float, degrees: tuple[DegreeT
     failing = _holm(degrees, 1.0 - confidence)
     accepted = p_value > 1.0 - confidence
     return Equipartition(
-        kt, kt_given, confidence, degrees, chi2, free, chi2_p, ks_p, p_value, accepted, () if accepted else failing
+        kt, kt_fixed, confidence, degrees, chi2, free, chi2_p, ks_p, p_value, accepted, () if accepted else failing
     )
 
 

@@ -35,7 +35,7 @@ def parse_named(text: str) -> tuple[dict[str, float], dict[str, float]]:
     unitless = [item["name"] for item in items if not item["unit"]]
     if unitless and items[-1]["unit"] and not shared:
         raise ValueError(
-            f"{text!r}: {items[-1]['unit']} stands at {items[-1]['name']} only; put a space before it to serve "
+            f"{text!r}: {items[-1]['unit']} belongs to {items[-1]['name']} only; put a space before it to apply it to "
             f"{', '.join(unitless)} too, or give each item a unit"
         )
 

@@ -79,9 +79,9 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["thermo", "CO", "--vibration", "100x1e9"], "unit 'e9' is not a known unit; the default is 'cm-1'"),
         (
             ["levels", "CO", "--spin-constants", "chi_aa(14N)=5"],
-            "1 spin is called after 14N, and CO has 1 of 12C, 1 of 16O",
+            "1 spin is named after 14N, but CO has 1 of 12C, 1 of 16O",
         ),
-        (["spectrum", "HCN", "--spin-constants", "C_aa(1H_1)=5 C_aa(1H_2)=5"], "2 spins are called after 1H"),
+        (["spectrum", "HCN", "--spin-constants", "C_aa(1H_1)=5 C_aa(1H_2)=5"], "2 spins are named after 1H"),
         (["fit", "nan.csv", "--start", "OCS", "--seed", "-1"], "--seed: -1: expected a whole number of 0 or more"),
         (["fit", "nan.csv", "--start", "OCS", "--bootstrap", "1000000000"], "a whole number from 0 to 100000"),
         (["spectrum", "CO", "--temperature", "5", "--temperature=10"], "--temperature: given more than once"),

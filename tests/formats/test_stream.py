@@ -52,7 +52,7 @@ def test_pieces_of_any_size_make_the_same_list(tmp_path, piece_lines, cut):
     whole = rotor.api.line_list(PROPANEDIOL, jmax=24, min_lgint=cut, q=1e5)
     same(pl.read_parquet(tmp_path / "a.parquet"), whole.to_polars())
     assert stream.lines == len(whole)
-    assert stream.pieces_made == {1: 22, 4000: stream.pieces_made, 10**9: 1}[piece_lines]
+    assert stream.pieces_computed == {1: 22, 4000: stream.pieces_computed, 10**9: 1}[piece_lines]
     assert [p.name for p in tmp_path.iterdir()] == ["a.parquet"]  # nothing is left behind
 
 
@@ -116,8 +116,8 @@ def test_a_killed_run_goes_on(tmp_path):
     left = {p: p.stat().st_mtime_ns for p in pieces.glob("j*.parquet")}
 
     stream = stream_lines(PROPANEDIOL, path, jmax=45, min_lgint=None, q=1e5, piece_lines=3000)
-    assert stream.pieces_found == len(left) >= 3
-    assert stream.pieces_made > 0
+    assert stream.pieces_reused == len(left) >= 3
+    assert stream.pieces_computed > 0
     same(pl.read_parquet(path), rotor.api.line_list(PROPANEDIOL, jmax=45, min_lgint=None, q=1e5).to_polars())
     assert not pieces.exists()
 

@@ -174,7 +174,7 @@ def test_what_scaling_of_distortion_misses_is_stated(name, heavy, quartic, sexti
     scaled, fitted = rotor.read(name, isotopes="H=2H"), rotor.read(heavy).constants
     for constant, off in {**quartic, **sextic}.items():
         assert 100 * (scaled.constants[constant] / fitted[constant] - 1) == pytest.approx(off, abs=0.06), constant
-    (note,) = [note for note in scaled.notes if "scaled as powers" in note]
+    (note,) = [note for note in scaled.notes if "scaled with powers" in note]
     low, high = min(map(abs, quartic.values())), max(map(abs, quartic.values()))
     assert f"{int(low)} to {round(high)} % " in note  # 3 to 13, 15 to 27
     assert "up to 107 %" in note

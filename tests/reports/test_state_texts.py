@@ -126,11 +126,11 @@ REFUSED = [
     ((*STATE, "--state-weights", "[3] none"), "there are 2 states"),
     ((*STATE, "--state-symmetry", "Cx"), "expected one of C1, Ci, C2v"),
     ((*STATE, "--state-symmetry", "Cs"), "expected one of C1, Ci, C2v"),
-    (("--constants", "A=20 B=10 C=8 GHz", "--state-symmetry", "C2v"), "there is one state here"),
+    (("--constants", "A=20 B=10 C=8 GHz", "--state-symmetry", "C2v"), "this top has a single state"),
     ((*STATE, "--state-symmetry", ""), "the text given is empty"),
     ((*STATE, "--state-symmetry", "C2v,C1"), "expected one of"),
     ((*STATE, "--state-names", "a"), "expected 2, one for each state"),
-    (("HCN", "--state-names", "a,b"), "there is one state here"),
+    (("HCN", "--state-names", "a,b"), "this top has a single state"),
 ]
 
 

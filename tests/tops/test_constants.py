@@ -108,7 +108,7 @@ def test_greek_and_underscores_are_read():
         ("B=-1", "is positive"),
         ("B=0", "is positive"),
         ("B=1e999", "not a finite number"),
-        ("A=5 B=4 C=3GHz", "stands at C only"),
+        ("A=5 B=4 C=3GHz", "belongs to C only"),
         ("B=3 furlong", "not a known unit"),
         ("B=3 kV/cm", "does not measure the same thing"),
         ("B=3 B=4", "given twice"),

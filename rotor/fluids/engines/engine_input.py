@@ -220,7 +220,7 @@ def engine_input_of(atoms: Any, settings: Settings) -> EngineInput:
     heads = [int(np.argmax(bodies.species == number)) for number in range(len(bodies.names))]
     spans = [slice(bodies.starts[body], bodies.starts[body + 1]) for body in heads]
     species = tuple(Species(by_symbols[tuple(atoms.symbols[span])], bodies.masses[span]) for span in spans)
-    own_axes = [
+    body_axes = [
         superpose(kind.model.positions_angstrom[: len(kind.masses)], bodies.sites[span], kind.masses).apply(
             kind.model.positions_angstrom
         )
@@ -228,7 +228,7 @@ def engine_input_of(atoms: Any, settings: Settings) -> EngineInput:
     ]
     removed = 0 if settings.ensemble == "langevin" else 3
     motion = _starting_motion(atoms, bodies, pose, settings, removed)
-    places, speeds = _sites(bodies, pose, own_axes, *motion)
+    places, speeds = _sites(bodies, pose, body_axes, *motion)
     return EngineInput(species, bodies.species, places, speeds, edges, bodies.degrees(removed))
 
 
@@ -256,11 +256,11 @@ def _starting_motion(atoms: Any, bodies: Bodies, pose: Pose, settings: Settings,
 
 
 def _sites(
-    bodies: Bodies, pose: Pose, own_axes: list[Floats], momentum: Floats, angular: Floats
+    bodies: Bodies, pose: Pose, body_axes: list[Floats], momentum: Floats, angular: Floats
 ) -> tuple[Floats, Floats]:
     """Positions and velocities of all sites, (sites, 3), from the shapes in principal axes (one array per species)."""
-    owners = np.repeat(np.arange(len(bodies)), [len(own_axes[k]) for k in bodies.species])
-    body = np.concatenate([own_axes[k] for k in bodies.species])
+    owners = np.repeat(np.arange(len(bodies)), [len(body_axes[k]) for k in bodies.species])
+    body = np.concatenate([body_axes[k] for k in bodies.species])
     lever = rotate(pose.attitude[owners], body)
     omega = rotate(pose.attitude, angular * bodies.inverse_moments)
     return pose.centres[owners] + lever, (momentum / bodies.mass[:, None])[owners] + np.cross(omega[owners], lever)

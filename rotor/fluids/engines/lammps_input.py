@@ -133,12 +133,12 @@ def pair_commands(engine_input: EngineInput, settings: Settings, form: Form, acc
         style = [f"pair_style table spline {TABLE_POINTS}"]
         return style + [f"pair_coeff {i} {j} pairs.table PAIR_{i}_{j} {cutoff:.17g}" for i, j, _ in pairs]
     if form.switch_angstrom:
-        one_style, name = f"lj/mdf {cutoff - form.switch_angstrom:.17g} {cutoff:.17g}", "lj/mdf"
+        lennard_jones, name = f"lj/mdf {cutoff - form.switch_angstrom:.17g} {cutoff:.17g}", "lj/mdf"
     else:
-        one_style, name = f"lj/cut {cutoff:.17g}", "lj/cut"
+        lennard_jones, name = f"lj/cut {cutoff:.17g}", "lj/cut"
     if not charged:
-        return [f"pair_style {one_style}", *(f"pair_coeff {i} {j} {_depth(sites)}" for i, j, sites in pairs)]
-    commands = [f"pair_style hybrid/overlay {one_style} coul/long {cutoff:.17g}"]
+        return [f"pair_style {lennard_jones}", *(f"pair_coeff {i} {j} {_depth(sites)}" for i, j, sites in pairs)]
+    commands = [f"pair_style hybrid/overlay {lennard_jones} coul/long {cutoff:.17g}"]
     commands += [f"pair_coeff {i} {j} {name} {_depth(sites)}" for i, j, sites in pairs]
     return [*commands, "pair_coeff * * coul/long", f"kspace_style {kspace} {accuracy:g}"]
 

@@ -42,8 +42,10 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
                 raise ValueError(f"{path}, line {number}: {name} is no number: {','.join(row)!r}") from None
     try:
         labels = {name: np.array(columns[name], dtype=np.int64) for name in quanta}
-        own_errors = np.array(columns[_OWN]) if _OWN in columns else None
-        return LevelTable(labels, np.array(columns["energy_mhz"]), np.array(columns["error_mhz"]), source, own_errors)
+        unshared_errors = np.array(columns[_OWN]) if _OWN in columns else None
+        return LevelTable(
+            labels, np.array(columns["energy_mhz"]), np.array(columns["error_mhz"]), source, unshared_errors
+        )
     except ValueError as reason:
         raise ValueError(f"{path}: {reason}") from None
 

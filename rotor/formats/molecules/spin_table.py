@@ -95,7 +95,9 @@ def _atom(part: TableReader, name: str, molecule: Molecule | None) -> int | None
         return None
     label = name.partition("_")[0]
     alike = [
-        i for i, nucleus in enumerate(molecule.nuclei, start=1) if label in (nucleus.label, *_own_name(nucleus.label))
+        i
+        for i, nucleus in enumerate(molecule.nuclei, start=1)
+        if label in (nucleus.label, *_short_names(nucleus.label))
     ]
     if number is None:
         return alike[0] if len(alike) == 1 else None
@@ -105,7 +107,7 @@ def _atom(part: TableReader, name: str, molecule: Molecule | None) -> int | None
     return number
 
 
-def _own_name(label: str) -> tuple[str, ...]:
+def _short_names(label: str) -> tuple[str, ...]:
     return {"2H": ("D",), "3H": ("T",)}.get(label, ())
 
 

@@ -107,14 +107,14 @@ def _read_image(hdu: Any, name: str, choices: ReadChoices) -> ObservedSpectrum:
     header = hdu.header
     axis = spectral_axis_number(header, name)
     data = np.asarray(hdu.data, dtype=np.float64)
-    values = _one_spectrum(data, data.ndim - axis, name, choices)
+    values = _pixel_spectrum(data, data.ndim - axis, name, choices)
     if (blank := header.get("BLANK")) is not None and header.get("BITPIX", 0) < 0:
         values = np.where(values == blank, np.nan, values)  # CLASS marks bad channels so in floating point too
     frequency, rest = image_axis_mhz(header, axis, len(values), name, choices)
     return _spectrum(frequency, values, header, rest, header.get("BUNIT"), name, choices)
 
 
-def _one_spectrum(data: Floats, axis: int, name: str, choices: ReadChoices) -> Floats:
+def _pixel_spectrum(data: Floats, axis: int, name: str, choices: ReadChoices) -> Floats:
     """The channels of an image of one long axis, or of the chosen pixel of a cube."""
     moved = np.moveaxis(data, axis, -1)
     if moved[..., 0].size == 1:

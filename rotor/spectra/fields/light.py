@@ -1,11 +1,11 @@
-"""The polarization of light in a static field, and the squares of the dipole that it sees.
+"""Polarization of light in a static field, and the squared dipole elements that it selects.
 
-The strength is scaled so that its mean over all directions of polarization is the S μ² of a catalogue. Light at an angle β with the
-field, whatever its azimuth, and light of one direction e see
+Strengths are scaled so that their mean over all directions of polarization is the S μ² of a catalogue. For light polarized at an angle β
+to the field (averaged over the azimuth), for polarization along a unit vector e, and for isotropic light
 
     S(β) = 3 [cos²β |⟨μ_∥⟩|² + ½ sin²β (|⟨μ⟩|² - |⟨μ_∥⟩|²)],      S(e) = 3 |⟨e·μ⟩|²,      isotropic light: |⟨μ⟩|².
 
-Where M is good |⟨μ_∥⟩|² is that of ΔM = 0 and the rest that of ΔM = ±1.
+If M is a good quantum number, |⟨μ_∥⟩|² belongs to ΔM = 0 and the rest to ΔM = ±1.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Light:
     direction: Vector | None = None
 
     def about(self, field: Vector) -> Light:
-        """This light, described by its angle with a field that has an axis of symmetry."""
+        """This light described by its angle with the field, for levels with a good M."""
         if self.direction is None:
             return self
         cosine = float(np.dot(self.direction, field) / np.linalg.norm(field))
@@ -41,37 +41,37 @@ class Light:
 
     @property
     def factors(self) -> tuple[float, float]:
-        """What |⟨μ_∥⟩|² and the other squares are multiplied by: (1, 1) for isotropic light, (3 cos²β, 1.5 sin²β) for linear."""
+        """Factors of |⟨μ_∥⟩|² and of the other squares: (1, 1) for isotropic light, (3 cos²β, 1.5 sin²β) for linear polarization."""
         if self.angle_degrees is None:
             return 1.0, 1.0
         cosine = math.cos(math.radians(self.angle_degrees))
         return 3 * cosine**2, 1.5 * (1 - cosine**2)
 
-    def strength(self, of_axes: Sequence[NDArray[Any]], field: Vector) -> Floats:
-        """From elements of μ_X, μ_Y and μ_Z, arrays of one shape; field: of length 1."""
+    def strength(self, components: Sequence[NDArray[Any]], field: Vector) -> Floats:
+        """S(β), or S(e), from elements of μ_X, μ_Y and μ_Z (arrays of equal shape); field: unit vector."""
         if self.direction is not None:
-            return 3 * _square(of_axes, self.direction)
+            return 3 * _square(components, self.direction)
         along, across = self.factors
-        parallel = _square(of_axes, field)
-        whole = np.sum([np.abs(component) ** 2 for component in of_axes], axis=0)
+        parallel = _square(components, field)
+        whole = np.sum([np.abs(component) ** 2 for component in components], axis=0)
         return np.asarray(along * parallel + across * np.maximum(whole - parallel, 0.0))
 
     @property
     def text(self) -> str:
-        """As it is reported."""
+        """Description for reports."""
         if self.direction is not None:
             return f"along ({', '.join(f'{x:g}' for x in self.direction)})"
         names = {angle: name for name, angle in LIGHT.items()}
         return names.get(self.angle_degrees, f"{self.angle_degrees}° to the field")
 
 
-def _square(of_axes: Sequence[NDArray[Any]], vector: Vector) -> Floats:
-    x, y, z = (part * axis for part, axis in zip(vector, of_axes, strict=True))
+def _square(components: Sequence[NDArray[Any]], vector: Vector) -> Floats:
+    x, y, z = (part * axis for part, axis in zip(vector, components, strict=True))
     return np.asarray(np.abs(x + y + z) ** 2)
 
 
 def light_of(light: LightText) -> Light:
-    """From a name in `LIGHT`, an angle with the field in degrees, or three components along X, Y, Z; ValueError for others.
+    """The light of a name in `LIGHT`, an angle with the field in degrees, or three components along X, Y, Z; else ValueError.
 
     >>> light_of("perpendicular").factors
     (1.1248198369963932e-32, 1.5)

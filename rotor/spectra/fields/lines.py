@@ -1,13 +1,13 @@
-"""The spectrum of a top in a static electric field: lines resolved in M, for light of a given polarization.
+"""Lines of a top in a static electric field, resolved in M, for a given polarization of the light.
 
-Every pair of states that the dipole connects is a line, ΔM = 0 for the part of the light that is polarized along the field, ΔM = ±1
-for the part across it. The strength is scaled so that its mean over all directions of polarization is the S μ² of a catalogue:
+Each pair of states that the dipole connects is a line: ΔM = 0 for light polarized along the field, ΔM = ±1 for light polarized
+perpendicular to it. Strengths are scaled so that their mean over all directions of polarization is the S μ² of a catalogue:
 
     S(β) = 3 Σ [cos²β |⟨μ_Z⟩|² + ½ sin²β |⟨μ_±1⟩|²],      isotropic light: Σ [|⟨μ_Z⟩|² + |⟨μ_±1⟩|²]
 
-(β between polarization and field; the sum is over the pairs that coincide, M with -M). Circular light along the field is like light
-across it. Where a field at an angle with the light of a laser mixes M, every pair of states is a line, and the polarization may be
-any direction (`rotor.spectra.fields.light`); with spins the states are |F τ M_F⟩.
+(β between polarization and field; the sum is over coinciding pairs, M and -M). Circularly polarized light that travels along the field
+counts as perpendicular. If a laser polarized at an angle to the static field mixes M, each pair of states is a line, and the polarization
+may have any direction (`rotor.spectra.fields.light`). With spins the states are |F τ M_F⟩.
 Intensities are those of `intensity`: 8π³/3hc ν S (p″ - p′), with p the population of one state.
 """
 
@@ -42,18 +42,18 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 DEFAULT_TOLERANCE_MHZ = 1e-4
-SAME_MHZ = 1e-6  # energies of states that coincide differ by round-off alone
-LEAST_STRENGTH = 1e-10  # of the strongest line: what round-off leaves of forbidden ones is below
+SAME_MHZ = 1e-6  # energies of coinciding states differ by round-off only
+LEAST_STRENGTH = 1e-10  # relative to the strongest line; round-off makes forbidden lines weaker than this
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FieldLines(Table):
-    """Lines in a field as columns of equal length: all fields of one pair of states after each other.
+    """Lines in a field as columns of equal length: for each pair of states, all fields in order.
 
-    frequency_mhz: E′ - E″, the upper state being the higher one at the last field: below 0 where they have crossed. shift_mhz: from the
-    line of the free top. strength_debye2, intensity_nm2_mhz: for the light given, all coinciding pairs together. upper, lower: labels of
-    the free levels; upper_m, lower_m: |M|, |M_F| with spins, -1 where M is mixed. lower_mhz: E″. upper_state, lower_state: numbers of
-    the states, counted through `blocks` of `request`.
+    frequency_mhz: E′ - E″, with the state that is higher at the last field as the upper one; negative where the states have crossed.
+    shift_mhz: from the line of the free top. strength_debye2, intensity_nm2_mhz: for this light, summed over coinciding pairs.
+    upper, lower: labels of the free levels. upper_m, lower_m: |M|, or |M_F| with spins; -1 if M is mixed. lower_mhz: E″. upper_state,
+    lower_state: numbers of the states, counted through `blocks` of `request`.
     """
 
     top: Top
@@ -80,7 +80,7 @@ class FieldLines(Table):
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Every column by its name with unit."""
+        """Columns by their names with unit."""
         names = (
             "field_kv_per_cm", "frequency_mhz", "shift_mhz", "strength_debye2", "intensity_nm2_mhz", "upper", "upper_m", "lower",
             "lower_m", "lower_mhz",
@@ -92,7 +92,7 @@ class FieldLines(Table):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Light, temperature, populations, Q at every field, and what was found about accuracy."""
+        """Light, temperature, populations, Q at each field, and the accuracy of the energies."""
         return {
             "dipole_abc_debye": self.top.dipole_abc_debye,
             "light": self.light,
@@ -105,7 +105,7 @@ class FieldLines(Table):
 
     @property
     def fields(self) -> Floats:
-        """The fields, each once."""
+        """The fields in rising order, without repetition."""
         return np.unique(self.field_kv_per_cm)
 
     def pairs(self) -> list[slice]:
@@ -114,9 +114,9 @@ class FieldLines(Table):
         return [slice(first, first + count) for first in range(0, len(self), count)]
 
     def lobes(self, upper: str, lower: str) -> FieldLines:
-        """The lines of one free line alone: its M components, called lobes where a field is switched on and off.
+        """The M components of a single line of the free molecule (the lobes of Stark modulation).
 
-        Raises ValueError where there are none.
+        Raises ValueError if there are none.
         """
         chosen = ((self.upper == upper) & (self.lower == lower)) | ((self.upper == lower) & (self.lower == upper))
         if not chosen.any():
@@ -125,7 +125,7 @@ class FieldLines(Table):
         return self.where(chosen)
 
     def where(self, chosen: NDArray[np.bool_]) -> FieldLines:
-        """Some of the rows; whole pairs of states where `pairs` is to be used."""
+        """The selected rows; `pairs` needs all rows of a pair of states."""
         names = (*self.columns, "upper_state", "lower_state")
         cut: dict[str, Any] = {name: getattr(self, name)[chosen] for name in names}
         return replace(self, **cut)
@@ -153,28 +153,28 @@ def field_lines(
     top : Top
         With `dipole_abc_debye`.
     fields_kv_per_cm : (n,)
-        Each once, in rising order.
+        Fields in rising order, without repetition.
     j_highest : int
-        Both states belong to free levels up to this J.
+        Highest J of the free levels of both states.
     light : str, float or (3,)
-        Polarization: "parallel" or "perpendicular" to the static field, "isotropic", the angle with the field in degrees (at every
-        azimuth alike), or components along X, Y, Z.
+        Polarization: "parallel" or "perpendicular" to the static field, "isotropic", the angle with the field in degrees (averaged over
+        the azimuth), or components along X, Y, Z.
     temperature_k : float
-        Of the populations.
+        Temperature of the populations.
     populations : str
-        "equilibrium" in the field, or "adiabatic": those of the free top, each state followed into the field, as in a beam.
+        "equilibrium" in the field, or "adiabatic": populations of the free top, kept by each state as it enters the field, as in a beam.
     intensity_w_per_cm2 : float
-        Of a laser along Z, far from resonance.
+        Intensity of a laser polarized along Z, far from resonance.
     direction : (3,)
-        Of the static field, any length; at an angle with Z it mixes M.
+        Direction of the static field, of any length; at an angle to Z it mixes M.
     effects : sequence of QuantumEffect
         The Hamiltonian of a top with spins, as in `stark_map`.
     jmax : int, optional
-        Of the basis; by default chosen.
+        Highest J of the basis; by default chosen for the tolerance.
     tolerance_mhz : float
-        Of energies.
+        Tolerance of the energies.
     executor : Executor, optional
-        Blocks are spread over it.
+        Shares the work over blocks.
 
     Returns
     -------
@@ -183,12 +183,12 @@ def field_lines(
     Raises
     ------
     ValueError
-        As `stark_map`, and for a polarization or populations that are not known.
+        As `stark_map`, and for an unknown polarization or kind of populations.
 
     Notes
     -----
-    Q is that of the free top, corrected in equilibrium by the states that are followed. States of mixed M that coincide share the
-    strengths of their lines in an arbitrary way: such lines are added up where they coincide at every field.
+    Q is that of the free top; in equilibrium it is corrected for the shifts of the computed states. The division of a strength between
+    coinciding states of mixed M is arbitrary: lines that coincide at every field are therefore merged.
 
     >>> from rotor.tops.top import Top
     >>> found = field_lines(Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0)), [0.0, 1.0], j_highest=1)
@@ -237,7 +237,7 @@ def field_lines(
 
 
 def _largest_error(solved: Sequence[BlockStates], j_highest: int) -> float:
-    """Bound of what the basis leaves out of energies of states that come from levels up to a J, MHz."""
+    """Bound in MHz of the basis error of the energies of states that correlate with levels up to `j_highest`."""
     return max(float(states.error[:, states.j <= j_highest].max(initial=0.0)) for states in solved)
 
 
@@ -263,13 +263,13 @@ def _strengths(
 
 
 def _between(up: BlockStates, low: BlockStates, elements: NDArray[Any]) -> NDArray[Any]:
-    """Elements between the states in the field (fields, up, low) from those between free ones."""
+    """Matrix elements between states in the field (fields, up, low), from those between free states."""
     held = elements[np.ix_(up.places, low.places)]
     return np.asarray(np.einsum("fis,ik,fkt->fst", up.vectors.conj(), held, low.vectors, optimize=True))
 
 
 class _Part(NamedTuple):
-    """Lines of one pair of blocks: columns (fields, lines), or (lines,) of labels and M."""
+    """Lines of a pair of blocks: columns (fields, lines); labels and M (lines,)."""
 
     frequency: Floats
     shift: Floats
@@ -282,7 +282,7 @@ class _Part(NamedTuple):
 def _lines_of(
     solved: list[BlockStates], pair: BlockPair, strength: Floats, populations: Populations, j_highest: int
 ) -> _Part:
-    """Every pair of states of two blocks with its strength (fields, up, low)."""
+    """Lines between the states of two blocks; strength: (fields, up, low)."""
     up, low = solved[pair.up], solved[pair.low]
     ours = [side.j <= j_highest for side in (up, low)]
     first, second = np.nonzero(np.multiply.outer(*ours) & (_above(len(ours[0])) if pair.up == pair.low else True))
@@ -306,7 +306,7 @@ def _lines_of(
 def _names(
     up: BlockStates, low: BlockStates, states: tuple[Ints, Ints], turned: NDArray[np.bool_]
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Label and M of the upper and of the lower state of every line, exchanged where `turned`."""
+    """Labels and M of the upper and lower state of each line, exchanged where `turned`."""
     out: list[NDArray[Any]] = []
     for this, other in ((0, 1), (1, 0)):
         sides = (up, low)
@@ -323,7 +323,7 @@ def _names(
 def _numbers(
     solved: list[BlockStates], pair: BlockPair, states: tuple[Ints, Ints], turned: NDArray[np.bool_]
 ) -> tuple[Ints, Ints]:
-    """Numbers of the upper and of the lower state of every line, counted through the blocks."""
+    """Numbers of the upper and lower state of each line, counted through the blocks."""
     first = np.cumsum([0, *(len(block.rows) for block in solved)])
     up, low = first[pair.up] + states[0], first[pair.low] + states[1]
     return np.where(turned, low, up), np.where(turned, up, low)
@@ -334,7 +334,7 @@ def _above(count: int) -> NDArray[np.bool_]:
 
 
 def _joined(parts: list[_Part]) -> dict[str, NDArray[Any]]:
-    """Columns of all pairs, the fields of one pair after each other."""
+    """Columns of all pairs; for each pair, all fields in order."""
 
     def column(pick: int) -> NDArray[Any]:
         return np.concatenate([np.asarray(part[pick]).T.ravel() for part in parts]) if parts else np.zeros(0)
@@ -345,24 +345,24 @@ def _joined(parts: list[_Part]) -> dict[str, NDArray[Any]]:
     values = ("frequency_mhz", "shift_mhz", "strength_debye2", "intensity_nm2_mhz", "lower_mhz")
     out = {name: column(place) for place, name in enumerate(values)}
     names = ("upper", "upper_m", "lower", "lower_m", "upper_state", "lower_state")
-    return {**out, **{one: name(place) for place, one in enumerate(names)}}
+    return {**out, **{key: name(place) for place, key in enumerate(names)}}
 
 
 def _strong(columns: dict[str, NDArray[Any]], fields: int) -> dict[str, NDArray[Any]]:
-    """Without the pairs that are forbidden at every field."""
+    """The columns without pairs of states that are forbidden at every field."""
     strength = columns["strength_debye2"].reshape(-1, fields)
     allowed = np.repeat(strength.max(axis=1) > LEAST_STRENGTH * strength.max(initial=0.0), fields)
     return {name: column[allowed] for name, column in columns.items()}
 
 
 def merged(columns: dict[str, NDArray[Any]], fields: int) -> dict[str, NDArray[Any]]:
-    """Lines of equal labels and |M| that coincide, with their lower states, at every field, as one: strengths and intensities added."""
+    """Merge lines of equal labels and |M| that coincide at every field, as do their lower states: strengths and intensities add up."""
     names = ("upper", "upper_m", "lower", "lower_m")
     keys = [np.unique(columns[name], return_inverse=True)[1].reshape(-1, fields)[:, 0] for name in names]
     place = np.stack(
         [columns[name].reshape(-1, fields) for name in ("lower_mhz", "frequency_mhz")]
     )  # (2, lines, fields)
-    first: list[int] = []  # of each group
+    first: list[int] = []  # first line of each group
     groups: dict[tuple[int, ...], list[int]] = {}
     number = np.zeros(place.shape[1], dtype=np.int64)
     for line, key in enumerate(zip(*(key.tolist() for key in keys), strict=True)):

@@ -1,4 +1,4 @@
-"""A request for what a field does to a spectrum and to a mixture of states, beside the map of its levels, and what answers it."""
+"""Request for lines, a spectrum, Stark coefficients and thermal means in a field, beside the map of the levels, and its answers."""
 
 from __future__ import annotations
 
@@ -53,31 +53,31 @@ def _read_line(line: Any) -> tuple[str, str]:
 
 @dataclass(frozen=True, kw_only=True)
 class FieldSample:
-    """What lines, spectra and mixtures in fields are of; every field is checked when it is made.
+    """The sample of lines, spectra and mixtures in fields; fields are checked when the request is made.
 
     light: "parallel", "perpendicular", "isotropic", an angle with the field in degrees, or a direction. temperature_k, populations: as in
-    `field_lines`. line: labels of two free levels, lines between others are left out; None: all. linewidth_mhz, range_mhz: of the
-    spectrum at the highest field; None: from the first line to the last. spread: standard deviation of the field over the sample, a
-    fraction of the field; 0: the same everywhere.
+    `field_lines`. line: labels of two free levels, to compute only lines between these; None: all lines. linewidth_mhz, range_mhz: of the
+    spectrum at the highest field; a range None: from the first line to the last. spread: standard deviation of the field over the
+    sample, as a fraction of the field; 0 for a homogeneous field.
     """
 
     light: LightText = declared(
         "parallel", Custom(_read_light, metavar="NAME"),
-        "Of --lines: parallel, perpendicular, isotropic, the angle with the field (degrees), or a direction X,Y,Z", option="--light",
+        "Polarization for --lines: parallel, perpendicular, isotropic, the angle with the field (degrees), or X,Y,Z", option="--light",
         panel=CONDITIONS,
     )  # fmt: skip
     temperature_k: float = declared(
-        300.0, Quantity("K", above=0, metavar="T"), "Of --lines, --spectrum and --mixture (K)", option="--temperature", panel=CONDITIONS,
-        common=True,
+        300.0, Quantity("K", above=0, metavar="T"), "Temperature for --lines, --spectrum, --mixture (K)", option="--temperature",
+        panel=CONDITIONS, common=True,
     )  # fmt: skip
     populations: str = declared(
-        "equilibrium", Text(POPULATIONS, "NAME"), "equilibrium in the field, or adiabatic: those of the free molecule, as in a beam",
+        "equilibrium", Text(POPULATIONS, "NAME"), "Equilibrium in the field, or adiabatic: those of the free molecule, as in a beam",
         option="--populations", panel=CONDITIONS,
     )  # fmt: skip
     line: tuple[str, str] | None = declared(
         None,
         Custom(_read_line),
-        "Lines between two free levels alone, such as '1 - 0'",
+        "Only lines between these two free levels, such as '1 - 0'",
         option="--line",
         panel=OBSERVABLES,
     )
@@ -88,12 +88,12 @@ class FieldSample:
     range_mhz: tuple[float, float] | None = declared(
         None,
         Range("MHz"),
-        "Frequencies of --spectrum (MHz); by default those of the lines",
+        "Frequency range of --spectrum (MHz); by default that of the lines",
         option="--range",
         panel=OBSERVABLES,
     )
     spread: float = declared(
-        0.0, Quantity(least=0, below=0.25), "Of --spectrum: standard deviation of the field over the sample, a fraction of it",
+        0.0, Quantity(least=0, below=0.25), "Standard deviation of the field over the sample for --spectrum, as a fraction",
         option="--spread", panel=CONDITIONS,
     )  # fmt: skip
 
@@ -102,7 +102,7 @@ class FieldSample:
         check_fields(self)
         require_one_of("populations", self.populations, POPULATIONS)
         if self.range_mhz is not None and not 0 <= self.range_mhz[0] < self.range_mhz[1]:
-            raise ValueError(f"range_mhz: {self.range_mhz}: two frequencies that rise are expected")
+            raise ValueError(f"range_mhz: {self.range_mhz}: expected two rising frequencies")
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class FieldRequest(FieldSample):
 
 
 def lines_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> FieldLines:
-    """The lines in every field of the map."""
+    """The lines at each field of the map."""
     return _lines_at(request, states.fields, executor)
 
 
@@ -139,7 +139,7 @@ def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> 
 
 
 def spectrum_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Spectrum:
-    """The cross section at the highest field, every line smeared by the spread of the field."""
+    """The cross section at the highest field, with lines broadened by the spread of the field."""
     from rotor.spectra.fields.spectrum import FieldDistribution, field_spectrum
 
     mean = float(states.fields[np.argmax(np.abs(states.fields))])
@@ -163,7 +163,7 @@ def spectrum_of(request: FieldRequest, states: FieldMap, executor: Executor | No
 
 
 def _around(lines: FieldLines, linewidth_mhz: float) -> tuple[float, float]:
-    """From below the first line that is not weak to above the last."""
+    """Range in MHz around all lines that are not weak."""
     strong = lines.intensity_nm2_mhz > 1e-3 * lines.intensity_nm2_mhz.max(initial=0.0)
     frequency = np.abs(lines.frequency_mhz[strong])
     margin = 20 * linewidth_mhz
@@ -180,7 +180,7 @@ def coefficients_of(request: FieldRequest, states: FieldMap, executor: Executor 
 
 
 def mixture_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
-    """Means of the thermal mixture in every field."""
+    """Means of the thermal mixture at each field."""
     stark = request.stark
     if stark.hyperfine:
         raise ValueError("mixtures of states with spins are not computed: leave out the hyperfine structure")
@@ -197,7 +197,7 @@ def mixture_of(request: FieldRequest, states: FieldMap, executor: Executor | Non
 
 
 def deflection_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
-    """Effective dipoles, one column for each state."""
+    """Effective dipoles, a column for each state."""
     from rotor.quantum.fields.deflection import deflection_table
 
     return deflection_table(states)

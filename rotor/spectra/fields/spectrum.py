@@ -1,11 +1,11 @@
-"""The spectrum of a sample in a field that is not the same everywhere: every line smeared by the distribution of fields.
+"""Spectrum of a sample in an inhomogeneous field: lines broadened by the distribution of fields.
 
-A line whose frequency ν(E) and intensity I(E) were computed at a few fields is joined by cubic splines in E. Its spectrum is
+The frequency ν(E) and intensity I(E) of a line, computed at a few fields, are interpolated by cubic splines in E. Its spectrum is
 
     ∫ p(E) I(E) s(ν - ν(E)) dE,
 
-p the density of fields in the sample, s the profile of a line. The integral is a sum over fields so close that ν(E) moves by less than a
-quarter of the width between them.
+with the density p of fields in the sample and the profile s of a line. The integral is a sum over fields that are so close that ν(E)
+changes by less than a quarter of the width from one to the next.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from rotor.spectra.fields.lines import FieldLines
 from rotor.spectra.profiles import gaussian, lorentzian
 from rotor.spectra.spectrum import Spectrum
 
-REACH = 4.0  # standard deviations of a Gaussian distribution that are taken
-LEAST_FIELDS = 33  # of a distribution
-MOST_FIELDS = 200_000  # to which a line is refined
-STEP = 0.25  # of the width between two fields
+REACH = 4.0  # extent of a Gaussian distribution, in standard deviations
+LEAST_FIELDS = 33  # smallest number of fields of a distribution
+MOST_FIELDS = 200_000  # largest number of fields of a line
+STEP = 0.25  # largest change of ν(E) between two fields, relative to the width
 
 
 @dataclass(frozen=True)
 class FieldDistribution:
-    """How much of a sample is at which field: a density (n,) over fields (n,) in kV/cm, joined by straight lines, of area 1.
+    """Distribution of the field over a sample: a density (n,) at fields (n,) in kV/cm, piecewise linear, of unit area.
 
-    ValueError for fewer than two fields, fields that do not rise, and a density that is negative or nowhere above 0.
+    Raises ValueError for fewer than two fields, fields that do not rise, and a density that is negative or zero everywhere.
     """
 
     fields_kv_per_cm: Floats
@@ -46,16 +46,16 @@ class FieldDistribution:
                 f"a distribution of fields has two fields or more and a density for each; got {fields.shape}"
             )
         if not np.isfinite(fields).all() or (np.diff(fields) <= 0).any():
-            raise ValueError("the fields of a distribution must be finite numbers of kV/cm that rise")
+            raise ValueError("fields of a distribution: expected finite, rising numbers in kV/cm")
         area = float(np.trapezoid(density, fields)) if (density >= 0).all() else math.nan
         if not (math.isfinite(area) and area > 0):
-            raise ValueError("the density of a distribution of fields must be 0 or more, and not 0 everywhere")
+            raise ValueError("density of a distribution of fields: expected numbers of 0 or more, not all 0")
         object.__setattr__(self, "fields_kv_per_cm", fields)
         object.__setattr__(self, "density", density / area)
 
     @classmethod
     def gaussian(cls, mean_kv_per_cm: float, deviation_kv_per_cm: float) -> FieldDistribution:
-        """A normal distribution of a mean and a standard deviation, out to four deviations.
+        """A normal distribution with this mean and standard deviation, cut at four standard deviations.
 
         >>> round(FieldDistribution.gaussian(10.0, 0.1).mean_kv_per_cm, 6)
         10.0
@@ -75,7 +75,7 @@ class FieldDistribution:
         return float(np.trapezoid(self.density * self.fields_kv_per_cm, self.fields_kv_per_cm))
 
     def weights(self, fields_kv_per_cm: Floats) -> Floats:
-        """Share of the sample that each of closely spaced fields (n,) stands for; they add up to 1."""
+        """Share of the sample at each of closely spaced fields (n,); the shares add up to 1."""
         here = np.interp(fields_kv_per_cm, self.fields_kv_per_cm, self.density) * np.gradient(fields_kv_per_cm)
         return np.asarray(here / here.sum())
 
@@ -88,18 +88,18 @@ def field_spectrum(
     fwhm_mhz: float,
     profile: str = "gaussian",
 ) -> Spectrum:
-    """The absorption cross section of a sample whose field has a distribution.
+    """Absorption cross section of a sample with a distribution of fields.
 
     Parameters
     ----------
     lines : FieldLines
-        At fields that cover the distribution, close enough for cubic splines between them.
+        Lines at fields that cover the distribution and are close enough for cubic splines.
     grid_mhz : (n,)
         Rising frequencies.
     distribution : FieldDistribution or float
-        Of the field in kV/cm; a number is one field for all.
+        Distribution of the field in kV/cm; a number means a homogeneous field.
     fwhm_mhz : float
-        Full width at half maximum of every line in one field.
+        Full width at half maximum of a line in a homogeneous field.
     profile : str
         "gaussian" or "lorentzian".
 
@@ -111,11 +111,11 @@ def field_spectrum(
     Raises
     ------
     ValueError
-        A distribution beyond the fields of the lines, fewer than two fields of them, a width not above 0, an unknown profile.
+        For a distribution beyond the fields of the lines, lines at fewer than two fields, a width not above 0, an unknown profile.
 
     Notes
     -----
-    Neglected: motion of molecules through different fields during their absorption.
+    Neglected: motion of the molecules through different fields during absorption.
     """
     shapes = {"gaussian": gaussian, "lorentzian": lorentzian}
     if profile not in shapes:
@@ -123,7 +123,7 @@ def field_spectrum(
     require_positive("fwhm_mhz", fwhm_mhz, "MHz")
     grid = np.asarray(grid_mhz, dtype=np.float64)
     if grid.ndim != 1 or len(grid) < 2 or not np.isfinite(grid).all() or (np.diff(grid) <= 0).any():
-        raise ValueError("the grid must be two or more finite frequencies in MHz that rise")
+        raise ValueError("grid: expected two or more finite, rising frequencies in MHz")
     total = np.zeros(len(grid))
     for frequency, area in _smeared(lines, distribution, fwhm_mhz):
         _add(total, grid, np.abs(frequency), area, fwhm_mhz, shapes[profile])
@@ -133,7 +133,7 @@ def field_spectrum(
 def _smeared(
     lines: FieldLines, distribution: FieldDistribution | float, fwhm_mhz: float
 ) -> list[tuple[Floats, Floats]]:
-    """Frequencies and areas of every pair of states over the fields of the sample."""
+    """Frequencies and areas of each pair of states over the fields of the sample."""
     from scipy.interpolate import CubicSpline
 
     fields = lines.fields
@@ -161,7 +161,7 @@ def _smeared(
 
 
 def _add(total: Floats, grid: Floats, centres: Floats, areas: Floats, fwhm_mhz: float, shape: object) -> None:
-    """Profiles of many centres, those outside the grid by more than 50 widths left out."""
+    """Add the profiles of many centres to `total`; centres more than 50 widths outside the grid are left out."""
     near = (centres > grid[0] - 50 * fwhm_mhz) & (centres < grid[-1] + 50 * fwhm_mhz)
     assert callable(shape)
     for start in range(0, int(near.sum()), 256):

@@ -2,12 +2,13 @@
 
     ΔE(E) = c1 E + c2 E² + c3 E³ + c4 E⁴ + ...
 
-c1 is not 0 where ±K coincide, c2 is what tables print (MHz/(kV/cm)²). They are perturbation sums over the blocks of the map
-(`rotor.quantum.fields.field_series`), so that no choice of fields enters. For a linear top, c2 of J = 0 is -μ²/6hB; of a symmetric one
-c1 = -μ KM/[J(J+1)] (Encyclopedia of Physical Science and Technology, 3rd edition, Microwave Molecular Spectroscopy, eq. 106).
+c1 is not 0 if ±K coincide; tables print c2 in MHz/(kV/cm)². The coefficients are perturbation sums over the blocks of the map
+(`rotor.quantum.fields.field_series`) and do not depend on the fields of the map. For a linear top, c2 of J = 0 is -μ²/6hB; for a
+symmetric top, c1 = -μ KM/[J(J+1)] (Encyclopedia of Physical Science and Technology, 3rd edition, Microwave Molecular
+Spectroscopy, eq. 106).
 
-A series has a range. It ends where E⁵ and E⁶ each add 1 % of the largest of the four terms: there the four coefficients give the shift to
-about that, and beyond it only the solved energies of the map do. Levels that a field mixes strongly because they are close, such as
+The series has a limited range. It ends where the E⁵ or the E⁶ term reaches 1 % of the largest of the first four terms. Up to there the
+four coefficients give the shift to about 1 %; beyond it, use the energies of the map. Close levels that the field mixes strongly, such as
 asymmetry doublets, have large coefficients and a short range.
 """
 
@@ -33,15 +34,15 @@ if TYPE_CHECKING:
     from rotor.spectra.fields.lines import FieldLines
 
 POWERS = 4
-_SUMMED = POWERS + 2  # E⁵ and E⁶ tell the range
-SHARE = 0.01  # of the shift: what the terms beyond E⁴ add at the end of the range
+_SUMMED = POWERS + 2  # E⁵ and E⁶ determine the range
+SHARE = 0.01  # of the shift: contribution of E⁵ or E⁶ at the end of the range
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StarkCoefficients(Table):
-    """Coefficients of shifts against the field, one row for each state or line.
+    """Stark coefficients, a row for each state or line.
 
-    names: labels and M by column. coefficients, errors: (n, powers) in MHz/(kV/cm)^p, p = 1 ... 4, errors those of rounding.
+    names: labels and M by column. coefficients, errors: (n, powers) in MHz/(kV/cm)^p, p = 1 ... 4; the errors are those of rounding.
     valid_to_kv_per_cm: (n,) field up to which the four terms give the shift to about 1 %.
     """
 
@@ -71,12 +72,13 @@ def level_coefficients(states: FieldMap) -> StarkCoefficients:
     Parameters
     ----------
     states : FieldMap
-        States, basis and direction of the field; its fields do not enter, except that a map of fields below 0 alone names states there.
+        The states, the basis and the direction of the field. The values of its fields do not matter, except that a map with only negative
+        fields names states at these.
 
     Returns
     -------
     StarkCoefficients
-        One row for each curve of the map.
+        A row for each curve of the map.
 
     Examples
     --------
@@ -97,7 +99,7 @@ def level_coefficients(states: FieldMap) -> StarkCoefficients:
 
 
 def line_coefficients(lines: FieldLines) -> StarkCoefficients:
-    """Stark coefficients of the lines between two states: those of the upper state less those of the lower one."""
+    """Stark coefficients of lines: those of the upper state minus those of the lower state."""
     first = [rows.start for rows in lines.pairs()]
     values, errors = _series_of_blocks(lines.request, lines.blocks)
     upper, lower = lines.upper_state[first], lines.lower_state[first]
@@ -112,7 +114,7 @@ def _series_of_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> Fiel
 
 
 def _block_series(request: MapRequest, block: FieldBlock) -> FieldSeries:
-    """c_1 ... c_6 of the states of a block, ranked as at the fields of the map."""
+    """Coefficients c1 ... c6 of the states of a block, in their order at the fields of the map."""
     sign = -1 if request.fields.max() <= 0 > request.fields.min() else 1
     turned = tuple(sign**n * term for n, term in enumerate(request.matrices(block)))
     series = field_series(turned, count_of(request, block, block.free_order), _SUMMED, block.even_in_field)
@@ -124,7 +126,7 @@ def _coefficients(names: dict[str, NDArray[Any]], values: Floats, errors: Floats
 
 
 def _range(sizes: Floats) -> Floats:
-    """Field at which E⁵ or E⁶ adds `SHARE` of the largest of the terms before, at most the highest field that is accepted."""
+    """Field at which the E⁵ or E⁶ term reaches `SHARE` of the largest lower term; at most the highest accepted field."""
     beyond = np.full(len(sizes), HIGHEST_KV_PER_CM)
     for q in range(POWERS + 1, _SUMMED + 1):
         term = sizes[:, q - 1]

@@ -1,7 +1,7 @@
-"""From a parent to its isotopologue: which axis became which, how far they turned, and constants carried over.
+"""Constants of an isotopologue from those of its parent: matching of the axes, their rotation, and scaling.
 
-Where the parent has better constants than its geometry gives, they go over by the ratio of calculated ones along matched
-axes, X' = X · X'_calc / X_calc, so that most of what vibration does cancels.
+Measured constants of the parent are multiplied by the ratio of calculated ones along matched axes, X' = X · X'_calc / X_calc.
+Most of the effect of vibration cancels in this ratio.
 """
 
 from __future__ import annotations
@@ -21,45 +21,43 @@ from rotor.tops.constants import Constants
 from rotor.tops.operators import distortion_terms, powers_of_spelled
 from rotor.tops.top import Top
 
-# Scaled distortion constants beside fitted ones (test_isotopologues.py measures them anew).
-_OFF_HEAVY = "by up to 1.1 % (quartic) and 10 % (sextic) where heavy atoms were replaced (OCS, HC3N)"
+# Errors of scaled distortion constants against fitted ones; test_isotopologues.py measures them again.
+_OFF_HEAVY = "by up to 1.1 % (quartic) and 10 % (sextic) for replaced heavy atoms (OCS, HC3N)"
 _OFF_HYDROGEN = (
-    "by 4 % (DC3N), 3 to 13 % (H2O to D2O) and 15 to 27 % (NH3 to ND3) where hydrogen was replaced, sextic ones by up to 107 %, so "
+    "by 4 % (DC3N), 3 to 13 % (H2O to D2O) and 15 to 27 % (NH3 to ND3) for replaced hydrogen; sextic ones by up to 107 %, so "
     "that even their sign may be wrong"
 )
 TURNED_TOO_FAR_DEGREES = 5.0  # beyond it distortion constants are not carried over
 
 
 def _alike(kind: str) -> tuple[tuple[int, ...], ...]:
-    """Axes that are free to turn among themselves."""
+    """Groups of axes that symmetry does not distinguish."""
     return {"spherical": ((0, 1, 2),), "oblate": ((0, 1), (2,)), "asymmetric": ((0,), (1,), (2,))}.get(
         kind, ((0,), (1, 2))
     )
 
 
-HEAVY_ERROR, HYDROGEN_ERROR = (
-    2e-4,
-    8e-3,
-)  # of scaled constants, measured: where heavy atoms were replaced, where hydrogen was
+# Relative errors of scaled constants, measured on molecules with a replaced heavy atom and with replaced hydrogen.
+HEAVY_ERROR, HYDROGEN_ERROR = 2e-4, 8e-3
 
 
 def matched_axes(parent: Top, turned: Top) -> tuple[str, float]:
-    """The parent's axes nearest to a, b, c, and the smallest cos² of the matches; free directions are taken together."""
+    """The parent's axes nearest to a, b, c, and the smallest cos² of the matches; degenerate axes are matched as a group."""
     assert parent.frame is not None  # both are tops of a geometry
     assert turned.frame is not None
     squares = (turned.frame.axes @ parent.frame.axes.T) ** 2
-    inside = np.zeros((3, 3))  # of each axis in the space that the other may turn in
+    inside = np.zeros((3, 3))  # squared projection of each axis on the degenerate space of the other
     for axes, other in itertools.product(map(list, _alike(turned.kind)), map(list, _alike(parent.kind))):
         block = np.ix_(axes, other)
         inside[block] = squares[block].sum() / min(len(axes), len(other))
         squares[block] = squares[block].mean()
-    ways = itertools.permutations(range(3))  # the first, which changes nothing, wins where overlaps are alike
+    ways = itertools.permutations(range(3))  # the identity comes first, so that it wins among equal overlaps
     best = max(ways, key=lambda way: round(sum(squares[i, j] for i, j in enumerate(way)), 9))
     return "".join("abc"[j] for j in best), min(float(inside[i, j]) for i, j in enumerate(best))
 
 
 def turned_degrees(parent: Top, turned: Top, axes: str) -> float:
-    """The angle between matched axes; where one of the tops is symmetric, of its unique axis alone."""
+    """Angle between matched axes in degrees; for a symmetric top, the angle of its unique axis."""
     assert parent.frame is not None  # both are tops of a geometry
     assert turned.frame is not None
     if "spherical" in (parent.kind, turned.kind):
@@ -89,30 +87,30 @@ def _angle(rotation: Floats) -> float:
 
 
 def carried_over(parent: Top, rigid: Top, turned: Top, axes: str, angle: float) -> Top:
-    """The top of the geometry, with the parent's constants carried over where they are others than its geometry's.
+    """The isotopologue with the parent's constants scaled to it, if these differ from those of the parent's geometry.
 
     Parameters
     ----------
     parent : Top
-        The parent, with its own constants.
+        The parent with its measured constants.
     rigid : Top
-        The parent as its geometry gives it.
+        The parent with the constants of its geometry.
     turned : Top
-        The isotopologue as its geometry gives it.
+        The isotopologue with the constants of its geometry.
     axes : str
-        The parent's axes nearest to a, b, c, as `matched_axes` gives them.
+        The parent's axes nearest to a, b, c, from `matched_axes`.
     angle : float
-        How far they turned, in degrees.
+        Rotation of the axes in degrees.
 
     Returns
     -------
     Top
-        The parent itself where no mass differs; `turned` where the parent's constants are those of its geometry.
+        The parent itself if no mass differs; `turned` if the parent's constants are those of its geometry.
 
     Notes
     -----
-    Neglected: what vibration changes in the ratio of constants. Such constants were 0.02 % off where heavy atoms were
-    replaced, and up to 0.8 % where hydrogen was.
+    Neglected: the effect of vibration on the ratio of constants. Scaled constants differed from measured ones by 0.02 % for
+    replaced heavy atoms, and by up to 0.8 % for replaced hydrogen.
     """
     if _masses(turned) == _masses(parent):
         return parent
@@ -125,8 +123,8 @@ def carried_over(parent: Top, rigid: Top, turned: Top, axes: str, angle: float) 
     constants = _constants_of_kind(values, turned.kind)
     name = parent.name or "the parent"
     note = (
-        f"constants are those of {name} times the ratio of those calculated from its geometry; such constants were "
-        f"{100 * HEAVY_ERROR:g} % off where heavy atoms were replaced, and up to {100 * HYDROGEN_ERROR:g} % where hydrogen was"
+        f"constants are those of {name} times the ratio calculated from its geometry; constants scaled in this way were wrong by "
+        f"{100 * HEAVY_ERROR:g} % for replaced heavy atoms, and by up to {100 * HYDROGEN_ERROR:g} % for replaced hydrogen"
     )
     origin = f" ({parent.source})" if parent.source else ""
     source = f"scaled from {name}{origin} by {_ratio_text(ratios, axes)}"
@@ -147,13 +145,13 @@ def _masses(top: Top) -> tuple[int, ...]:
 
 
 def _is_rigid(constants: Constants, rigid: Constants) -> bool:
-    """Whether constants are those of a rigid geometry and nothing more."""
+    """Whether the constants equal those of the rigid geometry."""
     same = constants.values.keys() == rigid.values.keys()
     return same and all(math.isclose(constants[name], rigid[name], rel_tol=1e-9) for name in rigid.values)
 
 
 def _ratios(rigid: Top, turned: Top, axes: str) -> Floats:
-    """X'_calc / X_calc along a, b, c; 1 along the axis of a linear molecule, where there is none."""
+    """X'_calc / X_calc along a, b, c; 1 along the axis of a linear molecule, which has no A."""
     before = np.array(rigid.constants.rigid)[["abc".index(letter) for letter in axes]]
     after = np.array(turned.constants.rigid)
     finite = np.isfinite(before)
@@ -168,7 +166,7 @@ def _ratio_text(ratios: Floats, axes: str) -> str:
 
 
 def _in_order(values: Floats, turned: Top) -> tuple[Floats, Top]:
-    """Values falling, with frame and tensors of the top put into the same order: near a symmetric top the names change."""
+    """Constants in falling order, with frame and tensors in the same order; near a symmetric top, scaling may exchange axes."""
     order = np.argsort(-values, kind="stable")
     if turned.kind != "asymmetric" or (order == np.arange(3)).all():
         return values, turned
@@ -177,7 +175,7 @@ def _in_order(values: Floats, turned: Top) -> tuple[Floats, Top]:
     axes = axes * np.array([[1.0], [1.0], [np.sign(np.linalg.det(axes))]])
     change = axes @ turned.frame.axes.T
     frame = PrincipalFrame(turned.frame.moments[order], axes, turned.frame.centre)
-    note = "the scaled constants have another order than the calculated ones: the axes are named by the scaled ones"
+    note = "scaling changed the order of the constants: a, b and c are named by the scaled constants"
     dipole, tensor = turned.dipole_abc_debye, turned.polarizability_abc_angstrom3
     moved: dict[str, Any] = {"frame": frame, "notes": (*turned.notes, note)}
     if dipole is not None:
@@ -202,11 +200,11 @@ def _constants_of_kind(values: Floats, kind: str) -> Constants:
 def _with_distortion(
     parent: Top, constants: Constants, axes: str, angle: float, hydrogen: bool
 ) -> tuple[Constants, tuple[str, ...]]:
-    """The parent's distortion constants by powers of the rotational ones, or none where the axes are others.
+    """The parent's distortion constants scaled by powers of the rotational constants; none if the axes changed.
 
-    c of c J^2p Jz^2q J±^2n goes as ρ^(p+n) ρz^q with the ratios ρ of Bx + By and ρz of Bz. For one bond that is exact: D
-    goes as B², H as B³ (J. L. Dunham, Phys. Rev. 41, 721 (1932), from D = 4 B³/ω² with ω² as B). A turn of the axes mixes
-    the constants, and nothing of that is in them: from H2O to HDO ΔJK changes its sign.
+    The coefficient of J^2p Jz^2q J±^2n is multiplied by ρ^(p+n) ρz^q, with the ratios ρ of Bx + By and ρz of Bz. For a diatomic
+    molecule this is exact: D scales as B², H as B³ (J. L. Dunham, Phys. Rev. 41, 721 (1932); D = 4 B³/ω² and ω² is
+    proportional to B). Neglected: a rotation of the axes mixes the constants. From H2O to HDO, ΔJK even changes its sign.
     """
     old = parent.constants
     names = [name for name in old.values if name not in ("A", "B", "C")]
@@ -220,14 +218,14 @@ def _with_distortion(
     scaled = {name: old[name] * across ** (p + n) * along**q for name, (p, q, n) in _powers(old, names).items()}
     changes = {**scaled, "reduction": old.reduction} if old.reduction else scaled
     note = (
-        f"distortion constants are the parent's scaled as powers of the rotational constants (D as B², H as B³); such "
-        f"constants were off {_OFF_HYDROGEN if hydrogen else _OFF_HEAVY}"
+        f"distortion constants are the parent's, scaled with powers of the rotational constants (D as B², H as B³); constants scaled "
+        f"in this way were wrong {_OFF_HYDROGEN if hydrogen else _OFF_HEAVY}"
     )
     return constants.replace(**changes), (note,)
 
 
 def _powers(constants: Constants, names: list[str]) -> dict[str, tuple[int, int, int]]:
-    """(p, q, n) of the one operator that each distortion constant stands for."""
+    """Powers (p, q, n) of the operator of each distortion constant."""
     table = distortion_terms(constants.kind, constants.reduction)
     spelled = {name: powers_of_spelled(name) for name in names}
     return {name: powers if (powers := spelled[name]) else next(iter(table[name])) for name in names}
@@ -235,16 +233,16 @@ def _powers(constants: Constants, names: list[str]) -> dict[str, tuple[int, int,
 
 def _why_rigid(old: Constants, constants: Constants, axes: str, angle: float) -> str:
     if constants.kind != old.kind:
-        why = f"the kind of top is {constants.kind}, the parent's {old.kind}"
+        why = f"it is a {constants.kind} top, the parent a {old.kind} one"
     elif axes != "abc":
-        why = f"a, b, c are nearest to the parent's {', '.join(axes)}"
+        why = f"its axes a, b, c are nearest to the parent's {', '.join(axes)}"
     else:
-        why = f"the axes turned by {angle:.1f}°"
-    return f"no distortion constants: those of the parent do not serve, {why}; a force field gives them (rotor.tops.distortion)"
+        why = f"its axes are turned by {angle:.1f}°"
+    return f"no distortion constants: those of the parent cannot be scaled, because {why}; a force field gives them (rotor.tops.distortion)"
 
 
 def _z_constants(constants: Constants) -> tuple[float, float]:
-    """½(Bx + By) and Bz, 1 for the z of a linear or spherical top, whose terms have no Jz."""
+    """½(Bx + By) and Bz; 1 in place of Bz for a linear or spherical top, whose terms have no Jz."""
     a, b, c = constants.rigid
     if constants.kind in ("linear", "spherical"):
         return b, 1.0

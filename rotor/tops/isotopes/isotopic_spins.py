@@ -1,11 +1,11 @@
-"""Constants of nuclear spins carried over to an isotopologue: tensors turned with its axes, scaled to its nuclei.
+"""Hyperfine constants of an isotopologue from those of its parent: tensors in the new axes, scaled to the new nuclei.
 
-    χ' = (Q'/Q) R χ Rᵀ         the gradient of the field belongs to the electrons and does not know isotopes
-    C' = (g'/g) R C I Rᵀ I'⁻¹   C = g K I⁻¹ with K of the electrons and the charges of the nuclei alone
+    χ' = (Q'/Q) R χ Rᵀ         the field gradient is a property of the electrons, equal for all isotopes
+    C' = (g'/g) R C I Rᵀ I'⁻¹   C = g K I⁻¹, where K depends only on the electrons and the nuclear charges
 
-R turns the principal axes of the parent into those of the isotopologue, I are the moments of inertia (W. Gordy and R. L. Cook,
+R transforms the principal axes of the parent into those of the isotopologue; I are the moments of inertia (W. Gordy and R. L. Cook,
 Microwave Molecular Spectra, 3rd ed., chapters IX.4 and IX.7; Q and g of data/isotopes.csv). Neglected: vibration, which changes χ of
-deuterium by some percent and of heavier nuclei by less than one. What belongs to two spins is left out.
+deuterium by some per cent and of heavier nuclei by less than one per cent. Constants of two spins are left out.
 """
 
 from __future__ import annotations
@@ -26,15 +26,13 @@ if TYPE_CHECKING:
 
 LETTERS = ("aa", "bb", "cc", "ab", "ac", "bc")
 DIFFERENCES = ("ab-ba", "ac-ca", "bc-cb")
-ROUND_OFF = (
-    1e-6  # of a tensor: elements that symmetry makes 0 are below it, as moments that it makes equal differ by less
-)
-TURNED_DEGREES = 0.1  # from which axes count as turned where a tensor off the diagonal is not known
+ROUND_OFF = 1e-6  # relative to a tensor: bound of elements that symmetry makes 0, and of differences that it makes 0
+TURNED_DEGREES = 0.1  # rotation of the axes above which unknown off-diagonal elements matter
 
 
 @dataclass(frozen=True)
 class _Change:
-    """One nucleus before and after, the rotation from the old axes to the new, and moments of inertia of both."""
+    """A nucleus of the parent and of the isotopologue, the rotation from the old axes to the new, and both sets of moments."""
 
     old: Isotope
     new: Isotope
@@ -44,9 +42,9 @@ class _Change:
 
 
 def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | None, tuple[str, ...]]:
-    """The constants of the parent's spins as its isotopologue `top` has them, and remarks.
+    """Spin constants of the isotopologue `top`, and notes; None if no spin has constants.
 
-    angle: by how many degrees the axes turned. None where no spin has constants any more.
+    angle: rotation of the axes in degrees.
     """
     constants = parent.spin_constants
     if (
@@ -67,7 +65,9 @@ def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | 
     for spin in constants.twice:
         atom = constants.atoms.get(spin) or _only_atom(parent.molecule, spin)
         if atom is None:
-            notes.append(f"constants of {spin} are left out: which nucleus of the geometry it is, is not said")
+            notes.append(
+                f"constants of {spin} are left out: the molecule does not say which nucleus of the geometry it is"
+            )
             continue
         old, new = parent.molecule.nuclei[atom - 1], top.molecule.nuclei[atom - 1]
         change = _Change(old, new, rotation, _moments(parent), _moments(top))
@@ -81,21 +81,19 @@ def carried_spins(parent: Top, top: Top, angle: float) -> tuple[SpinConstants | 
             twice[name], atoms[name] = round(2 * new.spin), atom
     if not values:
         return None, tuple(notes)
-    source = (
-        f"from those of {parent.name or 'the parent'} ({constants.source}), turned with the axes and scaled by Q and g"
-    )
+    source = f"from those of {parent.name or 'the parent'} ({constants.source}), in the new axes and scaled by Q and g of the nuclei"
     return SpinConstants(values, twice, source, atoms=atoms), tuple(notes)
 
 
 def _only_atom(molecule: Molecule, spin: str) -> int | None:
-    """The number of the atom that a spin named by its isotope must be: that of the only nucleus of it, counted from 1."""
+    """Number (from 1) of the only atom of the isotope that a spin is named after; None if several atoms or none fit."""
     atoms = [number for number, nucleus in enumerate(molecule.nuclei, 1) if nucleus.label == spin]
     return atoms[0] if len(atoms) == 1 else None
 
 
 def _pair_notes(constants: SpinConstants) -> list[str]:
     pairs = [name for name in constants.values if len(spins_of(name)) != 1]
-    return [f"{', '.join(pairs)}: what belongs to two spins is not carried over"] if pairs else []
+    return [f"{', '.join(pairs)}: constants of two spins are not carried over"] if pairs else []
 
 
 def _moments(top: Top) -> Floats:
@@ -105,7 +103,7 @@ def _moments(top: Top) -> Floats:
 def _carried_spin(
     constants: Mapping[str, float], change: _Change, angle: float, kind: str
 ) -> tuple[dict[str, float], list[str]]:
-    """The constants of one nucleus, without its name, and remarks."""
+    """Constants of one nucleus, by name without the spin, and notes."""
     chi = {name: value for name, value in constants.items() if name.startswith("chi_")}
     rotation = {name: value for name, value in constants.items() if name.startswith("C_")}
     notes = [f"{name} is not carried over" for name in constants if name not in chi and name not in rotation]
@@ -115,7 +113,7 @@ def _carried_spin(
         diagonal = not any(tensor[i, k] for i, k in ((0, 1), (0, 2), (1, 2)))
         if diagonal and kind == "asymmetric" and angle > TURNED_DEGREES:
             notes.append(
-                f"the axes turned by {angle:.1f}° and elements of χ off the diagonal are not known: what they add along the new axes is "
+                f"the axes are turned by {angle:.1f}° and off-diagonal elements of χ are not known: their part of the new constants is "
                 "missing"
             )
         q_ratio = _ratio(change.new.quadrupole_barn, change.old.quadrupole_barn, "quadrupole moment", change)
@@ -137,7 +135,7 @@ def _ratio(new: float | None, old: float | None, what: str, change: _Change) -> 
 
 
 def chi_tensor(chi: Mapping[str, float]) -> Floats:
-    """The traceless tensor (3, 3) along a, b, c of chi_aa, chi_bb-cc, ...; chi_aa alone has -½ chi_aa along b and c.
+    """Traceless tensor (3, 3) along a, b, c from chi_aa, chi_bb-cc, ...; chi_aa alone gives -½ chi_aa along b and c.
 
     >>> chi_tensor({"chi_aa": 2.0, "chi_bb-cc": 1.0}).diagonal().tolist()
     [2.0, -0.5, -1.5]
@@ -159,7 +157,7 @@ def chi_tensor(chi: Mapping[str, float]) -> Floats:
 
 
 def named_chi(tensor: Floats) -> dict[str, float]:
-    """chi_aa, chi_bb-cc and what is not 0 off the diagonal, of a tensor; rounding taken out; chi_cc alone where it is symmetric about c."""
+    """chi_aa, chi_bb-cc and non-zero off-diagonal elements of a tensor, without rounding; chi_cc alone if it is symmetric about c."""
     tensor = without_rounding(tensor)
     if np.count_nonzero(tensor) == 3 and tensor[0, 0] == tensor[1, 1]:  # symmetric about c
         return {"chi_cc": float(tensor[2, 2])}
@@ -174,7 +172,7 @@ def named_chi(tensor: Floats) -> dict[str, float]:
 
 
 def without_rounding(tensor: Floats) -> Floats:
-    """A tensor (3, 3) with 0 for elements below `ROUND_OFF` of it, and equal diagonal elements where they differ by less.
+    """A tensor (3, 3) with elements below `ROUND_OFF` of its largest set to 0, and diagonal elements made equal if they differ by less.
 
     >>> without_rounding(np.diag([1.0, 1.00000001, -2.0])).diagonal().tolist()
     [1.000000005, 1.000000005, -2.0]
@@ -188,7 +186,7 @@ def without_rounding(tensor: Floats) -> Floats:
 
 
 def _turned_rotation(constants: Mapping[str, float], change: _Change, g_ratio: float) -> dict[str, float]:
-    """Spin-rotation constants with the new moments of inertia; of a linear molecule C_iso alone goes with B."""
+    """Spin-rotation constants for the new moments of inertia; C_iso of a linear molecule is proportional to B."""
     if set(constants) == {"C_iso"}:
         return {"C_iso": constants["C_iso"] * g_ratio * float(change.moments[1] / change.new_moments[1])}
     if not set(constants) <= {f"C_{letters}" for letters in (*LETTERS, *DIFFERENCES)}:

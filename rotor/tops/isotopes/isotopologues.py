@@ -1,7 +1,7 @@
 """The isotopologues of a molecule: abundance, constants, axes, dipole and spin weights of each.
 
-In the approximation of Born and Oppenheimer the geometry and the charges stay where they are; the masses move the centre
-and turn the principal axes. What becomes of the constants stands in `rotor.tops.isotopes.isotopic_scaling`.
+In the Born-Oppenheimer approximation, isotopes change neither the geometry nor the charges; their masses shift the centre of mass
+and rotate the principal axes. `rotor.tops.isotopes.isotopic_scaling` scales measured constants.
 """
 
 from __future__ import annotations
@@ -25,22 +25,21 @@ from rotor.tops.top import Top, without_internal_rotation
 
 Changes = Mapping[int | str, str] | str
 
-MOST_ARRANGEMENTS = 20_000  # of isotopes on the atoms, equivalent ones counted each
+MOST_ARRANGEMENTS = 20_000  # placements of isotopes on the atoms, equivalent ones counted separately
 _DIPOLE_ERROR = 0.02  # of the whole: what symmetry of the bare geometry forbids below it is the error of the components
 _DOUBTFUL_OVERLAP = 0.6  # cos² below which it is doubtful which axis is which
 
 
 @dataclass(frozen=True)
 class Isotopologue:
-    """One isotopologue.
+    """An isotopologue of a parent molecule.
 
-    top : constants, kind, dipole in its own axes, spin weights, and in `top.molecule` the masses
-    substituted : by 1-based atom number, how it differs from the most abundant isotopes, such as `{2: "2H"}`
-    arrangements : how many equivalent placements of the isotopes count as this one
-    abundance : fraction of the natural molecules, all those placements together
-    axes : the parent's axes that a, b and c are nearest to: `"abc"`, or `"bac"` where two have changed places
-    turned_degrees : the angle by which the axes turned against the parent's, matched; axes that are free to turn in a
-        symmetric top do not count
+    top : constants, kind, dipole along its principal axes, spin weights, and the masses in `top.molecule`
+    substituted : isotopes other than the most abundant ones, by atom number from 1, such as `{2: "2H"}`
+    arrangements : number of equivalent placements of the isotopes
+    abundance : fraction of the natural molecules, summed over these placements
+    axes : the parent's axes nearest to a, b and c: `"abc"`, or `"bac"` if a and b are exchanged
+    turned_degrees : angle between matched axes of parent and isotopologue; degenerate axes of a symmetric top do not count
     """
 
     top: Top
@@ -57,21 +56,21 @@ class Isotopologue:
 
     @property
     def label(self) -> str:
-        """The formula, with the atoms that are substituted where there are any: `"H[2H]O (2=2H)"`."""
+        """The formula with the substituted atoms, if any: `"H[2H]O (2=2H)"`."""
         sites = ",".join(f"{atom}={name}" for atom, name in self.substituted.items())
         return f"{self.formula} ({sites})" if sites else self.formula
 
 
 def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopologue, ...]:
-    """All isotopologues of a molecule at least as abundant in nature as `min_abundance`, the most abundant first.
+    """Isotopologues of a molecule with a natural abundance of at least `min_abundance`, the most abundant first.
 
-    Placements that a symmetry of the geometry (rotation or reflection) carries into one another are one isotopologue.
-    An element that nature lacks keeps the isotope it has.
+    Placements that a rotation or reflection of the geometry exchanges are one isotopologue.
+    An element without natural isotopes keeps the isotope of the parent.
 
     Parameters
     ----------
     parent : Top
-        With a geometry; its isotopes need not be the abundant ones.
+        A top with a geometry, of any isotopes.
     min_abundance : float
         Fraction of the natural molecules, above 0.
 
@@ -82,7 +81,7 @@ def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopol
     Raises
     ------
     ValueError
-        A top without geometry, a limit that nothing reaches or that too many placements exceed.
+        For a top without geometry, and for a limit that no placement or too many placements reach.
 
     Examples
     --------
@@ -113,9 +112,9 @@ def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopol
 
 
 def isotopologue(parent: Top, changes: Changes) -> Isotopologue:
-    """The isotopologue of a top with a geometry that substitutions such as `"2=2H"` or `{"O": "18O"}` make.
+    """The isotopologue of a top with a geometry after substitutions such as `"2=2H"` or `{"O": "18O"}`.
 
-    Raises ValueError for a top without geometry, and what `Molecule.with_isotopes` refuses.
+    Raises ValueError for a top without geometry, and for substitutions that `Molecule.with_isotopes` refuses.
 
     >>> from rotor.molecules.molecule import Molecule
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]],
@@ -128,9 +127,9 @@ def isotopologue(parent: Top, changes: Changes) -> Isotopologue:
 
 
 def single_substitutions(parent: Top, element: str, name: str) -> tuple[Isotopologue, ...]:
-    """The isotopologues with one atom of an element substituted, one for each set of equivalent atoms.
+    """Isotopologues with a single substituted atom of an element, one for each set of equivalent atoms.
 
-    This is the set from which substitution structures are made. Raises ValueError for an element that the molecule lacks.
+    Substitution structures use this set. Raises ValueError for an element that the molecule lacks.
 
     >>> from rotor.molecules.molecule import Molecule
     >>> hcn = Molecule(("H", "C", "N"), [[0, 0, -1.0655], [0, 0, 0], [0, 0, 1.1532]])
@@ -152,22 +151,22 @@ def _geometry(parent: Top) -> Molecule:
     return parent.molecule
 
 
-# Which there are
+# Enumeration of the isotopologues
 
 
 def _bare_symmetry(molecule: Molecule) -> Symmetry:
-    """The symmetry of the geometry, all isotopes alike."""
+    """The symmetry of the geometry, isotopes ignored."""
     return symmetry_of(replace(molecule, mass_numbers=_abundant(molecule)))
 
 
 def _permutations(symmetry: Symmetry) -> list[NDArray[np.int64]]:
-    """The permutations of atoms that the operations make."""
+    """Permutations of the atoms under the operations."""
     distinct = {tuple(operation.permutation.tolist()) for operation in (*symmetry.rotations, *symmetry.improper)}
     return [np.array(permutation) for permutation in sorted(distinct)]
 
 
 def _without_masses(dipole: Floats, symmetry: Symmetry) -> Floats:
-    """A dipole as the bare geometry has it: charges do not know isotopes, components measured of one of them have errors."""
+    """The part of a dipole that the geometry allows without regard to isotopes; measured components have errors beyond it."""
     part = invariant_vector(dipole, symmetry)
     return part if np.linalg.norm(dipole - part) < _DIPOLE_ERROR * np.linalg.norm(dipole) else dipole
 
@@ -179,10 +178,10 @@ def _abundant(molecule: Molecule) -> tuple[int, ...]:
 
 
 def _placements(molecule: Molecule, least: float) -> Iterator[tuple[tuple[int, ...], float]]:
-    """Mass numbers and abundance of every placement with at least that abundance.
+    """Mass numbers and abundance of each placement of at least this abundance.
 
-    From the most abundant one atom after another is substituted, each step less abundant than the one before, so that
-    what falls below the limit is cut with all that would follow.
+    Starting from the most abundant placement, atoms are substituted in turn. Each substitution lowers the abundance, so that a
+    placement below the limit is dropped together with all further substitutions of it.
     """
     fractions = [{nuclide.mass_number: nuclide.abundance for nuclide in natural_isotopes(s)} for s in molecule.symbols]
     base = _abundant(molecule)
@@ -197,7 +196,7 @@ def _placements(molecule: Molecule, least: float) -> Iterator[tuple[tuple[int, .
             return
         if count > MOST_ARRANGEMENTS:
             raise ValueError(
-                f"more than {MOST_ARRANGEMENTS} placements of isotopes on {molecule.formula}: raise the least abundance"
+                f"more than {MOST_ARRANGEMENTS} placements of isotopes on {molecule.formula}: raise the lowest abundance"
             )
         start, numbers, part = waiting.pop()
         yield numbers, part
@@ -216,15 +215,15 @@ def _images(numbers: tuple[int, ...], permutations: list[NDArray[np.int64]]) -> 
 
 
 def _earliest(molecule: Molecule, numbers: tuple[int, ...]) -> list[int]:
-    """Greatest for the placement that names the lowest atoms."""
+    """Sort key: largest for the placement whose substituted atoms have the lowest numbers."""
     return [abs(number - usual) for number, usual in zip(numbers, _abundant(molecule), strict=True)]
 
 
-# What each is
+# Properties of each isotopologue
 
 
 class _Ancestor:
-    """A parent, its rigid top and the permutations of its bare geometry, found once for all its isotopologues."""
+    """A parent, its rigid top and the permutations of its geometry, computed once for all its isotopologues."""
 
     def __init__(self, parent: Top) -> None:
         molecule, dipole = _geometry(without_internal_rotation(parent, "isotopologues")), parent.dipole_abc_debye
@@ -241,7 +240,7 @@ class _Ancestor:
         self.parent, self.molecule, self.rigid = parent, molecule, Top.from_molecule(molecule)
 
     def isotopologue(self, numbers: tuple[int, ...]) -> Isotopologue:
-        """The isotopologue with those mass numbers."""
+        """The isotopologue with these mass numbers."""
         symbols, usual = self.molecule.symbols, _abundant(self.molecule)
         names = [f"{number}{symbol}" for number, symbol in zip(numbers, symbols, strict=True)]
         turned = Top.from_molecule(self.molecule.with_isotopes(dict(enumerate(names, start=1))))
@@ -269,7 +268,7 @@ def _name(parent: Top, molecule: Molecule, turned: Top) -> str:
 
 
 def _abundance(symbols: tuple[str, ...], numbers: tuple[int, ...]) -> float:
-    """Abundance of one placement; the isotopes of an element that nature lacks count as all there is."""
+    """Natural abundance of a placement; an isotope of an element without natural isotopes counts as 1."""
     pairs = zip(symbols, numbers, strict=True)
     return math.prod(isotope(s, number).abundance if natural_isotopes(s) else 1.0 for s, number in pairs)
 
@@ -277,8 +276,8 @@ def _abundance(symbols: tuple[str, ...], numbers: tuple[int, ...]) -> float:
 def _doubts(parent: Top, overlap: float, angle: float) -> list[str]:
     notes = []
     if overlap < _DOUBTFUL_OVERLAP:
-        notes.append(f"the axes turned by {angle:.0f}°: which of them is the parent's which is doubtful")
+        notes.append(f"the axes are turned by {angle:.0f}°: their assignment to the parent's axes is doubtful")
     dipole = parent.dipole_abc_debye
     if dipole is not None and sum(abs(mu) > 1e-3 for mu in dipole) > 1 and angle > 0.1:
-        notes.append("the dipole was turned with the signs that the parent's components are given with; check them")
+        notes.append("the dipole along the new axes depends on the signs of the parent's components; check them")
     return notes

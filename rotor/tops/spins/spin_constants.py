@@ -1,9 +1,9 @@
-"""Constants of nuclear and electron spins of a top, by name, with the spins they belong to.
+"""Constants of nuclear and electron spins of a top, by name with the spins.
 
     chi_aa(14N) = -4.22 MHz      quadrupole coupling along a      C_bb(14N), eps_aa(S), T_aa(S,14N), b_F(S,14N), ...
 
-Names are those of `rotor.quantum.effects`: hyperfine, spin_rotation, spin_spin. A spin is called after its isotope (14N; 35Cl_1 and
-35Cl_2 where there are several), which also says how large it is; any other name, such as S, must come with its spin.
+Names are those of `rotor.quantum.effects`: hyperfine, spin_rotation, spin_spin. A spin is named after its isotope (14N; 35Cl_1 and
+35Cl_2 for several), which determines its size; for any other name, such as S, the size must be given.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ _ISOTOPE = re.compile(r"(\d+[A-Z][a-z]?|D|T)(?:_\w+)?")
 
 @dataclass(frozen=True, eq=False)
 class SpinConstants:
-    """Values in MHz by name, the spins in the order in which they are coupled, and where the values are from.
+    """Values in MHz by name, the spins in their order of coupling, and the source of the values.
 
-    twice: twice every spin, by its name. uncertainties: in MHz, of the constants that have one. sources: of single spins.
-    atoms: the numbers of the nuclei in the geometry, counted from 1, by spin. totals: the name of the total spin, such as "I", of two
-    or three equivalent nuclei that are coupled to it first, by spin. weights_of_others: whether the spin weights of the top are
-    stated to be those of the nuclei beside the total spin. ValueError for a spin that is none, and for constants of a spin that is
+    twice: twice the size of each spin, by name. uncertainties: in MHz, by name. sources: by spin.
+    atoms: number of the nucleus in the geometry, from 1, by spin. totals: name of the total spin, such as "I", to which two
+    or three equivalent nuclei are coupled first, by spin. weights_of_others: whether the spin weights of the top are
+    those of the nuclei outside the total spin. Raises ValueError for an impossible spin, and for constants of a spin that is
     not listed.
     """
 
@@ -89,7 +89,7 @@ class SpinConstants:
         return type(self), (dict(self.values), dict(self.twice), self.source, *plain, self.weights_of_others)
 
     def of(self, spin: str) -> dict[str, float]:
-        """The constants of one spin alone in every state, by name without the spin.
+        """Constants that belong to this spin only, of all states, by name without the spin.
 
         >>> SpinConstants.parse("chi_aa(14N)=-4.22MHz C_bb(14N)=2kHz T_aa(14N,D)=2kHz").of("14N")
         {'chi_aa': -4.22, 'C_bb': 0.002}
@@ -102,9 +102,9 @@ class SpinConstants:
 
     @classmethod
     def parse(cls, text: str, spins: str | None = None, source: str = "") -> SpinConstants:
-        """From text such as "chi_aa(14N)=-4.22 chi_bb-cc(14N)=1.1 MHz" and, where a name is no isotope, "S=1/2 14N=1".
+        """Constants from a text such as "chi_aa(14N)=-4.22 chi_bb-cc(14N)=1.1 MHz"; spins: "S=1/2 14N=1", for names that are no isotopes.
 
-        An item keeps its own unit; a unit at the end, after a space, serves every item that carries none; without any,
+        An item may have a unit; a unit at the end, after a space, applies to all items without one; without any unit,
         numbers are MHz.
 
         >>> constants = SpinConstants.parse("chi_aa(14N)=-4.22408 MHz")
@@ -121,8 +121,8 @@ class SpinConstants:
         last, unitless = items[-1], [item["name"] for item in items if not item["unit"]]
         if unitless and last["unit"] and not last["gap"]:
             raise ValueError(
-                f"{text!r}: {last['unit']} stands at {last['name']} only; put a space before it to serve {', '.join(unitless)} "
-                "too, or give each its own"
+                f"{text!r}: the unit {last['unit']} belongs to {last['name']} only; put a space before it to apply it to "
+                f"{', '.join(unitless)} too, or give each constant a unit"
             )
         shared = last["unit"] or "MHz"
         values: dict[str, float] = {}
@@ -135,7 +135,7 @@ class SpinConstants:
 
     @classmethod
     def from_values(cls, values_mhz: Mapping[str, float], spins: str | None = None, source: str = "") -> SpinConstants:
-        """From values in MHz by name; spins as for `parse`.
+        """Constants from values in MHz by name; spins as for `parse`.
 
         >>> dict(SpinConstants.from_values({"eps_aa(S)": 300.0, "b_F(S,1H)": 40.0}, "S=1/2").twice)
         {'S': 1, '1H': 1}
@@ -147,9 +147,9 @@ class SpinConstants:
 
 
 def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> None:
-    """ValueError where a spin is named after an isotope that the molecule lacks, or has less often.
+    """Raise ValueError if more spins are named after an isotope than the molecule has nuclei of it.
 
-    Without a molecule, and of spins with names of their own, there is nothing to compare.
+    Not checked without a molecule, and for spins that are not named after isotopes.
     """
     if molecule is None:
         return
@@ -160,13 +160,13 @@ def refuse_other_nuclei(constants: SpinConstants, molecule: Molecule | None) -> 
         if count > there[symbol, number]:
             has = ", ".join(f"{n} of {a}{s}" for (s, a), n in there.items())
             raise ValueError(
-                f"{count} {'spin is' if count == 1 else 'spins are'} called after {number}{symbol}, and "
-                f"{molecule.formula} has {has}; give another isotope with --isotope, or the spin another name and its size"
+                f"{count} {'spin is' if count == 1 else 'spins are'} named after {number}{symbol}, but "
+                f"{molecule.formula} has {has}; choose the isotope with --isotope, or give the spin another name and its size"
             )
 
 
 def _without_spin(text: str) -> str:
-    """What to do about a constant that does not say to which spin it belongs; "" where there is none."""
+    """Remedy for a constant that lacks its spin, for an error message; "" if none lacks it."""
     constant = re.search(r"(?<![\w)])([A-Za-z][\w-]*)\s*=\s*[-+−.\d]", text)
     return (
         f"; {constant[1]} needs its spin or spins in round brackets, {constant[1]}(14N), {constant[1]}(S,14N)"
@@ -180,7 +180,7 @@ def _named(values: Mapping[str, float]) -> list[str]:
 
 
 def spins_of(name: str) -> tuple[str, ...]:
-    """The spins that a constant belongs to.
+    """Names of the spins of a constant.
 
     >>> spins_of("T_aa(S,14N)")
     ('S', '14N')
@@ -190,21 +190,19 @@ def spins_of(name: str) -> tuple[str, ...]:
 
 
 def twice_of(spin: str) -> int:
-    """Twice the spin of the nucleus that a spin is called after.
+    """Twice the spin of the isotope that a spin is named after.
 
     >>> twice_of("14N"), twice_of("35Cl_2"), twice_of("D")
     (2, 3, 2)
     """
     match = _ISOTOPE.fullmatch(spin)
     if not match:
-        raise ValueError(
-            f"spin {spin}: is not called after an isotope (14N, 35Cl_1); say how large it is, such as {spin}=1/2"
-        )
+        raise ValueError(f"spin {spin}: not named after an isotope (14N, 35Cl_1); give its size, such as {spin}=1/2")
     return round(2 * isotope(match[1]).spin)
 
 
 def is_isotope(name: str, twice: int) -> bool:
-    """Whether a name is that of an isotope whose nucleus has this spin, doubled."""
+    """Whether a name is that of an isotope whose nucleus has the spin `twice`/2."""
     try:
         return twice_of(name) == twice
     except ValueError:
@@ -212,7 +210,7 @@ def is_isotope(name: str, twice: int) -> bool:
 
 
 def spin_text(twice: int) -> str:
-    """How large a spin is, as text.
+    """The size of a spin as text.
 
     >>> spin_text(3), spin_text(2)
     ('3/2', '1')
@@ -221,7 +219,7 @@ def spin_text(twice: int) -> str:
 
 
 def _refuse_totals(totals: Mapping[str, str], twice: Mapping[str, int]) -> None:
-    """ValueError for a total spin of other than the last two or three spins of one size."""
+    """Raise ValueError unless the spins of a total are the last two or three, of equal size."""
     if not totals:
         return
     last = list(twice)[-len(totals) :]
@@ -239,7 +237,7 @@ def _refuse_totals(totals: Mapping[str, str], twice: Mapping[str, int]) -> None:
 
 
 def parse_coupled(text: str) -> tuple[dict[str, int], dict[str, str]]:
-    """Twice the spins by name, and of those that are coupled to a total I first its name, from "14N 35Cl_1+35Cl_2".
+    """Twice the spins by name, and the total spin of those that are coupled first, by name, from "14N 35Cl_1+35Cl_2".
 
     >>> parse_coupled("S=1/2 1H_1+1H_2=1/2")
     ({'S': 1, '1H_1': 1, '1H_2': 1}, {'1H_1': 'I', '1H_2': 'I'})
@@ -259,7 +257,7 @@ def parse_coupled(text: str) -> tuple[dict[str, int], dict[str, str]]:
 
 
 def parse_spins(text: str) -> dict[str, int]:
-    """Twice the spins by name from "S=1/2 14N=1", in that order.
+    """Twice the spins by name from "S=1/2 14N=1", in this order.
 
     >>> parse_spins("S=1/2, 14N=1, X=1.5")
     {'S': 1, '14N': 2, 'X': 3}

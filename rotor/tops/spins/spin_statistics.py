@@ -1,14 +1,14 @@
-"""Nuclear-spin weights from the permutations that a molecule's rotations make of its nuclei, with their spins.
+"""Nuclear-spin weights from the permutations of nuclei under the rotations of a molecule, and from the nuclear spins.
 
-A level exists with as many spin functions as make the total change sign under every odd permutation of like fermions
-and stay the same under all others. Under a rotation R the spin functions have the character Π (2I+1) over the cycles
-of its permutation; with the sign (-1)^(length-1) of each cycle of fermions, and the character of the electronic and
-vibrational state, that is f(R), and a rotational species Γ weighs
+The total wave function changes sign under an odd permutation of identical fermions, and does not change under any other
+permutation of identical nuclei. The weight of a level is the number of spin functions that satisfy this. Under a rotation R the
+spin functions have the character Π (2I+1) over the cycles of its permutation. Multiplied by the sign (-1)^(length-1) of each cycle
+of fermions and by the character of the electronic and vibrational state it is f(R), and the weight of a rotational species Γ is
 
     w(Γ) = Σ_R χ_Γ(R) f(R) / Σ_R 1
 
 (P. R. Bunker and P. Jensen, Molecular Symmetry and Spectroscopy, 2nd ed., NRC Research Press 1998, chapter 8). The
-rotations alone are enough as long as inversion is not resolved. No molecule is known here by name.
+rotations suffice as long as inversion is not resolved. No weight depends on the name of a molecule.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from rotor.molecules.symmetry.operations import Operation, shortest_distance
 from rotor.molecules.symmetry.point_group import TOLERANCE, Symmetry, find_symmetry, symmetry_of
 from rotor.tops.spins.spin_weights import IRREPS, SPECIES, SpinWeights, character_table
 
-STATES = ("symmetric", "antisymmetric")  # of an inverting molecule: the lower and the upper of each doublet
+STATES = ("symmetric", "antisymmetric")  # lower and upper state of each inversion doublet
 
 
 @dataclass(frozen=True)
 class CharacterRow:
-    """Rotations that are alike: their name, how many, the cycles of nuclei as (spin, length, count), and f(R)."""
+    """A class of rotations: name, number, cycles of nuclei as (spin, length, count), and f(R)."""
 
     rotation: str
     count: int
@@ -51,10 +51,10 @@ def weights_of(
     ----------
     molecule : Molecule
     tolerance : as for `symmetry_of`.
-    electronic : how the electronic and vibrational state behaves under the rotations, as for `spin_weights`; None for
-        what the molecule says of itself.
-    inversion : None leaves inversion doublets unresolved; `"symmetric"` or `"antisymmetric"` gives the weights of the
-        one state of a molecule that inverts through the plane of its a and b axes, such as NH3.
+    electronic : symmetry of the electronic and vibrational state under the rotations, as for `spin_weights`; None for
+        that of the molecule.
+    inversion : None for unresolved inversion doublets; `"symmetric"` or `"antisymmetric"` for the weights of one state of
+        a molecule that inverts through the plane of its a and b axes, such as NH3.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def weights_of(
 
 
 def spin_weights(symmetry: Symmetry, spins: Sequence[float], electronic: str | Sequence[int] = "even") -> SpinWeights:
-    """Weights of the rotational species of a molecule of that symmetry, reduced by their common divisor.
+    """Weights of the rotational species of a molecule from its symmetry, reduced by their common divisor.
 
     The rule follows from the group of rotations: none for C1 and C∞, parities of (Ka, Kc) for C2 and D2, |K| modulo n
     for Cn and Dn, parity of J for D∞, irreps for T, O and I. Equal moments of inertia do not matter.
@@ -92,15 +92,15 @@ def spin_weights(symmetry: Symmetry, spins: Sequence[float], electronic: str | S
     ----------
     symmetry : as `find_symmetry` gives it.
     spins : n nuclear spins in units of h/2π, in the order of the nuclei.
-    electronic : "even" for a state that every rotation leaves alike; "odd", where there are at most two classes of
-        rotations, for one that the other changes in sign (Σg- of O2: half turns across the axis; 16O18O has none); or
-        the characters +1 and -1, one for each of `symmetry.rotations`.
+    electronic : "even" for a totally symmetric state. "odd", for C2 and D∞ only, for a state that changes sign under the half
+        turns (Σg- of O2: half turns across the axis; 16O18O has none). Otherwise characters +1 and -1, one for each of
+        `symmetry.rotations`.
 
     Raises
     ------
     ValueError
-        Spins that do not fit the nuclei, differ between like nuclei or are not multiples of 1/2; characters that are no
-        representation.
+        For spins that do not fit the nuclei, differ between identical nuclei or are not multiples of 1/2, and for characters that
+        are not a representation.
 
     Examples
     --------
@@ -124,7 +124,7 @@ def spin_weights(symmetry: Symmetry, spins: Sequence[float], electronic: str | S
 def spin_characters(
     symmetry: Symmetry, spins: Sequence[float], electronic: str | Sequence[int] = "even"
 ) -> tuple[int, ...]:
-    """f(R) of each of `symmetry.rotations`: spin character times sign of fermions times electronic character."""
+    """f(R) of each of `symmetry.rotations`: spin character times sign of the fermions times electronic character."""
     n = len(symmetry.rotations[0].permutation)
     if len(spins) != n:
         raise ValueError(f"{len(spins)} spins for {n} nuclei: expected one each")
@@ -143,17 +143,19 @@ def spin_characters(
 def character_rows(
     symmetry: Symmetry, spins: Sequence[float], electronic: str | Sequence[int] = "even"
 ) -> list[CharacterRow]:
-    """The characters f(R) behind the weights, rotations of one kind together, E first and the others by name."""
+    """The characters f(R) behind the weights, one row for each class of rotations: E first, the others by name."""
     counts: dict[tuple[str, tuple[tuple[float, int, int], ...], int], int] = {}
     for operation, character in zip(symmetry.rotations, spin_characters(symmetry, spins, electronic), strict=True):
         key = _name_of(symmetry, operation), cycles(operation.permutation, spins), character
         counts[key] = counts.get(key, 0) + 1
-    ordered = sorted(counts.items(), key=lambda item: (item[0][0] != "E", item[0]))  # round-off orders rotations
+    ordered = sorted(
+        counts.items(), key=lambda item: (item[0][0] != "E", item[0])
+    )  # rotations themselves are ordered by round-off
     return [CharacterRow(name, count, turns, character) for (name, turns, character), count in ordered]
 
 
 def cycles(permutation: Ints, spins: Sequence[float]) -> tuple[tuple[float, int, int], ...]:
-    """Cycles of a permutation as (spin, length, count); ValueError where nuclei of different spin change places.
+    """Cycles of a permutation as (spin, length, count); ValueError if it exchanges nuclei of different spin.
 
     >>> cycles(np.array([1, 2, 0, 3]), [0.5, 0.5, 0.5, 1])
     ((0.5, 3, 1), (1.0, 1, 1))
@@ -178,33 +180,33 @@ def cycles(permutation: Ints, spins: Sequence[float]) -> tuple[tuple[float, int,
 def inverting_symmetry(
     kinds: Sequence[Hashable], masses_u: ArrayLike, positions_angstrom: ArrayLike, tolerance: float = TOLERANCE
 ) -> tuple[Symmetry, tuple[int, ...]]:
-    """The symmetry of a molecule that inverts, and the characters of the antisymmetric state of each doublet.
+    """Symmetry of an inverting molecule, and the characters of the antisymmetric state of each doublet.
 
-    The molecule is flattened onto the plane of its a and b axes, halfway between its two forms. Rotations of the flat
-    form that the rigid one has keep it in its form: +1. The others exchange the forms: -1.
+    The molecule is projected onto the plane of its a and b axes, halfway between its two forms. A rotation of the planar
+    form has the character +1 if it is also a rotation of the rigid form, and -1 if it exchanges the two forms.
 
     Parameters
     ----------
     kinds : sequence of hashable
-        Which nuclei are alike, one entry for each.
+        One entry for each nucleus; identical nuclei have equal entries.
     masses_u : (n,) array
         Masses of the nuclei.
     positions_angstrom : (n, 3) array
-        Of one of the two forms.
+        Positions in one of the two forms.
     tolerance : float, optional
-        Of the symmetry, relative to the shortest distance.
+        Tolerance of the symmetry, relative to the shortest distance.
 
     Returns
     -------
     symmetry : Symmetry
-        Of the flat form.
+        Symmetry of the planar form.
     characters : tuple of int
-        1 or -1 for each of its rotations.
+        1 or -1 for each rotation.
 
     Raises
     ------
     ValueError
-        For a molecule that is flat already, that has no one such plane, or whose nuclei would meet.
+        For a planar molecule, for one without a unique plane of inversion, and if nuclei would coincide in the plane.
     """
     rigid = find_symmetry(kinds, masses_u, positions_angstrom, tolerance)
     points = np.asarray(positions_angstrom, dtype=float)
@@ -224,7 +226,7 @@ def inverting_symmetry(
 
 
 def _cycle_character(spin: float, length: int) -> int:
-    """Spin character of one cycle with the sign of its permutation of fermions."""
+    """Spin character of a cycle, with the sign of the permutation for fermions."""
     states = round(2 * spin) + 1
     fermions = states % 2 == 0
     return -states if fermions and length % 2 == 0 else states
@@ -258,7 +260,7 @@ def _is_representation(rotations: Sequence[Operation], signs: Sequence[int]) -> 
 
 
 def _principal_letter(symmetry: Symmetry, operation: Operation) -> str:
-    """Which principal axis a twofold axis lies on."""
+    """Letter of the principal axis of a twofold rotation."""
     return "abc"[int(np.argmax(np.abs(symmetry.axes_abc @ operation.axis)))]
 
 
@@ -298,7 +300,7 @@ def _by_parities(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int
 def _by_k(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int]:
     """Cn or Dn, n > 2: |J K> turns by 2πK/n about the main axis; half turns across it swap ±K with (-1)^J.
 
-    Weights are those of one component. For Dn they are doubled, since a pair ±K weighs what may be an odd number.
+    Weights are those of a single component. For Dn they are doubled, because the weight of a pair ±K may be odd.
     """
     n, main = symmetry.axes[0]
     turns = dict.fromkeys((d for d in range(1, n + 1) if n % d == 0), 0)
@@ -316,7 +318,7 @@ def _by_k(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int]:
 
 
 def _ramanujan_sum(q: int, k: int) -> int:
-    """Σ cos(2πkm/q) over m = 1 ... q without common divisor with q: a whole number."""
+    """Σ cos(2πkm/q) over m = 1 ... q that are coprime to q; a whole number."""
     return round(sum(math.cos(2 * math.pi * k * m / q) for m in range(1, q + 1) if math.gcd(m, q) == 1))
 
 
@@ -324,14 +326,16 @@ def _by_irrep(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int]:
     """T, O, I. Classes of one order that are powers of each other share f, so that sums of characters are whole."""
     irreps = IRREPS[symmetry.rotation_group]
     classes, table = character_table(irreps)
-    of_name = {_name_of(symmetry, operation): f for operation, f in zip(symmetry.rotations, characters, strict=True)}
+    character_by_name = {
+        _name_of(symmetry, operation): f for operation, f in zip(symmetry.rotations, characters, strict=True)
+    }
     names = ["E" if n == 1 else f"C{n}" for n, _, _ in classes]
     if symmetry.rotation_group == "O":
         names[2] = "C4²"
     weights = {}
     for irrep, row in zip(irreps, table, strict=True):
-        sums = dict.fromkeys(of_name, 0.0)
+        sums = dict.fromkeys(character_by_name, 0.0)
         for name, (_, _, size), value in zip(names, classes, row, strict=True):
             sums[name] += size * value
-        weights[irrep] = sum(round(total) * of_name[name] for name, total in sums.items()) // len(characters)
+        weights[irrep] = sum(round(total) * character_by_name[name] for name, total in sums.items()) // len(characters)
     return weights

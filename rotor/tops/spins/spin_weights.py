@@ -1,4 +1,4 @@
-"""Nuclear-spin weights of rotational levels: which rule they follow and what each class weighs.
+"""Nuclear-spin weights of rotational levels: the rule that they follow, and the weight of each class.
 
 Four rules cover every rigid molecule: parity of (Ka, Kc) for asymmetric tops, K modulo n for symmetric tops,
 parity of J for linear ones, and the irreducible representation for spherical tops. Weights are stored reduced by
@@ -21,11 +21,11 @@ CUBIC_IRREPS = ("A1", "A2", "E", "F1", "F2")  # of the rotation group O
 
 @dataclass(frozen=True)
 class SpinWeights:
-    """Weights of the classes of one rule.
+    """Nuclear-spin weights of the classes of a rule.
 
     rule, classes:
 
-    - "none": all levels alike.
+    - "none": all levels have weight 1.
     - "KaKc": ee, eo, oe, oo, parities of Ka and Kc.
     - "K": 0 ... n-1, |K| modulo n, the weight of one component of a ±K pair. With twofold axes across the main one
       K = 0 levels alternate with J: "0even" and "0odd" (parity of J) stand for class 0, and a pair with K a multiple
@@ -46,7 +46,7 @@ class SpinWeights:
 
     @classmethod
     def from_mapping(cls, weights: dict[str, int]) -> SpinWeights:
-        """Weights by class name, reduced by their common divisor; the names tell the rule."""
+        """Weights from a mapping by class name, reduced by their common divisor; the names of the classes determine the rule."""
         names = {str(name): weight for name, weight in weights.items()}
         rule, classes = _rule_of(set(names))
         values = [names[name] for name in classes]
@@ -60,9 +60,9 @@ class SpinWeights:
         return {} if self.rule == "none" else dict(zip(self.classes, self.values, strict=True))
 
     def exchanged(self) -> SpinWeights:
-        """The weights with the two classes exchanged that half a turn tells apart, as levels of odd total spin of two nuclei have them.
+        """The weights of levels with odd total spin of two nuclei: the two classes that a half turn distinguishes are exchanged.
 
-        Raises ValueError for weights that are not those of half a turn about one axis.
+        Raises ValueError for weights that do not follow from a half turn about an axis.
 
         >>> SpinWeights.from_mapping({"ee": 1, "eo": 1, "oe": 0, "oo": 0}).exchanged().to_mapping()
         {'ee': 0, 'eo': 0, 'oe': 1, 'oo': 1}
@@ -81,9 +81,9 @@ class SpinWeights:
         )
 
     def with_pair(self, twice: int) -> SpinWeights:
-        """The weights of all nuclei, where these are those of the nuclei beside two of spin `twice`/2 that half a turn exchanges.
+        """The weights of all nuclei, from these weights without a pair of nuclei of spin i = `twice`/2 that a half turn exchanges.
 
-        Among the (2i+1)² functions of the two, (i+1)(2i+1) have the parity of the total spin 2i, and i(2i+1) the other. Raises
+        Of the (2i+1)² functions of the pair, (i+1)(2i+1) have the parity of the total spin 2i, and i(2i+1) the other parity. Raises
         ValueError as `exchanged`.
 
         >>> SpinWeights.from_mapping({"even": 1, "odd": 0}).with_pair(1).to_mapping()  # two protons
@@ -94,7 +94,7 @@ class SpinWeights:
         return SpinWeights.from_mapping({name: even * weight + odd * other for name, weight, other in both})
 
     def is_of_pair(self, twice: int) -> bool:
-        """Whether the classes weigh as the functions of two nuclei of spin `twice`/2 alone, i + 1 to i.
+        """Whether the weights are those of only two nuclei of spin i = `twice`/2: a ratio of i + 1 to i.
 
         >>> SpinWeights.from_mapping({"ee": 6, "eo": 6, "oe": 3, "oo": 3}).is_of_pair(2)
         True
@@ -104,7 +104,7 @@ class SpinWeights:
 
     @property
     def mean(self) -> float:
-        """The weight of one component averaged over many levels: what the classical limit of Q carries."""
+        """Mean weight of a component over many levels; the classical limit of Q contains it."""
         if self.rule == "irrep":
             j = np.arange(60)  # the counts of irreps repeat with J modulo 12 (T, O) or 30 (I)
             return float(self.of_spherical(j).sum() / (2 * j + 1).sum())
@@ -118,7 +118,7 @@ class SpinWeights:
         return len(self.classes) - ("0odd" in self.classes)
 
     def of_ka_kc(self, species: str) -> int:
-        """Weight of an asymmetric-top level whose parities of Ka and Kc are `species`."""
+        """Weight of a level of an asymmetric top; species: parities of Ka and Kc."""
         if self.rule == "none":
             return 1
         self._require(("KaKc",), "an asymmetric top")
@@ -127,8 +127,8 @@ class SpinWeights:
     def of_symmetric(self, j: ArrayLike, k: ArrayLike, oblate: bool = False) -> NDArray[np.int64]:
         """Weights of symmetric-top levels (J, |K|), summed over both signs of K.
 
-        By parities of (Ka, Kc), for a top that is symmetric by numbers or has twofold axes alone, K is Ka, or Kc
-        where `oblate`, and the pair holds both parities of the other; K = 0 holds that of J.
+        For weights by parities of (Ka, Kc) (an accidentally symmetric top, or one with only twofold axes), K is Ka, or Kc if `oblate`.
+        A pair ±K contains both parities of the other quantum number; K = 0 contains that of J.
         """
         j, k = np.broadcast_arrays(np.asarray(j), np.asarray(k))
         if self.rule == "none":
@@ -143,9 +143,9 @@ class SpinWeights:
         return np.asarray(np.where(k == 0, alone, doubled[k % len(doubled)]))
 
     def of_spherical(self, j: ArrayLike) -> NDArray[np.int64]:
-        """Weights of a spherical top's levels of each J, summed over the irreps that its 2J+1 components of K hold.
+        """Weights of the levels J of a spherical top, summed over the irreps in its 2J+1 components of K.
 
-        A top that is spherical by numbers keeps the weights by K or by parities of (Ka, Kc), summed likewise.
+        Weights by K or by parities of (Ka, Kc), of an accidentally spherical top, are summed in the same way.
         """
         j = np.asarray(j)
         if self.rule == "none":
@@ -158,7 +158,7 @@ class SpinWeights:
         return np.array(sums, dtype=np.int64).reshape(j.shape)
 
     def of_irrep(self, irrep: str) -> int:
-        """Weight of one level of a spherical top, over its 1, 2 or 3 components, by its irrep A1, A2, E, F1 or F2.
+        """Weight of a level of a spherical top with all its 1, 2 or 3 components, by its irrep A1, A2, E, F1 or F2.
 
         >>> SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3}).of_irrep("F2")
         3
@@ -181,7 +181,7 @@ class SpinWeights:
         return np.asarray(self._whole_numbers()[j % 2])
 
     def _by_residue(self) -> NDArray[np.float64]:
-        """Weight of one component of a pair with |K| > 0, by |K| modulo n; half of 0even + 0odd for residue 0."""
+        """Weight of a component of a pair with |K| > 0, by |K| modulo n; half of 0even + 0odd for residue 0."""
         values = self._whole_numbers().astype(np.float64)
         return np.concatenate([[values[:2].mean()], values[2:]]) if "0odd" in self.classes else values
 
@@ -201,9 +201,9 @@ class SpinWeights:
             )
 
 
-# Irreps of the rotation groups: order of the rotations of each class, how often it is turned by 2π/order, number of
-# rotations in it, and the characters by class (Bunker and Jensen, Molecular Symmetry and Spectroscopy, appendix A).
-# E of the group T stands for its two conjugate halves together. g = (1 + √5)/2.
+# Irreps of the rotation groups. A class (n, k, count) has `count` rotations by 2πk/n; an irrep has a character for each class
+# (Bunker and Jensen, Molecular Symmetry and Spectroscopy, appendix A). E of the group T is the sum of two conjugate irreps.
+# g = (1 + √5)/2.
 _G = (1 + 5**0.5) / 2
 _IRREPS: dict[tuple[str, ...], tuple[tuple[tuple[int, int, int], ...], tuple[tuple[float, ...], ...]]] = {
     ("A", "E", "F"): (
@@ -223,7 +223,7 @@ IRREPS = dict(zip("TOI", _IRREPS, strict=True))
 
 
 def character_table(irreps: tuple[str, ...]) -> tuple[tuple[tuple[int, int, int], ...], tuple[tuple[float, ...], ...]]:
-    """Classes of rotations of T, O or I, as (n, k, how many) for the angle 2πk/n, and the characters of the irreps.
+    """Classes of rotations of T, O or I, as (n, k, count) for the angle 2πk/n, and the characters of the irreps.
 
     >>> character_table(IRREPS["T"])[0]
     ((1, 0, 1), (3, 1, 8), (2, 1, 3))
@@ -232,7 +232,7 @@ def character_table(irreps: tuple[str, ...]) -> tuple[tuple[tuple[int, int, int]
 
 
 def irreps_in_j(j: NDArray[np.int64], irreps: tuple[str, ...]) -> NDArray[np.int64]:
-    """How often each irrep of T, O or I (first axis) stands in the 2J+1 components of K; degenerate ones count once.
+    """How often each irrep of T, O or I (first axis) occurs in the 2J+1 components of K; a degenerate irrep counts once.
 
     n = Σ g χ_irrep χ_J / Σ g over the classes of g rotations by the angle 2πk/n, where the character of the 2J+1
     functions, χ_J = sin((2J+1)πk/n)/sin(πk/n), is the same for J + n.

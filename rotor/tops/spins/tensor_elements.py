@@ -1,14 +1,14 @@
-"""Elements of tensors of spins as they are published, in the form in which this package has them: each independent one once.
+"""Published elements of spin tensors, converted to the independent elements that this package uses.
 
-| given | read as |
+| published | stored as |
 |---|---|
 | chi_bb_minus_cc | chi_bb-cc |
-| two or three of chi_aa, chi_bb, chi_cc, and of T and D | chi_aa and chi_bb-cc: these tensors have no trace |
-| C_ba alone | C_ab: one order stands for both |
-| C_ab and C_ba, also of eps, each with its powers | C_ab = ½(C_ab + C_ba), C_ab-ba = ½(C_ab - C_ba) |
+| two or three of chi_aa, chi_bb, chi_cc; also of T and D | chi_aa and chi_bb-cc: these tensors are traceless |
+| C_ba alone | C_ab, for both orders |
+| C_ab and C_ba; also of eps, and with powers | C_ab = ½(C_ab + C_ba), C_ab-ba = ½(C_ab - C_ba) |
 
-The two orders: C_ab multiplies ½{S_a, N_b}, the axis of the spin first, as in I·C·J. J. M. Brown and T. J. Sears (J. Mol. Spectrosc. 75,
-111 (1979)) have N first in their eps. chi, T and D are symmetric: there chi_ba is chi_ab.
+Order of the axes: C_ab multiplies ½{S_a, N_b}, the axis of the spin first, as in I·C·J. J. M. Brown and T. J. Sears (J. Mol. Spectrosc. 75,
+111 (1979)) put N first in their eps. chi, T and D are symmetric: chi_ba equals chi_ab.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SYMMETRIC = re.compile(r"(?P<tensor>chi|T|D)_(?P<axes>ba|ca|cb)(?P<rest>(?:_[JK
 def plain_elements(
     values: Mapping[str, float], errors: Mapping[str, float]
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Values and uncertainties in MHz by the names of this package, from those of the table above.
+    """Values and uncertainties in MHz by the names of this package, from published elements (table above).
 
     >>> plain_elements({"C_ab(H)": 3.0, "C_ba(H)": 1.0, "chi_bb_minus_cc(D)": 2.0}, {})[0]
     {'C_ab(H)': 2.0, 'chi_bb-cc(D)': 2.0, 'C_ab-ba(H)': 1.0}
@@ -36,10 +36,10 @@ def plain_elements(
 def without_trace(
     values: Mapping[str, float], errors: Mapping[str, float]
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Two or three diagonal elements of a traceless tensor (chi, T, D) as its aa and bb-cc; other names as they are.
+    """Two or three diagonal elements of a traceless tensor (chi, T, D) converted to aa and bb-cc; other names do not change.
 
-    One alone stays: the other two are minus half of it each. ValueError for three that do not add up to 0, within 1e-3 of the largest
-    (published elements are rounded), and for a difference beside two of them.
+    A single element stays: the other two are each minus half of it. Raises ValueError for three elements whose sum exceeds 1e-3 of the
+    largest (published elements are rounded), and for a difference beside two elements.
 
     >>> without_trace({"chi_aa(14N)": 2.0, "chi_cc(14N)": -3.5}, {})[0]
     {'chi_aa(14N)': 2.0, 'chi_bb-cc(14N)': 5.0}
@@ -76,9 +76,9 @@ def without_trace(
 
 
 def in_both_orders(values: dict[str, float], errors: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]:
-    """C_ab and C_ba as their mean and half their difference; C_ba alone as C_ab, which then stands for both.
+    """C_ab and C_ba converted to their mean and half their difference; C_ba alone becomes C_ab, for both orders.
 
-    Raises ValueError where chi, T or D, which are symmetric, are given in both orders, and C_ab-ba beside them.
+    Raises ValueError if a symmetric tensor (chi, T, D) has both orders, and if C_ab-ba is given beside C_ab and C_ba.
 
     >>> in_both_orders({"eps_ca(S)": 3.0}, {"eps_ca(S)": 0.1})
     ({'eps_ac(S)': 3.0}, {'eps_ac(S)': 0.1})
@@ -110,5 +110,5 @@ def in_both_orders(values: dict[str, float], errors: dict[str, float]) -> tuple[
 
 
 def _in_short(name: str) -> str:
-    """chi_bb_minus_cc(14N) as chi_bb-cc(14N)."""
+    """The short form of a name: chi_bb-cc(14N) for chi_bb_minus_cc(14N)."""
     return re.sub(r"^([A-Za-z]+_[abc]{2})_minus_([abc]{2})", r"\1-\2", name)

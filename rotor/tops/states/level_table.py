@@ -1,6 +1,6 @@
 """Level energies as a table, for molecules whose distortion series does not converge: water, D2O, HDO.
 
-A table belongs to one set of constants and one isotopologue: where either changes, it no longer holds.
+A table belongs to a set of constants and an isotopologue; it is dropped when either changes.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from rotor.table import Table
 class LevelTable(Table):
     """Energies of labelled levels.
 
-    quanta : columns (n,) of whole numbers by name, `j`, `ka`, `kc` of an asymmetric top, in the order in which they label
+    quanta : columns (n,) of whole numbers by name, in the order of a label: `j`, `ka`, `kc` of an asymmetric top
     energy_mhz : (n,), E/h in MHz from the level J = 0
     error_mhz : (n,), one standard deviation in MHz
-    source : where the energies are from
-    own_error_mhz : (n,), the part of the error that other states `v` of the same rotation do not share; None where it is not known, and
-        then no line has an error: those of two energies of one table are correlated
+    source : source of the energies
+    own_error_mhz : (n,), the part of the error that other states `v` of the same rotation do not share. If it is not known (None),
+        lines have no error, because errors of energies in a table are correlated.
 
-    Raises ValueError for columns of different length, a level that is there twice, and energies that are not finite.
+    Raises ValueError for columns of different length, a repeated level, and energies that are not finite.
 
     >>> table = LevelTable({"j": np.array([0, 1]), "ka": np.array([0, 0]), "kc": np.array([0, 1])}, np.array([0.0, 9.0]), np.ones(2))
     >>> table.rows_of({"j": np.array([1, 2]), "ka": np.array([0, 0]), "kc": np.array([1, 2])}).tolist()
@@ -64,13 +64,13 @@ class LevelTable(Table):
 
     @property
     def columns(self) -> dict[str, NDArray[np.generic]]:
-        """Quantum numbers, energy and error by name, and the own part of the error where it is known."""
+        """Quantum numbers, energy and error by name, and the part of the error that is not shared, if known."""
         out: dict[str, NDArray[np.generic]] = dict(self.quanta)
         out |= {"energy_mhz": self.energy_mhz, "error_mhz": self.error_mhz}
         return out if self.own_error_mhz is None else out | {"own_error_mhz": self.own_error_mhz}
 
     def rows_of(self, quanta: Mapping[str, Ints]) -> Ints:
-        """The row (m,) of each labelled level, -1 where the table has none; labels by the names that the table has."""
+        """Row (m,) of each labelled level, -1 if it is not in the table; labels by the names of the table."""
         order, keys, sizes = self._sorted
         labels = np.stack([np.asarray(quanta[name], dtype=np.int64) for name in self.quanta])
         inside = ((labels >= 0) & (labels < sizes[:, None])).all(axis=0)
@@ -79,10 +79,10 @@ class LevelTable(Table):
         return np.where(inside & (keys[place] == key), order[place], -1)
 
     def line_errors(self, upper: Ints, lower: Ints) -> Floats:
-        """One standard deviation of lines between rows (m,) of the table in MHz, nan where a row is -1.
+        """One standard deviation in MHz of lines between rows (m,) of the table; nan if a row is -1.
 
-        Between two states of one rotation the states' own errors count; between other levels the whole errors, as if uncorrelated. Raises
-        ValueError for a table that does not know own parts.
+        Between two states of one rotation only the parts of the errors that are not shared count; between other levels the whole errors
+        count, as if uncorrelated. Raises ValueError for a table without `own_error_mhz`.
         """
         if self.own_error_mhz is None:
             raise ValueError("errors of lines between levels of a table: expected a table with own_error_mhz")
@@ -99,10 +99,10 @@ class LevelTable(Table):
 def tabulated_energies(
     table: LevelTable, quanta: Mapping[str, Ints], energy_mhz: Floats
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Energies (n,) in MHz of solved levels, those that the table has replaced, and which these are, (n,).
+    """Energies (n,) in MHz of solved levels, replaced by those of the table where it has them, and the mask (n,) of replaced levels.
 
-    quanta, energy_mhz: labels by name and energies (n,) of the solved levels, counted from the Hamiltonian's zero, the level J = 0.
-    A level that is missing in the table keeps the energy of the distortion series.
+    quanta, energy_mhz: labels by name and energies (n,) of the solved levels, from the level J = 0.
+    A level that is not in the table keeps the energy of the distortion series.
     """
     rows = table.rows_of(quanta)
     known = rows >= 0

@@ -1,13 +1,13 @@
-"""Vibrational or tunnelling states beyond the state of a top's constants: their constants, what couples them, their dipoles.
+"""Further vibrational or tunnelling states of a top: their constants, couplings and dipoles.
 
     E[1] = 23785.9 MHz     B[1] = 298041 MHz      G_c[0,1] = 450 MHz      F_ab[0,1], W[0,1] ...
 
-Names are those of `rotor.quantum.effects.interactions`; state 0 is the top's own, without brackets. Each further state has E and every
-constant that it is to have; none is taken over.
+Names are those of `rotor.quantum.effects.interactions`. State 0 is that of the top's constants, which have no brackets. Each further state
+needs E and all its constants; none is taken from state 0.
 
-Which couplings exist between two states is a question of symmetry: G_c and F_ab transform like a rotation about c, G_a and F_bc like
-one about a, G_b and F_ac like one about b, W like nothing at all. The product of the species of two states is one species, so that
-two of these kinds exist together only where no operation of the group has different characters for them.
+Symmetry decides which couplings exist between two states: G_c and F_ab transform like a rotation about c, G_a and F_bc like a rotation
+about a, G_b and F_ac like a rotation about b, and W is totally symmetric. The product of the species of two states is a single species.
+Two kinds of coupling therefore exist together only if every operation of the group has the same character for both.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _EVEN = {
     "C2v": "",
     "D2": "",
     "D2h": "",
-}  # rotations that each group takes for totally symmetric
+}  # axes of the rotations that are totally symmetric in each group
 _EVEN |= {f"{group}({axis})": axis for group in ("C2", "C2h") for axis in "abc"}
 _EVEN |= {f"Cs({plane})": axis for plane, axis in (("bc", "a"), ("ac", "b"), ("ab", "c"))}
 GROUPS = tuple(_EVEN)
@@ -41,14 +41,14 @@ GROUPS = tuple(_EVEN)
 
 @dataclass(frozen=True, eq=False)
 class StateConstants:
-    """Values in MHz by name with the state in brackets, names of the states, weights and dipoles of states, and where they are from.
+    """Constants of further states in MHz, by name with the state in brackets; names, spin weights and dipoles of the states; source.
 
-    names: by number from 0 on, such as "0+", "0-". weights: of states, 0 among them, that differ from the top's. dipoles: (μa, μb, μc)
-    in debye by pairs (v', v), within states and between them; a state that is not named has the top's dipole, and no pair that is not
-    named has one. symmetry: the group of the states, such as "C2v" or "Cs(ab)", with the plane or the axis; "" where none is
-    declared. uncertainties: in MHz, of the constants that have one.
+    names: of all states from 0 on, such as "0+", "0-". weights: spin weights by state (0 included) that differ from the top's.
+    dipoles: (μa, μb, μc) in debye by pairs (v', v), within a state or between two. A state without an entry has the top's dipole; a pair
+    without an entry has none. symmetry: the group of the states with its plane or axis, such as "C2v" or "Cs(ab)"; "" if not declared.
+    uncertainties: in MHz, by name.
 
-    Raises ValueError for names without a state, for a coupling or dipole of a state that has no constants, and for two couplings that
+    Raises ValueError for names without a state, for a coupling or dipole of a state without constants, and for two couplings that
     the declared symmetry does not allow together.
 
     >>> StateConstants({"E[1]": 23786.0, "B[1]": 298041.0, "C[1]": 187000.0}).count
@@ -91,7 +91,7 @@ class StateConstants:
 
     @property
     def count(self) -> int:
-        """How many states there are with the top's own."""
+        """Number of states, state 0 included."""
         return 1 + max((v for states in self._states.values() for v in states), default=0)
 
     @property
@@ -100,7 +100,7 @@ class StateConstants:
         return tuple(name for name, states in self._states.items() if len(states) == 2)
 
     def of_state(self, v: int) -> dict[str, float]:
-        """The constants of one state without its brackets, E among them, in MHz.
+        """Constants of a state in MHz, E included, by name without brackets.
 
         >>> StateConstants({"E[1]": 5.0, "B[1]": 3.0}).of_state(1)
         {'E': 5.0, 'B': 3.0}
@@ -108,19 +108,19 @@ class StateConstants:
         return {name.partition("[")[0]: self.values[name] for name, states in self._states.items() if states == (v,)}
 
     def name_of(self, v: int) -> str:
-        """What a state is called: its name, else its number."""
+        """The name of a state, or its number if it has no name."""
         return self.names[v] if self.names else str(v)
 
     def with_dipole(self, before: Vector | None, after: Vector) -> StateConstants:
-        """The same states; a dipole that is the top's own one, `before`, becomes `after`, and the others stay."""
+        """The states after a change of the top's dipole from `before` to `after`; states with another dipole keep it."""
         changed = {pair: after if vector == before else vector for pair, vector in self.dipoles.items()}
         return replace(self, dipoles=changed)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on couplings that exist together only without a symmetry, if no symmetry is declared.
+        """Notes on couplings that exist together only without symmetry, if no symmetry is declared.
 
-        Two kinds of coupling have a group that allows both, such as Cs(ab) G_c and W; three have C1 and Ci alone.
+        For two kinds of coupling there is a group that allows both, such as Cs(ab) for G_c and W; for three there are only C1 and Ci.
 
         >>> values = {"E[1]": 5.0, "B[1]": 3.0, "G_b[0,1]": 1.0, "G_c[0,1]": 1.0, "W[0,1]": 1.0}
         >>> StateConstants(values).notes[0].partition(":")[0]
@@ -164,9 +164,9 @@ class StateConstants:
             )
 
     def refuse_couplings(self, group: str, even: str) -> None:
-        """ValueError for two couplings of one pair of states if the group allows only one of them.
+        """Raise ValueError for two couplings of a pair of states if the group allows only one of them.
 
-        even: the axes, of "abc", about which a rotation is totally symmetric in the group.
+        even: those of the axes "abc" about which a rotation is totally symmetric in the group.
         """
         taken: dict[tuple[int, ...], tuple[str, str]] = {}
         for name in self.couplings:
@@ -180,9 +180,9 @@ class StateConstants:
 
     @classmethod
     def parse(cls, text: str, source: str = "") -> StateConstants:
-        """From text such as "E[1]=23785.9 B[1]=298041 C[1]=187000 W[0,1]=3 MHz".
+        """States from a text such as "E[1]=23785.9 B[1]=298041 C[1]=187000 W[0,1]=3 MHz".
 
-        An item keeps its own unit; a unit at the end serves every item that carries none; without any, numbers are MHz.
+        An item may have a unit; a unit at the end applies to all items without one; without any unit, numbers are MHz.
         """
         items = list(_ITEM.finditer(text))
         rest = _ITEM.sub("", text).strip(" ,")
@@ -207,7 +207,7 @@ def _vector(vector: Any) -> Vector:
 
 
 def states_of_name(name: str) -> tuple[int, ...]:
-    """The numbers in the brackets of a name, rising.
+    """Numbers of the states in the brackets of a name, in rising order.
 
     >>> states_of_name("B[1]"), states_of_name("G_c[1,0]")
     ((1,), (0, 1))
@@ -226,7 +226,7 @@ def states_of_name(name: str) -> tuple[int, ...]:
 
 
 def kind_of_coupling(name: str) -> str:
-    """The axis of the rotation that a coupling transforms like, "" for W.
+    """Axis of the rotation that a coupling transforms like; "" for W.
 
     >>> [kind_of_coupling(name) for name in ("G_c[0,1]", "F_bc_J[0,1]", "W_pm2[0,1]")]
     ['c', 'a', '']
@@ -238,7 +238,7 @@ def kind_of_coupling(name: str) -> str:
 
 
 def _class_of(kind: str, even: str) -> str:
-    """Kinds that a group does not distinguish have one class: those of `even` are like none, the two others alike, or each its own."""
+    """Class of a kind of coupling: kinds that the group does not distinguish share it. Kinds in `even` are totally symmetric."""
     if kind in even:
         return ""
     return "".join(sorted(set("abc") - set(even))) if len(even) == 1 else kind

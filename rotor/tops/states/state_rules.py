@@ -1,7 +1,7 @@
-"""Which states, couplings and dipoles of states a top can have: its constants' names, its geometry and its spin weights decide.
+"""Checks of states, couplings and dipoles against the names of a top's constants, its geometry and its spin weights.
 
 Two couplings between the same two states are allowed together only if no operation of the point group distinguishes them. A
-dipole between two states joins levels of equal nuclear-spin weight alone, since light does not turn ortho into para.
+dipole between two states joins only levels of equal nuclear-spin weight, since light does not convert ortho into para.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from rotor.molecules.symmetry.point_group import Symmetry
 
 NOISE_DEBYE = 1e-3
-_ALONG = 1e-2  # of the elements of an operation, below which it has the principal axes for its own
+_ALONG = 1e-2  # largest off-diagonal element of an operation whose axes are the principal axes
 _FIGURE = {"linear": 0, "prolate": 0, "oblate": 2}
 _JOINED = ((("ee", "eo"), ("oe", "oo")), (("ee", "oo"), ("eo", "oe")), (("ee", "oe"), ("eo", "oo")))  # by μa, μb, μc
 
 
 def refuse_incomplete_states(states: StateConstants, kind: str, constants: Constants) -> None:
-    """ValueError where a further state lacks one of A, B, C that the first has, or has a constant that no such top has."""
+    """Raise ValueError if a further state lacks one of A, B, C of the first, or has a constant of another kind of top."""
     rigid = [name for name in constants.values if name in ("A", "B", "C")]
     known = ("E", *vocabulary(kind, constants.reduction))
     for v in range(1, states.count):
@@ -44,7 +44,7 @@ def refuse_incomplete_states(states: StateConstants, kind: str, constants: Const
 
 
 def _refuse_reduced(states: StateConstants, v: int) -> None:
-    """ValueError for distortion of a further state where the first does not say in which reduction."""
+    """Raise ValueError for distortion constants of a further state if the first state has no reduction."""
     reduced = [name for name in states.of_state(v) if name not in ("E", "A", "B", "C") and not powers_of_spelled(name)]
     if reduced:
         raise ValueError(
@@ -53,16 +53,16 @@ def _refuse_reduced(states: StateConstants, v: int) -> None:
 
 
 def refuse_forbidden_couplings(states: StateConstants, symmetry: Symmetry, frame: PrincipalFrame) -> None:
-    """ValueError for couplings of an asymmetric top that its geometry does not allow together."""
+    """Raise ValueError for couplings of an asymmetric top that its geometry does not allow together."""
     group, even = _even_rotations(symmetry, frame)
     if len(even) < 3:
         states.refuse_couplings(group, even)
 
 
 def _even_rotations(symmetry: Symmetry, frame: PrincipalFrame) -> tuple[str, str]:
-    """The point group, and the axes of "abc" about which a rotation is totally symmetric in it.
+    """The point group, and those of the axes "abc" about which a rotation is totally symmetric in it.
 
-    A rotation is an axial vector, that an operation R multiplies by det R times R_xx.
+    A rotation is an axial vector; an operation R multiplies it by det R times R_xx.
     """
     even_axes = "abc"
     for operation in (*symmetry.rotations, *symmetry.improper):
@@ -76,25 +76,26 @@ def _even_rotations(symmetry: Symmetry, frame: PrincipalFrame) -> tuple[str, str
 def refuse_forbidden_state_dipoles(
     states: StateConstants, kind: str, spin_weights: SpinWeights, dipole_abc_debye: Vector | None
 ) -> None:
-    """ValueError for a dipole in a state or between two that would join levels of different nuclear-spin weight.
+    """Refuse a dipole in a state, or between two, that would join levels of different nuclear-spin weight.
 
     Parameters
     ----------
     states : StateConstants
+        Dipoles and spin weights of the states.
     kind : str
-        Of the top.
+        Kind of top.
     spin_weights : SpinWeights
-        Of the first state, and of those without weights of their own.
+        Weights of the first state, and of states without an entry in `states.weights`.
     dipole_abc_debye : (3,) tuple or None
-        Of every state without one of its own.
+        Dipole of states without an entry in `states.dipoles`.
 
     Raises
     ------
     ValueError
-        With the component, its value and the states. What weights do not tell is taken as given.
+        Names the component, its value and the states. Dipoles that the weights cannot decide are accepted.
     """
-    of_states = {} if dipole_abc_debye is None else {(v, v): dipole_abc_debye for v in range(states.count)}
-    for (upper, lower), moment in (of_states | dict(states.dipoles)).items():
+    moments = {} if dipole_abc_debye is None else {(v, v): dipole_abc_debye for v in range(states.count)}
+    for (upper, lower), moment in (moments | dict(states.dipoles)).items():
         first, second = (states.weights.get(v, spin_weights) for v in (upper, lower))
         for axis, value in enumerate(moment):
             if abs(value) > NOISE_DEBYE and not _joins_equals(axis, kind, first, second):
@@ -107,7 +108,7 @@ def refuse_forbidden_state_dipoles(
 
 
 def _joins_equals(axis: int, kind: str, first: SpinWeights, second: SpinWeights) -> bool:
-    """Whether μ along one axis joins levels of equal weight alone, of two states with weights of one rule."""
+    """Whether μ along an axis joins only levels of equal weight, for two states whose weights follow the same rule."""
     if first.rule != second.rule:
         return False
     first_weights, other = (dict(zip(weights.classes, weights.values, strict=True)) for weights in (first, second))
@@ -115,7 +116,7 @@ def _joins_equals(axis: int, kind: str, first: SpinWeights, second: SpinWeights)
         return all(first_weights[a] == other[b] and first_weights[b] == other[a] for a, b in _JOINED[axis])
     if first.rule == "J":
         return first_weights["even"] == other["odd"] and first_weights["odd"] == other["even"]
-    if first.rule == "K" and axis == _FIGURE.get(kind):  # along the axis K stays, and J of K = 0 changes by one
+    if first.rule == "K" and axis == _FIGURE.get(kind):  # μ along the axis keeps K, and for K = 0 changes J by one
         both = [
             (by_class.get("0even", by_class.get("0")), by_class.get("0odd", by_class.get("0")))
             for by_class in (first_weights, other)

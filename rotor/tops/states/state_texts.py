@@ -1,9 +1,9 @@
-"""Further states from texts, as the command line and scenes give them; the same as the table [states] of a molecule file.
+"""Further states from texts of the command line and of scenes, with the content of the table [states] of a molecule file.
 
 constants   E[1]=23785.9 A[1]=... W[0,1]=3 MHz
-names       0+,0-                                   one for each state, from 0 on
-symmetry    C2v                                     or another of `state_constants.GROUPS`: of which the states are
-weights     [0] even=1,odd=3  [1] even=3,odd=1      spin weights of states that differ from the top's; "none": all levels alike
+names       0+,0-                                   a name for each state, from 0 on
+symmetry    C2v                                     group of the states, one of `state_constants.GROUPS`
+weights     [0] even=1,odd=3  [1] even=3,odd=1      spin weights that differ from the top's; "none": equal weights of all levels
 dipoles     [1] 0,0,1.30  [0,1] 0,0,1.47 D          along a, b, c, within a state or between two
 """
 
@@ -34,17 +34,17 @@ _ITEM = re.compile(r"\[(?P<states>[^\[\]]*)\]\s*=?\s*(?P<text>[^\[\]]+)")
 
 
 def with_state_texts(top: Top, texts: Mapping[str, str | None], source: str) -> Top:
-    """A top with further states, or with other names, weights, dipoles or another symmetry of those that it has.
+    """A top with further states, or with changed names, weights, dipoles or symmetry of its states.
 
-    Weights and dipoles that are not named stay as they are.
+    Weights and dipoles without an entry do not change.
 
     Parameters
     ----------
     top : Top
     texts : mapping of str to str or None
-        By `KEYS`; what is None or missing is not given.
+        Texts by `KEYS`; a key may be missing or None.
     source : str
-        Where what is given here is from; of what it replaces the source of the top's states stays.
+        Source of the texts; it is added to the source of the top's states.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def with_state_texts(top: Top, texts: Mapping[str, str | None], source: str) -> 
     Raises
     ------
     ValueError
-        Where a text is none of its kind, or belongs to states that the top has not; it begins with the key.
+        For an unreadable text, and for a text about a state that the top does not have; the message begins with the key.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def with_state_texts(top: Top, texts: Mapping[str, str | None], source: str) -> 
     if "state_constants" in stated:
         states = _parsed("state_constants", lambda: StateConstants.parse(stated["state_constants"], source))
     if states is None:
-        raise ValueError(f"{first}: there is one state here; further ones need their constants too")
+        raise ValueError(f"{first}: this top has a single state; give the constants of further states too")
     for key, text in stated.items():
         if key != "state_constants":
             states = _parsed(key, partial(_changed, states, key, text, top))
@@ -80,14 +80,14 @@ def with_state_texts(top: Top, texts: Mapping[str, str | None], source: str) -> 
     try:
         return replace(top, states=whole)
     except ValueError as error:
-        of_dipole = [
+        dipole_keys = [
             key for key in ("state_dipoles", "state_weights") if key in stated and str(error).startswith("dipole")
         ]
-        raise ValueError(f"{[*of_dipole, first][0]}: {error}") from None
+        raise ValueError(f"{[*dipole_keys, first][0]}: {error}") from None
 
 
 def _changed(states: StateConstants, key: str, text: str, top: Top) -> StateConstants:
-    """The states with what one text says of them."""
+    """The states after the change that a text describes."""
     if key == "state_names":
         return replace(states, names=tuple(name.strip() for name in text.split(",")))
     if key == "state_symmetry":
@@ -123,7 +123,7 @@ def dipoles_of_text(text: str) -> dict[tuple[int, int], Vector]:
 
 
 def weights_of_text(text: str, top: Top) -> dict[int, SpinWeights]:
-    """Spin weights by state, from `[0] even=1,odd=3 [1] even=3,odd=1`; "none" where all levels of a state are alike."""
+    """Spin weights by state, from `[0] even=1,odd=3 [1] even=3,odd=1`; "none" for equal weights of all levels."""
     weights: dict[int, SpinWeights] = {}
     for (state,), part in _items(text, "[1] even=3,odd=1", 1):
         if state in weights:
@@ -132,7 +132,7 @@ def weights_of_text(text: str, top: Top) -> dict[int, SpinWeights]:
         rule = weights[state].rule
         if "none" not in (rule, top.spin_weights.rule) and rule != top.spin_weights.rule:
             raise ValueError(
-                f"{part!r}: weights by {rule}, and those of the top go by {top.spin_weights.rule}; expected one rule"
+                f"{part!r}: these weights follow the rule {rule}, those of the top the rule {top.spin_weights.rule}; use the top's rule"
             )
     return weights
 
@@ -151,7 +151,7 @@ def _weights(text: str) -> SpinWeights:
 
 
 def _items(text: str, example: str, most: int) -> list[tuple[tuple[int, ...], str]]:
-    """Numbers of states, rising, and what follows them."""
+    """Numbers of states in rising order, with the text that follows them."""
     items = list(_ITEM.finditer(text))
     if not items or _ITEM.sub("", text).strip(" ,;"):
         raise ValueError(f"{text!r}: expected the state in square brackets and its value, such as {example}")

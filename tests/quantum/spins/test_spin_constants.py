@@ -46,7 +46,7 @@ def test_text_becomes_values_and_spins():
         ("chi_aa=5 MHz", None, "expected constants such as"),
         ("chi_aa(14N)=5 rubbish", None, "unit|expected"),
         ("chi_aa(14N)=5 chi_aa(14N)=6", None, "given twice"),
-        ("chi_aa(X)=5", None, "say how large it is"),
+        ("chi_aa(X)=5", None, "give its size"),
         ("chi_aa(12C)=5", None, "splits nothing"),
         ("chi_aa(14N)=5", "14N=0.3", "expected spins such as"),
         ("chi_aa(14N)=5 GHK", None, "GHK"),
@@ -165,7 +165,7 @@ def test_command_refuses(more, says, capsys):
 
 def test_a_unit_at_one_constant_does_not_serve_the_others():
     with pytest.raises(
-        ValueError, match=r"kHz stands at C_bb\(14N\) only; put a space before it to serve chi_aa\(14N\) too"
+        ValueError, match=r"the unit kHz belongs to C_bb\(14N\) only; put a space before it to apply it to chi_aa\(14N\) too"
     ):
         SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8kHz")
     assert SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8 MHz").values["C_bb(14N)"] == 1.8
@@ -236,7 +236,7 @@ def test_constants_of_spins_as_text_or_mapping_are_the_same():
 
 
 def test_what_a_mapping_refuses():
-    with pytest.raises(ValueError, match="say how large it is, such as S=1/2"):
+    with pytest.raises(ValueError, match="give its size, such as S=1/2"):
         Top.from_constants(NAMED)
     with pytest.raises(ValueError, match="spin_constants: given among the constants and again"):
         Top.from_constants(NAMED, spin_constants="chi_aa(14N)=1 MHz", spins="S=1/2")
