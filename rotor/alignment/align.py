@@ -201,7 +201,7 @@ def align(
     jmax = guessed_jmax(top, pulses, ensemble.jmax, tolerance) if jmax_option is None else jmax_option
     if jmax < ensemble.jmax + EDGE:
         raise ValueError(
-            f"J max {jmax}: the ensemble itself has J up to {ensemble.jmax}; give at least {ensemble.jmax + EDGE}"
+            f"J max {jmax}: the ensemble has J up to {ensemble.jmax}; give at least {ensemble.jmax + EDGE}"
         )
     if jmax_option is None and jmax > HIGHEST_J:
         raise ValueError(
@@ -218,7 +218,7 @@ def align(
         if jmax_option is not None:
             raise BasisTooSmallError(
                 f"J max {jmax} is too small for a tolerance of {tolerance:g}: the two highest J hold {pilot.edge:.2g} of the "
-                "population; give a higher J max, or none and it is chosen"
+                "population; give a higher J max, or leave it out"
             )
         jmax = int(1.15 * jmax) + 4
         if jmax > HIGHEST_J:
@@ -234,8 +234,8 @@ def _checked_times(times_ps: ArrayLike, pulses: Sequence[Pulse]) -> Floats:
     end = max(pulse.window_ps[1] for pulse in pulses)
     if times[-1] < end:
         raise ValueError(
-            f"the times end at {times[-1]:g} ps, before the last pulse does ({end:g} ps): a pulse is longer than the times; let them "
-            "go on, or shorten it"
+            f"the times end at {times[-1]:g} ps, before the last pulse does ({end:g} ps); give later times, "
+            "or a shorter pulse"
         )
     return times
 

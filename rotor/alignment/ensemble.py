@@ -96,7 +96,7 @@ def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
     """
     if not (math.isfinite(temperature_k) and temperature_k > 0):
         raise ValueError(
-            f"temperature {temperature_k} K: a finite temperature above 0 K is expected (0 means one level)"
+            f"temperature {temperature_k} K: expected a finite temperature above 0 K (0 means a single level)"
         )
     levels = _levels_for(one_state(top, "alignment"), temperature_k, cut)
     exists = levels.weight > 0

@@ -120,7 +120,7 @@ def polarization(axis: ArrayLike) -> Axis:
     """
     vector = np.asarray(axis, dtype=np.complex128)
     if vector.shape != (3,) or not np.isfinite(vector).all() or not np.abs(vector).max() > 0:
-        raise ValueError(f"a polarization is three finite components along X, Y, Z, not all 0; got {axis!r}")
+        raise ValueError(f"polarization: expected three finite components along X, Y, Z, not all 0; got {axis!r}")
     x, y, z = (vector / np.linalg.norm(vector)).tolist()
     return x, y, z
 
@@ -266,7 +266,7 @@ class TabulatedPulse(Pulse):
         times, values = (np.array(a, dtype=np.float64) for a in (self.times_ps, self.intensities_w_per_cm2))
         if times.ndim != 1 or times.shape != values.shape or len(times) < 2:
             raise ValueError(
-                f"a table of a pulse has as many intensities as times, 2 or more; got {times.shape}, {values.shape}"
+                f"table of a pulse: expected as many intensities as times, 2 or more; got {times.shape}, {values.shape}"
             )
         if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
             raise ValueError("the times of a pulse's table must be finite and rise")
@@ -368,7 +368,7 @@ class DipolePulse(Pulse):
             )
         if not (math.isfinite(self.frequency_thz) and self.frequency_thz >= 0.0):
             raise ValueError(
-                f"frequency {self.frequency_thz:g} THz: expected a finite number of 0 or more; the phase turns the field round"
+                f"frequency {self.frequency_thz:g} THz: expected a finite number of 0 or more; the phase reverses the field"
             )
         checked_duration(self.fwhm_ps, "width of a pulse")
         _checked_time(self.centre_ps)

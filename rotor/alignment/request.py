@@ -115,7 +115,7 @@ class AlignRequest:
         for name, time in (("from_ps", first), ("until_ps", last)):
             if not abs(time) <= FARTHEST_PS:
                 raise ValueError(
-                    f"{name}: {time:g} ps: expected a time within {FARTHEST_PS:g} ps; farther away the phases of double precision mean "
+                    f"{name}: {time:g} ps: expected a time within {FARTHEST_PS:g} ps; beyond that, phases in double precision mean "
                     "nothing"
                 )
         if not first < last:

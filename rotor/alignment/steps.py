@@ -125,7 +125,7 @@ def _refined(
         if below is not None and _cost(plan) > 2 * _cost(below.plan):
             return below
     raise ValueError(
-        f"more than {MOST_STEPS} steps would be needed for a tolerance of {problem.tolerance:g}; give a larger one"
+        f"more than {MOST_STEPS} steps would be needed for a tolerance of {problem.tolerance:g}; give a larger tolerance"
     )
 
 

@@ -77,7 +77,7 @@ class DrivenRequest:
         if self.step is not None and (system.needs_velocity or system.added):
             raise ValueError(
                 "step: a splitting holds no torque of the angular velocity (drag) and no rolling; leave the step out: the "
-                "adaptive method serves them"
+                "adaptive method handles them"
             )
         _ = self.method
 

@@ -170,7 +170,7 @@ def lyapunov_exponents(
             return exponents
     raise ValueError(
         f"accuracy: {accuracy:g} per time cannot be given: the error after a time of {exponents.time:g} is {exponents.reached:.2g} "
-        f"({exponents.budget.line()}); ask for less, or give a longer time or a smaller tolerance"
+        f"({exponents.budget.line()}); choose a lower accuracy, a longer time or a smaller tolerance"
     )
 
 

@@ -36,7 +36,7 @@ class MotionTable(Table):
         """The table of a motion that an integrator made, of one body."""
         if motion.momentum.ndim != 2:
             raise ValueError(
-                f"a table holds one body; this motion is of bodies {motion.momentum.shape[:-2]}: choose one"
+                f"a table has a single body; this motion has bodies {motion.momentum.shape[:-2]}: choose one of them"
             )
         return cls(motion.times, motion.momentum, continuous(motion.attitude), motion.energy)
 
@@ -67,7 +67,7 @@ def sampled(motion: FreeMotion, times: ArrayLike) -> MotionTable:
     times = np.asarray(times, dtype=np.float64)
     if motion.moments.shape != (3,) or times.ndim != 1:
         raise ValueError(
-            f"a table holds one body at a list of times; got bodies {motion.moments.shape[:-1]}, times {times.shape}"
+            f"a table has a single body at a list of times; got bodies {motion.moments.shape[:-1]}, times {times.shape}"
         )
     momentum, attitude = motion.at(times)
     attitude = continuous(attitude)

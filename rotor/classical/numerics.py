@@ -41,8 +41,8 @@ def choose_growth(scene: Any, request: Any, allowed: float) -> Choice:
     """No settings to choose: the growth rate at the unstable axis of a free body is a closed form."""
     if not isinstance(request, TumbleRequest):
         raise ValueError(
-            f"accuracy: {allowed:g} %: is of the growth rate of a free motion; a motion under effects has an accuracy of the "
-            "attitude, in rad"
+            f"accuracy: {allowed:g} %: % is the unit of the growth rate of a free motion; for a motion under effects give the "
+            "accuracy of the attitude, in rad"
         )
     return Choice(request, NOTHING_CHEAPER)
 

@@ -130,7 +130,7 @@ def _refuse_endless(request: DrivenRequest, allowed: float) -> None:
     if steps > MOST_STEPS:
         raise ValueError(
             f"accuracy: this motion takes about {steps:.2g} steps, and {MOST_STEPS:.0g} take hours; give a shorter time, or a body "
-            "that turns more slowly"
+            "that rotates more slowly"
         )
 
 
@@ -209,5 +209,5 @@ def _loosest(motions: _Motions, allowed: float, misses: int = LOOSEST - 1) -> tu
 def _refusal(allowed: float, error: float) -> str:
     return (
         f"accuracy: {allowed:g} rad cannot be given: steps to {tolerance_of(FINEST):g} still differ by {error:.2g} rad at "
-        "the end, the motion is chaotic or too long for double precision; ask for less, or for a shorter time"
+        "the end, the motion is chaotic or too long for double precision; choose a lower accuracy or a shorter time"
     )

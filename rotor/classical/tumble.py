@@ -73,7 +73,7 @@ class TumbleRequest:
         _refuse_sizes(moments, momentum)
         if momentum.shape != (3,) or not momentum.any():
             raise ValueError(
-                f"angular_momentum: {self.angular_momentum}: expected three components, one of them not 0; a body at rest "
+                f"angular_momentum: {self.angular_momentum}: expected three components, not all 0; a body at rest "
                 "does not tumble"
             )
         if self.times is not None and not (len(self.times) and np.isfinite(self.times).all()):
@@ -125,7 +125,7 @@ class TumbleRequest:
         if low + middle >= high * (1 - 1e-12):
             return ()
         return (
-            f"no real body has these moments: {low:g} + {middle:g} is less than {high:g}; the equations do not need it",
+            f"no real body has these moments: {low:g} + {middle:g} is less than {high:g}; the motion is computed all the same",
         )
 
 

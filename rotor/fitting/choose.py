@@ -359,7 +359,9 @@ def suggest_lines(
         raise ValueError(f"{name} is not among the free parameters {', '.join(fit.parameters.names)}")
     column = fit.parameters.names.index(name)
     if not np.isfinite(fit.errors).all():
-        raise ValueError("some parameters are not determined by the lines; hold them before asking for the next line")
+        raise ValueError(
+            "some parameters are not determined by the lines; hold them to get a suggestion for the next line"
+        )
     labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
     places = places.reshape(-1)
     level_model = model(labels) if model else model_of(fit.named, labels)

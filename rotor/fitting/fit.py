@@ -81,7 +81,7 @@ class Fit:
         """The fitted constants. ValueError if the parameters are not named constants."""
         if self.constants is None:
             raise ValueError(
-                "the parameters of this fit are codes of SPFIT with spins or states; it has no named constants"
+                "the parameters of this fit are SPFIT codes with spins or states; it has no named constants"
             )
         return self.constants
 
@@ -137,7 +137,7 @@ def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
     if not np.isfinite(statistics.errors).all():
         lost = ", ".join(combination.text for combination in statistics.undetermined)
         raise ValueError(
-            f"the lines do not determine {lost}: there is no covariance; hold it or give an a-priori error"
+            f"the lines do not determine {lost}: there is no covariance; hold these parameters or give a-priori errors"
         )
     covariance = covariance_of_determined(parameters, statistics)
     return covariance or Covariance((), np.zeros((0, 0)))
@@ -243,8 +243,8 @@ def _with_levels(
     same = np.flatnonzero(upper == lower)
     if len(same):
         raise ValueError(
-            f"{_named(lines, int(same[0]))}: upper and lower state are one level, which makes "
-            "no line: correct its labels, or take the line out"
+            f"{_named(lines, int(same[0]))}: upper and lower state are the same "
+            "level: correct the labels, or remove the line"
         )
     try:
         return lines, model(labels), []

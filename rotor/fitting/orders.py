@@ -22,7 +22,7 @@ def order_of(name: str, constants: ConstantSet) -> int:
     terms_by_name = distortion_terms(constants.kind, constants.reduction)
     if not spelled and name not in terms_by_name:
         raise ValueError(
-            f"{name!r} is no constant of the kind {constants.kind}; expected one such as {', '.join(list(terms_by_name)[:3])}"
+            f"{name!r} is not a constant of the kind {constants.kind}; expected one such as {', '.join(list(terms_by_name)[:3])}"
         )
     terms = {spelled: 1.0} if spelled else terms_by_name[name]
     return max(2 * (p + q + n) for p, q, n in terms)

@@ -224,5 +224,5 @@ def _priors(chosen: Sequence[str], priors_mhz: Mapping[str, float], constants: C
         raise ValueError(f"priors_mhz: a-priori error of {', '.join(lost)}, which is not free")
     for name, value in errors.items():
         if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"priors_mhz: a-priori error of {name}: {value!r} MHz; a standard error is above 0")
+            raise ValueError(f"priors_mhz: a-priori error of {name}: {value!r} MHz; expected a standard error above 0")
     return np.array([errors.get(name, np.inf) for name in chosen])

@@ -127,7 +127,9 @@ def publication_table(
     if form not in FORMS:
         raise ValueError(f"form {form!r}: one of {', '.join(FORMS)} is needed")
     if scaled and not fit.degrees_of_freedom:
-        raise ValueError("scaled: with 0 degrees of freedom there are no errors from the scatter; take the stated ones")
+        raise ValueError(
+            "scaled: without degrees of freedom there are no errors from the scatter; use the stated errors"
+        )
     factor = fit.reduced_chi if scaled else 1.0
     table = rows or _rows(fit)
     cells = [_cells(row, factor, digits, form, any(each.states for each in table)) for row in table]

@@ -263,7 +263,7 @@ def errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], 
     zero = lines.error_mhz == 0
     if zero.all() and options.default_error_mhz is None:
         raise ValueError(
-            f"{lines.source or 'the lines'}: every line has an error of 0: give errors in the file, or one for all of them "
+            f"{lines.source or 'the lines'}: all lines have an error of 0: give errors in the file, or a common error "
             "(default_error_mhz)"
         )
     if options.default_error_mhz is not None:

@@ -34,7 +34,7 @@ class TextFile:
         self.path = Path(path)
         if length is not None and (not self.path.is_file() or self.path.stat().st_size < length):
             raise ValueError(
-                f"{path}: is shorter than when the checkpoint was written ({length} bytes); it was changed since"
+                f"{path}: is shorter than the {length} bytes that it had when the checkpoint was written; it was changed since"
             )
         self._file = open(path, "wb" if length is None else "r+b", buffering=0)  # noqa: SIM115 - open as long as the run
         if length is not None:
@@ -179,7 +179,7 @@ def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
     import zipfile
 
     if not Path(path).is_file():
-        raise ValueError(f"{path}: there is no such checkpoint to resume from; leave --resume out to begin")
+        raise ValueError(f"{path}: no such checkpoint; leave --resume out to start a new run")
     try:
         with open(path, "rb") as handle, np.load(handle, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files if name != "about"}

@@ -91,7 +91,7 @@ def model_labels(atoms: Atoms, models: Sequence[RigidModel]) -> NDArray[np.int64
         if fits is None:
             expected = " or ".join(" ".join(elements) for elements in ordered)
             raise ValueError(
-                f"atom {at} ({symbols[at]}) begins no molecule of the models given: expected {expected}, in this order"
+                f"atom {at} ({symbols[at]}) does not begin a molecule of the models: expected {expected}, in this order"
             )
         labels[at : at + len(fits)] = number
         at, number = at + len(fits), number + 1

@@ -108,9 +108,7 @@ def motion_means(frames: MotionFrames, interval_ps: float, axes: Floats | None) 
         for order in (1, 2):
             values = [correlation_time(block, step, order) for block in blocks]
             if any(math.isnan(value) for value in values):
-                missing = (
-                    f"C_{order} has not fallen to 1/e in {WINDOW:g} of a block of {length / BLOCKS:.3g} ps: run longer"
-                )
+                missing = f"C_{order} has not decayed to 1/e within {WINDOW:g} of a block of {length / BLOCKS:.3g} ps: run longer"
             else:
                 table.append(_mean(f"τ{order} of reorientation", "ps", values))
     window = (DIFFUSION_FROM_PS, WINDOW * length / BLOCKS)

@@ -70,7 +70,9 @@ def with_box(request: FluidRequest) -> FluidRequest:
 def _rotor_request(request: FluidRequest) -> FluidRequest:
     """The request with its box; ValueError for another engine."""
     if request.engine != "rotor":
-        raise ValueError(f"accuracy: the engine {request.engine} is not swept; give numerics.step, or the engine rotor")
+        raise ValueError(
+            f"accuracy: not available for the engine {request.engine}; give numerics.step, or use the engine rotor"
+        )
     return with_box(request)
 
 
@@ -88,7 +90,7 @@ def choose_step(scene: Any, request: FluidRequest, allowed: float) -> Choice:
             return Choice(replace(request, settings=replace(request.settings, step_fs=step)), how, error)
         step = math.floor(95.0 * step) / 100.0
     raise ValueError(
-        f"accuracy: {allowed:g} K cannot be given: the steps would be shorter than {SHORTEST_STEP_FS:g} fs; ask for less"
+        f"accuracy: {allowed:g} K cannot be given: the steps would be shorter than {SHORTEST_STEP_FS:g} fs; choose a lower accuracy"
     )
 
 
@@ -144,7 +146,7 @@ def force_error(request: FluidRequest) -> float:
 def sweeps_of_fluid(request: FluidRequest) -> Sweeps:
     """Sweeps of the step (energy and positions over a short time), of the cutoff and of Ewald's tolerance (forces)."""
     if request.engine != "rotor":
-        raise ValueError(f"numerics.engine {request.engine}: the knobs of the engine rotor alone are swept")
+        raise ValueError(f"numerics.engine {request.engine}: only the settings of the engine rotor are swept")
     ready = with_box(request)
     return Sweeps(
         (_step(ready), _cutoff(ready), *_ewald(ready)), ("conditions.steps: the error of a mean is in its report",)

@@ -82,7 +82,9 @@ class FluidRequest:
         require_one_of("engine", self.engine, ("rotor", *ENGINES))
         models = models_of(self.settings.model)
         if isinstance(self.box, NewBox) and len(models) > 1:
-            raise ValueError(f"model {self.settings.model!r}: a box is made of one model; give a box of the mixture")
+            raise ValueError(
+                f"model {self.settings.model!r}: a new box has a single model; for a mixture give the file of a box"
+            )
 
     @property
     def equilibration_ps(self) -> float | None:

@@ -120,7 +120,7 @@ def run_fluid(
     if resume and outputs.checkpoint is None:
         raise ValueError("to resume a run, name the checkpoint that it wrote")
     if not resume and outputs.checkpoint is not None and os.path.exists(outputs.checkpoint):
-        raise ValueError(f"{outputs.checkpoint}: exists already; resume from it, or remove it to begin anew")
+        raise ValueError(f"{outputs.checkpoint}: exists already; resume from it, or remove it to start again")
     dynamics = dynamics_of(atoms, settings, begin=not resume)
     run = _Run(dynamics, settings, outputs, frames)
     if resume:
@@ -268,7 +268,7 @@ class _Run:
         except OSError as error:
             what = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
             raise RunStopped(
-                f"{what} at step {dynamics.nsteps}; what was written before is whole{self._named_checkpoint()}"
+                f"{what} at step {dynamics.nsteps}; files written before are complete{self._named_checkpoint()}"
             ) from error
 
     def record(self) -> FluidRecord:
@@ -294,9 +294,11 @@ class _Run:
                 raise ValueError(f"{path}: was written by a run with {name} = {value}, not {mine.get(name)}")
         if list(about["files"]) != self._names():
             before = ", ".join(about["files"]) or "none"
-            raise ValueError(f"{path}: the run that is resumed wrote these files: {before}; name the same ones")
+            raise ValueError(f"{path}: the resumed run wrote other files: {before}; name the same files")
         if about["step"] > self.settings.steps:
-            raise ValueError(f"{path}: is of step {about['step']}, beyond the {self.settings.steps} steps of this run")
+            raise ValueError(
+                f"{path}: belongs to step {about['step']}, after the {self.settings.steps} steps of this run"
+            )
         state = State(*(np.array(arrays[name]) for name in ("centres", "momentum", "spin", "carry")))
         if self.dynamics.thermostat is not None:
             self.dynamics.thermostat.restore(about["thermostat"])

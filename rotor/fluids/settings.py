@@ -90,4 +90,6 @@ class Settings:
         if self.ensemble not in ENSEMBLES:
             raise ValueError(f"{self.ensemble!r} is no ensemble; there are {', '.join(ENSEMBLES)}")
         if self.electrostatics not in ELECTROSTATICS:
-            raise ValueError(f"{self.electrostatics!r}: charges are treated by one of {', '.join(ELECTROSTATICS)}")
+            raise ValueError(
+                f"{self.electrostatics!r}: expected a treatment of charges, one of {', '.join(ELECTROSTATICS)}"
+            )

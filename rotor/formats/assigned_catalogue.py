@@ -41,7 +41,7 @@ def catalogue_lines(path: str | os.PathLike[str], names: Sequence[str]) -> tuple
     ground = ((beyond == 0) | (beyond == BLANK)).all(axis=1) | split
     notes = []
     if not ground.all():
-        notes.append(f"{int((~ground).sum())} measured lines of other states, or with spins, are left aside")
+        notes.append(f"{int((~ground).sum())} measured lines of other states, or with spins, are left out")
     measured, split = measured.take(ground), split[ground]
     frequency, error, upper, lower, weight = _columns(measured, width)
     first = _first_of_each(upper, lower, frequency)
@@ -64,7 +64,7 @@ def whole_catalogue_lines(path: str | os.PathLike[str], names: Sequence[str]) ->
     """The measured lines of a catalogue with all quantum numbers, v and F included; and notes."""
     measured, width = _measured(path), len(names)
     whole = (measured.qnfmt % 10 == width) & ((measured.qnfmt // 1000 % 2 == 1) == ("v" in names))
-    notes = [] if whole.all() else [f"{int((~whole).sum())} measured lines without {', '.join(names)} are left aside"]
+    notes = [] if whole.all() else [f"{int((~whole).sum())} measured lines without {', '.join(names)} are left out"]
     measured = measured.take(whole)
     frequency, error, upper, lower, weight = _columns(measured, width)
     first = _first_of_each(upper, lower, frequency)

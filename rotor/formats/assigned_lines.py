@@ -269,7 +269,7 @@ def _note_of_blends(lines: Assignments) -> list[str]:
         return []
     return [
         f"{count} lines have the frequency and the error of their neighbours: they are "
-        f"{counted(len(set(lines.blend[lines.blended].tolist())), 'blend')}, as in a .lin file; a column blend says otherwise"
+        f"{counted(len(set(lines.blend[lines.blended].tolist())), 'blend')}, as in a .lin file; use a column blend to change this"
     ]
 
 
@@ -303,7 +303,7 @@ def _widths(
             width = _size(path, i, name, row, 0.0) * _WIDTH[name]
             if width and counts[blend] < 2:
                 raise ValueError(
-                    f"{path}, line {i} of the table: a {name} is that of a blend; name the blend of two lines or more"
+                    f"{path}, line {i} of the table: a {name} belongs to a blend; name a blend of two lines or more"
                 )
             if width and widths.setdefault(blend, width) != width:
                 raise ValueError(f"{path}, line {i} of the table: another {name} of this blend stands before; give one")
@@ -332,7 +332,7 @@ def _refuse_columns(
     other = next((sign for sign in (";", "\t") if len(columns) == 1 and sign in columns[0]), None)
     if other is not None:
         raise ValueError(
-            f"{path}: its columns are parted by {other!r}; commas are needed, and a point in decimal numbers"
+            f"{path}: its columns are separated by {other!r}; expected commas, and a point in decimal numbers"
         )
     missing = [name for name in labels if name not in columns]
     strange = [name for name in columns if name not in accepted]

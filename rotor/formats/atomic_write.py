@@ -88,9 +88,7 @@ def resolved(path: str | os.PathLike[str]) -> Path:
         os.stat(path)
     except OSError as error:
         if error.errno == errno.ELOOP:
-            raise ValueError(
-                f"{os.fspath(path)}: is a link that leads back to itself; remove it or name a file"
-            ) from None
+            raise ValueError(f"{os.fspath(path)}: is a link that points to itself; remove it or name a file") from None
     return Path(os.path.realpath(path))
 
 

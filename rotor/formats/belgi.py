@@ -87,7 +87,7 @@ def read_belgi(path: str | os.PathLike[str]) -> Top:
         )
     if strange := [name for name, value in values.items() if value and name not in names]:
         raise ValueError(
-            f"{os.fspath(path)}: {', '.join(strange)}: read are {', '.join(names)}; give the others in a .toml file"
+            f"{os.fspath(path)}: {', '.join(strange)}: rotor reads {', '.join(names)}; give the others in a .toml file"
         )
     numbers = {ours: values[theirs] * (1.0 if ours == "rho" else scale) for theirs, ours in names.items()}
     internal = {name: value for name in TORSION.values() if (value := numbers[name]) or name in ("F", "rho", "V3")}
@@ -114,7 +114,7 @@ def read_belgi_levels(path: str | os.PathLike[str]) -> ListedLevels:
             rows += [(int(block[2]), int(v), int(block[1]), int(k), float(energy)) for v, k, energy in levels]
     if not rows:
         raise ValueError(
-            f"{os.fspath(path)}: no levels in it; expected lines such as VT= 0 K= 0 E= 44.73 CM-1, or six columns"
+            f"{os.fspath(path)}: contains no levels; expected lines such as VT= 0 K= 0 E= 44.73 CM-1, or six columns"
         )
     species, vt, j, k, energy = np.array(rows).T
     whole = [column.astype(np.int64) for column in (species, vt, j, k)]

@@ -22,5 +22,5 @@ def read_box(path: str | os.PathLike[str]) -> Atoms:
     atoms: Any = frames[-1]
     atoms.calc = None
     if not atoms.pbc.any():
-        raise ValueError(f"{path}: has no cell that repeats; a box has one (in extended xyz, Lattice and pbc)")
+        raise ValueError(f"{path}: has no periodic cell; a box needs one (in extended xyz, Lattice and pbc)")
     return cast("Atoms", atoms)

@@ -68,7 +68,7 @@ def sweeps_of_fit(request: Any) -> Sweeps:
             Sweep("numerics.iterations", (measure,), iterations, finest, against, answer_fit),
             Sweep("tolerance of the search", (measure,), tolerances, finest, against, answer_fit),
         ),
-        ("numerics.loss, numerics.reject_above: which lines count is not a question of accuracy",),
+        ("numerics.loss, numerics.reject_above: an accuracy does not decide which lines count",),
     )
 
 

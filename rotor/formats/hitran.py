@@ -271,7 +271,7 @@ def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundanc
     if lines.temperature_k != TEMPERATURE_K:
         raise ValueError(
             f"HITRAN's intensities are those at 296 K, the list was made for {lines.temperature_k:g} K; "
-            "make it anew with temperature_k=296 (and with Q at 296 K where you give Q)"
+            "compute it again at temperature_k=296 (with Q at 296 K, if you give Q)"
         )
     if not 0 < abundance <= 1:
         raise ValueError(f"abundance {abundance}: the share of the isotopologue is above 0 and at most 1")

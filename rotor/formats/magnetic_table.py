@@ -39,7 +39,7 @@ def _tensor(table: TableReader, name: str, kind: str) -> Tensor | None:
         names = tuple(f"{name}_{element}" for element in ELEMENTS)
     present = {key for key in table.content if key == name or key.startswith(f"{name}_")}
     if extra := sorted(present - set(names)):
-        raise ValueError(f"{table.place}: {', '.join(extra)} beside {names[0]}: give the tensor in one of its forms")
+        raise ValueError(f"{table.place}: {', '.join(extra)} beside {names[0]}: give the tensor in a single form")
     values = [table.number(key) for key in names]
     if missing := [key for key, value in zip(names[:3], values, strict=False) if value is None]:
         raise ValueError(f"{table.place}: {', '.join(missing)} is missing")

@@ -69,8 +69,8 @@ def _pieces(file: IO[bytes] | gzip.GzipFile, packed_size: int, name: str) -> Ite
 
 def _too_large(name: str, most: int, packed_size: int) -> str:
     return (
-        f"{name}: unpacks to more than {most / 1e6:.0f} MB from {packed_size / 1e6:.3g} MB, more than text of numbers "
-        "does; unpack it first if it is meant"
+        f"{name}: unpacks to more than {most / 1e6:.0f} MB from {packed_size / 1e6:.3g} MB, more than a text of numbers; "
+        "unpack it first if this is right"
     )
 
 

@@ -81,9 +81,7 @@ def _from_npy(name: str) -> Floats:
     except (ValueError, OSError, EOFError) as error:
         raise ValueError(f"{name}: not an array of numbers as numpy.save writes it: {error}") from None
     if values.ndim != 2 or not {2, 3} & set(values.shape) or values.dtype.kind not in "fiu":
-        raise ValueError(
-            f"{name}: an array of shape {values.shape}; two or three columns or rows of numbers are needed"
-        )
+        raise ValueError(f"{name}: an array of shape {values.shape}; expected two or three columns or rows of numbers")
     return np.asarray(values if values.shape[1] in (2, 3) else values.T, dtype=np.float64)
 
 

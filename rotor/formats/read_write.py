@@ -138,7 +138,7 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
         return _with_isotopes(content, isotopes)
     if isotopes:
         raise ValueError(
-            f"{path}: holds a {type(content).__name__}, which has no atoms to substitute; leave the isotopes out"
+            f"{path}: holds a {type(content).__name__}, which has no atoms to substitute; leave out the isotopes"
         )
     return content
 
@@ -181,7 +181,7 @@ def _read_standard_input(isotopes: Isotopes | None) -> Top:
     content = sys.stdin.buffer.read(HARMLESS_BYTES + 1)
     if len(content) > HARMLESS_BYTES:
         raise ValueError(
-            f"standard input goes on after {HARMLESS_BYTES / 1e6:.0f} MB, more than a molecule has; give a file"
+            f"standard input exceeds {HARMLESS_BYTES / 1e6:.0f} MB, more than a molecule needs; give a file"
         )
     text = decode(content, "standard input")
     if not text.strip():

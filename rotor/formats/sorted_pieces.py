@@ -32,11 +32,11 @@ def open_folder(folder: Path, record: Mapping[str, Any]) -> None:
         before = json.loads(manifest.read_text(encoding="utf-8"))
         recorded, differs = before["sha256"], _first_difference(before["list"], json.loads(text))
     except (ValueError, KeyError, TypeError):
-        raise ValueError(f"{manifest}: is no manifest of pieces; remove the folder to begin anew") from None
+        raise ValueError(f"{manifest}: is not a manifest of pieces; remove the folder to start again") from None
     if recorded != mark["sha256"]:
         raise ValueError(
             f"{folder}: holds pieces of another list ({differs}); finish that list with its own settings, or remove the "
-            "folder to begin anew"
+            "folder to start again"
         )
 
 

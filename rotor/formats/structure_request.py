@@ -66,7 +66,7 @@ class StructureRequest:
         check_fields(self)
         if self.check and set(self.methods) == {"rs"}:
             raise ValueError(
-                "check: goes with r0, rm1, rm2 or re, which are fitted to all isotopologues; add one to the methods"
+                "check: needs r0, rm1, rm2 or re, which are fitted to all isotopologues; add one of them to the methods"
             )
 
 

@@ -24,7 +24,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 
 
 def _too_deep(where: str) -> str:
-    return f"{where}: lists or tables more than {MOST_DEPTH} deep in one another; a file of molecules has four"
+    return f"{where}: lists or tables more than {MOST_DEPTH} deep; a molecule file needs four"
 
 
 def _refuse_extremes(thing: Any, where: str, depth: int) -> None:

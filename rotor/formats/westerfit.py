@@ -170,7 +170,7 @@ def _second_order(lines: Sequence[tuple[int, str]]) -> tuple[dict[str, float], d
             )
         elif value:
             raise ValueError(
-                f"line {number}: {name} = {value:g}: such a term is not computed here; leave it out and fit anew"
+                f"line {number}: {name} = {value:g}: this term is not computed; leave it out and fit again"
             )
     return values, spins
 

@@ -111,16 +111,14 @@ def _top(name: str, settings: dict[str, int], values: dict[str, float]) -> Top:
         raise ValueError(f"reduc {settings['reduc']}: read are Watson's A (0) and S (1)")
     tops = settings.get("ntop", 1)
     if tops not in (1, 2, 3) or settings.get("nfold", 3) != 3:
-        raise ValueError(f"{tops} tops of fold {settings.get('nfold', 3)}: read are one to three threefold tops")
+        raise ValueError(f"{tops} tops of fold {settings.get('nfold', 3)}: rotor reads one to three threefold tops")
     strange = [
         key for key, value in values.items()
         if value and re.sub(r"_[123]$", "", key) not in (*ROTATION, *DISTORTION, *DIPOLE, *OF_TOP, *DERIVED, *QUADRUPOLE)
     ]  # fmt: skip
     if strange:
         squares = "; XIAM multiplies Dpi2 by ⟨p - ρ·P⟩², which no term here does" if "Dpi2" in "".join(strange) else ""
-        raise ValueError(
-            f"{', '.join(strange)}: such terms are not computed here; leave them out and fit anew{squares}"
-        )
+        raise ValueError(f"{', '.join(strange)}: these terms are not computed; leave them out and fit again{squares}")
     bj, bk, minus = (values[key] * MHZ_PER_GHZ for key in ROTATION)
     numbers: dict[str, Any] = {"A": bj + bk, "B": bj + minus, "C": bj - minus}
     numbers |= {
@@ -144,7 +142,7 @@ def _spin(settings: dict[str, int], values: dict[str, float]) -> SpinConstants |
     coupling = {ours: values[theirs] * MHZ_PER_GHZ for theirs, ours in QUADRUPOLE.items() if values.get(theirs)}
     if settings.get("spin2"):
         raise ValueError(
-            f"spin2 {settings['spin2']}: read is one nucleus; leave the second out and give --spin-constants"
+            f"spin2 {settings['spin2']}: rotor reads a single nucleus; leave out the second and give --spin-constants"
         )
     if coupling and settings.get("spin", 0) < 2:
         raise ValueError(
@@ -162,7 +160,7 @@ def _single_top(values: dict[str, float]) -> dict[str, float]:
     constants = _constants_of_top(values, "")
     turn = constants.pop("epsilon", 0.0)
     if abs(np.sin(turn)) > 1e-6:
-        raise ValueError(f"epsil = {turn:g}: the axis of the top is not in the plane ab; such a top is not computed")
+        raise ValueError(f"epsil = {turn:g}: the axis of the top is not in the ab plane; such a top is not computed")
     return constants | {"delta": float(np.cos(turn)) * constants["delta"]}
 
 

@@ -88,9 +88,7 @@ def persistence_steps(rotation: ArrayLike) -> float:
     real = values.real[np.abs(values.imag) < 1e-12]
     largest = float(real.max())
     if not 0.0 < largest < 1.0:
-        raise ValueError(
-            f"a chain whose steps do not vary has no persistence length: the largest eigenvalue is {largest:g}"
-        )
+        raise ValueError(f"a chain of constant steps has no persistence length: the largest eigenvalue is {largest:g}")
     return -1.0 / math.log(largest)
 
 

@@ -185,7 +185,7 @@ def principal_frame(
         raise ValueError("an inertia tensor is a symmetric (3, 3) array of finite numbers")
     moments, columns = np.linalg.eigh(tensor)
     if moments[0] < -1e-9 * abs(moments[2]) or moments[0] + moments[1] < moments[2] * (1 - 1e-9):
-        raise ValueError(f"moments {moments.tolist()} belong to no body: each is at most the sum of the other two")
+        raise ValueError(f"moments {moments.tolist()} are impossible: each moment is at most the sum of the other two")
 
     moments = np.where(moments < 1e-12 * moments[2], 0.0, moments)
     axes = columns.T

@@ -311,7 +311,9 @@ def _norm3(v: Floats) -> Floats:
 def _length(q: Floats) -> Floats:
     length = np.asarray(np.hypot(np.hypot(q[..., 0], q[..., 1]), np.hypot(q[..., 2], q[..., 3])))
     if not np.all(length > 0.0) or not np.all(np.isfinite(length)):
-        raise ValueError("a quaternion of zero or undefined length is no rotation; give at least one finite component")
+        raise ValueError(
+            "a quaternion of zero or undefined length is not a rotation; give finite components, not all 0"
+        )
     return length
 
 
@@ -339,4 +341,6 @@ def _require_rotation(m: Floats) -> None:
             "for round-off); nearest_rotation() gives the nearest rotation and its distance"
         )
     if np.any(np.linalg.det(m) < 0.0):
-        raise ValueError("a matrix of determinant -1 is a reflection, no rotation; nearest_rotation() finds one")
+        raise ValueError(
+            "a matrix of determinant -1 is a reflection, not a rotation; nearest_rotation() gives the nearest rotation"
+        )

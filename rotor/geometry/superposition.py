@@ -121,7 +121,9 @@ def _clouds(mobile: ArrayLike, target: ArrayLike) -> tuple[Floats, Floats]:
         if not np.all(np.isfinite(cloud)):
             raise ValueError(f"{name}: a coordinate is not finite")
     if x.shape[-2] != y.shape[-2]:
-        raise ValueError(f"clouds of {x.shape[-2]} and {y.shape[-2]} points: point i of one belongs to i of the other")
+        raise ValueError(
+            f"clouds of {x.shape[-2]} and {y.shape[-2]} points: expected the same number, in the same order"
+        )
     return x, y
 
 

@@ -214,17 +214,17 @@ def bond_rotation(molecule: Molecule, bond: str) -> BondRotation:
         raise ValueError(f"{name} are not bonded: {apart:.3g} Å apart; atom {first + 1} is bonded to {others}")
     top, frame = _side(neighbours, last, first), _side(neighbours, first, last)
     if first in top:
-        raise ValueError(f"{name}: the bond is part of a ring, about which nothing turns; give a bond of no ring")
+        raise ValueError(f"{name}: the bond is part of a ring, about which nothing can turn; name a bond outside rings")
     for atoms, end in ((frame, first), (top, last)):
         if len(atoms) == 1:
             raise ValueError(
-                f"{name}: atom {end + 1} ({molecule.symbols[end]}) is bonded to no further atom, so that nothing turns; "
-                "give a bond with atoms on both sides"
+                f"{name}: atom {end + 1} ({molecule.symbols[end]}) is bonded to no other atom, so that nothing turns; "
+                "name a bond with atoms on both sides"
             )
         if max(_off_axis(x, i, first, last) for i in atoms) <= ON_AXIS_ANGSTROM:
             raise ValueError(
                 f"{name}: all atoms behind atom {end + 1} lie on the line of the bond (a linear group), so that nothing turns; "
-                "give a bond with atoms off its line on both sides"
+                "name a bond with atoms off its line on both sides"
             )
     return BondRotation(molecule, first, last, np.array(sorted(top)), np.array(sorted(frame)))
 

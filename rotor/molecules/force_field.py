@@ -79,7 +79,7 @@ class ForceField:
         lopsided = float(np.abs(hessian - hessian.T).max())
         if lopsided > LOPSIDED * float(np.abs(hessian).max()):
             raise ValueError(
-                f"the Hessian differs from its transpose by up to {lopsided:.3g} eV/Å²: it is none, or its rows are out of order"
+                f"the Hessian differs from its transpose by up to {lopsided:.3g} eV/Å²: it is not a Hessian, or its rows are out of order"
             )
         hessian = (hessian + hessian.T) / 2
         hessian.setflags(write=False)
@@ -103,14 +103,14 @@ class ForceField:
         left_over_cm = float(np.sqrt(left_over) * _WAVENUMBER)
         if left_over_cm > LEFT_OVER_CM:
             raise ValueError(
-                f"the Hessian holds the molecule against rotation or translation by {left_over_cm:.0f} cm⁻¹ "
+                f"rotation or translation changes the energy of this Hessian, by {left_over_cm:.0f} cm⁻¹ "
                 f"(at most {LEFT_OVER_CM:.0f}): it belongs to another geometry, frame or order of atoms"
             )
         inside = np.linalg.svd(rigid, full_matrices=True)[0][:, rigid.shape[1] :]
         stiffness, vectors = np.linalg.eigh(inside.T @ weighted @ inside)
         if len(stiffness) and stiffness[0] <= 0:
             raise ValueError(
-                f"a vibration of {_wavenumber(stiffness[0]):.0f}i cm⁻¹: the geometry is no minimum; optimise it first"
+                f"a vibration of {_wavenumber(stiffness[0]):.0f}i cm⁻¹: the geometry is not a minimum; optimise it first"
             )
         return Vibrations(_wavenumber(stiffness), inside @ vectors, stiffness, left_over_cm)
 
@@ -170,7 +170,7 @@ def force_field_from_calculator(
     if not rest <= most_force_ev_per_angstrom:
         raise ValueError(
             f"a force of {rest:.3g} eV/Å on an atom of {molecule.formula} (at most {most_force_ev_per_angstrom:g}): "
-            "the geometry is no minimum of this calculator; refine it first (rotor.api.refine)"
+            "the geometry is not a minimum of this calculator; refine it first (rotor.api.refine)"
         )
     start = atoms.get_positions()
     rows = []

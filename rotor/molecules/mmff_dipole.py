@@ -49,11 +49,14 @@ def estimate_dipole(molecule: Molecule) -> tuple[Floats | None, str]:
     from rdkit import rdBase
 
     if len(molecule.symbols) > MOST_ATOMS:
-        return None, f"no dipole for {molecule.formula}: bonds are found up to {MOST_ATOMS} atoms; give one"
+        return (
+            None,
+            f"no dipole for {molecule.formula}: bonds are only determined for up to {MOST_ATOMS} atoms; give a dipole",
+        )
     with rdBase.BlockLogs():
         bare = bonded_rdkit(molecule)
         if bare is None:
-            why = "no ordinary bonds fit its geometry (a radical, a metal, or far from equilibrium?)"
+            why = "its geometry does not fit ordinary bonds (a radical, a metal, or far from equilibrium?)"
             return None, f"no dipole for {molecule.formula}: {why}; give one"
         dipole = mmff_dipole(bare, molecule)
     if dipole is None:

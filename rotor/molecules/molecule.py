@@ -181,7 +181,9 @@ class Molecule:
             return [key - 1]
         atoms = [i for i, symbol in enumerate(self.symbols) if symbol == key]
         if not atoms:
-            raise ValueError(f"element {key!r} to substitute is not in {self.formula}; use one of it or an atom number")
+            raise ValueError(
+                f"element {key!r} to substitute is not in {self.formula}; name an element of it or an atom number"
+            )
         return atoms
 
     def moved(self, rotation: ArrayLike = _UNTURNED, shift_angstrom: ArrayLike = (0.0, 0.0, 0.0)) -> Molecule:
@@ -250,7 +252,7 @@ def _checked_tensors(tensors: Mapping[int, Floats], atoms: int, key: str) -> dic
         tensor = _checked(value, (3, 3), f"{key} of atom {atom}")
         least = 1e-6 * max(1.0, float(np.abs(tensor).max()))
         if abs(np.trace(tensor)) > least or np.abs(tensor - tensor.T).max() > least:
-            raise ValueError(f"{key} of atom {atom}: {tensor.tolist()} is not symmetric and traceless; it must be")
+            raise ValueError(f"{key} of atom {atom}: {tensor.tolist()} expected a symmetric, traceless tensor")
         checked[atom] = tensor
     return checked
 

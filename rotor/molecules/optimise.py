@@ -19,7 +19,7 @@ _CLASS_NAMES = {"tblite": "TBLite", "xtb": "XTB"}
 _SETTINGS = {"tblite": {"verbosity": 0}, "xtb": {}}  # by default tblite writes each cycle to standard output
 _NOT_FOR_MOLECULES = {
     "emt": "EMT is a potential for metals; its forces on C, N, O and H are for tests of programs, not for geometries",
-    "lj": "one Lennard-Jones parameter for all atoms holds no molecule together; build the calculator in Python",
+    "lj": "equal Lennard-Jones parameters for all atoms do not bind a molecule; build the calculator in Python",
     "morse": "one Morse parameter for all atoms is no molecule; build the calculator in Python",
     "tip3p": "TIP3P holds water rigid, so that there is nothing to optimise",
     "tip4p": "TIP4P holds water rigid, so that there is nothing to optimise",

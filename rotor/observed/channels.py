@@ -77,7 +77,7 @@ def fit_rejecting(
     for _ in range(_ROUNDS):
         if used.sum() < least:
             raise ValueError(
-                f"{int(used.sum())} of {len(spectrum)} channels are left near lines and not brighter than the model; expected {least}"
+                f"{int(used.sum())} of {len(spectrum)} channels are near lines and not brighter than the model; expected {least}"
             )
         begin = components if fit is None else fit.components
         fit = fit_source(spectrum.where(used), begin, sight, choices)

@@ -93,7 +93,7 @@ def rotational_diagram(
     lines = _integrated(spectrum, components, number, sight)
     if len(lines) < 2:
         raise ValueError(
-            f"{component.species.name}: {len(lines)} lines that the model has above three standard deviations; a diagram needs two"
+            f"{component.species.name}: {len(lines)} lines above three standard deviations in the model; a diagram needs two"
         )
     rows, area, sigma = (np.array(column) for column in zip(*lines, strict=True))
     species = component.species.where(rows.astype(int))

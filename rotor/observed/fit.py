@@ -203,7 +203,7 @@ def fit_source(
     _refuse(spectrum, components, sight)
     free = variables(components, choices.free, choices.shared, choices.fixed)
     if len(spectrum) <= len(free):
-        raise ValueError(f"{len(spectrum)} channels for {len(free)} parameters; fit fewer of them, or more channels")
+        raise ValueError(f"{len(spectrum)} channels for {len(free)} parameters; fit fewer parameters, or more channels")
     noise = total_noise(spectrum, components, sight, choices)
     minimum = minimum_of(spectrum, components, free, sight, noise, choices, progress)
     best = free.applied(components, minimum.parameters)

@@ -250,7 +250,8 @@ def _filling(members: Ints, components: Sequence[Component], sight: Sight) -> fl
     sizes = {components[k].size_arcsec for k in members}
     if len(sizes) > 1:
         raise ValueError(
-            f"components of one layer with sizes {sorted(map(str, sizes))}: a layer has a single size; put them into different layers"
+            f"components of one layer with sizes {sorted(map(str, sizes))}: a layer has a single size; put "
+            "components of different sizes into different layers"
         )
     size = sizes.pop()
     if size is None:

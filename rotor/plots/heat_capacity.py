@@ -138,7 +138,7 @@ def _frame(axes: Any, view: View) -> None:
         axes.set_xscale("linear")
     if view.horizontal is not None and view.horizontal[0] <= 0 and axes.get_xscale() == "log":
         raise ValueError(
-            f"temperatures from {view.horizontal[0]:g} K: a logarithmic axis has none of 0 or less; raise the first"
+            f"temperatures from {view.horizontal[0]:g} K: a logarithmic axis needs temperatures above 0; raise the first"
         )
     show_part(axes, replace(view, log=None))
 

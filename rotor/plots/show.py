@@ -99,7 +99,7 @@ def plot(
         if not isinstance(thing, ONE_PANEL):
             accepted = ", ".join(sorted(kind.__name__ for kind in ONE_PANEL))
             raise ValueError(
-                f"ax: the picture of a {type(thing).__name__} is a figure of its own; axes are taken for {accepted}"
+                f"ax: the picture of a {type(thing).__name__} needs a figure of its own; ax is accepted for {accepted}"
             )
         options["axes"] = ax
     with users_style(style):

@@ -123,7 +123,7 @@ def _curves(field_map: FieldMap, view: View) -> list[Ints]:
     shown = np.flatnonzero((field_map.fields >= low) & (field_map.fields <= high))
     if len(shown) < 2:
         raise ValueError(
-            f"the map has {len(shown)} of its fields from {low:g} to {high:g}; a picture needs two or more"
+            f"the map has {len(shown)} of its fields from {low:g} to {high:g}; a picture needs at least two"
         )
     return [rows.start + shown for rows in field_map.curves()]
 

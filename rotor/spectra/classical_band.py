@@ -208,12 +208,14 @@ def band_from_correlation(
     if correction not in get_args(Correction):
         raise ValueError(f"correction {correction!r} is none of {', '.join(get_args(Correction))}")
     if times.ndim != 1 or times.shape != c1.shape or len(times) < 8 or times[0] != 0 or not _even(times):
-        raise ValueError(f"times of shape {times.shape} for C1 of {c1.shape}: expected even ones from 0, 8 or more")
+        raise ValueError(
+            f"times of shape {times.shape} for C1 of {c1.shape}: expected evenly spaced times from 0, 8 or more"
+        )
     window = _window(times, WINDOW_SHARE * fwhm_mhz)
     if window[-1] > 2 * WINDOW_END:
         expected = times[-1] * math.sqrt(math.log(WINDOW_END) / math.log(window[-1]))
         raise ValueError(
-            f"C1 up to {times[-1]:g} ps is too short for a width of {fwhm_mhz:g} MHz; {expected:.3g} ps would do"
+            f"C1 up to {times[-1]:g} ps is too short for a width of {fwhm_mhz:g} MHz; {expected:.3g} ps would be enough"
         )
 
     kt_mhz = temperature_k * units.MHZ_PER_K

@@ -90,7 +90,8 @@ def _sources(layer: LayerInput, subject: Any) -> tuple[Source, ...]:
         if len(values) not in (1, count):
             text = ",".join(f"{value:g}" for value in values)
             raise ValueError(
-                f"{name}: {text}: {counted(len(values), 'number')} for {counted(count, 'molecule')}; expected one for all or one for each"
+                f"{name}: {text}: {counted(len(values), 'number')} for {counted(count, 'molecule')}; "
+                "expected a single number, or one for each molecule"
             )
 
     def value(name: str, number: int) -> float:
@@ -172,7 +173,7 @@ class EmissionRequest:
             )
         first, last = self.range_mhz
         if not 0 < first < last or math.isinf(last):
-            raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a finite range above 0 that rises")
+            raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a finite, rising range above 0")
         count = math.log(last / first) * 8 * KM_PER_S / self.narrowest.fwhm_km_s
         if count > MOST_POINTS:
             raise ValueError(

@@ -212,8 +212,8 @@ def _notes_of_geometry(top: Top) -> Iterator[str]:
     """Note that frequencies from a geometry are too inaccurate to find lines with a telescope."""
     if top.molecule is not None and top.molecule.uncertainty and top.source == top.molecule.source:
         yield (
-            f"{top.name}: constants follow from a geometry good to {100 * top.molecule.uncertainty:.2g} %, frequencies have this error: "
-            "a catalogue of JPL or CDMS (.cat) has measured frequencies"
+            f"{top.name}: constants are from a geometry with an error of {100 * top.molecule.uncertainty:.2g} %, frequencies have "
+            "this error: a catalogue of JPL or CDMS (.cat) has measured frequencies"
         )
 
 

@@ -37,7 +37,7 @@ def require_cut(min_lgint: float | None) -> None:
     """Raise ValueError for a cut beyond the range of a double; None and -inf mean no cut."""
     if min_lgint is not None and min_lgint != -math.inf and not abs(min_lgint) <= MOST_LOG10:
         raise ValueError(
-            f"min_lgint: {min_lgint:g}: expected a number from {-MOST_LOG10} to {MOST_LOG10}, or None for every allowed line"
+            f"min_lgint: {min_lgint:g}: expected a number from {-MOST_LOG10} to {MOST_LOG10}, or None for all allowed lines"
         )
 
 

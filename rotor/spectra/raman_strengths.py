@@ -156,7 +156,7 @@ def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> Ram
                 "several states of a symmetric top: expected a polarizability with its axis; check the tensor"
             )
         if spin_weights.rule == "K":
-            raise ValueError("spin weights by K need an axis, and the polarizability has none; check the tensor")
+            raise ValueError("spin weights by K need an axis, but the polarizability has none; check the tensor")
         return _without_axis(levels, tensor, spin_weights, representation)
     pieces = [_axial_transitions(levels, delta_j, float(along)) for delta_j in (1, 2)]
     return _joined([piece for piece in pieces if len(piece.lower)])

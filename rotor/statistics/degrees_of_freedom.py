@@ -54,13 +54,17 @@ def rotating_axes(moments: ArrayLike, linear_below: float = LINEAR_BELOW) -> NDA
     """
     array = np.asarray(moments, dtype=np.float64)
     if array.ndim == 0 or array.shape[-1] != 3 or not np.isfinite(array).all() or (array < 0.0).any():
-        raise ValueError(f"principal moments are finite, not negative and of shape (..., 3); got {array.tolist()}")
+        raise ValueError(
+            f"principal moments: expected finite numbers of 0 or more, of shape (..., 3); got {array.tolist()}"
+        )
     if not 0.0 < linear_below < 1.0:
         raise ValueError(f"linear_below = {linear_below}: expected a ratio between 0 and 1")
     largest = array.max(axis=-1, keepdims=True)
     turns = (array >= linear_below * largest) & (largest > 0.0)
     if np.any(turns.sum(axis=-1) == 1):
-        raise ValueError("a body with one moment above 0 is impossible: a linear one has two equal ones, (0, I, I)")
+        raise ValueError(
+            "a body with a single moment above 0 is impossible: a linear body has two equal moments, (0, I, I)"
+        )
     return np.asarray(turns)
 
 
@@ -105,7 +109,7 @@ def vibrational_degrees(atoms: int, linear: bool) -> int:
     """
     if atoms < 1 or (atoms == 2 and not linear):
         raise ValueError(
-            f"{atoms} atoms{'' if linear else ', not linear'}: two atoms are always in a line, none are no molecule"
+            f"{atoms} atoms{'' if linear else ', not linear'}: two atoms are always linear, and a molecule has at least one"
         )
     return 0 if atoms == 1 else 3 * atoms - (5 if linear else 6)
 

@@ -173,7 +173,7 @@ def kinetic_degrees(
         mass, v = np.asarray(masses, dtype=np.float64), np.asarray(velocities, dtype=np.float64)
         _check_shape("velocities", v, len(mass))
         if momentum_removed and len(mass) == 1:
-            raise ValueError("one body whose momentum is removed has no translation left; leave its velocity out")
+            raise ValueError("a single body without total momentum has no translation; leave its velocity out")
         degrees += _translations(mass, v, _groups(species, len(mass)), momentum_removed)
     if moments is not None and momenta is not None:
         inertia, m = np.asarray(moments, dtype=np.float64), np.asarray(momenta, dtype=np.float64)
@@ -308,8 +308,8 @@ def _mean_of(name: str, ratios: Floats, count: float) -> _Mean:
     g = statistical_inefficiency(series[:, None])
     if len(series) < LEAST_INDEPENDENT * max(inefficiency, g):
         raise ValueError(
-            f"{name}: {len(series)} frames are too few for energies that stay alike for {max(inefficiency, g):.3g} of them; "
-            f"{math.ceil(LEAST_INDEPENDENT * max(inefficiency, g))} would do, or one frame alone"
+            f"{name}: {len(series)} frames are too few for energies that are correlated over {max(inefficiency, g):.3g} of them; "
+            f"{math.ceil(LEAST_INDEPENDENT * max(inefficiency, g))} would be enough, or a single frame"
         )
     spread = math.sqrt(float(series.var(ddof=1)) * g / len(series))
     return _Mean(

@@ -95,7 +95,7 @@ class Minimum:
         return {
             CONVERGED: f"converged after {counted(count, 'iteration')}: the next step would be {left}{bends}",
             STALLED: f"no step decreases the residuals, although {left} seem to be left",
-            EXHAUSTED: f"{counted(count, 'iteration was', 'iterations were')} not enough: the next step would be {left}",
+            EXHAUSTED: f"not converged after {counted(count, 'iteration')}: the next step would be {left}",
             INTERRUPTED: f"interrupted after {counted(count, 'iteration')}: the next step would be {left}",
         }[self.status]
 

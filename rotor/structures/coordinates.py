@@ -89,7 +89,9 @@ def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
         raise ValueError(f"{name} = {list(atoms)}: the molecule has atoms 1 to {count}")
     coordinate = Named(name, chosen, (chosen,))
     if len(chosen) == 3 and abs(coordinate.value(molecule.positions_angstrom) - 180.0) < np.degrees(_STRAIGHT):
-        raise ValueError(f"{name} = {list(atoms)}: a straight angle cannot be fitted; leave it out, it stays straight")
+        raise ValueError(
+            f"{name} = {list(atoms)}: a straight angle cannot be fitted; leave it out, and it stays straight"
+        )
     images = dict.fromkeys(_one_way(tuple(int(p[atom - 1]) + 1 for atom in chosen)) for p in permutations(molecule))
     if len(chosen) == 4:  # a reflection reverses the sign of a dihedral angle: such images are not equivalent
         value = coordinate.value(molecule.positions_angstrom)

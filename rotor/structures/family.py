@@ -166,7 +166,7 @@ def _refuse_constants(
 ) -> None:
     strays = [key for key in constants if key not in CONSTANTS]
     if strays or not constants:
-        raise ValueError(f"{name}: {', '.join(strays) or 'no constants'}; one or more of A, B, C are needed")
+        raise ValueError(f"{name}: {', '.join(strays) or 'no constants'}; expected at least one of A, B, C")
     for key, value in constants.items():
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"{name}: {key} = {value!r} MHz; a rotational constant is above 0")
@@ -203,7 +203,7 @@ def _measured_to_rigid(species: Species) -> dict[str, float]:
 def _refuse_family(family_species: Sequence[Species], molecule: Molecule) -> None:
     if family_species[0].molecule.mass_numbers != molecule.mass_numbers:
         raise ValueError(
-            f"{family_species[0].name}: the first isotopologue is the parent and has the isotopes of the geometry"
+            f"{family_species[0].name}: the first isotopologue is the parent; it needs the isotopes of the geometry"
         )
     seen: dict[tuple[int, ...], str] = {}
     for species in family_species:

@@ -139,7 +139,7 @@ def _refuse_settings(method: str, weights: str, coordinates: Sequence[Named], he
         for image in each.alike:
             if once.setdefault(image, each.name) != each.name:
                 raise ValueError(
-                    f"{once[image]} and {each.name} are the same coordinate, or equal by symmetry; give one"
+                    f"{once[image]} and {each.name} are the same coordinate, or equal by symmetry; leave one of them out"
                 )
     both = {atoms for each in coordinates for atoms in each.alike} & {atoms for each in held for atoms in each.alike}
     if both:
@@ -174,7 +174,9 @@ class _Problem:
         rows, observed, errors = _observations(family, method, leave_out)
         if weights == "errors" and not (errors > 0).all():
             first = family.species[rows[int(np.argmin(errors))][0]].name
-            raise ValueError(f"weights by errors: {first} has a constant without an error; give one, or weigh equally")
+            raise ValueError(
+                f"weights by errors: {first} has a constant without an error; give the error, or use equal weights"
+            )
         axes = sorted({family.species[s].axes[g] for s, g in rows})
         if family.top.kind in ("linear", "prolate", "oblate"):
             axes = sorted({_equal_axis(family, axis) for axis in axes})
@@ -421,7 +423,7 @@ def _notes(problem: _Problem, condition: float, free: int) -> tuple[str, ...]:
             f"{STUDENT[free]} times (Student's t)"
         )
     if len(problem.observed) == problem.count:
-        notes.append("as many unknowns as moments: nothing is left to judge the fit by, and no errors follow")
+        notes.append("as many unknowns as moments: the fit cannot be tested, and there are no errors")
     if condition > 1e4:
         notes.append(f"condition {condition:.1e}: some combination of the parameters is poorly determined")
     family = problem.family

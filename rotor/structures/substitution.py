@@ -212,7 +212,7 @@ def _doubts(atom: SubstitutedAtom) -> list[str]:
         texts = ", ".join(f"{axis}² = {squares['abc'.index(axis)]:.2g}" for axis in imaginary)
         out.append(f"atom {atom.atom} ({atom.species}): imaginary coordinate, {texts} Å²; taken as 0")
     if small:
-        out.append(f"atom {atom.atom} ({atom.species}): |{'|, |'.join(small)}| below 0.15 Å is not trustworthy")
+        out.append(f"atom {atom.atom} ({atom.species}): |{'|, |'.join(small)}| below 0.15 Å is unreliable")
     return out
 
 

@@ -68,7 +68,7 @@ class GasRequest:
         if self.times_ps is not None:
             if not 0 < len(self.times_ps) <= MOST_TIMES:
                 raise ValueError(
-                    f"times_ps: {len(self.times_ps)} times: at most {MOST_TIMES} times in one run; ask for fewer"
+                    f"times_ps: {len(self.times_ps)} times: a run has at most {MOST_TIMES} times; give fewer"
                 )
             if not np.isfinite(self.times_ps).all():
                 raise ValueError("times_ps: expected finite times")

@@ -28,7 +28,7 @@ def classical_above_k(top: Top, tolerance: float = 0.01) -> float:
     1.93
     """
     if not 0 < tolerance < 1:
-        raise ValueError(f"tolerance {tolerance}: expected a part of the classical heat capacity, between 0 and 1")
+        raise ValueError(f"tolerance {tolerance}: expected a fraction of the classical heat capacity, between 0 and 1")
     rigid, theta = _rigid(top), max(t for t in rotational_temperatures_k(top) if math.isfinite(t))
     classical = classical_limit(rigid).degrees / 2
 

@@ -214,7 +214,9 @@ def _parts(top: Top, species: str) -> tuple[dict[str, SpinWeights], dict[str, fl
     if species == "equilibrium":
         return {species: top.spin_weights}, {}
     if weights_by_species.keys() == {"all"}:
-        raise ValueError(f"species {species!r}: all levels of {top.name or 'this top'} are of one nuclear-spin species")
+        raise ValueError(
+            f"species {species!r}: all levels of {top.name or 'this top'} belong to the same nuclear-spin species"
+        )
     if species == "normal":
         means = {name: weights.mean for name, weights in weights_by_species.items()}
         return weights_by_species, {name: mean / sum(means.values()) for name, mean in means.items()}
@@ -244,7 +246,7 @@ def refuse_electrons_twice(top: Top, effects: Sequence[QuantumEffect], electroni
     """Raise ValueError for electronic states together with effects of the electron spin: Q would count its functions twice."""
     if electronic is not None and _has_electrons(top, effects):
         raise ValueError(
-            "electronic: the constants of the electron spin make Q count its functions already; leave one of the two out"
+            "electronic: the constants of the electron spin already contribute its functions to Q; leave one of the two out"
         )
 
 
@@ -342,7 +344,9 @@ def _with_gas(functions: ThermoFunctions, pressure_bar: float, electronic: Elect
     if not (math.isfinite(pressure_bar) and pressure_bar > 0):
         raise ValueError(f"pressure {pressure_bar} bar: expected a finite pressure above 0")
     if functions.top.mass_u is None:
-        raise ValueError("the ideal gas needs the mass of the molecule, and bare constants have none; give a molecule")
+        raise ValueError(
+            "the ideal gas needs the mass of the molecule, which constants alone do not have; give a molecule"
+        )
     t, rt = functions.temperature_k, GAS_CONSTANT * functions.temperature_k
     ln_q_vib, mean_vib, cv_vib = np.zeros((3, len(t)))
     if functions.vibrations is not None:

@@ -75,7 +75,7 @@ def choose_molecules(unit: str, request: GasRequest, allowed: float) -> Choice:
     if count > MOST_MOLECULES:
         raise ValueError(
             f"accuracy: {allowed:g} {unit}".rstrip()
-            + f" would need {count:.2g} molecules, more than the {MOST_MOLECULES:g} of a run; ask for less"
+            + f" would need {count:.2g} molecules, more than the {MOST_MOLECULES:g} of a run; choose a lower accuracy"
         )
     return Choice(replace(request, molecules=count), f"{count} molecules, at a confidence of {request.confidence:g}")
 
@@ -87,7 +87,7 @@ def _spread(request: GasRequest, allowed: float, unit: str) -> float:
         return scale * relative_spread(unit, degrees_of(request))
     if request.times_ps is None:
         raise ValueError(
-            f"accuracy: {allowed:g}: is of correlation functions; give observables.times, or a unit, K or %"
+            f"accuracy: {allowed:g}: an accuracy without a unit is one of correlation functions; give observables.times, or the unit K or %"
         )
     from rotor.thermodynamics.classical_gas import answer_gas
 

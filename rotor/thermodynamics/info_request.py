@@ -50,7 +50,7 @@ class InfoRequest:
         "conditions.temperature", common=True, example="10:300K:30",
     )  # fmt: skip
     conformers: int | None = declared(
-        None, Whole(1, MOST_CONFORMERS), "Of a SMILES: the different conformers among N that are tried, with their energies",
+        None, Whole(1, MOST_CONFORMERS), "For a SMILES: try N conformers, and list the different ones with their energies",
         "observables.conformers", panel=OBSERVABLES, common=True, example=20,
     )  # fmt: skip
     smiles: str = ""
@@ -59,7 +59,7 @@ class InfoRequest:
         check_fields(self)
         if self.conformers is not None and not self.smiles.startswith("SMILES:"):
             raise ValueError(
-                f"conformers: {self.smiles or 'constants'!r} is one geometry; conformers are made of a SMILES"
+                f"conformers: {self.smiles or 'constants'!r} is a single geometry; conformers need a SMILES"
             )
 
 

@@ -214,7 +214,7 @@ def refusal(temperature_k: float, error: float, at_worst: float = AT_WORST) -> s
     """The message for a sum that is refused because of its estimated relative error."""
     how_much = f"{error:.1e} of it" if error < 1 else "all of it"
     return (
-        f"Q({temperature_k:g} K): the levels that count lie beyond the reach of the distortion constants or of a sum "
+        f"Q({temperature_k:g} K): populated levels lie beyond the reach of the distortion constants or of the sum "
         f"(estimated error {how_much}, above {at_worst:g}); lower the temperature, or give Q"
     )
 

@@ -73,7 +73,7 @@ def weights_in_species(weights: SpinWeights, species: SpinWeights) -> SpinWeight
         return weights
     if weights.rule != species.rule:
         raise ValueError(
-            f"spin weights of a state by {weights.rule}, and of the molecule by {species.rule}: expected one rule"
+            f"spin weights of a state follow the rule {weights.rule}, those of the molecule {species.rule}: expected the same rule"
         )
     weight_of_class = dict(zip(species.classes, species.values, strict=True))
     whole = {

@@ -449,7 +449,7 @@ def table_barrier(rotation: BondRotation) -> tuple[TorsionalPotential, str]:
                 doubt = "" if barrier.safe else ", within a factor of about 2"
                 return TorsionalPotential({3: barrier.v3_cm * units.MHZ_PER_CM}), f"V3 of {barrier.molecule}{doubt}"
     raise ValueError(
-        "potential: the table has methyl groups alone, and none like that of this bond; give V_n or a scan (mmff, a calculator)"
+        "potential: the table only has methyl groups, and none like that of this bond; give V_n or a scan (mmff, a calculator)"
     )
 
 

@@ -133,7 +133,7 @@ def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
     assigned, fit_again = fit_problem(model, lines)
     fit = fit_again(assigned)
     if not fit.converged:
-        raise ValueError(f"{record.name}: the fit did not converge: {fit.reason}; the constants stay as they are")
+        raise ValueError(f"{record.name}: the fit did not converge: {fit.reason}; the constants are unchanged")
     rms, weighted = fit.rms_mhz(), fit.weighted_rms
     wrong = probably_wrong(fit, list(lines), fit_again)
     summary = FitSummary(

@@ -33,7 +33,7 @@ def search(spectrum: ObservedSpectrum, message: Mapping[str, Any], peaks: PeakLi
 def records_of(answer: Any, state: State) -> tuple[str, dict[str, Record | None], list[str]]:
     """Label, records and remarks from an answer of `rotor assign`; ValueError for an answer without species."""
     if not answer.species:
-        raise ValueError("rotor assign: no species stands above chance in this spectrum; nothing is assigned")
+        raise ValueError("rotor assign: no species is significant in this spectrum; nothing is assigned")
     changes: dict[str, Record | None] = {}
     remarks = []
     number, line_number, blend = state.free_number("species"), state.free_number("line"), free_blend(state)

@@ -135,7 +135,7 @@ def refitted_together(models: Mapping[int, Model], state: State) -> dict[int, Sp
     )
     fit = fit_of(lines)
     if not fit.converged:
-        raise ValueError(f"{names}: the fit did not converge: {fit.reason}; the constants stay as they are")
+        raise ValueError(f"{names}: the fit did not converge: {fit.reason}; the constants are unchanged")
     wrong = probably_wrong(fit, [number for part in parts for number in part.lines], fit_of)
     places = np.cumsum([0, *(len(part.free.names) for part in parts)]).tolist()
     return {

@@ -71,7 +71,7 @@ def _refuse_label(model: Model, upper: tuple[int, ...], lower: tuple[int, ...]) 
     names = model.quanta
     for side in (upper, lower):
         if len(side) != len(names):
-            raise ValueError(f"{' '.join(map(str, side))}: {len(names)} quantum numbers are needed: {', '.join(names)}")
+            raise ValueError(f"{' '.join(map(str, side))}: {len(names)} quantum numbers; expected {', '.join(names)}")
     if upper == lower:
         raise ValueError(f"{' '.join(map(str, upper))}: upper and lower level are the same; a line joins two levels")
     if not np.isfinite(model.calculated_mhz(np.array([upper]), np.array([lower]))[0]):

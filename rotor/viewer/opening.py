@@ -33,7 +33,7 @@ def open_spectrum(path: Path, reading: SpectrumFile | None = None) -> ObservedSp
     if first_bytes(path, 6) == b"\x93NUMPY":
         values = np.load(path, allow_pickle=False)
         if values.ndim != 2 or not {2, 3} & set(values.shape) or values.dtype.kind not in "fiu":
-            raise ValueError(f"{path}: an array of shape {values.shape}; two columns or rows of numbers are needed")
+            raise ValueError(f"{path}: an array of shape {values.shape}; expected two columns or rows of numbers")
         columns = values if values.shape[1] in (2, 3) else values.T
         noise = None if reading is None else reading.noise
         return observed_spectrum(columns[:, 0], columns[:, 1], noise=noise, source=path.name)
@@ -161,7 +161,7 @@ def _fill(service: Service, molecules: Sequence[str], lines: str | None, tempera
             note(text)
     if lines is not None:
         if not session.state.species:
-            raise ValueError(f"{lines}: lines need a molecule that they belong to; name it after the spectrum")
+            raise ValueError(f"{lines}: lines need a molecule; name it after the spectrum")
         chosen = service.predictions.stored(molecules[0]) if molecules else None
         first = next(n for n, species in session.state.species.items() if chosen in (None, species.source))
         for text in service.read_lines(lines, first):

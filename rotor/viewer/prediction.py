@@ -92,7 +92,7 @@ def with_assumed_dipole(top: Top) -> tuple[Top, str]:
         axes = {"linear": (1, 0, 0), "prolate": (1, 0, 0), "oblate": (0, 0, 1)}.get(top.kind, (1, 1, 1))
         dipole = tuple(ASSUMED_DEBYE * axis for axis in axes)
         return top.with_dipole(dipole, "assumed"), (
-            f"{top.name or 'the molecule'}: dipole not known, {ASSUMED_DEBYE:g} D along each axis assumed; set it beside the constants"
+            f"{top.name or 'the molecule'}: dipole not known, {ASSUMED_DEBYE:g} D along each axis assumed; enter it with the constants"
         )
 
 

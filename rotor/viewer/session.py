@@ -136,7 +136,7 @@ def read_session(path: Path) -> Session:
         content = msgspec.json.decode(path.read_bytes(), type=SessionFile)
     except msgspec.MsgspecError as error:
         raise ValueError(
-            f"{path}: not a session of rotor view: {error}; name another file with --session to begin a new one"
+            f"{path}: not a session of rotor view: {error}; name another file with --session to start a new session"
         ) from None
     if content.kind != KIND or content.schema != SCHEMA:
         raise ValueError(

@@ -105,7 +105,7 @@ def add_species(state: State, message: Message, context: Context) -> Change:
         context.notes.append(remark)
     if reached >= MOST_J:
         context.notes.append(
-            f"{record.name}: lines up to J = {MOST_J}; at {temperature:g} K weaker ones of higher J exist"
+            f"{record.name}: lines up to J = {MOST_J}; at {temperature:g} K there are weaker lines of higher J"
         )
     return f"add {record.name}", {species_key(number): record}
 

@@ -398,7 +398,7 @@ def test_a_j_max_too_small_is_refused_and_the_one_chosen_is_enough():
         (lambda: DipolePulse(1e9, 1.0), "check the unit"),
         (lambda: DipolePulse(1.0, 1.0, axis=(1, 1j, 0)), "real direction"),
         (lambda: elliptical(-1.0), "ratio"),
-        (lambda: align(OCS, GaussianPulse(1e12, 10.0), [0.0, 5.0]), "longer than the times"),
+        (lambda: align(OCS, GaussianPulse(1e12, 10.0), [0.0, 5.0]), "give later times, or a shorter pulse"),
         (lambda: align(OCS, [], [0.0, 5.0]), "no pulse"),
         (lambda: align(OCS, GaussianPulse(1e12, 1.0), [5.0, 4.0]), "rise"),
         (lambda: align(OCS, GaussianPulse(1e12, 1.0), [5.0], temperature_k=-3.0), "temperature"),

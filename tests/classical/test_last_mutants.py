@@ -35,7 +35,7 @@ def test_a_motion_that_speeds_up_without_bound_is_refused_early(monkeypatch):
     monkeypatch.setattr(lie_runge_kutta, "PLAIN_STEPS", 0)
     monkeypatch.setattr(lie_runge_kutta, "MOST_STEPS", 1e5)
     drag = LinearDrag([-1.0, -1.0, -1.0])
-    with pytest.raises(ValueError, match="more steps are needed: an effect feeds energy in without bound"):
+    with pytest.raises(ValueError, match="more steps are needed: an effect adds energy without bound"):
         integrate(lie_runge_kutta.LieRungeKutta(), [1.0, 2.0, 3.0], [0.3, 0.2, 1.0], [0.0, 1000.0], effects=[drag])
 
 

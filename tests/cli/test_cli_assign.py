@@ -131,7 +131,7 @@ def test_an_array_that_is_no_list_of_peaks_is_refused(call: Call, array: np.ndar
     np.save("peaks.npy", array)
     code, _, error = call("assign", "peaks.npy")
     assert code == 2
-    assert f"an array of shape {array.shape}; two or three columns or rows of numbers are needed" in error
+    assert f"an array of shape {array.shape}; expected two or three columns or rows of numbers" in error
 
 
 @pytest.mark.parametrize(

@@ -188,7 +188,7 @@ def test_wrong_input_is_one_line(call, folder, arguments, said):
 def test_frequencies_of_a_geometry_are_noted(call):
     """Methanol of the g2 set, 2 % off; not carbon monoxide, which was measured."""
     noted = call("emission", "CH3OH", "--range", "90:100GHz", "--excitation", "50")[2]
-    assert "constants follow from a geometry good to 2 %, frequencies have this error" in noted
+    assert "constants are from a geometry with an error of 2 %, frequencies have this error" in noted
     assert call("emission", "CO", "--band", "ALMA3")[2] == ""
 
 

@@ -271,7 +271,7 @@ def test_a_tensor_in_two_forms_is_refused(call):
     Path("m.toml").write_text(NITRILE.replace("g = -0.01", "g = -0.01\ng_perpendicular = -0.01"))
     code, _, err = call("zeeman", "m.toml", "--field", "1 T", "--states", "J<=1")
     assert code == 2
-    assert "g_perpendicular beside g: give the tensor in one of its forms" in err
+    assert "g_perpendicular beside g: give the tensor in a single form" in err
 
 
 def test_zeeman_writes_what_the_library_computes(call):

@@ -134,7 +134,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
         (("empty.csv", "--constants", "B=57000 MHz", "--free", "B"), "no lines in it"),
         (("co.csv", "--constants", "A=6 B=5 C=4 GHz", "--free", "B"), "no column ka_upper"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--out", "no/folder"), "there is no folder"),
-        (("zero.csv", "--constants", "B=57000 MHz", "--free", "B"), "or one for all of them (--default-error)"),
+        (("zero.csv", "--constants", "B=57000 MHz", "--free", "B"), "or a common error (--default-error)"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,Q"), "--free: 'Q' is not a rotational constant"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,mu_q"), "--free: 'mu_q' is not a rotational constant"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,mu_q"), "mu_a, mu_b, mu_c (lines in a field)"),
@@ -394,7 +394,7 @@ def test_methods_that_cannot_be_are_refused(call, folder):
     assert "--method: 'rx'" in call("structure", "ocs.toml", "--method", "rx")[2]
     code, _, err = call("structure", "ocs.toml", "--method", "rs", "--check")
     assert code == 2
-    assert "--check: goes with r0, rm1, rm2 or re" in err
+    assert "--check: needs r0, rm1, rm2 or re" in err
     assert "no constant has a correction" in call("structure", "ocs.toml", "--method", "re")[2]
     assert "a family of isotopologues is a .toml file" in call("structure", "ocs.xyz")[2]
 

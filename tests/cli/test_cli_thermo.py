@@ -174,7 +174,7 @@ def test_wrong_input_is_one_line(call, folder, arguments, said):
 def test_beyond_the_reach_of_the_constants_there_is_no_answer(call, folder):
     code, out, err = call("thermo", "water", "--temperature", "300,5000", "--csv", "w.csv")
     assert code == 1
-    assert err.startswith("error: Q(5000 K): the levels that count lie beyond the reach of the distortion constants")
+    assert err.startswith("error: Q(5000 K): populated levels lie beyond the reach of the distortion constants")
     assert err.endswith("; lower the temperature, or give Q; of those asked for the sum can be had up to 300 K\n")
     assert (out, err.count("\n"), list(folder.iterdir())) == ("", 1, [])
 
@@ -185,7 +185,7 @@ def test_a_temperature_far_too_high_is_refused_soon(call, folder):
     code, out, err = call("thermo", "water", "--temperature", "1e6")
     assert time.perf_counter() - start < 20  # 1 s
     assert code == 1
-    assert err.startswith("error: Q(1e+06 K): the levels that count lie beyond the reach")
+    assert err.startswith("error: Q(1e+06 K): populated levels lie beyond the reach")
     assert (out, err.count("\n")) == ("", 1)
 
 

@@ -64,7 +64,7 @@ def test_a_scene_says_the_same(call):
     [
         (("C2H6",), "error: --bond: none is named; give two atom numbers, such as 1-2"),
         (("C2H6", "--bond", "3-6"), "error: --bond: atoms 3 (H) and 6 (H) are not bonded"),
-        (("C2H6", "--bond", "1-3"), "error: --bond: atoms 1 (C) and 3 (H): atom 3 (H) is bonded to no further atom"),
+        (("C2H6", "--bond", "1-3"), "error: --bond: atoms 1 (C) and 3 (H): atom 3 (H) is bonded to no other atom"),
         (("SMILES:C1CC1", "--bond", "1-2"), "error: --bond: atoms 1 (C) and 2 (C): the bond is part of a ring"),
         (("C2H6", "--bond", "1-2", "--potential", "V2=3"), "error: --potential: V2: the bond has 3 equal positions in a turn"),
         (("C2H6", "--bond", "1-2", "--potential", "nothing"), "error: --potential: calculator 'nothing' is unknown to ASE"),

@@ -168,7 +168,7 @@ def test_mopac_with_internal_coordinates(tmp_path, ending):
     path = tmp_path / "a.out"
     path.write_text(text.replace(" == MOPAC DONE ==", ending))
     if not ending:
-        with pytest.raises(ValueError, match="does not say here that it ended well"):
+        with pytest.raises(ValueError, match="does not report a normal end here"):
             read_output(path)
         return
     molecule = read_output(path)
@@ -184,7 +184,7 @@ def test_molpro_of_2012_and_of_2018(tmp_path, ending):
     path = tmp_path / "a.out"
     path.write_text(text.replace("Variable memory released", ending))
     if ending == "ERROR EXIT":
-        with pytest.raises(ValueError, match="does not say here that it ended well"):
+        with pytest.raises(ValueError, match="does not report a normal end here"):
             read_output(path)
         return
     molecule = read_output(path)

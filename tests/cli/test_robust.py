@@ -86,7 +86,7 @@ def test_a_gzip_bomb_is_read_with_a_bound(call, name):
 def test_a_link_in_a_circle_is_refused(call):
     os.symlink("x.csv", "x.csv")
     code, _, err = call("spectrum", "CO", "--csv", "x.csv")
-    assert (code, "--csv x.csv: is a link that leads back to itself" in err) == (2, True)
+    assert (code, "--csv x.csv: is a link that points to itself" in err) == (2, True)
 
 
 @pytest.mark.parametrize("verb", ["fit", "cat", "fluid", "structure", "convert"])

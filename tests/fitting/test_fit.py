@@ -216,7 +216,7 @@ def test_lines_without_an_error_are_left_out_openly_or_given_one():
     assert sum("its error is 0" in text for text in fit.notes) == 2
     assert fit_lines(subset, TRUE, parameters(TRUE, ["A", "B", "C"]), FitOptions(default_error_mhz=0.01)).used.all()
     none = assignments(ASYMMETRIC, lines.upper, lines.lower, lines.frequency_mhz, 0.0)
-    with pytest.raises(ValueError, match="every line has an error of 0"):
+    with pytest.raises(ValueError, match="all lines have an error of 0"):
         fit_lines(none, TRUE, parameters(TRUE, ["A"]))
 
 
@@ -275,7 +275,10 @@ def test_a_blend_of_known_width_weighs_how_far_its_components_lie_apart(tmp_path
         fit.residuals.tolist()
     )
     text = (tmp_path / "blend.csv").read_text(encoding="utf-8")
-    for old, new, words in (("3,40.0\n", "7,40.0\n", "that of a blend"), ("3,40.0\n", "3,41.0\n", "another width_mhz")):
+    for old, new, words in (
+        ("3,40.0\n", "7,40.0\n", "belongs to a blend"),
+        ("3,40.0\n", "3,41.0\n", "another width_mhz"),
+    ):
         (tmp_path / "blend.csv").write_text(text.replace(old, new, 1), encoding="utf-8")
         with pytest.raises(ValueError, match=words):
             read_assigned_lines(tmp_path / "blend.csv", ASYMMETRIC)
@@ -355,7 +358,7 @@ def test_impossible_numbers_are_refused(change, message):
         (["A"], {"ties": ["A = 2*B"]}, "A must not be free, and B must be"),
         (["A"], {"ties": ["B about A"]}, "write 'X = 2.5"),
         (["A"], {"priors_mhz": {"B": 1.0}}, "which is not free"),
-        (["A"], {"priors_mhz": {"A": 0.0}}, "a standard error is above 0"),
+        (["A"], {"priors_mhz": {"A": 0.0}}, "expected a standard error above 0"),
     ],
 )
 def test_impossible_parameters_are_refused(free, keywords, message):

@@ -339,7 +339,7 @@ def test_lengths_beside_bonds_do_not_lie_on_atoms():
 
 
 @pytest.mark.parametrize(
-    ("sign", "words"), [(";", "its columns are parted by ';'; commas are needed"), ("\t", "parted by '\\\\t'")]
+    ("sign", "words"), [(";", "its columns are separated by ';'; expected commas"), ("\t", "separated by '\\\\t'")]
 )
 def test_a_table_with_other_signs_between_its_columns_is_named(call, folder, seen, sign, words):
     write_csv(folder / "x.csv", seen)

@@ -80,7 +80,7 @@ def test_atoms_that_do_not_match_are_named() -> None:
     with pytest.raises(ValueError, match=r"molecule 1 \(atoms 3 to 4\) is O-H; the models are spce"):
         assemble(atoms, models)
     atoms.set_array("molecule", np.array([0, 0, 1, 1, 1, 0]))
-    with pytest.raises(ValueError, match="do not stand together"):
+    with pytest.raises(ValueError, match="are not consecutive"):
         assemble(atoms, models)
     with pytest.raises(ValueError, match="have the same atoms: spce"):
         assemble(atoms, models_of(["spce", "tip3p"]))

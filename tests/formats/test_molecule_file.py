@@ -146,7 +146,7 @@ def test_library_survives_writing_and_reading(path: Path, tmp_path: Path):
 
 def test_levels_are_written_beside_and_never_lost(tmp_path: Path):
     water = read_molecule_file(next(path for path in LIBRARY if path.stem == "H2O"))
-    with pytest.raises(ValueError, match="level energies stand in a file of their own"):
+    with pytest.raises(ValueError, match="level energies need a separate file"):
         molecule_file_text(water)
     write_molecule_file(water, tmp_path / "w.toml")
     assert {path.name for path in tmp_path.iterdir()} == {"w.toml", "w_levels.csv"}

@@ -142,7 +142,7 @@ def test_pieces_of_another_list_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"pieces of another list \(temperature_k was 300\.0, is 100\.0\)"):
         stream_lines(PROPANEDIOL, path, jmax=15, q=1e5, piece_lines=1000, temperature_k=100.0)
     (tmp_path / "a.parquet.pieces" / "manifest.json").write_text("{}")
-    with pytest.raises(ValueError, match="no manifest of pieces"):
+    with pytest.raises(ValueError, match="not a manifest of pieces"):
         stream_lines(PROPANEDIOL, path, jmax=15, q=1e5, piece_lines=1000)
 
 

@@ -87,10 +87,10 @@ def test_several_tops(tmp_path, ntop):
         (" F0 ", " XX ", "F0 missing"),
         ("reduc 1", "reduc 2", "reduc 2"),
         ("ntop 1", "ntop 4", "4 tops"),
-        ("\\F(1) ", " epsil 0.3\n\\F(1) ", "not in the plane"),
+        ("\\F(1) ", " epsil 0.3\n\\F(1) ", "not in the ab plane"),
         ("\\F(1) ", " Dpi2J 1E-6\n\\F(1) ", "Dpi2J.*which no term here does"),
         ("\\F(1) ", " chi_z 1E-3\n\\F(1) ", "chi_aa beside spin 0: expected spin 2"),
-        ("reduc 1", "reduc 1\nspin 2\nspin2 2", "spin2 2: read is one nucleus"),
+        ("reduc 1", "reduc 1\nspin 2\nspin2 2", "spin2 2: rotor reads a single nucleus"),
         ("\\F(1) ", " C+ 1E-6\n\\F(1) ", r"C\+: such terms"),
     ],
 )

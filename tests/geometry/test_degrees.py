@@ -89,7 +89,7 @@ def test_no_degree_has_no_temperature():
     [
         ([WATER], 4, "4 totals removed"),
         ([WATER], -1, "-1 totals removed"),
-        ([[0.0, 0.0, 1.0]], 0, "one moment above 0"),
+        ([[0.0, 0.0, 1.0]], 0, "a single moment above 0"),
         ([[-1.0, 1.0, 1.0]], 0, "not negative"),
         ([[math.nan] * 3], 0, "finite"),
         (WATER, 0, "have shape"),
@@ -101,7 +101,7 @@ def test_wrong_input(moments, removed, said):
 
 
 def test_wrong_counts_of_atoms():
-    with pytest.raises(ValueError, match="two atoms are always in a line"):
+    with pytest.raises(ValueError, match="two atoms are always linear"):
         vibrational_degrees(2, False)
     with pytest.raises(ValueError, match="leave -1 degrees"):
         atomic_degrees(1, 1, 3)

@@ -213,7 +213,7 @@ def test_tblite_takes_a_smiles_to_distortion_constants(capfd):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [(["water", "--calculator", "EMT"], "--calculator: calculator 'EMT'"), (["--constants", "B=1", "--calculator", "x"], "no geometry"),
-     (["water", "--conformers", "5"], "made of a SMILES"), (["SMILES:CC", "--conformers", "0"], "--conformers: 0")],
+     (["water", "--conformers", "5"], "conformers need a SMILES"), (["SMILES:CC", "--conformers", "0"], "--conformers: 0")],
 )  # fmt: skip
 def test_mistakes_with_calculators_and_conformers(capsys, arguments, words):
     from rotor.cli import run

@@ -126,7 +126,7 @@ def test_dummies_and_a_polarizability_of_cfour(tmp_path):
     )
     molecule = read_molecule(path)
     assert (molecule.formula, molecule.charge) == ("H2O+", 1)
-    assert "CFOUR's polarizability was not taken" in molecule.notes[0]
+    assert "CFOUR's polarizability was not read" in molecule.notes[0]
     assert molecule.dipole_debye is not None
 
 

@@ -303,7 +303,7 @@ def test_bad_input_is_told(kinds, mass, positions, message):
 
 @pytest.mark.parametrize("tolerance", [0, -1, 0.3, float("nan")])
 def test_bad_tolerances_are_told(tolerance):
-    with pytest.raises(ValueError, match="part of the shortest distance"):
+    with pytest.raises(ValueError, match="fraction of the shortest distance"):
         find_symmetry("HH", [1, 1], [[0, 0, 0], [0, 0, 0.74]], tolerance)
 
 

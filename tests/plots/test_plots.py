@@ -145,7 +145,7 @@ def test_axes_are_refused_for_a_picture_of_several_panels():
     from matplotlib.figure import Figure
 
     answer = rotor.api.answer_stark(rotor.api.StarkRequest(rotor.read("OCS"), (0.0, 10.0)))
-    with pytest.raises(ValueError, match=r"ax: the picture of a StarkAnswer is a figure of its own"):
+    with pytest.raises(ValueError, match=r"ax: the picture of a StarkAnswer needs a figure of its own"):
         rotor.plot(answer, ax=Figure().subplots())
 
 

@@ -270,7 +270,7 @@ def test_energies_that_follow_the_law_too_well_have_an_answer():
         ({"moments": [[1, 1, 1]], "momenta": np.zeros((4, 2, 3))}, r"momenta of shape \(4, 2, 3\) for 1 bodies"),
         (
             {"masses": [1], "velocities": np.zeros((1, 3)), "momentum_removed": True},
-            "one body whose momentum is removed",
+            "a single body without total momentum",
         ),
     ],
 )

@@ -363,7 +363,7 @@ def test_errors_weigh_and_hold_and_leave_out():
     [
         ([], "a family without isotopologues"),
         ([("x", "C=13C", {"B": 1.0}, {})], "the first isotopologue is the parent"),
-        ([("x", "", {"D": 1.0}, {})], "D; one or more of A, B, C"),
+        ([("x", "", {"D": 1.0}, {})], "D; expected at least one of A, B, C"),
         ([("x", "", {"B": -1.0}, {})], "a rotational constant is above 0"),
         ([("x", "", {"B": 1.0}, {"A": 1.0})], "error of A, but no such constant"),
         (

@@ -65,7 +65,7 @@ def test_a_table_of_q_sums_once_where_one_temperature_is_out_of_reach(monkeypatc
     top = of(CUT_SHORT)
     rows = partition_table(top, [0.5, 30.0, 1.0])
     assert [row["q"] is None for row in rows] == [False, True, False]
-    assert rows[1]["source"].startswith("Q(30 K): the levels that count lie beyond the reach")
+    assert rows[1]["source"].startswith("Q(30 K): populated levels lie beyond the reach")
     assert rows[1]["jmax"] is rows[1]["relative_error"] is None
     assert rows[1]["classical"] > 1000
     alone = partition_functions(top, [0.5, 1.0])

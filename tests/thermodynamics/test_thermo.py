@@ -79,7 +79,7 @@ def test_levels_that_distortion_does_not_serve_are_counted_with_their_error():
     # what the series leaves out of trusted levels (DeltaK K⁴ is 9 % of A K² at Ka = 9) is no part of the error
     assert partition.q == pytest.approx(better.q, rel=partition.relative_error + 0.02)
     assert f"relative error about {partition.relative_error:.0e}" in partition.source
-    with pytest.raises(ValueError, match=r"Q\(10000 K\): the levels that count lie beyond the reach"):
+    with pytest.raises(ValueError, match=r"Q\(10000 K\): populated levels lie beyond the reach"):
         partition_function(Top(QUARTIC_WATER), [300.0, 10_000.0])
 
 

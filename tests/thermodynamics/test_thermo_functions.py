@@ -363,7 +363,7 @@ def test_distortion_beyond_its_reach():
     top = rotor.read("water")
     functions = thermodynamic_functions(top, [300.0, 1000.0, 1200.0])
     assert functions.relative_error[0] < 1e-5 < functions.relative_error[1] < functions.relative_error[2] < 0.1
-    with pytest.raises(ValueError, match=r"Q\(5000 K\): the levels that count lie .* can be had up to 300 K"):
+    with pytest.raises(ValueError, match=r"Q\(5000 K\): populated levels lie .* can be had up to 300 K"):
         thermodynamic_functions(top, [300.0, 5000.0])
     with pytest.raises(ValueError, match="beyond the reach of the distortion constants"):
         level_sums(top, [top.spin_weights], [1200.0], 1e-8, at_worst=1e-8)

@@ -86,7 +86,7 @@ def test_steiner_and_turning():
 @pytest.mark.parametrize(
     ("tensor", "words"),
     [
-        (np.diag([1.0, 1.0, 3.0]), "belong to no body"),
+        (np.diag([1.0, 1.0, 3.0]), "are impossible"),
         (np.array([[1.0, 2, 0], [0, 1, 0], [0, 0, 1]]), "symmetric"),
         (np.full((3, 3), np.nan), "finite"),
     ],

@@ -408,7 +408,7 @@ def test_an_exported_page_has_everything_inside(service, tmp_path):
         ({"do": "window", "first_mhz": 2, "last_mhz": 1, "pixels": 9}, "expected a range that rises"),
         ({"do": "assign", "frequency_mhz": -1}, "expected a number above 0"),
         ({"do": "assign", "frequency_mhz": 9e3, "to": [{"species": 9}]}, "species: 9: expected one of 1"),
-        ({"do": "assign", "frequency_mhz": 9e3, "to": [{"species": 1, "upper": [1], "lower": [0]}]}, "3 quantum numbers are needed"),
+        ({"do": "assign", "frequency_mhz": 9e3, "to": [{"species": 1, "upper": [1], "lower": [0]}]}, "3 quantum numbers; expected"),
         ({"do": "assign", "frequency_mhz": 9e3, "to": [{"species": 1, "upper": [1, 1, 1], "lower": [1, 1, 1]}]}, "are the same"),
         ({"do": "assign", "frequency_mhz": 9e3, "to": [{"species": 1, "upper": [1, 5, 1], "lower": [1, 1, 1]}]}, "there is no such level"),
         ({"do": "remove", "lines": [99]}, "there is no line 99"),

@@ -70,7 +70,7 @@ class InducedDipole(Torque):
         matrix = np.diag(array) if array.shape == (3,) else array
         if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)) or not np.array_equal(matrix, matrix.T):
             raise ValueError(
-                f"a polarizability is 3 numbers or a symmetric finite 3x3 matrix; got {np.asarray(array).tolist()}; "
+                f"a polarizability: expected 3 numbers or a symmetric, finite 3x3 matrix; got {np.asarray(array).tolist()}; "
                 "for a nearly symmetric one give (α + αᵀ)/2"
             )
         matrix.setflags(write=False)

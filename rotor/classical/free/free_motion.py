@@ -129,7 +129,7 @@ def _rows(moments: Floats, momentum: Floats) -> Rows:
     )
     if not np.all(np.abs(rates) < 1e300):
         raise ValueError(
-            "a body turns faster than double precision can express; choose units in which |L|/I is moderate"
+            "a body rotates faster than double precision can represent; choose units in which |L|/I is moderate"
         )
     series = both.series.copy()
     series[:, :3] *= unit_m[:, None]

@@ -110,5 +110,5 @@ def even_levels(moments: ArrayLike, per_side: int) -> Floats:
 def _massive(moments: ArrayLike) -> Floats:
     moments = checked_moments(moments)
     if moments.shape != (3,) or np.any(moments == 0.0):
-        raise ValueError(f"polhodes are those of one body of three moments above zero; got {moments.tolist()}")
+        raise ValueError(f"polhodes: expected a single body with three moments above zero; got {moments.tolist()}")
     return moments

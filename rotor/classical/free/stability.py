@@ -102,7 +102,7 @@ def precession_rates(moments: ArrayLike, momentum: ArrayLike) -> tuple[Floats, F
     """
     moments, momentum = _massive(moments), np.asarray(momentum, dtype=np.float64)
     if np.any(moments[..., 0] != moments[..., 1]):
-        raise ValueError(f"precession rates are those of a symmetric top, moments (I, I, I3); got {moments.tolist()}")
+        raise ValueError(f"precession rates: expected a symmetric top, moments (I, I, I3); got {moments.tolist()}")
     equal, unique = moments[..., 0], moments[..., 2]
     body = (unique / equal - 1.0) * momentum[..., 2] / unique
     return np.asarray(body), np.asarray(np.linalg.norm(momentum, axis=-1) / equal)

@@ -84,7 +84,7 @@ def propagate(
     if momentum.ndim != 2:
         raise ValueError(f"the momenta of many tops have shape (n, 3); got {momentum.shape}")
     if steps < 0:
-        raise ValueError(f"the number of steps is not negative; got {steps} (to go back, give a negative step)")
+        raise ValueError(f"number of steps: expected 0 or more; got {steps} (a negative step goes back in time)")
     n = len(momentum)
     attitude = np.ascontiguousarray(np.broadcast_to(normalised(attitude), (n, 4)))
     rates, axes = (np.ascontiguousarray(np.broadcast_to(a, (n, a.shape[-1]))) for a in rates_and_axes(moments))

@@ -96,9 +96,7 @@ def propagate_driven(
         _check_turns(2.0 * widest, step, WIDEST_TURN)
         out[0][members], out[1][members] = part
     if not np.isfinite(out[0]).all():
-        raise ValueError(
-            "the motion did not stay finite: the step is too long, or an effect feeds energy in without bound"
-        )
+        raise ValueError("the motion diverged: the step is too long, or an effect adds energy without bound")
     return out
 
 
@@ -107,8 +105,8 @@ def _served(system: System) -> SystemForm:
     form = system.compiled
     if form is None or system.inner or system.needs_velocity:
         raise ValueError(
-            "very many bodies at once serve torques of attitude and time that have a compiled form: fields, gravity, constant "
-            "torques, drives; drag, inner momenta and functions of yours need integrate(...)"
+            "many bodies at once need torques of attitude and time with a compiled form: fields, gravity, constant "
+            "torques, drives; drag, inner momenta and Python functions need integrate(...)"
         )
     return form
 

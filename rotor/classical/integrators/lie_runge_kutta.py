@@ -34,7 +34,7 @@ _TOO_SHORT = (
 
 
 _TOO_LONG = (
-    "at time {time:g} about {steps:.0e} more steps are needed: an effect feeds energy in without bound, or the time is too long; "
+    "at time {time:g} about {steps:.0e} more steps are needed: an effect adds energy without bound, or the time is too long; "
     "end the motion earlier, or loosen the tolerance"
 )
 

@@ -155,7 +155,7 @@ class KickDrift(Method):
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.step) and self.step > 0.0):
-            raise ValueError(f"a step is a positive time; got {self.step!r} (to go back, give times that decrease)")
+            raise ValueError(f"step: expected a positive time; got {self.step!r} (decreasing times go back)")
 
     @property
     @abstractmethod
@@ -329,7 +329,7 @@ def _omega_and_energy(system: System, times: Floats, momentum: Floats, attitude:
 def _checked_times(times: ArrayLike) -> Floats:
     array = np.asarray(times, dtype=np.float64)
     if array.ndim != 1 or array.size < 1 or not np.all(np.isfinite(array)):
-        raise ValueError(f"times are a list of finite numbers, the first of them that of the start; got {times!r}")
+        raise ValueError(f"times: expected a list of finite numbers that begins with the start; got {times!r}")
     steps = np.diff(array)
     if not (np.all(steps > 0.0) or np.all(steps < 0.0)):
         raise ValueError("times must all increase, or all decrease, without repetition")

@@ -237,11 +237,11 @@ def _edges(atoms: Any, cutoff_angstrom: float) -> Floats:
     edges = np.diag(cell)
     if not (np.all(atoms.pbc) and np.allclose(cell, np.diag(edges)) and np.all(edges > 0)):
         raise ValueError(
-            "the engines take a rectangular cell that is periodic in all directions; give the box such a one"
+            "the engines need a rectangular cell that is periodic in all directions; give the box such a cell"
         )
     if 2 * cutoff_angstrom > edges.min():
         raise ValueError(
-            f"a cutoff of {cutoff_angstrom:g} Å in a cell of {edges.min():g} Å: at most half of it will do"
+            f"a cutoff of {cutoff_angstrom:g} Å in a cell of {edges.min():g} Å: expected at most half of the cell"
         )
     return edges
 

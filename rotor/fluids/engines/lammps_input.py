@@ -155,7 +155,7 @@ def ensemble_commands(engine_input: EngineInput, settings: Settings) -> list[str
     if settings.ensemble == "nose-hoover":
         raise ValueError(
             "nose-hoover: LAMMPS' chains for rigid bodies hold translations and rotations apart and count the total momentum, "
-            "which stays at 0: translations would be too warm by N/(N - 1); take langevin, or OpenMM"
+            "which stays at 0: translations would be too warm by N/(N - 1); use langevin, or OpenMM"
         )
     single, bodies = engine_input.sites_of_kinds == 1, engine_input.sites_of_kinds > 1
     bath = f"{settings.temperature_k:.17g} {settings.temperature_k:.17g} {1 / settings.friction_per_ps:.17g}"

@@ -131,7 +131,7 @@ def _by_label(symbols: list[str], labels: Integers, models: tuple[RigidModel, ..
     """Kinds of the runs of equal labels."""
     bounds = np.concatenate(([0], np.flatnonzero(np.diff(labels)) + 1, [len(labels)]))
     if len(bounds) - 1 != len(np.unique(labels)):
-        raise ValueError('atoms of one molecule (array "molecule") do not stand together; sort the box by molecule')
+        raise ValueError('atoms of one molecule (array "molecule") are not consecutive; sort the box by molecule')
     kind_of_symbols = {model.symbols: kind for kind, model in enumerate(models)}
     kinds = []
     for start, end in pairwise(bounds):

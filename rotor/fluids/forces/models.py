@@ -55,7 +55,7 @@ class RigidModel:
             raise ValueError(f"model {self.name}: real atoms stand first, and there is at least one")
         if abs(sum(site.charge_e for site in self.sites)) > 1e-9:
             raise ValueError(
-                f"model {self.name}: the charges add to {sum(s.charge_e for s in self.sites):g} e, not to 0"
+                f"model {self.name}: the charges add up to {sum(s.charge_e for s in self.sites):g} e, not to 0"
             )
 
     @property

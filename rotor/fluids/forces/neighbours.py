@@ -58,7 +58,7 @@ class Neighbours:
         shortest, widest = repeated.min(), 2 * self.assembly.reach_angstrom.max()
         if self.cutoff_angstrom > 0.5 * shortest * (1 + 1e-12):
             raise ValueError(
-                f"cutoff {self.cutoff_angstrom:g} Å is more than half the smallest edge of the cell, {shortest:g} Å: "
+                f"cutoff {self.cutoff_angstrom:g} Å is more than half of the smallest edge of the cell, {shortest:g} Å: "
                 f"at most {0.5 * shortest:g} Å, or a larger box"
             )
         if self.cutoff_angstrom + widest >= shortest or self.within_angstrom.max() + self.skin_angstrom > 2 * shortest:
@@ -125,8 +125,8 @@ class Neighbours:
             self.starts = self.starts[:0]  # a repeated call must fail again
             raise ValueError(
                 f"atoms {closest[1]} and {closest[2]} of different molecules are {closest[0]:.3g} Å apart; molecules "
-                f"on top of each other (nearer than {CLOSEST_ANGSTROM} Å) have no sensible energy: move one of them, or, if "
-                "they were apart before, take a shorter step"
+                f"on top of each other (nearer than {CLOSEST_ANGSTROM} Å) have no meaningful energy: move one of them, or, if "
+                "they were apart before, use a shorter step"
             )
 
     def closest(self, within_angstrom: float) -> tuple[float, int, int] | None:

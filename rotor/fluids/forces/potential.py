@@ -125,7 +125,9 @@ class RigidPotential(Calculator):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} = {getattr(self, name)}: expected a number above 0")
         if self.electrostatics not in ELECTROSTATICS:
-            raise ValueError(f"{self.electrostatics!r}: charges are treated by one of {', '.join(ELECTROSTATICS)}")
+            raise ValueError(
+                f"{self.electrostatics!r}: expected a treatment of charges, one of {', '.join(ELECTROSTATICS)}"
+            )
         if math.isinf(self.cutoff_angstrom) and self.electrostatics != "reaction-field":
             raise ValueError("a cutoff of inf is for open boxes with the reaction field (which is then none)")
         if not 0 <= self.switch_width_angstrom < self.cutoff_angstrom:
@@ -368,5 +370,5 @@ def right_angled(atoms: Any) -> Floats:
             f"angles of the cell are {np.round(atoms.cell.angles(), 4).tolist()} degrees; expected right angles along x, y, z"
         )
     if any(repeat and not edge > 0 for repeat, edge in zip(repeats, edges, strict=True)):
-        raise ValueError(f"edges of the cell are {edges} Å; directions that repeat (pbc) need one above 0")
+        raise ValueError(f"edges of the cell are {edges} Å; periodic directions (pbc) need an edge above 0")
     return np.array([edge if repeat else 0.0 for repeat, edge in zip(repeats, edges, strict=True)])

@@ -317,7 +317,9 @@ def _principal(masses: Floats, places: Floats) -> _Shape:
     centred = places - body.centre
     if heavy.sum() == 1:
         if np.abs(centred).max() > 0.0:
-            raise ValueError("a molecule with one mass and sites off it has no moments of inertia: give them mass")
+            raise ValueError(
+                "a molecule with a single massive site and massless sites elsewhere has no moments of inertia: give these sites a mass"
+            )
         return _Shape(centred, np.zeros(3), masses)
     frame = inertia.principal_frame(body)
     sites, moments = centred @ frame.axes.T, frame.moments

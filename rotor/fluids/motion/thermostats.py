@@ -184,7 +184,7 @@ class NoseHoover(Thermostat):
         self._bodies = bodies
         counts = (degrees.translation, degrees.rotation) if self.separate else (degrees.total,)
         if min(counts) < 1:
-            raise ValueError(f"a chain on {min(counts)} degrees of freedom has nothing to hold at a temperature")
+            raise ValueError(f"a chain on {min(counts)} degrees of freedom has nothing to thermostat")
         self._chains = [_Chain(count, self.kt, self.relaxation, self.links) for count in counts]
 
     def act(self, state: State, time: float) -> None:

@@ -229,7 +229,7 @@ def connect(path: Path, *, read_only: bool = False) -> DuckDBPyConnection:
     if version is None or int(version) != VERSION:
         engine.close()
         raise ValueError(
-            f"{path}: a catalogue of version {version}; this release reads version {VERSION}: build it anew"
+            f"{path}: a catalogue of version {version}; this release reads version {VERSION}: build the catalogue again"
         )
     return engine
 

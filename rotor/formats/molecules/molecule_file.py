@@ -257,7 +257,7 @@ def parse_molecule_file(
     refuse_unknown_keys(content, ("name", "names", *_TABLES), where)
     tables = {name: TableReader(where, name, content[name]) for name in _TABLES if name in content}
     if not {"geometry", "constants"} & tables.keys():
-        raise ValueError(f"{where}: neither [constants] nor [geometry]: one of them, or both, make a molecule file")
+        raise ValueError(f"{where}: neither [constants] nor [geometry]: a molecule file needs one of them, or both")
 
     sources = {name: table.text("source") for name, table in tables.items() if "source" in table.content}
     unverified: frozenset[str] = frozenset().union(*(unverified_in(name, table) for name, table in tables.items()))

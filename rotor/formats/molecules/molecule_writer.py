@@ -60,9 +60,7 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
     }
     if molecule.levels is not None:
         if not levels_file:
-            raise ValueError(
-                f"{molecule.name}: level energies stand in a file of their own; name it, or leave them out"
-            )
+            raise ValueError(f"{molecule.name}: level energies need a separate file; name it, or leave them out")
         tables["levels"] = {"file": levels_file}
     parts = ["\n".join(_lines(head))]
     for name, table in tables.items():

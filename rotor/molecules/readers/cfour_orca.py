@@ -60,7 +60,7 @@ def read_plain(output: Output) -> Read:
 def unread(output: Output) -> tuple[str, ...]:
     """Notes on data in such an output that are not read."""
     if output.program.name == "CFOUR" and any("polarizabilit" in line.lower() for line in output.lines):
-        return (f"{output.where}: CFOUR's polarizability was not taken: how it is printed is not known here",)
+        return (f"{output.where}: CFOUR's polarizability was not read: rotor does not know its printed form",)
     return ()
 
 

@@ -34,7 +34,7 @@ def with_field_gradients(molecule: Molecule, output: Output) -> Molecule:
         return molecule
     geometry = tables(output)[-1][0]
     if last < geometry:
-        note = f"{output.where}: the field gradients of line {last + 1} belong to another geometry than the last one: left out"
+        note = f"{output.where}: the field gradients of line {last + 1} belong to a geometry before the last one and are left out"
         return replace(molecule, notes=(*molecule.notes, note))
     gradients = _gradients(output, geometry, molecule)
     couplings = {**molecule.quadrupole_mhz, **couplings_mhz(gradients, molecule.nuclei)}

@@ -99,9 +99,7 @@ def refuse_cut(output: Output) -> None:
     ]
     if not endings or starts[-1] > endings[-1]:
         last = max((i for i, line in enumerate(output.lines) if line.strip()), default=0)
-        rule = (
-            f"the file ends without {output.program.ending!r}, so that it was cut or the run failed; give a whole one"
-        )
+        rule = f"the file ends without {output.program.ending!r}, because it was cut or the run failed; give a complete file"
         raise output.refuse(last, rule)
 
 

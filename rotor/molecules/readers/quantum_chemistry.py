@@ -201,10 +201,8 @@ def _read_other(text: str, where: str) -> Molecule:
     ended_well = any(words in text for words in OTHER_ENDINGS.get(program, ()))
     if not data.metadata.get("success", False) and not ended_well:
         last = len(text.rstrip().splitlines())
-        raise ValueError(f"{where}: line {last}: {program} does not say here that it ended well; give a whole output")
-    note = (
-        f"{where}: dipole and polarizability were not taken, since the axes of {program}'s tensors are not known here"
-    )
+        raise ValueError(f"{where}: line {last}: {program} does not report a normal end here; give a complete output")
+    note = f"{where}: dipole and polarizability were not read, because the axes of {program}'s tensors are not known"
     molecule = _geometry(data, where, f"{program}, read with cclib")
     return (
         replace(molecule, notes=(note,)) if hasattr(data, "moments") or hasattr(data, "polarizabilities") else molecule
@@ -340,12 +338,12 @@ def _disagreement(molecule: Molecule, data: Any, output: Output) -> tuple[str, .
         _apart(printed, _constants_mhz(masses, molecule.positions_angstrom)) for masses in _other_masses(molecule, data)
     ]
     if min(others) < max(CONSTANTS_AGREE, digits):
-        used = f"they agree with the masses that {output.program.name} used, which are not those of the isotopes"
+        used = f"they agree with the masses that {output.program.name} used, which differ from those of the isotopes"
         return (f"{differ}, {apart:.1e} apart: {used}",)
     if min(apart, *others) > OTHER_GEOMETRY:
         bohr = _apart(printed, _constants_mhz(molecule.masses_u, molecule.positions_angstrom * BOHR_RADIUS_ANGSTROM))
         cause = "its coordinates are in bohr" if bohr < OTHER_GEOMETRY else "it is another geometry, or in another unit"
-        raise ValueError(f"{differ}, {apart:.1%} apart: {cause}; give an xyz file of the geometry that is meant")
+        raise ValueError(f"{differ}, {apart:.1%} apart: {cause}; give an xyz file of the right geometry")
     return (f"{differ}, {apart:.1e} apart: is the geometry the last one?",)
 
 

@@ -63,7 +63,7 @@ def _read(source: Any) -> Molecule:
     if hasattr(source, "GetConformer"):
         return from_rdkit(source)
     raise ValueError(
-        f"a {type(source).__name__} is no molecule: give a path, 'SMILES:...', a name, ase.Atoms or an RDKit molecule"
+        f"a {type(source).__name__} is not a molecule: give a path, 'SMILES:...', a name, ase.Atoms or an RDKit molecule"
     )
 
 
@@ -116,7 +116,7 @@ def _output_without_cclib(path: Path) -> Molecule:
         molecule = _read_with_ase(path)
     except ValueError as reason:
         raise ValueError(f"{reason}; {WITHOUT_CCLIB}") from None
-    note = f"{path}: {WITHOUT_CCLIB}; then polarizability, printed constants and a cut end are looked at too"
+    note = f"{path}: {WITHOUT_CCLIB}; with it, rotor also reads the polarizability and checks the printed constants and the end of the file"
     return replace(molecule, notes=(*molecule.notes, note))
 
 
@@ -214,7 +214,7 @@ def g2_molecule(name: str) -> Molecule:
         near = list(dict.fromkeys([*same, *difflib.get_close_matches(name, names, n=5, cutoff=0.5)]))
         hint = f" (near it: {', '.join(near)})" if near else ""
         raise ValueError(
-            f"{name!r} is no file and no molecule of ASE's g2{hint}; give a path, or 'SMILES:...' for a SMILES"
+            f"{name!r} is neither a file nor a molecule of ASE's g2{hint}; give a path, or 'SMILES:...' for a SMILES"
         )
     atoms = g2[name]
     unpaired = round(float(sum(atoms.get_initial_magnetic_moments())))  # the collection gives those of the ground state

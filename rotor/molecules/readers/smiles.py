@@ -77,7 +77,7 @@ def from_smiles(text: str) -> Molecule:
     if not near:
         return distinct[0].molecule
     others = (
-        f"the lowest conformer was taken; {near} more within {NEAR_KJ_PER_MOL:g} kJ/mol of it have other constants "
+        f"the lowest conformer was taken; {near} more within {NEAR_KJ_PER_MOL:g} kJ/mol have different constants "
         "(rotor info --conformers lists them)"
     )
     return replace(distinct[0].molecule, notes=(*distinct[0].molecule.notes, others))
@@ -193,7 +193,7 @@ def parse_sdf(text: str, where: str = "sdf text") -> Molecule:
     with rdBase.BlockLogs(), rdBase.CaptureErrorLog() as log:
         mol = Chem.MolFromMolBlock(blocks[0], sanitize=False, removeHs=False)
     if mol is None:
-        raise ValueError(f"{where}: no mol or sdf file ({_reason(log.messages)}); write it as V2000 or V3000")
+        raise ValueError(f"{where}: not a mol or sdf file ({_reason(log.messages)}); write it as V2000 or V3000")
     try:
         molecule = from_rdkit(mol, name=mol.GetProp("_Name"))
     except ValueError as reason:
@@ -264,7 +264,7 @@ def _parsed(text: str) -> Any:
     whole = Chem.AddHs(mol)
     if whole.GetNumAtoms() > MOST_ATOMS:
         raise ValueError(
-            f"SMILES {text!r:.80}: {whole.GetNumAtoms()} atoms with their hydrogens, and conformers are sought of at most "
+            f"SMILES {text!r:.80}: {whole.GetNumAtoms()} atoms with their hydrogens, but conformers are searched for at most "
             f"{MOST_ATOMS}; give the geometry as an xyz file"
         )
     return whole
@@ -313,7 +313,9 @@ def _trust(mol: Any, field: str) -> tuple[float | None, tuple[str, ...]]:
         return DOUBTFUL_UNCERTAINTY, (warning, *notes, *_stereo_note(mol))
     typical = MMFF_UNCERTAINTY if field == "MMFF94" else UFF_UNCERTAINTY
     tail = ", a tenth by more than 6 %" if field == "MMFF94" else ""
-    notes.append(f"geometry from {field}, not measured: half of such constants are off by {typical:.1%} or more{tail}")
+    notes.append(
+        f"geometry from {field}, not measured: half of such constants are wrong by {typical:.1%} or more{tail}"
+    )
     return typical, (*notes, *_stereo_note(mol))
 
 

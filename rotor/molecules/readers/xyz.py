@@ -131,7 +131,7 @@ def _extended(comment: str, where: str) -> tuple[dict[str, Any], _Columns]:
         info = read_pairs(comment)
     except (IndexError, ValueError) as reason:
         raise ValueError(
-            f"{where}: {comment!r:.80} is no list of key=value; correct its quotes and brackets"
+            f"{where}: {comment!r:.80} is not a list of key=value; correct its quotes and brackets"
         ) from reason
     if "Properties" not in info:
         return info, _Columns()

@@ -129,8 +129,8 @@ def find_operations(labels: Ints, points: Floats, reach: float) -> tuple[list[Op
             operations[key] = fitted(points, permutation, key[2])
         if len(operations) > MOST_OPERATIONS:
             raise ValueError(
-                f"more than {MOST_OPERATIONS} symmetry operations within {reach:.3g} Å: not a molecule whose group can "
-                "be named; give spin weights by hand"
+                f"more than {MOST_OPERATIONS} symmetry operations within {reach:.3g} Å: its point group cannot be "
+                "named; give spin weights by hand"
             )
     return [operation for operation in operations.values() if operation.mismatch_angstrom <= reach], base
 
@@ -275,4 +275,4 @@ def symmetrised(points: Floats, operations: list[Operation]) -> tuple[Floats, li
         points = mean
         if moved <= 1e-12 * float(np.abs(points).max()):
             return points, [fitted(points, o.permutation, p) for o, p in zip(operations, proper, strict=True)]
-    raise ValueError(f"made symmetric, the geometry still moves by {moved:.2g} Å after 100 rounds; lower the tolerance")
+    raise ValueError(f"the symmetrised geometry still moves by {moved:.2g} Å after 100 rounds; lower the tolerance")

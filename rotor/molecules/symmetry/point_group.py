@@ -138,7 +138,9 @@ def find_symmetry(
     """
     labels, masses, points = _checked(kinds, masses_u, positions_angstrom)
     if not 0 < tolerance <= NEAR:
-        raise ValueError(f"tolerance {tolerance}: expected a part of the shortest distance, above 0 and up to {NEAR}")
+        raise ValueError(
+            f"tolerance {tolerance}: expected a fraction of the shortest distance, above 0 and up to {NEAR}"
+        )
     if len(points) == 1:
         return _atom_symmetry(tolerance)
 

@@ -113,7 +113,7 @@ def test_an_isotope_in_both_groups_leaves_no_symmetry():
         ("C2H6", "1-9", "'1-9': expected two different atoms of C2H6, which has atoms 1 to 8"),
         ("C2H6", "2-2", "'2-2': expected two different atoms"),
         ("C2H6", "3-6", "atoms 3 (H) and 6 (H) are not bonded: "),
-        ("C2H6", "1-3", "atom 3 (H) is bonded to no further atom"),
+        ("C2H6", "1-3", "atom 3 (H) is bonded to no other atom"),
         ("SMILES:C1CCCCC1", "1-2", "the bond is part of a ring"),
         ("SMILES:CC#C", "1-2", "all atoms behind atom 2 lie on the line of the bond (a linear group)"),
     ],
@@ -287,7 +287,7 @@ def test_a_scan_of_an_ase_calculator_object_is_that_of_its_name():
 def test_the_table_has_the_barrier_of_acetaldehyde():
     answer = answer_torsion(TorsionRequest(top_of("SMILES:CC=O"), "1-2", "table"))
     assert answer.facts()["barrier_cm"] == pytest.approx(407.6, rel=1e-9)
-    with pytest.raises(ValueError, match="potential: the table has methyl groups alone"):
+    with pytest.raises(ValueError, match="potential: the table only has methyl groups"):
         TorsionRequest(top_of("SMILES:OO"), "1-2", "table")
 
 

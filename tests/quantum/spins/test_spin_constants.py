@@ -165,7 +165,8 @@ def test_command_refuses(more, says, capsys):
 
 def test_a_unit_at_one_constant_does_not_serve_the_others():
     with pytest.raises(
-        ValueError, match=r"the unit kHz belongs to C_bb\(14N\) only; put a space before it to apply it to chi_aa\(14N\) too"
+        ValueError,
+        match=r"the unit kHz belongs to C_bb\(14N\) only; put a space before it to apply it to chi_aa\(14N\) too",
     ):
         SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8kHz")
     assert SpinConstants.parse("chi_aa(14N)=-4.22 C_bb(14N)=1.8 MHz").values["C_bb(14N)"] == 1.8
