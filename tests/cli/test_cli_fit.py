@@ -160,7 +160,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
         (("co.csv", "--start", "co.csv", "--free", "B"), "--start co.csv: a list of lines has no constants"),
         (("one.csv", "--constants", "B=57000 D=0.1 MHz", "--free", "B,D"), "one.csv: 2 free constants for 1 measured"),
         (("bad.csv", "--constants", "B=57000 MHz", "--free", "B"), "line 1 of the table: there is no level -1"),
-        (("same.csv", *BD), "line 1, 1 - 1 at 0.0000 MHz: upper and lower state are one level"),
+        (("same.csv", *BD), "line 1, 1 - 1 at 0.0000 MHz: upper and lower state are the same level"),
         (("long.csv", *BD), "line 1 of the table: 1 value more"),
         (("negative.csv", *BD), "line 1 of the table: error_mhz = -0.1"),
         (
