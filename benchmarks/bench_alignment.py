@@ -143,24 +143,23 @@ def exponentials(steps: int, times: np.ndarray) -> np.ndarray:
 
 def picture(curves: dict[str, list[tuple[float, float]]], path: Path) -> None:
     """Error against time, one curve a method."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from rotor.plots.picture import new_figure, save, styled
 
-    figure = Figure(figsize=(6.0, 4.0), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    for name, points in curves.items():
-        axes.loglog(
-            [ms for _, ms in points],
-            [max(error, 1e-13) for error, _ in points],
-            "o-",
-            label=name.replace("ours", "rotor"),
-        )
-    axes.set_xlabel("Processor time (ms)")
-    axes.set_ylabel("Largest error of ⟨cos²θ⟩")
-    axes.set_title("OCS from J = 0, 50 fs, 4001 times", loc="left")
-    axes.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    with styled():
+        figure = new_figure((4.8, 3.4))
+        axes = figure.add_subplot()
+        for (name, points), marker in zip(curves.items(), "osD", strict=False):
+            axes.loglog(
+                [ms for _, ms in points],
+                [max(error, 1e-13) for error, _ in points],
+                f"{marker}-",
+                label=name.replace("ours", "rotor"),
+            )
+        axes.set_xlabel("Processor time (ms)")
+        axes.set_ylabel("Largest error of ⟨cos²θ⟩")
+        axes.set_title("OCS from J = 0, pulse of 50 fs, 4001 times")
+        axes.legend()
+    save(figure, path, "work and precision", {"made by": "benchmarks/bench_alignment.py"})
 
 
 def main() -> None:

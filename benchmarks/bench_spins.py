@@ -194,25 +194,14 @@ def methods(rounds: int) -> dict[str, dict[str, tuple[float, float]]]:
 
 def picture(computed: dict[str, dict[str, tuple[float, float]]], path: Path) -> None:
     """Largest error of a level against time, a point a method."""
-    from matplotlib.figure import Figure
+    from rotor.plots.work_precision import Panel, Point, plot_work_precision
 
-    figure = Figure(figsize=(7.2, 4.2), layout="constrained")
-    axes = figure.add_subplot()
-    for name, points in computed.items():
-        seconds = [points[method][0] for method in METHODS]
-        errors = [
-            max(points[method][1], 1e-9) for method in METHODS
-        ]  # the exact one counts as far as digits of energies go
-        axes.loglog(seconds, errors, "o", label=name)
-        for method, x, y in zip(METHODS, seconds, errors, strict=True):
-            above = 5 if method == "first-order" else -11
-            axes.annotate(method, (x, y), xytext=(4, above), textcoords="offset points", fontsize=8)
-    axes.set_xlabel("Processor time for all levels (s)")
-    axes.set_ylabel("Largest error of a level (MHz); 10⁻⁹ for none")
-    axes.margins(x=0.25, y=0.15)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    curves = {
+        name: [Point(method, *points[method], own=method == "exact") for method in METHODS]
+        for name, points in computed.items()
+    }
+    panel = Panel("Methods for hyperfine structure", "energy of a level (MHz)", curves, joined=False)
+    plot_work_precision([panel], path, facts={"made by": "benchmarks/bench_spins.py"})
 
 
 def main() -> None:

@@ -141,30 +141,32 @@ def timed(job: Callable[[], None]) -> float:
 
 def plot(rows: list[dict[str, float]], path: Path) -> None:
     """T_rot/T_trans over the step: by momenta on and between steps over that of the mixture, and the mixture itself."""
-    import matplotlib.pyplot as plt
+    from rotor.plots.picture import BLUE, ORANGE, new_figure, save, styled
 
-    figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
     steps = np.array([row["step_fs"] for row in rows])
     h = np.linspace(0, 4.2, 200)
     s = np.maximum(0.5e-3 * LIBRATION_PER_PS * h, 1e-9)
     forms = {"full": s * np.sqrt(1 - s**2) / np.arcsin(s), "half": s / (np.sqrt(1 - s**2) * np.arcsin(s))}
     labels = {"full": "momenta on the step", "half": "momenta at half steps"}
-    for (name, form), colour in zip(forms.items(), ("tab:blue", "tab:orange"), strict=True):
-        axes.plot(h, form, color=colour, lw=1, alpha=0.6)
-        over = [row[f"{name}_ratio"] / row["mixed_ratio"] for row in rows]
-        axes.plot(steps, over, "o", ms=5, color=colour, label=f"{labels[name]}, over the mixture")
-    axes.axhline(1.0, color="black", lw=1, alpha=0.6)
-    mixed, errors = ([row[f"mixed_{what}"] for row in rows] for what in ("ratio", "error"))
-    axes.errorbar(
-        steps, mixed, errors, fmt="s", ms=4, capsize=2, color="black", label="the mixture itself, with its error"
-    )
-    axes.set(
-        xlabel="Step (fs)",
-        ylabel="Temperature ratio $T_\\mathrm{rot}/T_\\mathrm{trans}$",
-        title="SPC/E water at constant energy; lines: one libration of 112 rad/ps",
-    )
-    axes.legend(frameon=False, loc="lower left")
-    figure.savefig(path, dpi=120)
+    with styled():
+        figure = new_figure((4.8, 3.4))
+        axes = figure.add_subplot()
+        for (name, form), colour in zip(forms.items(), (BLUE, ORANGE), strict=True):
+            axes.plot(h, form, color=colour, lw=1, alpha=0.6)
+            over = [row[f"{name}_ratio"] / row["mixed_ratio"] for row in rows]
+            axes.plot(steps, over, "o", ms=5, color=colour, label=f"{labels[name]}, over the mixture")
+        axes.axhline(1.0, color="black", lw=1, alpha=0.6)
+        mixed, errors = ([row[f"mixed_{what}"] for row in rows] for what in ("ratio", "error"))
+        axes.errorbar(
+            steps, mixed, errors, fmt="s", ms=4, capsize=2, color="black", label="the mixture, with its error"
+        )
+        axes.set(
+            xlabel="Step (fs)",
+            ylabel="Temperature ratio $T_\\mathrm{rot}/T_\\mathrm{trans}$",
+            title="SPC/E water at constant energy; lines: a libration of 112 rad/ps",
+        )
+        axes.legend(loc="lower left")
+    save(figure, path, "Temperatures of water", {"made by": "benchmarks/bench_thermometers.py"})
 
 
 def main() -> None:

@@ -101,33 +101,32 @@ def curves() -> dict[str, Curve]:
         cost, attitude = timed(lambda t=tolerance: scipy_motion(t, span), 1)
         plain.append((cost, float(distance(attitude, exact))))
     table["scipy DOP853"] = plain
-    table["exact motion, after 48,000 periods"] = exact_point()
+    table["exact, 48,000 periods"] = exact_point()
     return table
 
 
 def draw(table: dict[str, Curve], picture: Path) -> None:
     """The work-precision picture."""
-    import matplotlib
+    from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, PALETTE, new_figure, save, styled
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(8, 5.5), layout="constrained")
-    styles = {"rotations": ("tab:blue", "o"), "symmetric": ("tab:green", "s"), "Moser": ("tab:red", "^")}
-    styles |= {"Lie": ("tab:purple", "D"), "scipy": ("tab:gray", "v"), "exact": ("black", "*")}
+    looks = {"rotations": (BLUE, "o"), "symmetric": (GREEN, "s"), "Moser": (ORANGE, "^")}
+    looks |= {"Lie": (PALETTE[3], "D"), "scipy": (GREY, "v"), "exact": ("black", "*")}
     dashes = {"2": ":", "4": "--", "8": "-"}
-    for name, points in table.items():
-        color, marker = next(style for key, style in styles.items() if name.startswith(key))
-        cost, error = np.array(points).T
-        size = 14 if marker == "*" else 5
-        axes.loglog(error, cost, color=color, marker=marker, ms=size, ls=dashes.get(name[-1], "-."), label=name)
-    axes.invert_xaxis()
-    axes.set_xlabel("Error of the attitude after 1000 periods (rad)")
-    axes.set_ylabel("Time per period on one core (µs)")
-    axes.set_title("Free asymmetric top: what accuracy costs")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, ncols=2)
-    figure.savefig(picture, dpi=130)
+    with styled():
+        figure = new_figure((5.2, 4.6))
+        axes = figure.add_subplot()
+        for name, points in table.items():
+            color, marker = next(look for key, look in looks.items() if name.startswith(key))
+            cost, error = np.array(points).T
+            size = 12 if marker == "*" else 5
+            axes.loglog(error, cost, color=color, marker=marker, ms=size, ls=dashes.get(name[-1], "-."), label=name)
+        axes.invert_xaxis()
+        axes.set_xlabel("Error of the attitude after 1000 periods (rad)")
+        axes.set_ylabel("Processor time of a period (µs)")
+        axes.set_title("Free rotation of an asymmetric top")
+        axes.grid(alpha=0.25)
+        figure.legend(loc="outside lower center", ncols=2, fontsize=7.5)
+    save(figure, picture, "work and precision", {"made by": "benchmarks/bench_work_precision.py"})
 
 
 def main() -> None:

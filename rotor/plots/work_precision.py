@@ -9,13 +9,20 @@ from __future__ import annotations
 import math
 import os
 import re
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, name_text, new_figure, save, styled
 
-PANEL_INCHES = (3.6, 2.8)
+PANEL_INCHES = (
+    2.75,
+    2.6,
+)  # of two in a row: at the width of a journal column (8.5 cm) the smallest exponents have 3.4 pt
+SINGLE_INCHES = (4.8, 3.4)
+TITLE_LETTERS = 34  # that fit above one of two panels
+NAME_POINTS = 8.0  # size of the settings at the points, and of the legend
 LEAST_DRAWN = 1e-17  # an error of 0 is drawn as an open point below all others
 PLACES = (
     (6.0, 2.0, "left"),
@@ -26,7 +33,7 @@ PLACES = (
 )  # offset (points) of a name from its mark, and its alignment
 MARK_PIXELS = 3.0  # half of a mark
 LEAST_JOINED = 4  # settings; fewer are not joined by a line
-MARKERS = "osD^vP*"  # one more than colours, so that no two curves are alike
+MARKERS = "osD^vP*X"  # one more than colours, so that no two curves are alike
 
 
 @dataclass(frozen=True)
@@ -58,13 +65,12 @@ def work_precision_figure(panels: Sequence[Panel], title: str = "") -> Any:
         raise ValueError("a work-precision picture needs a setting that was measured; there is none")
     across = min(len(panels), 2)
     down = math.ceil(len(panels) / across)
-    wide, high = PANEL_INCHES
+    wide, high = PANEL_INCHES if across > 1 else SINGLE_INCHES
     with styled():
-        figure = new_figure(
-            (2 * wide if across == 1 else across * wide, (1.3 if across == 1 else 1.0) * high * down + 0.3)
-        )
+        figure = new_figure((across * wide, high * down + 0.3))
         all_axes = figure.subplots(down, across, squeeze=False).ravel()
-        drawn = [_draw(axes, panel) for axes, panel in zip(all_axes, panels, strict=False)]
+        letters = TITLE_LETTERS if across > 1 else 2 * TITLE_LETTERS
+        drawn = [_draw(axes, panel, letters) for axes, panel in zip(all_axes, panels, strict=False)]
         for axes in all_axes[len(panels) :]:
             axes.set_axis_off()
         if title:
@@ -103,8 +109,8 @@ def plot_work_precision(
 Places = list[tuple[Point, float]]  # settings of a curve, with the errors as drawn
 
 
-def _draw(axes: Any, panel: Panel) -> list[Places]:
-    """Draw the curves of a panel; their settings with the errors as drawn."""
+def _draw(axes: Any, panel: Panel, letters: int) -> list[Places]:
+    """Draw the curves of a panel; their settings with the errors as drawn. letters: width of the titles."""
     points = [point for curve in panel.curves.values() for point in curve]
     floor = max(min((point.error for point in points if point.error > 0.0), default=0.0) / 10.0, LEAST_DRAWN)
     few = len(panel.curves) == 1
@@ -113,25 +119,35 @@ def _draw(axes: Any, panel: Panel) -> list[Places]:
         colour, marker = (BLUE, "o") if few else (PALETTE[number % len(PALETTE)], MARKERS[number % len(MARKERS)])
         errors = _curve(axes, curve, floor, (colour, marker, name), panel.joined)
         drawn.append(list(zip(curve, errors, strict=True)))
-    axes.set(xscale="log", yscale="log", xlabel="Processor time (s)", ylabel=f"Error of {panel.of}")
+    axes.set(xscale="log", yscale="log", xlabel="Processor time (s)", ylabel=textwrap.fill(f"Error of {panel.of}", letters))
     axes.margins(x=0.25, y=0.15)
     _scale(axes)
     if any(point.error == 0.0 for point in points):
-        axes.text(0.99, 0.01, "open points: error 0", transform=axes.transAxes, ha="right", fontsize=6.5, color=GREY)
-    axes.set_title(panel.title[:1].upper() + panel.title[1:], loc="left")
+        axes.text(
+            0.99, 0.01, "open points: error 0", transform=axes.transAxes, ha="right", fontsize=NAME_POINTS, color=GREY
+        )
+    axes.set_title(textwrap.fill(panel.title[:1].upper() + panel.title[1:], letters), loc="left", fontsize=9.0)
     axes.grid(alpha=0.25)
     if not few:
-        _legend_above(axes, len(panel.curves))
+        _legend_above(axes, [name_text(name) for name in panel.curves])
     return drawn
 
 
-def _legend_above(axes: Any, count: int) -> None:
-    """The names of the curves between title and axes, where no mark lies; in one or two rows."""
-    columns = count if count <= 3 else math.ceil(count / 2)
+def _legend_above(axes: Any, names: Sequence[str]) -> None:
+    """The names of the curves between title and axes, where no mark lies, in as many columns as fit."""
+    widest = max(map(len, names)) * 0.5 * NAME_POINTS / 72 + 0.35  # inches: half a font size a letter, and the mark
+    columns = max(1, min(len(names), int(0.8 * axes.figure.get_figwidth() / axes.get_gridspec().ncols / widest)))
     axes.legend(
-        frameon=False, fontsize=7, ncols=columns, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2
+        fontsize=NAME_POINTS,
+        ncols=columns,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.2,
+        handletextpad=0.2,
+        columnspacing=1.0,
     )
-    axes.set_title(axes.get_title(loc="left"), loc="left", pad=6 + 12 * math.ceil(count / columns))
+    rows = math.ceil(len(names) / columns)
+    axes.set_title(axes.get_title(loc="left"), loc="left", fontsize=9.0, pad=6 + 1.55 * NAME_POINTS * rows)
 
 
 def _scale(axes: Any) -> None:
@@ -190,7 +206,7 @@ def _name_settings(axes: Any, curves: Sequence[Places]) -> None:
             (point.seconds, error),
             xytext=(0, 0),
             textcoords="offset points",
-            fontsize=6.5,
+            fontsize=NAME_POINTS,
             color=GREY,
         )
         text.set_in_layout(False)
