@@ -40,11 +40,12 @@ def beside(lines, file):
 water = rotor.read("water")
 lines = rotor.api.line_list(water, temperature_k=300, jmax=20)
 print(f"{water.name}: {water.kind} top, κ = {water.kappa:.3f}, {len(lines)} lines, Q(300 K) = {lines.q:.2f}")
-print(lines.strongest(5))
+lines.strongest(5).to_pandas()
 
+# %%
 up, low = lines.levels.find(j=1, ka=1, kc=0), lines.levels.find(j=1, ka=0, kc=1)
 ground = int(np.flatnonzero((lines.upper == up) & (lines.lower == low))[0])
-print(f"\n1(1,0) - 1(0,1): {lines.frequency_mhz[ground]:.3f} MHz, A = {lines.einstein_a_per_s[ground]:.3e} 1/s")
+print(f"1(1,0) - 1(0,1): {lines.frequency_mhz[ground]:.3f} MHz, A = {lines.einstein_a_per_s[ground]:.3e} 1/s")
 
 assert water.kind == "asymmetric"
 assert abs(lines.frequency_mhz[ground] - 556935.988) < 3  # measured; the constants meet measured lines to 0.8 MHz rms

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import isotopologue, isotopologues
@@ -30,13 +31,20 @@ published = Path("../tests/oracles/catalogues")  # measured lines of JPL and CDM
 # %%
 water = rotor.read("water")
 family = isotopologues(water)
-for one in family:
-    a, b, c = one.top.rotational_constants_mhz
-    mu = ", ".join(f"{abs(x):.3f}" for x in one.top.dipole_abc_debye)
-    print(
-        f"{one.formula:10} {one.abundance:.2e}  A {a:8.0f}  B {b:8.0f}  C {c:8.0f} MHz  |μ| {mu} D, axes {one.turned_degrees:.1f}°"
-    )
+table = pd.DataFrame(
+    {
+        "abundance": [item.abundance for item in family],
+        **{f"{name} (MHz)": [item.top.rotational_constants_mhz[i] for item in family] for i, name in enumerate("ABC")},
+        **{f"|μ{name}| (D)": [abs(item.top.dipole_abc_debye[i]) for item in family] for i, name in enumerate("abc")},
+        "axes turned by (°)": [item.turned_degrees for item in family],
+    },
+    index=[item.formula for item in family],
+)
+table.round(
+    {"A (MHz)": 0, "B (MHz)": 0, "C (MHz)": 0, "|μa| (D)": 3, "|μb| (D)": 3, "|μc| (D)": 3, "axes turned by (°)": 1}
+)
 
+# %%
 assert [one.formula for one in family] == ["H2O", "H2[18O]", "H2[17O]", "H[2H]O"]
 
 # %% [markdown]

@@ -10,6 +10,7 @@ import math
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import (
@@ -44,19 +45,27 @@ def gas_of(name, molecules, seed):
 # one statement for all degrees of a gas, the largest distance between distributions another.
 
 # %%
-tests = {}
+tests, rows = {}, {}
 for seed, name in enumerate(("water", "HCl", "CH4", "NH3", "CO2", "C6H6")):
     gas = gas_of(name, 10_000, seed)
     tests[name] = test = equipartition(gas.kinetic, kt)
     one = count_degrees([gas.moments])
     farthest = max(test.degrees, key=lambda degree: abs(degree.sigma))
-    print(
-        f"{name:6s} {one.translation} + {one.rotation} degrees, χ² = {test.chi2:5.2f} (p = {test.chi2_p:.2f}), "
-        f"distributions p = {test.ks_p:.2f}; farthest {farthest.name}, {farthest.sigma:+.2f} σ"
-    )
+    rows[name] = {
+        "translations": one.translation,
+        "rotations": one.rotation,
+        "χ²": round(test.chi2, 2),
+        "p of χ²": round(test.chi2_p, 2),
+        "p of the distributions": round(test.ks_p, 2),
+        "farthest degree": farthest.name,
+        "its distance (σ)": round(farthest.sigma, 2),
+    }
     assert test.accepted
     assert one.rotation == (2 if name in ("HCl", "CO2") else 3)
 
+pd.DataFrame(rows).transpose()
+
+# %%
 equipartition_figure(tests)
 
 # %% [markdown]

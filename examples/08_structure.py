@@ -7,6 +7,8 @@
 # %%
 from pathlib import Path
 
+import pandas as pd
+
 import rotor
 from rotor import Molecule, Top
 from rotor.api import (
@@ -32,8 +34,16 @@ samples = Path("../tests/oracles/fits")  # measured lines, in this repository
 
 # %%
 file = read_family(samples / "ocs.toml")
-for one in file.family.species:
-    print(f"{one.name:6s} B = {one.constants_mhz['B']:.6f}({one.errors_mhz['B']:.0e}) MHz, {one.source}")
+pd.DataFrame(
+    {
+        one.name: {
+            "B (MHz)": f"{one.constants_mhz['B']:.6f}",
+            "error (MHz)": f"{one.errors_mhz['B']:.0e}",
+            "source": one.source,
+        }
+        for one in file.family.species
+    }
+).transpose()
 
 # %% [markdown]
 # Each atom replaced says where it is (Kraitchman): the substitution structure r_s, with Costain's error for vibration.
@@ -41,8 +51,9 @@ for one in file.family.species:
 # %%
 rs = substitution_structure(file.family, coordinates=file.coordinates)
 values = {value.name: value for value in rs.values}
-for value in rs.values:
-    print(f"r_s({value.name}) = {value.value:.5f} ± {value.error:.4f} Å")
+pd.DataFrame([{"bond": v.name, "r_s (Å)": f"{v.value:.5f}", "error (Å)": f"{v.error:.4f}"} for v in rs.values])
+
+# %%
 assert abs(values["CO"].value - 1.16054) < 1e-5  # published
 assert abs(values["CS"].value - 1.55967) < 1e-5
 
@@ -51,9 +62,18 @@ assert abs(values["CS"].value - 1.55967) < 1e-5
 
 # %%
 fits = {method: fit_structure(file.family, method, coordinates=file.coordinates) for method in ("r0", "rm1")}
-for method, found in fits.items():
-    lengths = ", ".join(f"{value.name} {value.value:.4f} ± {value.error:.4f}" for value in found.values)
-    print(f"{method}: {lengths} Å; rms {found.rms_u_angstrom2:.1e} u Å², {found.degrees_of_freedom} degrees of freedom")
+pd.DataFrame(
+    {
+        method: {
+            **{f"{v.name} (Å)": f"{v.value:.4f} ± {v.error:.4f}" for v in result.values},
+            "rms (u Å²)": f"{result.rms_u_angstrom2:.1e}",
+            "degrees of freedom": result.degrees_of_freedom,
+        }
+        for method, result in fits.items()
+    }
+).transpose()
+
+# %%
 assert fits["rm1"].values[0].value < values["CO"].value  # r_m is nearer to equilibrium, 1.156 Å, than r_s
 
 # %%

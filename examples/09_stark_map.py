@@ -8,6 +8,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from scipy.special import obl_cv
 
 import rotor
@@ -40,12 +41,18 @@ ocs = Top.from_constants("B=6081.492475 D=1.301777e-3 MHz", dipole_abc_debye=(0.
 
 # %%
 states = stark_map(ocs, np.linspace(0, 200, 201), j_highest=2)
-for rows in states.curves():
-    last = rows.stop - 1
-    print(
-        f"J = {states.label[last]}, |M| = {states.m[last]}: {states.energy_mhz[last]:12.3f} MHz at 200 kV/cm, "
-        f"μ_eff = {states.slope[last]:+.4f} D, <cosθ> = {states.cosines['costheta'][last]:+.4f}"
-    )
+last = [rows.stop - 1 for rows in states.curves()]
+pd.DataFrame(
+    {
+        "J": states.label[last],
+        "|M|": states.m[last],
+        "energy at 200 kV/cm (MHz)": states.energy_mhz[last].round(3),
+        "effective dipole (D)": states.slope[last].round(4),
+        "⟨cosθ⟩": states.cosines["costheta"][last].round(4),
+    }
+)
+
+# %%
 stark_figure(states, title="OCS in a static field")
 
 # %%

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import used_method
@@ -66,7 +67,6 @@ centre = float(rotor.api.line_list(hcn, jmax=1, min_lgint=None).frequency_mhz[0]
 lines, quanta = components(hcn, 1)
 first, _ = components(hcn, 1, "first-order")
 laboratory = measured("hcn")
-print(" F' - F''   measured, MHz   computed, MHz  obs - calc, kHz   shift, MHz   Casimir, MHz  strength")
 rows = []
 for (upper, lower), frequency, plain, strength in zip(
     quanta, lines.frequency_mhz, first.frequency_mhz, lines.strength_debye2, strict=True
@@ -75,10 +75,18 @@ for (upper, lower), frequency, plain, strength in zip(
     rows.append(
         (f, frequency, plain - centre, casimir(f), 1e3 * (seen - frequency), strength / lines.strength_debye2.sum())
     )
-    print(
-        f"  {f} - 1 {seen:18.4f} {frequency:15.4f} {rows[-1][4]:12.2f} {plain - centre:17.4f} {casimir(f):13.4f} {rows[-1][5]:10.4f}"
-    )
 
+names = (
+    "F'",
+    "computed (MHz)",
+    "first-order shift (MHz)",
+    "Casimir's formula (MHz)",
+    "obs - calc (kHz)",
+    "share of the strength",
+)
+pd.DataFrame(rows, columns=names).round(4)
+
+# %%
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4), layout="constrained", width_ratios=(1, 1.4))
 for f, _, shift, *_ in rows:
     left.plot([0.0, 0.6, 1.0, 2.0], [0, 0, shift, shift], color="C0", lw=1)

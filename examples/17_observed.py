@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import (
@@ -62,8 +63,11 @@ assert species.name == "Ethylene oxide"
 sight = Sight(beam_arcsec=0.5)
 start = start_components(spectrum, [species], sight, velocity_km_s=0.0, fwhm_km_s=1.0, size_arcsec=0.5)
 fit = fit_rejecting(spectrum, start, sight, FitChoices(calibration=0.1), deviations=4.0)
-for row in fit.parameters:
-    print(f"{row['name']:40s} {row['value']:12.5g} ± {row['error']:.2g}")
+pd.DataFrame(
+    [{"parameter": r["name"], "value": f"{r['value']:.5g}", "error": f"{r['error']:.2g}"} for r in fit.parameters]
+)
+
+# %%
 component = fit.components[0]
 assert abs(component.velocity_km_s - -0.2) < 0.1  # published: -0.2 km/s
 assert abs(component.fwhm_km_s - 1.0) < 0.25  # published: 1.0 km/s

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from IPython.display import display
 
 import rotor
@@ -100,9 +101,13 @@ if far:
     widget.do("reject", lines=far, rejected=True)
     widget.do("refit", species=1)
 fitted = widget.session.state.species[1]
-for name in "ABC":
-    print(f"{name} = {fitted.constants[name]:.4f} ± {fitted.errors[name]:.4f} MHz, true {truth[name]:.4f}")
-    assert abs(fitted.constants[name] - truth[name]) < 0.02
+assert all(abs(fitted.constants[name] - truth[name]) < 0.02 for name in "ABC")
+pd.DataFrame(
+    {
+        name: {"fitted (MHz)": fitted.constants[name], "error (MHz)": fitted.errors[name], "true (MHz)": truth[name]}
+        for name in "ABC"
+    }
+).transpose().round(4)
 
 figure, axes = plt.subplots(2, 1, figsize=(8, 4.5), sharex=True)
 axes[0].plot(frequency[::5], intensity[::5], lw=0.5)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import (
@@ -65,15 +66,21 @@ for tag, lines in species.items():
     start = start_components(spectrum, [lines], sight, velocity_km_s=0.0, fwhm_km_s=1.0, size_arcsec=0.5)
     fits[tag] = fit_rejecting(spectrum, start, sight, choices, deviations=4.0)
 
-print(f"{'':16s}{'N (1e15/cm²)':>16s}{'published':>11s}{'T (K)':>14s}{'published':>11s}{'v (km/s)':>10s}")
+rows = {}
 for tag, fit in fits.items():
     column, kelvin, velocity, _ = fit.parameters
     total, correction, published_k = published[tag]
     error = f"± {kelvin['error']:3.0f}" if kelvin["determined"] else "bound"
-    print(
-        f"{species[tag].name:16s}{column['value'] / 1e15:9.2f} ± {column['error'] / 1e15:4.2f}{total / correction / 1e15:11.2f}"
-        f"{kelvin['value']:8.0f} {error}{published_k:11.0f}{velocity['value']:10.2f}"
-    )
+    rows[species[tag].name] = {
+        "N (1e15/cm²)": f"{column['value'] / 1e15:.2f} ± {column['error'] / 1e15:.2f}",
+        "N published": f"{total / correction / 1e15:.2f}",
+        "T (K)": f"{kelvin['value']:.0f} {error}",
+        "T published": f"{published_k:.0f}",
+        "v (km/s)": f"{velocity['value']:.2f}",
+    }
+pd.DataFrame(rows).transpose()
+
+# %%
 ratio = {tag: fit.components[0].column_per_cm2 / (published[tag][0] / published[tag][1]) for tag, fit in fits.items()}
 assert all(0.5 < ratio[tag] < 1.3 for tag in ("c060501", "c044504", "c057505", "c062504"))
 assert all(-0.25 < fit.components[0].velocity_km_s < 0.1 for fit in fits.values())  # published: -0.2 km/s
