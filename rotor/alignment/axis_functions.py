@@ -106,7 +106,7 @@ def asymmetric_elements(block: SolvedFieldBlock, axis: int, function: EvenFuncti
             amplitudes[np.searchsorted(j, degree), first : first + len(row)] = row
         total += amplitudes.conj().T @ (_between_functions(j, k, int(block.m), function) @ amplitudes)
     if np.abs(total.imag).max() > ROUND_OFF * max(float(np.abs(total.real).max()), 1.0):
-        raise ValueError("a function of an axis has complex elements: it is not even")
+        raise ValueError("a function of an axis must be even in its angle; the elements of this one are complex")
     return np.ascontiguousarray(total.real)
 
 

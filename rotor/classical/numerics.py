@@ -33,7 +33,7 @@ def choose(scene: Any, request: Any, allowed: float) -> Choice:
 
 
 def error_of_motion(answer: Any) -> float:
-    """Error of a motion: round-off if free; the error of steps is known from their choice."""
+    """Rounding error of a free motion; 0 for a driven motion, whose step error is estimated when the step is chosen."""
     return float(answer.errors.rounding.value or 0.0) if isinstance(answer, TumbleAnswer) else 0.0
 
 

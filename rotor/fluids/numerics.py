@@ -262,7 +262,9 @@ def left_out_of_fluid(
     turning = step_correction(bodies, force, torque, step_fs * 1e-3 / units.ASE_TIME_PS).rotation_ev / 12
     neglected = [
         LeftOut("quantum mechanics of nuclei", 100 * quantum, "%", "of kT a molecule, free energy, to order ħ²"),
-        LeftOut("finite box", 100 * count ** (-1 / 3), "%", "of the diffusion, which a periodic box slows down"),
+        LeftOut(
+            "finite box", 100 * count ** (-1 / 3), "%", "of the diffusion coefficient, which a periodic box lowers"
+        ),
     ]
     if degrees:
         share = turning / (0.5 * degrees * kt)

@@ -381,10 +381,10 @@ def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
     if name.startswith("species_"):
         return species_number(path, line, name, text)
     if text.partition("/")[2] == "2":
-        raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; this quantum number is whole here")
+        raise ValueError(f"{path}, line {line} of the table: {name} reads {text!r}; expected a whole number")
     value = _real(path, line, name, row)
     if not float(value).is_integer():
-        raise ValueError(f"{path}, line {line} of the table: {name} = {value:g}; a quantum number is whole")
+        raise ValueError(f"{path}, line {line} of the table: {name} = {value:g}; expected a whole number")
     return int(value)
 
 
@@ -397,8 +397,8 @@ def _half(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
     value = _real(path, line, name, row) if not slash else math.nan
     if not (2 * value) % 2 == 1:
         raise ValueError(
-            f"{path}, line {line} of the table: {name} reads {text!r}; this quantum number is a half-integer: write 5/2 or 2.5, or "
-            "twice it, 5"
+            f"{path}, line {line} of the table: {name} reads {text!r}; expected a half-integer: 5/2, 2.5, or twice its "
+            "value, 5"
         )
     return int(2 * value)
 

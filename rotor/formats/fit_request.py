@@ -235,7 +235,7 @@ def fit_of_lines(
     if moved:
         fitted = parameters(begin, names, ties=ties, priors_mhz=priors)
         said = ", ".join(f"{name} at {value:.3g} {'D' if name in DIPOLES else 'MHz'}" for name, value in moved.items())
-        notes = [*notes, f"of these the lines know the square alone, so that they start beside 0: {said}"]
+        notes = [*notes, f"only the square of these affects the lines, so that they start beside 0: {said}"]
     title = " ".join(top.name.split()) or f"{top.kind} top"
     files = FitFiles(name, start=start)
     return FitRequest(

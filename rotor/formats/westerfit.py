@@ -119,9 +119,9 @@ def _sections(text: str) -> dict[str, list[tuple[int, str]]]:
 def _top(name: str, sections: Mapping[str, Sequence[tuple[int, str]]]) -> Top:
     settings = {key.strip(): value.strip() for _, line in sections["CNTRLS"] for key, _, value in [line.partition("=")]}
     if settings.get("NFOLD") != "3":
-        raise ValueError(f"NFOLD = {settings.get('NFOLD', '0')}: read are threefold tops")
+        raise ValueError(f"NFOLD = {settings.get('NFOLD', '0')}: rotor reads threefold tops only")
     if settings.get("Irrep", "Ir") != "Ir":
-        raise ValueError(f"Irrep = {settings['Irrep']}: read is Ir (z, x, y = a, b, c)")
+        raise ValueError(f"Irrep = {settings['Irrep']}: rotor reads Ir only (z, x, y = a, b, c)")
     values, spins = _second_order(sections["2NDORDER"])
     dipole = [0.0, 0.0, 0.0]
     for key, value in _further(_terms(sections.get("PARAMS", ())), dipole).items():
@@ -132,7 +132,7 @@ def _top(name: str, sections: Mapping[str, Sequence[tuple[int, str]]]) -> Top:
     )
     twice = round(2 * float(settings.get("S", "0")))
     if spins and not twice:
-        raise ValueError(f"{', '.join(spins)} beside S = 0: expected the spin S of the nucleus")
+        raise ValueError(f"{', '.join(spins)} with S = 0: set S to the spin of the nucleus")
     named = {f"{key}({SPIN})": value for key, value in spins.items()}
     return Top.from_constants(
         Constants(reduction="A", representation="Ir", **rotation),

@@ -1,10 +1,10 @@
-"""Error budget of column densities that a fit of an observed spectrum finds (`rotor.requests.budget`), in percent, of the least certain.
+"""Error budget of fitted column densities (`rotor.requests.budget`) in percent, for the least certain of them.
 
 | term | value |
 |---|---|
 | rounding | brightness in double precision |
-| truncation | twice the step that would follow, in standard errors |
-| model | the fraction of the brightness by which one layer in equilibrium may be wrong, which its column follows |
+| truncation | twice the next step of the search, in standard errors |
+| model | relative error of the brightness of a single layer in equilibrium; the column density has the same error |
 | data | frequencies of the catalogue are in the noise of the channels; strengths have no stated error |
 | statistics | standard error by the noise of the channels, times √(χ²/ν) where that is above 1 |
 """
@@ -16,12 +16,12 @@ import math
 from rotor.observed.fit import SourceFit
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 
-REMAINING = 2.0  # of the next step: the search halves what is left with every step, or does better
+REMAINING = 2.0  # distance to the minimum in next steps: each step of the search at least halves it
 COLUMN = "column_per_cm2"
 
 
 def columns_budget(fit: SourceFit | None, model_error: float) -> ErrorBudget:
-    """The errors of the column densities of a fit; model_error: a fraction of the brightness."""
+    """Error budget of the column densities of a fit; model_error: relative error of the brightness."""
     statistics = _statistics(fit)
     left = None if fit is None or statistics.value is None else REMAINING * fit.minimum.distance * statistics.value
     return ErrorBudget(

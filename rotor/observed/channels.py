@@ -1,7 +1,7 @@
-"""Which channels of a crowded spectrum a fit uses: those near the lines of its species, less those where another species shines.
+"""Selection of the channels for a fit of a crowded spectrum: near lines of its species, and without lines of other species.
 
-Lines of species that are not in the model make the spectrum brighter, never darker. Channels in which it is above the fitted model by more
-than some standard deviations are left out, the fit is repeated, and channels that the new model explains come back, until none changes.
+Lines of species outside the model make the spectrum brighter, never darker. Channels that exceed the fitted model by more than a few
+standard deviations are left out and the fit is repeated; channels that the new model explains return. This ends when no channel changes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _LEAST = 3  # channels a parameter
 def near_lines(
     spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight, widths: float
 ) -> NDArray[np.bool_]:
-    """Channels (n,) within some widths of a line of any component."""
+    """Mask (n,) of the channels within `widths` line widths of a line of any component."""
     near = np.zeros(len(spectrum), dtype=np.bool_)
     for component in components:
         centre = component.species.frequency_mhz * (1 - component.velocity_km_s / KM_PER_S) / (1 + sight.redshift)
@@ -42,26 +42,26 @@ def fit_rejecting(
     deviations: float = 4.0,
     widths: float = 3.0,
 ) -> SourceFit:
-    """A fit of a crowded spectrum: channels near the lines alone, and without those that other species make brighter.
+    """Fit of a crowded spectrum, restricted to channels near the lines and without channels that other species make brighter.
 
     Parameters
     ----------
     spectrum, components, sight, choices :
         As in `fit_source`.
     deviations : float, optional
-        Standard deviations above the model from which a channel is left out.
+        A channel further above the model than this, in standard deviations, is left out.
     widths : float, optional
-        Reach around each line, in its width.
+        Distance from each line, in line widths.
 
     Returns
     -------
     SourceFit
-        Its spectrum has the channels that were used.
+        The fit; its spectrum has only the selected channels.
 
     Raises
     ------
     ValueError
-        Where fewer than three channels a parameter are left.
+        If fewer than three channels for each parameter remain.
     """
     sight, choices = sight or Sight(), choices or FitChoices()
     near = near_lines(spectrum, components, sight, widths)

@@ -1,10 +1,10 @@
-"""Cubes: the same fit in every pixel, from neighbour to neighbour, with a mask, spread over an executor by rows.
+"""Fits of a cube: the same fit in each pixel of a mask, started from the neighbouring pixel; an executor shares the rows.
 
-First a chain of one pixel in each row is fitted: it begins at the brightest pixel of the cube, and goes up and down from row to row to the
-pixel that is nearest to the one before, so that a velocity field is followed. Then each row goes outwards from its pixel of the chain,
-independently of the others. A pixel begins where its neighbour ended. Where that leads to nothing (not converged, or parameters without
-an error and a χ² that noise alone does not have) it begins anew with the start of its row, with that of all, and at the velocity that
-correlation with the species finds in the pixel itself; the least χ² counts.
+First a chain with one pixel in each row is fitted. It begins at the brightest pixel of the cube and proceeds up and down, from row to row,
+to the nearest pixel, so that it follows a velocity field. Then each row is fitted outwards from its pixel of the chain, independently of
+other rows. A pixel starts from the result of its neighbour. If that fit fails (not converged, or parameters without an error and a χ² above
+that of noise), further starts are tried: that of the row, the common start, and the velocity from the correlation of the pixel with the
+species. The fit with the smallest χ² is taken.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from rotor.observed.spectrum import ObservedSpectrum
 from rotor.observed.start import velocity_and_width
 from rotor.observed.variables import variables
 
-_CHANCE = 4.0  # standard deviations of χ²/ν, up to which it is that of noise
+_CHANCE = 4.0  # largest χ²/ν of noise alone, in standard deviations above 1
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class CubeFit:
 
 @dataclass(frozen=True)
 class _Row:
-    """What a worker needs for one row. first: the pixel that is fitted first, with `components`. start: that of all pixels."""
+    """Data of a row for a worker. first: pixel to begin with, started from `components`. start: the common start of all pixels."""
 
     frequency_mhz: Floats
     intensity: NDArray[Any]  # (channels, x)
@@ -80,15 +80,15 @@ def fit_cube(
     intensity : (n, y, x) array
         K.
     noise : float or (y, x) array
-        Of a channel.
+        Standard deviation of a channel.
     components : sequence of Component
-        The start of every pixel.
+        The common start of all pixels.
     sight, choices : optional
         As in `fit_source`.
     mask : (y, x) array of bool, optional
-        Pixels that are fitted; by default those with a channel above five standard deviations.
+        Pixels to fit; by default those with a channel above five standard deviations.
     executor : Executor, optional
-        Rows are spread over it.
+        Shares the work over rows.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def fit_cube(
     Raises
     ------
     ValueError
-        For shapes that do not fit each other.
+        For inconsistent shapes.
     """
     n, height, width = intensity.shape
     if len(frequency_mhz) != n:
@@ -120,12 +120,12 @@ def fit_cube(
 
 
 def _fit_to_use(intensity: NDArray[Any], noise: Floats) -> NDArray[np.bool_]:
-    """Pixels (x,) with noise and at least half of their channels."""
+    """Mask (x,) of pixels with known noise and finite values in at least half of their channels."""
     return np.asarray((np.isfinite(intensity).mean(axis=0) >= 0.5) & (noise > 0))
 
 
 def _chained(rows: list[_Row]) -> list[_Row]:
-    """The rows with their first pixels and the components with which these begin, followed from the brightest pixel of all."""
+    """The rows with their first pixels and starts, from a chain of fits that begins at the brightest pixel of the cube."""
     peaks = [np.where(row.mask, _peak(row.intensity), -np.inf) for row in rows]
     brightest = int(np.argmax([peak.max(initial=-np.inf) for peak in peaks]))
     out = list(rows)
@@ -144,19 +144,19 @@ def _chained(rows: list[_Row]) -> list[_Row]:
 
 
 def _peak(intensity: NDArray[Any]) -> Floats:
-    """The brightest channel of every pixel (x,); -inf where none is finite."""
+    """Intensity of the brightest channel of each pixel (x,); -inf if no channel is finite."""
     return np.asarray(np.max(np.where(np.isfinite(intensity), intensity, -np.inf), axis=0))
 
 
 def _fit_pixel(row: _Row, x: int, neighbour: tuple[Component, ...]) -> SourceFit | None:
-    """The fit of least χ² among those that converged; further starts are tried until there is one to trust. None where none can be made."""
+    """The converged fit with the smallest χ²; starts are tried until a fit is trusted. None if no fit is possible."""
     spectrum, best = _pixel(row, x), None
     for start in _starts(row, spectrum, neighbour):
         try:
             fit = fit_source(spectrum, start, row.sight, row.choices)
         except (
             ValueError
-        ):  # the search left the range of doubles, or the pixel has too few channels: not fitted, as the map says
+        ):  # the search left the range of doubles, or the pixel has too few channels: the map marks it as not fitted
             continue
         if best is None or (fit.minimum.converged, -fit.chi_squared) > (best.minimum.converged, -best.chi_squared):
             best = fit
@@ -166,7 +166,7 @@ def _fit_pixel(row: _Row, x: int, neighbour: tuple[Component, ...]) -> SourceFit
 
 
 def _starts(row: _Row, spectrum: ObservedSpectrum, neighbour: tuple[Component, ...]) -> Iterator[tuple[Component, ...]]:
-    """The neighbour, the start of the row, that of all, and that at the velocity and width of the pixel's own correlation."""
+    """Starts of a pixel: its neighbour, that of the row, the common one, and the velocity and width from the correlation of the pixel."""
     yield from {id(each): each for each in (neighbour, row.components, row.start)}.values()
     known = [component.species for component in row.start]
     velocity, width = velocity_and_width(spectrum, known, None, None, row.sight)
@@ -174,7 +174,7 @@ def _starts(row: _Row, spectrum: ObservedSpectrum, neighbour: tuple[Component, .
 
 
 def _is_trusted(fit: SourceFit) -> bool:
-    """Whether a search has ended at lines: a start off every line ends with nothing determined and a χ² that noise does not have."""
+    """Whether a fit describes lines: after a start far from all lines no parameter is determined, and χ² is above that of noise."""
     noise_alone = 1 + _CHANCE * math.sqrt(2 / max(fit.degrees_of_freedom, 1))
     determined = all(parameter["determined"] for parameter in fit.parameters)
     return fit.minimum.converged and (determined or fit.reduced_chi_squared < noise_alone)

@@ -3,8 +3,8 @@
     ln(N_u/g_u) = ln(N/Q(T)) - E_u/kT,        N_u/g_u = (8π k ν²/(h c³ A g_u)) W C_τ,   W = ∫T_B dv,  C_τ = τ/(1 - e^-τ)
 
 (P. F. Goldsmith and W. D. Langer, Astrophys. J. 517, 209 (1999)), here with Planck's law and the background: W is divided by
-[J(T) - J(T_bg)]/T_RJ, which is 1 in the limit that the formula is for. C_τ follows from the line's own temperature and column density,
-found by repetition. A line is used alone, where others add less than a tenth to it in a fitted model.
+[J(T) - J(T_bg)]/T_RJ, which is 1 in the Rayleigh-Jeans limit of the formula. C_τ follows from the temperature and column density of the
+straight line, by iteration. A spectral line is used if other lines contribute less than a tenth to it in a fitted model.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from rotor.spectra.emission import planck_k
 from rotor.spectra.opacity import NM2_IN_CM2
 from rotor.table import Table
 
-_REACH = 2.0  # widths on either side, over which a line is integrated
-_OTHERS = 0.1  # of a line, above which it is a blend
+_REACH = 2.0  # range of integration on either side of a line, in line widths
+_OTHERS = 0.1  # contribution of other lines, relative to a line, above which it is a blend
 _ROUNDS = 50
 _C_CM = units.SPEED_OF_LIGHT_M_PER_S * 100
 _DETECTED = 3.0
@@ -33,10 +33,10 @@ _DETECTED = 3.0
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RotationalDiagram(Table):
-    """Points (n,) of a diagram and the line through them.
+    """Points (n,) of a rotational diagram and the straight line through them.
 
-    frequency_mhz, energy_upper_k. log_population: ln(N_u/g_u) with the correction, error of it, uncorrected without. optical_depth: at the
-    centre. excitation_k, column_per_cm2 and their errors: of the line.
+    frequency_mhz, energy_upper_k: of the spectral lines. log_population, error: ln(N_u/g_u), corrected for optical depth.
+    uncorrected: without the correction. optical_depth: at the centre. excitation_k, column_per_cm2, errors: from the straight line.
     """
 
     frequency_mhz: Floats
@@ -66,18 +66,18 @@ def rotational_diagram(
     *,
     corrected: bool = True,
 ) -> RotationalDiagram:
-    """The diagram of one component of a model, from its lines that no other disturbs.
+    """The rotational diagram of a component of a model, from its unblended lines.
 
     Parameters
     ----------
     spectrum : ObservedSpectrum
     components : sequence of Component
-        Fitted, or a guess: velocity and width say where lines are integrated, the others which lines are blends.
+        Components of a fit, or a guess: velocity and width give the ranges of integration, all components together the blends.
     number : int, optional
-        Of the component.
+        Number of the component.
     sight : Sight, optional
     corrected : bool, optional
-        For optical depth.
+        Whether populations are corrected for optical depth.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def rotational_diagram(
 def _integrated(
     spectrum: ObservedSpectrum, components: Sequence[Component], number: int, sight: Sight
 ) -> list[tuple[int, float, float]]:
-    """Row, ∫T_B dv (K km/s) and its error, of lines that the model has above three standard deviations and that are no blends."""
+    """Row, ∫T_B dv (K km/s) and its error of unblended lines above three standard deviations in the model."""
     component, species = components[number], components[number].species
     total = model(components, spectrum.frequency_mhz, sight).brightness_k
     alone = model([component], spectrum.frequency_mhz, sight).brightness_k
@@ -165,7 +165,7 @@ def _integrated(
 def _points(
     component: Component, species: Any, area: Floats, t: float, column: float, sight: Sight, corrected: bool
 ) -> tuple[Floats, Floats, Floats]:
-    """ln(N_u/g_u) corrected and not, and the optical depth at the centre."""
+    """ln(N_u/g_u) with and without the correction, and the optical depth at the centre."""
     nu = species.frequency_mhz
     photon = nu / units.MHZ_PER_K
     contrast = planck_k(nu, t) - planck_k(nu, sight.background_k * (1 + sight.redshift))
@@ -188,20 +188,20 @@ def _points(
 
 
 def _mean_escape(depth: Floats) -> Floats:
-    """∫(1 - e^-τ(v))dv/∫τ(v)dv of a Gaussian line with a depth at its centre, (n,)."""
+    """∫(1 - e^-τ(v))dv/∫τ(v)dv (n,) of Gaussian lines with these optical depths at their centres."""
     u = np.linspace(-3.0, 3.0, 121)
     shape = np.exp(-4 * math.log(2) * u * u)
     return np.asarray((escape(depth[:, None] * shape)[0] * shape).sum(axis=1) / shape.sum())
 
 
 def _linear(x: Floats, y: Floats, line: Floats, relative: Floats) -> tuple[float, float, Floats]:
-    """The line through populations whose errors are those of the line, linear in the integrals: logarithms of noise are biased."""
+    """The straight line through populations, with errors of the integrals predicted by it: logarithms of noisy integrals are biased."""
     ratio = np.exp(y - line)
     return _weighted_line(x, line + ratio - 1, relative * ratio)
 
 
 def _weighted_line(x: Floats, y: Floats, sigma: Floats) -> tuple[float, float, Floats]:
-    """Slope, intercept, and their covariance (2, 2) in that order."""
+    """Slope, intercept, and their covariance (2, 2), of a weighted straight line."""
     matrix = np.stack([x, np.ones_like(x)], axis=1) / sigma[:, None]
     covariance = np.asarray(np.linalg.inv(matrix.T @ matrix), dtype=np.float64)
     slope, intercept = (covariance @ (matrix.T @ (y / sigma))).tolist()
@@ -209,7 +209,7 @@ def _weighted_line(x: Floats, y: Floats, sigma: Floats) -> tuple[float, float, F
 
 
 def plot_rotational_diagram(diagram: RotationalDiagram, axes: Any) -> None:
-    """Points with errors, corrected and not, and the line, on axes of matplotlib."""
+    """Draw points with errors, with and without the correction, and the straight line on matplotlib axes."""
     axes.errorbar(
         diagram.energy_upper_k,
         diagram.log_population,

@@ -1,4 +1,4 @@
-"""Rotational diagrams of every species of a model, as a table of their points."""
+"""Rotational diagrams of all species of a model, as a table of points."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rotor.table import Table
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SpeciesDiagrams(Table):
-    """Diagrams by name of the species, those without a diagram left out, with the reason in `notes`."""
+    """Rotational diagrams by species; `notes` has the reason if a species has none."""
 
     names: tuple[str, ...]
     diagrams: tuple[RotationalDiagram, ...]
@@ -32,7 +32,7 @@ class SpeciesDiagrams(Table):
         return {"species": species} | {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def facts(self) -> list[dict[str, Any]]:
-        """Temperature and column density of each line through the points."""
+        """Temperature and column density of each diagram."""
         names = ("excitation_k", "excitation_error_k", "column_per_cm2", "column_error_per_cm2", "chi_squared")
         return [
             {"species": name, "lines": len(diagram.error), **{key: getattr(diagram, key) for key in names}}

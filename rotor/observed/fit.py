@@ -1,10 +1,10 @@
-"""LTE fits of observed spectra: least squares of brightness, its statistics, and what each component contributes.
+"""LTE fits of observed spectra: least squares of brightness, statistics, and the contribution of each component.
 
-χ² = Σ (T_obs - T_model)²/σ² is made least by `rotor.statistics.least_squares`, in ln N, ln T, v, ln Δv, ln θ (`variables`). Standard
-errors follow from the noise of the channels, and are multiplied by √(χ²/(n - m)) where that is above 1 (the model is then not all there
-is). Weak priors around the start (`PRIORS`) hold parameters that the spectrum does not determine; a parameter whose error is more than
-half of its prior is said to be undetermined. Frequencies of catalogues have errors of their own: a line that is off by δ shifts the model
-by δ ∂T/∂ν, which enters the noise as one more term, of the size of the catalogue's error (`catalogue_noise`).
+`rotor.statistics.least_squares` minimises χ² = Σ (T_obs - T_model)²/σ² in ln N, ln T, v, ln Δv, ln θ (`variables`). Standard
+errors follow from the noise of the channels. They are multiplied by √(χ²/(n - m)) if this is above 1, that is, if the model is incomplete.
+Weak priors around the start (`PRIORS`) hold parameters that the spectrum does not determine; a parameter is called undetermined if its
+error exceeds half of its prior. Catalogue frequencies have errors: an error δ changes the model by δ ∂T/∂ν, a further term of the noise
+(`catalogue_noise`).
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from rotor.table import Table, counted
 
 PRIORS = {"column_per_cm2": 5.0, "excitation_k": 1.5, "velocity_km_s": 2.0, "fwhm_km_s": 1.0, "size_arcsec": 1.5}
 """Standard deviations of the priors: of logarithms, and of velocities in widths."""
-NEEDED = 9.0  # gain in χ² for a component, beyond 2 for every parameter of its own
+NEEDED = 9.0  # gain in χ² that a needed component exceeds, besides 2 for each of its parameters
 
 
 @dataclass(frozen=True)
 class FitChoices:
-    """How a spectrum is fitted.
+    """Settings of a fit.
 
-    free, shared: parameters, see `variables`. fixed: parameters of single components that stay. calibration: relative error of the
-    intensity scale and of the catalogues' intensities, added to the noise as a fraction of the spectrum. priors: whether
-    `PRIORS` hold what is not determined. most_iterations: of the search.
+    free, shared: parameters, see `variables`. fixed: parameters of single components that are not fitted. calibration: relative error of
+    the intensity scale and of the catalogues' intensities; this fraction of the spectrum is added to the noise. priors: whether
+    `PRIORS` hold undetermined parameters. most_iterations: limit of the search.
     """
 
     free: tuple[str, ...] = DEFAULT_FREE
@@ -51,8 +51,8 @@ class FitChoices:
 class SourceFit(Table):
     """A fitted source.
 
-    components: at the minimum. variables, values, statistics: of the search, the errors from the noise alone. spectrum, model_k: channels
-    that were fitted and the brightness of the model there. minimum: how the search ended. sight, choices, start: what it began with.
+    components: at the minimum. variables, values, statistics: of the search, with errors from the noise only. spectrum, model_k: fitted
+    channels and the brightness of the model there. minimum: end of the search. sight, choices, start: input of the fit.
     """
 
     spectrum: ObservedSpectrum
@@ -74,7 +74,7 @@ class SourceFit(Table):
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Channels less determined parameters."""
+        """Number of channels minus number of determined parameters."""
         return len(self.spectrum) - self.statistics.rank
 
     @property
@@ -84,12 +84,12 @@ class SourceFit(Table):
 
     @property
     def scale(self) -> float:
-        """Factor of the errors: √(χ²/(n - m)) where that is above 1."""
+        """Factor of the errors: √(χ²/(n - m)), at least 1."""
         return math.sqrt(max(1.0, self.reduced_chi_squared)) if self.degrees_of_freedom > 0 else 1.0
 
     @cached_property
     def parameters(self) -> list[dict[str, Any]]:
-        """Every free parameter: name, value, error (symmetric, to first order), interval of 68 %, and whether it is determined."""
+        """Free parameters: name, value, error (symmetric, to first order), interval of 68 %, and whether it is determined."""
         out = []
         errors = self.statistics.errors * self.scale
         for name, variable, value, error in zip(
@@ -131,11 +131,11 @@ class SourceFit(Table):
 
     @property
     def residuals_k(self) -> Floats:
-        """Observed less modelled brightness (n,)."""
+        """Observed minus modelled brightness (n,)."""
         return self.spectrum.intensity - self.model_k
 
     def facts(self) -> dict[str, Any]:
-        """Everything but the arrays, as plain numbers, texts, lists and dictionaries."""
+        """All content except arrays, as plain numbers, texts, lists and dictionaries."""
         return {
             "components": [component_facts(component) for component in self.components],
             "parameters": [
@@ -172,19 +172,19 @@ def fit_source(
     *,
     progress: Callable[[Iteration], None] | None = None,
 ) -> SourceFit:
-    """Column densities, temperatures, velocities and widths that describe a spectrum best, from a start.
+    """Least-squares fit of column densities, temperatures, velocities and widths to a spectrum.
 
     Parameters
     ----------
     spectrum : ObservedSpectrum
-        In K, its continuum subtracted.
+        Spectrum in K without continuum.
     components : sequence of Component
-        The start; `start_values` makes one from the spectrum.
+        The start; `start_components` estimates it from the spectrum.
     sight : Sight, optional
         Background, beam, redshift, dust.
     choices : FitChoices, optional
     progress : callable, optional
-        Called with every iteration.
+        Called at each iteration.
 
     Returns
     -------
@@ -197,7 +197,7 @@ def fit_source(
 
     Notes
     -----
-    A minimum may be a local one; velocities must begin within a width of the lines.
+    The minimum may be a local one; velocities must start within a width of the lines.
     """
     sight, choices = sight or Sight(), choices or FitChoices()
     _refuse(spectrum, components, sight)
@@ -232,7 +232,7 @@ def minimum_of(
     choices: FitChoices,
     progress: Callable[[Iteration], None] | None = None,
 ) -> Minimum:
-    """Where the search for the least χ² ends; the priors are the last residuals."""
+    """The minimum of χ² from a start; the priors are the last residuals."""
     start, widths = free.values(components), prior_widths(components, free)
     rows = np.diag(1 / widths)
 
@@ -254,7 +254,7 @@ def minimum_of(
 
 
 def prior_widths(components: Sequence[Component], free: Variables) -> Floats:
-    """Standard deviations (m,) of the priors of what a search moves."""
+    """Standard deviations (m,) of the priors of the search variables."""
     scale = [
         components[variable.components[0]].fwhm_km_s if variable.name == "velocity_km_s" else 1.0
         for variable in free.items
@@ -278,7 +278,7 @@ def _refuse(spectrum: ObservedSpectrum, components: Sequence[Component], sight: 
 def total_noise(
     spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight, choices: FitChoices
 ) -> Floats:
-    """Noise of the channels with the errors of calibration and of the catalogues' frequencies, at the start of a fit, (n,)."""
+    """Noise (n,) of the channels at the start of a fit, with errors of calibration and of the catalogues' frequencies."""
     variance = spectrum.noise**2
     if choices.calibration:
         variance = variance + (choices.calibration * spectrum.intensity.clip(min=0.0)) ** 2
@@ -286,9 +286,9 @@ def total_noise(
 
 
 def catalogue_noise(components: Sequence[Component], grid_mhz: Floats, sight: Sight) -> Floats:
-    """What errors δ of catalogue frequencies do to the brightness: |∂T_B/∂ν| δ, (n,).
+    """Errors (n,) of the brightness from errors δ of catalogue frequencies: |∂T_B/∂ν| δ.
 
-    Every line is shifted by its own error; where lines overlap the shifted spectra differ by the sum, an upper bound.
+    All lines are shifted by their errors in the same direction; where lines overlap this is an upper bound.
     """
     if not any((component.species.error_mhz > 0).any() for component in components):
         return np.zeros(len(grid_mhz))
@@ -299,7 +299,7 @@ def catalogue_noise(components: Sequence[Component], grid_mhz: Floats, sight: Si
 
 
 def _moved(component: Component) -> Any:
-    """Lines at their frequencies plus their errors, of at most a third of a width each: farther off a line is not fitted at all."""
+    """Lines shifted by their frequency errors, by at most a third of a width; a line with a larger error does not affect the fit."""
     species = component.species
     third = species.frequency_mhz * component.fwhm_km_s / 299792.458 / 3
     moved = species.frequency_mhz + np.minimum(species.error_mhz, third)
@@ -309,10 +309,10 @@ def _moved(component: Component) -> Any:
 
 @dataclass(frozen=True)
 class Contribution:
-    """What a component does for a fit: gain of χ² (Δχ²) and whether it is needed; its upper limit where it is not.
+    """Contribution of a component to a fit: gain of χ² (Δχ²), whether it is needed, and an upper limit if not.
 
-    signal: Δχ² of the component against the same fit without it. limit_per_cm2: column density below which it stays at 3 standard
-    deviations, at the temperature, velocity and width of the component; None where it is needed.
+    signal: increase of χ² when the component is left out and the others are fitted again. limit_per_cm2: upper limit of the column density
+    at 3 standard deviations, for the temperature, velocity and width of the component; None if it is needed.
     """
 
     species: str
@@ -322,7 +322,7 @@ class Contribution:
 
 
 def contributions(fit: SourceFit) -> list[Contribution]:
-    """What each component explains that the others, fitted again without it, do not."""
+    """Contribution of each component: loss of χ² when it is left out and the others are fitted again."""
     _refuse(fit.spectrum, fit.components, fit.sight)
     out = []
     for k, component in enumerate(fit.components):
@@ -351,9 +351,9 @@ def _without(fit: SourceFit, k: int) -> Floats:
 def upper_limit(fit: SourceFit, k: int, others_k: Floats | None = None, deviations: float = 3.0) -> float:
     """Column density of a component at which χ² is `deviations`² above its least value.
 
-    At the temperature with which the fit began (that of a species without lines means nothing); at the fitted velocity and width, or
-    those of the start where they are not determined.
-    others_k: brightness (n,) of the other components, by default as they are in the fit.
+    The temperature is that of the start, because the fitted temperature of a species without lines is meaningless. Velocity and width are
+    the fitted ones, or those of the start if they are not determined.
+    others_k: brightness (n,) of the other components, by default that of the fit.
     """
     if others_k is None:
         others = [component for i, component in enumerate(fit.components) if i != k]
@@ -372,7 +372,7 @@ def limit_of(
     others_k: Floats | None = None,
     deviations: float = 3.0,
 ) -> float:
-    """Upper limit of a column density from the residuals of a spectrum, see `upper_limit`."""
+    """Upper limit of a column density from the residuals of a spectrum, as `upper_limit`."""
     seen = sight or Sight()
     left = spectrum.intensity if others_k is None else spectrum.intensity - others_k
     thin = replace(component, column_per_cm2=1.0)
@@ -395,7 +395,7 @@ def _thick_limit(
     first: float,
     deviations: float,
 ) -> float:
-    """The limit with saturation: the column at which χ² has risen above the least one over all columns."""
+    """The limit with saturation: the column density at which χ² exceeds its minimum by the square of `deviations`."""
 
     def chi_squared(column: float) -> float:
         seen = model([replace(thin, column_per_cm2=column)], spectrum.frequency_mhz, sight).brightness_k

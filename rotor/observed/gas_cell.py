@@ -2,8 +2,8 @@
 
     A(ν) = lg(P_0/P) = Σ_k τ_k(ν)/ln 10,    τ_k(ν) = N_k L Σ_i I_i(T) φ_i(ν)
 
-after the law of Beer and Lambert, P = P_0 10^(-A) (IUPAC Compendium of Chemical Terminology, 5th ed. (2025), doi 10.1351/goldbook.B00626),
-with one temperature T for all species, N_k L the molecules in the line of sight, and Gaussians of one relative width, as motion makes them.
+by the law of Beer and Lambert, P = P_0 10^(-A) (IUPAC Compendium of Chemical Terminology, 5th ed. (2025), doi 10.1351/goldbook.B00626),
+with a common temperature T, the column density N_k L of each species, and Doppler profiles (Gaussians of a common relative width).
 Neglected: pressure broadening, emission of the gas, and the response of the detector.
 """
 
@@ -47,7 +47,7 @@ def absorbance(components: Sequence[Component], grid_mhz: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CellFit(SourceFit):
-    """A fitted gas cell: `SourceFit` of absorbance; `model_k`, `residuals_k` are absorbances here."""
+    """A fitted gas cell: a `SourceFit` whose `model_k` and `residuals_k` are absorbances."""
 
     @property
     def temperature_k(self) -> float:
@@ -56,7 +56,7 @@ class CellFit(SourceFit):
 
     @property
     def temperature_error_k(self) -> float:
-        """Its standard error; inf where it is not determined."""
+        """Standard error of the temperature; inf if it is not determined."""
         return float(self.parameters_of(0)["excitation_k"]["error"])
 
     @property
@@ -65,7 +65,7 @@ class CellFit(SourceFit):
         return tuple(self.parameters_of(k)["column_per_cm2"]["error"] for k in range(len(self.components)))
 
     def facts(self) -> dict[str, Any]:
-        """As of a source, `rms` and `noise` in absorbance."""
+        """Facts as of a `SourceFit`, with `rms` and `noise` in absorbance."""
         content = super().facts()
         return content | {"rms": content.pop("rms_k"), "noise": content.pop("noise_k")}
 
@@ -76,7 +76,7 @@ def start_cell(
     temperature_k: float | None = None,
     fwhm_km_s: float | None = None,
 ) -> list[Component]:
-    """Components to begin a fit with: of some temperatures and widths those with the least χ², column densities linear in A.
+    """Start of a fit: the temperature and width of a grid with the smallest χ²; column densities by linear least squares.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ def start_cell(
         Its unit is absorbance.
     species : sequence of SpeciesLines
     temperature_k, fwhm_km_s : float, optional
-        Where they are known.
+        Known values; by default estimated.
 
     Returns
     -------
     list of Component
-        At rest; of species that show nothing the column density is that of a third of the noise.
+        Components at rest; the column density of a species without visible lines corresponds to a third of the noise.
 
     Raises
     ------
@@ -118,14 +118,14 @@ def start_cell(
 
 
 def fit_cell(spectrum: ObservedSpectrum, start: Sequence[Component]) -> CellFit:
-    """Column densities of all species, one temperature and one width, from a spectrum in absorbance.
+    """Fit of a gas cell: column densities of all species, a common temperature and a common width.
 
     Parameters
     ----------
     spectrum : ObservedSpectrum
         Its unit is absorbance.
     start : sequence of Component
-        The first one's temperature and width count for all; `start_cell` estimates them.
+        The start; temperature and width are those of the first component. `start_cell` estimates it.
 
     Returns
     -------
@@ -143,7 +143,9 @@ def fit_cell(spectrum: ObservedSpectrum, start: Sequence[Component]) -> CellFit:
     def evaluate(values: Floats) -> tuple[Floats, Floats]:
         parts = free.applied(start, values)
         depths = np.stack([component_depth(component, grid, slopes=True) for component in parts]) / _LN10
-        slopes = np.concatenate([depths[:, 1:], np.zeros_like(depths[:, :1])], axis=1)  # none of the size of a source
+        slopes = np.concatenate(
+            [depths[:, 1:], np.zeros_like(depths[:, :1])], axis=1
+        )  # the size of a source has no effect
         return (spectrum.intensity - depths[:, 0].sum(axis=0)) / noise, free.jacobian(parts, slopes) / noise[:, None]
 
     minimum = free.minimum(evaluate, start, tolerance=1e-3)

@@ -1,12 +1,12 @@
-"""Which species a spectrum needs: forward selection with refits, then each that the others can do without is dropped.
+"""Identification of species in a spectrum: forward selection with refits, then removal of species that are not needed.
 
-Thin templates of all candidates at a few temperatures are projected on what the model so far leaves, gain = (t·r)²/(t·t) in χ² for t·r > 0
-(orthogonal matching pursuit: S. Chen, S. A. Billings, W. Luo, Int. J. Control 50, 1873 (1989)). The best candidates are fitted with optical
-depth, the best of them stays if it gains more than a threshold that grows with the number of candidates, and all are fitted again. In the
-end every species is removed once and the others fitted without it: what χ² loses is its evidence. Lines that a species should show and
-does not count against it in full, while a channel far above the model counts no more than a few standard deviations: so that species which
-match many lines win over those that match a bright one. The noise has a part proportional to the model, for what LTE and one layer
-leave out.
+Optically thin templates t of all candidates at a few temperatures are projected on the residuals r of the current model. The gain in χ² is
+(t·r)²/(t·t) for t·r > 0 (orthogonal matching pursuit: S. Chen, S. A. Billings, W. Luo, Int. J. Control 50, 1873 (1989)). The best
+candidates are fitted with optical depth. The best of these is added if its gain exceeds a threshold that grows with the number of
+candidates; then all species are fitted again. At the end each species is removed once and the others are fitted without it: the increase of
+χ² is its evidence. Expected lines that are missing count in full against a species, whereas a channel far above the model counts as a few
+standard deviations at most. Species that match many lines therefore win over those that match a bright line. A part of the noise is
+proportional to the model, to account for departures from LTE and from a single layer.
 """
 
 from __future__ import annotations
@@ -28,24 +28,24 @@ from rotor.observed.start import TEMPERATURES_K, velocity_and_width
 from rotor.spectra.emission import planck_k
 from rotor.table import Table
 
-THRESHOLD = 16.0  # gain of χ², beyond 2 ln(templates), from which a species counts
-_TRIED = 4  # best candidates that are fitted at each step
-_ALWAYS_REFITTED = 12  # species up to which all are fitted again at each step
+THRESHOLD = 16.0  # smallest gain of χ² of a species, in addition to 2 ln(templates)
+_TRIED = 4  # number of candidates that are fitted at each step
+_ALWAYS_REFITTED = 12  # largest number of species that are all fitted again at each step
 _REFIT_EVERY = 5
-_UNIDENTIFIED = 5.0  # standard deviations
+_UNIDENTIFIED = 5.0  # smallest peak of an unidentified line, in standard deviations
 _VISIBLE = 3.0
-_RIVAL = 0.7  # of the evidence of a species, from which another that is not in the model could explain it
+_RIVAL = 0.7  # smallest gain of a rival outside the model, relative to the evidence of a species
 _RIVALS = 3
-_GUARD = 4.0  # standard deviations above the model, from which a channel counts less
-_SHARED = 0.3  # standard deviations, above which a species takes part in a channel
+_GUARD = 4.0  # standard deviations above the model; a channel further above has less weight
+_SHARED = 0.3  # smallest brightness of a species in a channel that it contributes to, in standard deviations
 
 
 @dataclass(frozen=True)
 class IdentifyChoices:
-    """How species are looked for.
+    """Settings of an identification.
 
-    velocity_km_s, fwhm_km_s: where known; otherwise estimated from the spectrum. temperatures_k: of the templates. model_error: of the
-    brightness, a fraction, added to the noise. most_species: at which the search ends. threshold: gain of χ² of a species.
+    velocity_km_s, fwhm_km_s: known values, otherwise estimated from the spectrum. temperatures_k: of the templates. model_error: relative
+    error of the brightness, added to the noise. most_species: limit of the search. threshold: smallest gain of χ² of a species.
     """
 
     velocity_km_s: float | None = None
@@ -61,9 +61,9 @@ class IdentifyChoices:
 class Evidence:
     """A species that the spectrum needs.
 
-    component: fitted. signal: loss of χ² without it, over the mean square of the residuals in its channels.
-    visible, expected: lines above three standard deviations in the
-    spectrum at the place of those that the model has above three. rivals: species outside the model that explain nearly as much.
+    component: fitted. signal: increase of χ² without it, divided by the mean square of the residuals in its channels.
+    expected: number of its lines above three standard deviations in the model. visible: number of these that the spectrum shows.
+    rivals: species outside the model that explain nearly as much.
     """
 
     component: Component
@@ -74,13 +74,13 @@ class Evidence:
 
     @property
     def single_line(self) -> bool:
-        """Whether no more than one of its lines is seen: lines of species that are no candidates then pass for it by chance."""
+        """Whether at most one of its lines is visible; such a line may belong to a species outside the candidates."""
         return self.visible <= 1
 
 
 @dataclass(frozen=True)
 class Unidentified:
-    """A line that the model does not have: frequency and brightness of its peak, standard deviations, candidates with a line there."""
+    """A line outside the model: frequency and brightness of its peak, significance in standard deviations, candidates with a line there."""
 
     frequency_mhz: float
     peak_k: float
@@ -90,7 +90,7 @@ class Unidentified:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Table):
-    """Species by evidence, lines that stay unidentified, the fit of all, and how many candidates there were."""
+    """Species by evidence, unidentified lines, the fit of all species, and the number of candidates."""
 
     species: tuple[Evidence, ...]
     unidentified: tuple[Unidentified, ...]
@@ -102,7 +102,7 @@ class Identification(Table):
 
     @property
     def names(self) -> list[str]:
-        """Names of the species, the one with most evidence first."""
+        """Names of the species in order of falling evidence."""
         return [evidence.component.species.name for evidence in self.species]
 
     @property
@@ -118,7 +118,7 @@ class Identification(Table):
         return table | {name: np.array([getattr(component, name) for component in parts]) for name in numbers}
 
     def facts(self) -> dict[str, Any]:
-        """Everything as plain numbers, texts, lists and dictionaries."""
+        """All content as plain numbers, texts, lists and dictionaries."""
         rows = [
             dict(zip(self.columns, row, strict=True))
             for row in zip(*(c.tolist() for c in self.columns.values()), strict=True)
@@ -152,19 +152,19 @@ def identify(
     *,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
-    """The species that a spectrum needs, ranked by evidence, and the lines that none of the candidates explains.
+    """Species in a spectrum, ranked by evidence, and the lines that no candidate explains.
 
     Parameters
     ----------
     spectrum : ObservedSpectrum
-        In K, its continuum subtracted.
+        Spectrum in K without continuum.
     candidates : sequence of SpeciesLines
-        Such as all of a catalogue in the range of the spectrum.
+        For instance all species of a catalogue in the range of the spectrum.
     sight : Sight, optional
         Background, beam, redshift.
     choices : IdentifyChoices, optional
     progress : callable, optional
-        Called with the name of every species that enters.
+        Called with the name of each added species.
 
     Returns
     -------
@@ -173,12 +173,12 @@ def identify(
     Raises
     ------
     ValueError
-        Where no candidate has a line in the range.
+        If no candidate has a line in the range.
 
     Notes
     -----
     All species have nearly the same velocity and width (free within priors in the last fit). A species with a single line in the range
-    rests on that line alone: look at its rivals.
+    depends on this line only: check its rivals.
     """
     sight, choices = sight or Sight(), choices or IdentifyChoices()
     first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
@@ -204,7 +204,7 @@ def identify(
 
 
 class _Bank:
-    """Thin templates, brightness per column density, of all candidates at all temperatures, as a sparse matrix (s t, n)."""
+    """Optically thin templates (brightness per column density) of all candidates at all temperatures, as a sparse matrix (s t, n)."""
 
     def __init__(
         self,
@@ -233,7 +233,7 @@ class _Bank:
         self.squares = self.templates.multiply(self.templates).tocsr()
 
     def gains(self, residual_k: Floats, sigma: Floats) -> tuple[Floats, Floats]:
-        """Gain of χ² and column density of every candidate at every temperature, (s, t) each."""
+        """Gain of χ² and column density of each candidate at each temperature, (s, t) each."""
         overlap = self.templates @ (residual_k / sigma**2)
         length = self.squares @ (1 / sigma**2)
         safe = np.where(length > 0, length, 1.0)
@@ -243,7 +243,7 @@ class _Bank:
         return gain.reshape(shape), column.reshape(shape)
 
     def best(self, residual_k: Floats, sigma: Floats) -> tuple[Floats, list[Component]]:
-        """The gain of every candidate at its best temperature, and a component that starts there."""
+        """Gain of each candidate at its best temperature, and a component to start from."""
         gain, column = self.gains(residual_k, sigma)
         at = gain.argmax(axis=1)
         rows = np.arange(len(at))
@@ -280,7 +280,7 @@ class _Search:
         self.refused: set[int] = set()
 
     def model_k(self, components: Sequence[Component] | None = None) -> Floats:
-        """Brightness of the species so far."""
+        """Brightness of the current model."""
         parts = self.components if components is None else components
         return (
             model(parts, self.spectrum.frequency_mhz, self.sight).brightness_k
@@ -289,21 +289,21 @@ class _Search:
         )
 
     def sigma(self, brightness_k: Floats) -> Floats:
-        """Noise with what the model may be wrong by."""
+        """Noise including the error of the model."""
         return np.asarray(np.hypot(self.spectrum.noise, self.choices.model_error * brightness_k))
 
     def guarded(self, brightness_k: Floats) -> Floats:
-        """Noise raised where the spectrum is far above the model, so that lines of unknown species do not attract the others."""
+        """Noise, raised where the spectrum is far above the model, so that lines of unknown species do not attract known species."""
         above = (self.spectrum.intensity - brightness_k) / _GUARD
         return np.asarray(np.maximum(self.sigma(brightness_k), above))
 
     def run(self) -> None:
-        """Add species until none gains enough."""
+        """Add species until the gain is below the threshold."""
         while len(self.components) < self.choices.most_species and self._add():
             self._refit()
 
     def _add(self) -> bool:
-        """Add the best candidate; False where none gains enough."""
+        """Add the best candidate; False if its gain is below the threshold."""
         now = self.model_k()
         residual = self.spectrum.intensity - now
         sigma = self.guarded(now)
@@ -327,7 +327,7 @@ class _Search:
         return True
 
     def _gain(self, component: Component, residual: Floats, sigma: Floats) -> tuple[float, Component]:
-        """Gain of χ² of a candidate fitted with optical depth to what is left, and the fitted component."""
+        """Gain of χ² of a candidate that is fitted to the residuals with optical depth, and the fitted component."""
         left = replace(self.spectrum, intensity=residual, noise=sigma)
         try:
             fit = fit_source(
@@ -339,13 +339,13 @@ class _Search:
         return before - fit.chi_squared, fit.components[0]
 
     def _refit(self) -> None:
-        """All species together, one velocity and one width, where they are few or it is time."""
+        """Fit all species with a common velocity and width, if there are few species or the last such fit is several steps ago."""
         count = len(self.components)
         if count <= _ALWAYS_REFITTED or count % _REFIT_EVERY == 0:
             self.components = list(self.fit(self.components, 15).components)
 
     def fit(self, components: Sequence[Component], iterations: int, *, alone: bool = False) -> SourceFit:
-        """A fit of components with the noise of their own model; alone: velocity and width of each."""
+        """A fit of components, with noise that includes the error of their model; alone: separate velocities and widths."""
         noisy = replace(self.spectrum, noise=self.guarded(self.model_k(components)))
         shared = () if alone else ("velocity_km_s", "fwhm_km_s")
         free = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
@@ -354,7 +354,7 @@ class _Search:
         )
 
     def pruned(self) -> tuple[SourceFit | None, Floats]:
-        """The last fit, without species that the others make unnecessary, and the evidence of each that stays."""
+        """The last fit without unnecessary species, and the evidence of the remaining species."""
         while self.components:
             fit = self.fit(self.components, 40)
             signals = self.signals(fit)
@@ -366,7 +366,7 @@ class _Search:
         return None, np.zeros(0)
 
     def signals(self, fit: SourceFit) -> Floats:
-        """For every species the χ² that is lost without it, those that share its channels fitted again."""
+        """Increase of χ² without each species, with the species that share its channels fitted again."""
         grid = fit.spectrum.frequency_mhz
         alone = np.array([model([component], grid, self.sight).brightness_k for component in fit.components])
         shines = np.abs(alone) > _SHARED * fit.noise
@@ -379,7 +379,7 @@ class _Search:
         return out / _local_scatter(fit, shines)
 
     def _misfit(self, fit: SourceFit, left: Floats, near: list[Component]) -> float:
-        """χ² of what is left with some species, fitted again."""
+        """χ² of the residuals after these species are fitted again."""
         if not near:
             return float(np.sum((left / fit.noise) ** 2))
         part = replace(fit.spectrum, intensity=left, noise=fit.noise)
@@ -389,13 +389,13 @@ class _Search:
 
 
 def _local_scatter(fit: SourceFit, shines: NDArray[np.bool_]) -> Floats:
-    """Mean square of the residuals over the noise in the channels of every species, at least 1: what is not fitted well is no evidence."""
+    """Mean square of residual over noise in the channels of each species, at least 1; a poor fit lowers the evidence."""
     squares = (fit.residuals_k / fit.noise) ** 2
     return np.array([max(1.0, float(squares[part].mean())) if part.any() else 1.0 for part in shines])
 
 
 def _evidence(fit: SourceFit, k: int, signal: float, bank: _Bank, search: _Search) -> Evidence:
-    """What speaks for a species: lost χ², lines seen of those expected, and rivals."""
+    """Evidence of a species: increase of χ² without it, visible and expected lines, rivals."""
     component = fit.components[k]
     alone = model([component], fit.spectrum.frequency_mhz, fit.sight).brightness_k
     expected, visible = _lines_seen(search.spectrum, alone)
@@ -409,7 +409,7 @@ def _evidence(fit: SourceFit, k: int, signal: float, bank: _Bank, search: _Searc
 
 
 def _lines_seen(spectrum: ObservedSpectrum, alone: Floats) -> tuple[int, int]:
-    """Groups of channels where the species is above three standard deviations, and how many of them the spectrum has at half that."""
+    """Number of expected lines (groups of channels above three standard deviations in the model), and of those that are visible."""
     noise = spectrum.noise
     high = alone > _VISIBLE * noise
     edges = np.flatnonzero(np.diff(np.concatenate([[False], high, [False]]).astype(int)))
@@ -422,7 +422,7 @@ def _lines_seen(spectrum: ObservedSpectrum, alone: Floats) -> tuple[int, int]:
 
 
 def _unidentified(search: _Search, fit: SourceFit | None) -> tuple[Unidentified, ...]:
-    """Peaks of what the model leaves above five standard deviations, a width apart, the strongest first."""
+    """Peaks of the residuals above five standard deviations, at least a width apart, the strongest first."""
     spectrum = search.spectrum
     brightness = np.zeros(len(spectrum)) if fit is None else fit.model_k
     residual = spectrum.intensity - brightness

@@ -1,4 +1,4 @@
-"""LTE models of a radio source: optical depths, brightness, and their derivatives by every parameter.
+"""LTE models of a radio source: optical depths, brightness, and derivatives with respect to all parameters.
 
 Components k (a species in a region of the source) have column density N, excitation temperature T, velocity v and width Δv:
 
@@ -6,10 +6,10 @@ Components k (a species in a region of the source) have column density N, excita
     T_B(ν) = Σ_layers f [Σ_k τ_k c_k] g(τ),  g(τ) = (1 - e^-τ)/τ,   τ = Σ_k τ_k,   c_k = J_ν(T_k (1 - v/c)) - J_ν(T_bg)
 
 The equation of radiative transfer through a uniform layer (J. G. Mangum and Y. L. Shirley, Publ. Astron. Soc. Pac. 127 (2015) 266)
-with the mixed source function S = Σ τ_k J_k/Σ τ_k: components of a layer lie in one another, layers lie side by side in
-the beam. For one temperature it is the usual [J(T) - J(T_bg)](1 - e^-τ). Dust in a layer is one more τ_k, a power law of ν, whose own
+with the mixed source function S = Σ τ_k J_k/Σ τ_k: components of a layer are mixed, layers lie side by side in
+the beam. For a single temperature it is the usual [J(T) - J(T_bg)](1 - e^-τ). Dust in a layer is a further τ_k, a power law of ν, whose
 emission is subtracted with the continuum. f = θ_s²/(θ_s² + θ_b²) for a Gaussian source in a Gaussian beam.
-Neglected: departures from one temperature in a component, scattering, and the width of a channel unless it is stated.
+Neglected: temperature gradients in a component, scattering, and the width of a channel unless it is given.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class Component:
 
     column_per_cm2: molecules in the line of sight. excitation_k: of rotation. velocity_km_s: radio convention, relative to the frame of
     the spectrum. fwhm_km_s: full width at half maximum. size_arcsec: full width of the source at half maximum; None fills the beam.
-    layer: components of one layer absorb one another's light; layers lie side by side.
-    ValueError for what is not above 0 and a velocity beyond that of light.
+    layer: number of the layer; components of a layer absorb one another's light, layers lie side by side.
+    Raises ValueError for numbers not above 0, and for a velocity beyond that of light.
     """
 
     species: SpeciesLines
@@ -66,13 +66,13 @@ class Component:
 
     @property
     def seen_k(self) -> float:
-        """T_ex (1 - v/c), the temperature of the black body that a moving one of T_ex looks like (`rotor.spectra.emission`)."""
+        """T_ex (1 - v/c), the apparent temperature of a moving black body at T_ex (`rotor.spectra.emission`)."""
         return self.excitation_k * self.shift
 
 
 @dataclass(frozen=True)
 class Dust:
-    """Dust mixed with the gas of every layer: τ_d = depth (ν/reference)^β at one temperature."""
+    """Dust mixed with the gas of all layers: τ_d = depth (ν/reference)^β at a single temperature."""
 
     depth: float
     temperature_k: float
@@ -86,12 +86,11 @@ class Dust:
 
 @dataclass(frozen=True)
 class Sight:
-    """How a source is seen.
+    """Background, beam, redshift, dust and channels of an observation.
 
-    background_k: behind it, as observed; at the source it is hotter by 1 + z. beam_arcsec: full width of the beam at
-    half maximum, needed where a component has a size. redshift: z of the
-    source; frequencies are observed ones, ν_rest/(1 + z), and a brightness is smaller by 1 + z. dust: within the layers.
-    channel_mhz: width of a channel over which the model is averaged; None takes the value at its centre.
+    background_k: observed temperature behind the source; at the source it is higher by 1 + z. beam_arcsec: full width of the beam at
+    half maximum, needed if a component has a size. redshift: z of the source; observed frequencies are ν_rest/(1 + z), and the
+    brightness is lower by 1 + z. dust: in the layers. channel_mhz: width of a channel over which the model is averaged; None: its centre.
     """
 
     background_k: float = BACKGROUND_K
@@ -105,7 +104,7 @@ class Sight:
 class Modelled:
     """Brightness (n,) and optical depth (n,) of a model; by component: optical depths (k, n).
 
-    slopes: (k, 5, n) derivatives of the brightness by the `PARAMETERS` of every component, where they were asked for.
+    slopes: (k, 5, n) derivatives of the brightness with respect to the `PARAMETERS` of each component, if requested.
     """
 
     brightness_k: Floats
@@ -115,7 +114,7 @@ class Modelled:
 
 
 def escape(depth: Floats) -> tuple[Floats, Floats]:
-    """g(τ) = (1 - e^-τ)/τ and its derivative, (n,) each, to full precision for every τ, negative ones of masers included.
+    """g(τ) = (1 - e^-τ)/τ and its derivative, (n,) each, to full precision for all τ, also the negative ones of masers.
 
     >>> [round(float(x), 6) for x in escape(np.array([0.0]))[0]], round(float(escape(np.array([2.0]))[0][0]), 6)
     ([1.0], 0.432332)
@@ -148,7 +147,7 @@ def planck_slope(frequency_mhz: Floats, temperature_k: float) -> Floats:
 def model(
     components: Sequence[Component], grid_mhz: Floats, sight: Sight | None = None, *, slopes: bool = False
 ) -> Modelled:
-    """Brightness temperature of a source on a grid of observed frequencies, the continuum subtracted.
+    """Brightness temperature of a source without continuum, on a grid of observed frequencies.
 
     Parameters
     ----------
@@ -186,7 +185,7 @@ def model(
 
 
 def _averaged(components: Sequence[Component], grid: Floats, sight: Sight, slopes: bool) -> Modelled:
-    """The mean over every channel by Gauss's rule with four points."""
+    """The mean over each channel, by Gauss quadrature with four points."""
     nodes, weights = np.polynomial.legendre.leggauss(4)
     fine = (grid[:, None] + nodes * (sight.channel_mhz or 0.0) / 2).ravel()
     order = np.argsort(fine, kind="stable")
@@ -207,7 +206,7 @@ def _averaged(components: Sequence[Component], grid: Floats, sight: Sight, slope
 
 
 def layers(components: Sequence[Component]) -> list[Ints]:
-    """Numbers of the components of every layer."""
+    """Numbers of the components of each layer."""
     labels = np.array([component.layer for component in components])
     return [np.flatnonzero(labels == label) for label in np.unique(labels)]
 
@@ -220,7 +219,7 @@ def _layer(
     sight: Sight,
     derivative: Floats | None,
 ) -> tuple[Floats, Floats]:
-    """Brightness and optical depth of one layer; its derivatives are entered into `derivative`."""
+    """Brightness and optical depth of a layer; its derivatives are written into `derivative`."""
     behind = planck_k(grid, sight.background_k * (1 + sight.redshift))
     contrast = [planck_k(grid, components[k].seen_k) - behind for k in members]
     τ = np.sum([depths[k][0] for k in members], axis=0)
@@ -262,7 +261,7 @@ def _filling(members: Ints, components: Sequence[Component], sight: Sight) -> fl
 
 
 def component_depth(component: Component, grid_mhz: Floats, slopes: bool = False) -> Floats:
-    """τ of a component on a rising grid, (1, n), with `slopes` also its derivatives by N, T, v, Δv, (5, n).
+    """τ of a component on a rising grid (1, n); with `slopes` also its derivatives with respect to N, T, v, Δv (5, n).
 
     With u = (ν - ν_c)/w:  ∂τ/∂N = τ/N;  ∂I/∂T from the exponents and Q;  ∂φ/∂ν_c and ∂φ/∂w of a Gaussian, both ν_c and w moving with v.
     """
@@ -295,7 +294,7 @@ def component_depth(component: Component, grid_mhz: Floats, slopes: bool = False
 
 
 def _log_slope(lines: SpeciesLines, temperature_k: float) -> Floats:
-    """d ln I/dT of every line: E″/kT² - (x/T)/(e^x - 1) - (d ln Q/d ln T)/T, x = hν/kT."""
+    """d ln I/dT of each line: E″/kT² - (x/T)/(e^x - 1) - (d ln Q/d ln T)/T, x = hν/kT."""
     x = lines.frequency_mhz / (units.MHZ_PER_K * temperature_k)
     photon = x / np.expm1(x)
     return np.asarray(
@@ -304,7 +303,7 @@ def _log_slope(lines: SpeciesLines, temperature_k: float) -> Floats:
 
 
 def _windows(grid: Floats, centre: Floats, reach: Floats) -> tuple[Ints, Ints]:
-    """Pairs of a line and a channel within its reach, (m,) each."""
+    """Pairs of lines and channels within the reach of the lines, (m,) each."""
     first = np.searchsorted(grid, centre - reach)
     count = np.searchsorted(grid, centre + reach) - first
     line = np.repeat(np.arange(len(centre)), count)

@@ -1,11 +1,12 @@
-"""Non-LTE excitation through pythonradex (G. Cataldi and others; extra `nonlte`), as a model for the same kind of fit.
+"""Non-LTE excitation by pythonradex (G. Cataldi and others; extra `nonlte`), and fits with it.
 
-Level populations follow from column density, kinetic temperature and the densities of colliders with rates of a LAMDA file (escape
-probabilities; F. F. S. van der Tak et al., Astron. Astrophys. 468, 627 (2007)). Each line then has a temperature of its own:
+Level populations follow from the column density, the kinetic temperature and the densities of colliders, with the rates of a LAMDA file
+(escape probabilities; F. F. S. van der Tak et al., Astron. Astrophys. 468, 627 (2007)). Each line then has its excitation temperature T_i:
 
     T_B(ν) = f [Σ_i τ_i(ν) (J_ν(T_i) - J_ν(T_bg))] (1 - e^-τ)/τ,       τ = Σ τ_i,    τ_i Gaussians of the width Δv
 
-the formula of `rotor.observed.model` line by line. Frequencies are those of the file. Derivatives are differences.
+which is the formula of `rotor.observed.model` with a temperature for each line. Frequencies are those of the file. Derivatives are finite
+differences.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ _CM2 = 1e4
 
 @dataclass(frozen=True)
 class NonLteComponent:
-    """A species of a LAMDA file in gas that is not in equilibrium.
+    """A species of a LAMDA file in gas without local thermodynamic equilibrium.
 
     file: LAMDA. column_per_cm2, kinetic_k. density_per_cm3: of the collider. collider: H2, para-H2, ortho-H2, e, H, He or H+.
     velocity_km_s, fwhm_km_s, size_arcsec: as in `Component`. geometry: one of `GEOMETRIES`.
@@ -63,7 +64,7 @@ class NonLteComponent:
 
 @dataclass(frozen=True)
 class ExcitedLines:
-    """Lines (n,) with their own excitation temperatures and optical depths at the centre."""
+    """Lines (n,) with excitation temperatures and optical depths at the centre."""
 
     frequency_mhz: Floats
     excitation_k: Floats
@@ -72,7 +73,7 @@ class ExcitedLines:
 
 @lru_cache(maxsize=8)
 def _source(file: str, geometry: str, fwhm_km_s: float) -> Any:
-    """A source of pythonradex; reading the file and the rates is what takes time."""
+    """A source of pythonradex, cached because reading the file and its rates takes time."""
     try:
         from pythonradex import radiative_transfer
     except ModuleNotFoundError as error:
@@ -131,7 +132,7 @@ def excited_lines(component: NonLteComponent, sight: Sight | None = None) -> Exc
 
 
 def non_lte_brightness(component: NonLteComponent, grid_mhz: Floats, sight: Sight | None = None) -> Floats:
-    """T_B (n,) on a rising grid of observed frequencies, the background subtracted."""
+    """T_B (n,) on a rising grid of observed frequencies, with the background subtracted."""
     sight = sight or Sight()
     lines = excited_lines(component, sight)
     grid = np.asarray(grid_mhz, dtype=np.float64) * (1 + sight.redshift)
@@ -164,7 +165,7 @@ def _rayleigh_jeans(frequency_mhz: Floats, kelvin: float) -> Floats:
 
 @dataclass(frozen=True)
 class NonLteFit:
-    """A fitted component, the parameters that were free, and their statistics in ln N, ln T, ln n, v, ln Δv."""
+    """A fitted component, its free parameters, and their statistics in ln N, ln T, ln n, v, ln Δv."""
 
     component: NonLteComponent
     free: tuple[str, ...]
@@ -174,7 +175,7 @@ class NonLteFit:
 
     @property
     def errors(self) -> dict[str, float]:
-        """Standard errors by parameter; infinite where the spectrum does not determine one."""
+        """Standard errors by parameter; infinite if the spectrum does not determine it."""
         scale = max(1.0, self.minimum.rms * math.sqrt(self.channels / max(self.channels - len(self.free), 1)))
         values = [1.0 if name == "velocity_km_s" else getattr(self.component, name) for name in self.free]
         return {
@@ -186,7 +187,7 @@ class NonLteFit:
 def fit_non_lte(
     spectrum: ObservedSpectrum, start: NonLteComponent, sight: Sight | None = None, free: tuple[str, ...] = FITTED
 ) -> NonLteFit:
-    """Column density, kinetic temperature, density, velocity and width that describe a spectrum best.
+    """Least-squares fit of column density, kinetic temperature, density, velocity and width to a spectrum.
 
     Parameters
     ----------
@@ -195,7 +196,7 @@ def fit_non_lte(
     start : NonLteComponent
     sight : Sight, optional
     free : tuple of str, optional
-        Of `FITTED`.
+        Free parameters, from `FITTED`.
 
     Returns
     -------
@@ -204,7 +205,7 @@ def fit_non_lte(
     Raises
     ------
     ValueError
-        For an unknown parameter, and where the start cannot be computed.
+        For an unknown parameter, and if the start cannot be computed.
     ImportError
         Without pythonradex.
     """

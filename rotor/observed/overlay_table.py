@@ -16,31 +16,31 @@ from rotor.observed.model import KM_PER_S, Component, Sight, model
 from rotor.observed.spectrum import ABSORBANCE, ObservedSpectrum
 from rotor.table import Table
 
-VISIBLE = 3.0  # standard deviations of a modelled line that is listed
-BLEND = 1 / 3  # of the brightness of a line, from which another species at its centre makes a blend
+VISIBLE = 3.0  # smallest listed line of the model, in standard deviations
+BLEND = 1 / 3  # brightness of other species at the centre of a line, relative to it, above which it is a blend
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ColumnTable(Table):
-    """A table of its columns."""
+    """A table made of columns."""
 
     values: dict[str, NDArray[Any]]
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """Every column by its name."""
+        """Columns by name."""
         return self.values
 
 
 def modelled(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> Floats:
-    """What components look like in the unit of a spectrum (n,): brightness in K, or the absorbance of a gas cell."""
+    """Model of components (n,) in the unit of a spectrum: brightness in K, or absorbance of a gas cell."""
     if spectrum.unit == ABSORBANCE:
         return absorbance(components, spectrum.frequency_mhz)
     return model(components, spectrum.frequency_mhz, sight).brightness_k
 
 
 def overlay_table(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> ColumnTable:
-    """frequency_mhz, observed_k, noise_k, model_k, residual_k, optical_depth of every channel; without `_k` in absorbance."""
+    """frequency_mhz, observed_k, noise_k, model_k, residual_k, optical_depth of each channel; names without `_k` for absorbance."""
     unit = _suffix(spectrum)
     if spectrum.unit == ABSORBANCE:
         seen = absorbance(components, spectrum.frequency_mhz)

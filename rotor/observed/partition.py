@@ -1,8 +1,8 @@
-"""Partition functions as tables of temperatures, interpolated in log Q against log T.
+"""Partition functions as tables over temperature, interpolated in log Q against log T.
 
-Between the points of a table a monotone cubic (F. N. Fritsch and R. E. Carlson, SIAM J. Numer. Anal. 17, 238 (1980)) in the two
-logarithms: Q of a linear molecule is a straight line of slope 1 there, of a nonlinear one of slope 3/2 (C. H. Townes and
-A. L. Schawlow, Microwave Spectroscopy, 1955, chapter 4). Beyond the table the end slope is continued, for at most a factor of two in T.
+The interpolation is a monotone cubic (F. N. Fritsch and R. E. Carlson, SIAM J. Numer. Anal. 17, 238 (1980)) of both logarithms, in
+which Q of a linear molecule has the slope 1 and Q of a nonlinear molecule the slope 3/2 (C. H. Townes and A. L. Schawlow, Microwave
+Spectroscopy, 1955, chapter 4). Beyond the table the slope at its end is continued, for at most a factor of two in T.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ SUMMED_K = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PartitionTable(Table):
-    """Q(T) at rising temperatures (n,), with every nuclear-spin weight that the lines have.
+    """Q(T) at rising temperatures (n,), with the nuclear-spin weights of the lines.
 
-    ValueError for a table without a point, temperatures that do not rise, and Q that is not above 0.
+    Raises ValueError for a table without a point, temperatures that do not rise, and Q not above 0.
     """
 
     temperature_k: Floats
@@ -75,7 +75,7 @@ class PartitionTable(Table):
 
     @property
     def range_k(self) -> tuple[float, float]:
-        """Lowest and highest temperature at which Q is given: the table's ends and a factor of two more."""
+        """Lowest and highest temperature of Q: the ends of the table, extended by a factor of two."""
         if len(self.q) == 1:
             return float(self.temperature_k[0]), float(self.temperature_k[0])
         return float(self.temperature_k[0]) / BEYOND, float(self.temperature_k[-1]) * BEYOND
@@ -116,7 +116,7 @@ class PartitionTable(Table):
 
 
 def partition_of_top(top: Top, temperatures_k: Sequence[float] = SUMMED_K) -> PartitionTable:
-    """Q(T) of a top summed from its levels at the temperatures of CDMS and others between.
+    """Q(T) of a top, summed from its levels at the temperatures of CDMS and at others between them.
 
     >>> from rotor.tops.top import Top
     >>> table = partition_of_top(Top.from_constants("B=57635.968 MHz"))

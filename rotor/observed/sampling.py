@@ -1,7 +1,7 @@
 """Distributions of fitted parameters by emcee (D. Foreman-Mackey et al., Publ. Astron. Soc. Pac. 125, 306 (2013)); extra `sampling`.
 
-ln p = -χ²/2 with the noise and the priors of the fit, in what the fit moves (logarithms but for velocities). Walkers begin around the
-minimum with the covariance of the fit. The first part of the chain, five autocorrelation times, is left out.
+ln p = -χ²/2 with the noise and the priors of the fit, in the variables of its search (logarithms, except for velocities). Walkers start
+around the minimum with the covariance of the fit. The first five autocorrelation times of the chain are left out.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from rotor.observed.spectrum import KELVIN
 from rotor.table import Table
 
 EXTRA = 'python -m pip install "molrotor[sampling]"'
-_BURN = 5  # autocorrelation times
+_BURN = 5  # start of the chain that is left out, in autocorrelation times
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SourceSample(Table):
-    """Draws (n, m) of the parameters of a fit, in their own units, and the autocorrelation time of the chain in steps."""
+    """Draws (n, m) of the parameters of a fit in their units, and the autocorrelation time of the chain in steps."""
 
     names: tuple[str, ...]
     draws: Floats
@@ -33,12 +33,12 @@ class SourceSample(Table):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """Every parameter by its name."""
+        """Draws by name of the parameter."""
         return {name: self.draws[:, i] for i, name in enumerate(self.names)}
 
     @property
     def effective(self) -> float:
-        """Independent draws: their number over the autocorrelation time."""
+        """Number of independent draws: number of draws divided by the autocorrelation time."""
         return len(self.draws) / self.autocorrelation if self.autocorrelation > 0 else float(len(self.draws))
 
     @property
@@ -47,7 +47,7 @@ class SourceSample(Table):
         return f"{len(self.draws)} draws, {self.effective:.0f} of them independent, {self.accepted:.0%} accepted"
 
     def facts(self) -> dict[str, Any]:
-        """Medians and quantiles of 16 and 84 % of every parameter."""
+        """Median and quantiles at 16 and 84 % of each parameter."""
         low, middle, high = np.quantile(self.draws, (0.1587, 0.5, 0.8413), axis=0)
         return {
             "draws": len(self.draws),
@@ -61,13 +61,13 @@ class SourceSample(Table):
 
 
 def sample_source(fit: SourceFit, steps: int, *, walkers: int | None = None, seed: int = 1) -> SourceSample:
-    """Draws from the distribution of the parameters of a fit.
+    """Sample the distribution of the parameters of a fit.
 
     Parameters
     ----------
     fit : SourceFit
     steps : int
-        Of every walker.
+        Steps of each walker.
     walkers : int, optional
         By default four for each parameter.
     seed : int, optional
@@ -123,7 +123,7 @@ def _log_probability(values: Floats, fit: SourceFit) -> float:
 
 
 def plot_corner(sample: SourceSample, path: Any) -> None:
-    """A corner picture of the draws (extra `sampling`)."""
+    """Draw a corner plot of a sample (extra `sampling`)."""
     figure = load_corner().corner(
         sample.draws, labels=list(sample.names), quantiles=(0.1587, 0.5, 0.8413), show_titles=True, title_fmt=".3g"
     )
@@ -131,7 +131,7 @@ def plot_corner(sample: SourceSample, path: Any) -> None:
 
 
 def load_corner() -> Any:
-    """The package corner; ImportError with the extra where it is not installed."""
+    """The package corner; ImportError that names the extra if it is not installed."""
     try:
         import corner
     except ModuleNotFoundError as error:

@@ -1,9 +1,9 @@
-"""Lines of a species in the form that every excitation needs: frequency, strength without population, lower energy.
+"""Lines of a species independent of excitation: frequency, strength without population, lower energy.
 
     I_i(T) = S_i [exp(-E″/kT) - exp(-E′/kT)] / Q(T),       S_i = (8π³/3hc) ν g_I S μ² = c² A g_u / (8π ν²)
 
 (H. M. Pickett et al., J. Quant. Spectrosc. Radiat. Transf. 60, 883 (1998), eqs. 1 to 3). S_i follows from LGINT, from an Einstein
-coefficient or from a line strength; it does not depend on the temperature, so that an excitation temperature can be fitted.
+coefficient or from a line strength. It does not depend on temperature, so that an excitation temperature can be fitted.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ _A_TO_STRENGTH = units.SPEED_OF_LIGHT_M_PER_S**2 / (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SpeciesLines(Table):
-    """Lines of one species, (n,) each, rising in frequency.
+    """Lines of a species, (n,) each, rising in frequency.
 
-    strength_nm2_mhz: S_i above. energy_lower_k: E″/k. g_upper. error_mhz: one standard deviation of each frequency, 0 where it is
-    unknown. upper, lower: quantum numbers as text, or empty. partition: Q(T). source: where the lines are from. identity: tag, formula,
-    InChIKey and such, where known.
+    strength_nm2_mhz: S_i (see the module). energy_lower_k: E″/k. g_upper: degeneracy. error_mhz: one standard deviation of each frequency,
+    0 if unknown. upper, lower: quantum numbers as text, or empty. partition: Q(T). source: source of the lines. identity: tag, formula,
+    InChIKey and the like, if known.
     """
 
     name: str
@@ -66,7 +66,7 @@ class SpeciesLines(Table):
 
     @property
     def columns(self) -> dict[str, Any]:
-        """Every column by its name."""
+        """Columns by name."""
         numbers = (
             "frequency_mhz",
             "error_mhz",
@@ -80,7 +80,7 @@ class SpeciesLines(Table):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Name, source and what identifies the species."""
+        """Name, source and identity of the species."""
         return {"name": self.name, "source": self.source, **self.identity, "rows": len(self)}
 
     def intensity_nm2_mhz(self, temperature_k: float) -> Floats:
@@ -93,12 +93,12 @@ class SpeciesLines(Table):
         return np.asarray(np.exp(-self.energy_lower_k / temperature_k) * photon / self.partition.at(temperature_k))
 
     def where(self, chosen: NDArray[Any] | slice) -> SpeciesLines:
-        """The lines that a slice, a mask or an array of indices chooses."""
+        """The lines selected by a slice, a mask or an array of indices."""
         names = ("frequency_mhz", "strength_nm2_mhz", "energy_lower_k", "g_upper", "error_mhz", "upper", "lower")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
     def between(self, first_mhz: float, last_mhz: float) -> SpeciesLines:
-        """The lines of a range of frequencies."""
+        """The lines in a range of frequencies."""
         first, last = np.searchsorted(self.frequency_mhz, (first_mhz, last_mhz))
         return self.where(slice(int(first), int(last)))
 
@@ -117,7 +117,7 @@ def species_lines(
     source: str = "",
     identity: dict[str, Any] | None = None,
 ) -> SpeciesLines:
-    """Lines of one species from columns (n,) in any order, sorted by frequency; ValueError for columns of other lengths.
+    """Lines of a species from columns (n,) in any order, sorted by frequency; ValueError for columns of different length.
 
     >>> q = PartitionTable(np.array([10.0, 300.0]), np.array([3.97, 108.79]))
     >>> co = species_lines("CO", [115271.2], strength_from_einstein([7.203e-8], [115271.2], [3]), [0.0], [3], q)
@@ -158,7 +158,7 @@ def strength_from_einstein(einstein_a_per_s: ArrayLike, frequency_mhz: ArrayLike
 def strength_from_lgint(
     lgint: ArrayLike, frequency_mhz: ArrayLike, energy_lower_k: ArrayLike, q: float, temperature_k: float = CATALOGUE_K
 ) -> Floats:
-    """S_i in nm² MHz from log10 I of a catalogue at the temperature of Q, with the catalogues' value of 8π³/3hc replaced by CODATA's."""
+    """S_i in nm² MHz from log10 I of a catalogue at the temperature of Q; the catalogues' 8π³/3hc is replaced by that of CODATA."""
     frequency, energy = np.asarray(frequency_mhz, dtype=np.float64), np.asarray(energy_lower_k, dtype=np.float64)
     photon = -np.expm1(-frequency / (units.MHZ_PER_K * temperature_k))
     scaled = 10.0 ** np.asarray(lgint, dtype=np.float64) * q * (INTENSITY_NM2_MHZ / LGINT_NM2_MHZ)
@@ -166,7 +166,7 @@ def strength_from_lgint(
 
 
 def species_of_lines(lines: Lines, name: str | None = None, partition: PartitionTable | None = None) -> SpeciesLines:
-    """A computed line list as a species, with Q(T) summed from the levels unless it is given."""
+    """A computed line list as a species; Q(T) is summed from the levels unless `partition` has it."""
     labels = [[" ".join(text.split()) for text in lines.levels.labels(rows)] for rows in (lines.upper, lines.lower)]
     weight = lines.levels.weight_per_component[lines.lower]
     errors = lines.error_mhz

@@ -1,8 +1,8 @@
-"""An observed spectrum: intensity against frequency, with noise, units, frame and beam as the file states them.
+"""An observed spectrum: intensity against frequency, with noise, unit, frame and beam from its file.
 
-Line-free channels are found by clipping: the median and 1.4826 times the median absolute deviation of the channels left, those beyond
-three deviations removed with their neighbours, until none is left to remove (P. J. Huber, Robust Statistics, 1981, chapter 5, for the
-factor). Baselines are Legendre polynomials through the line-free channels. From flux density to brightness by Rayleigh and Jeans' law:
+Clipping selects the line-free channels. With the median and 1.4826 times the median absolute deviation of the remaining channels (P. J.
+Huber, Robust Statistics, 1981, chapter 5), channels beyond three deviations are removed with their neighbours, until none is removed.
+Baselines are Legendre polynomials through the line-free channels. The Rayleigh-Jeans law converts flux density to brightness:
 
     T_B = c² S/(2 k ν² Ω),  Ω = π θ_1 θ_2/(4 ln 2), the integral of a Gaussian beam
 """
@@ -33,8 +33,8 @@ class ObservedSpectrum(Table):
     """Channels (n,) of rising frequency with finite intensities.
 
     frequency_mhz: in the stated frame. intensity: in `unit`. noise (n,): one standard deviation of each channel. unit: one of `UNITS`.
-    rest_mhz: rest frequency of the header, None without one. frame: LSRK, BARYCENT, TOPOCENT, SOURCE, ... as stated. beam_arcsec:
-    full widths at half maximum, None where unknown. source: where it was read. notes: what was assumed or left out.
+    rest_mhz: rest frequency of the header, or None. frame: LSRK, BARYCENT, TOPOCENT, SOURCE, ... as in the file. beam_arcsec:
+    full widths at half maximum, None if unknown. source: file or origin. notes: assumptions and omissions.
     header: further facts by name.
     """
 
@@ -59,7 +59,7 @@ class ObservedSpectrum(Table):
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """File, unit, frame, beam, and what was assumed."""
+        """File, unit, frame, beam, and assumptions."""
         return {
             "source": self.source,
             "unit": self.unit,
@@ -78,13 +78,13 @@ class ObservedSpectrum(Table):
         return float(np.median(np.diff(self.frequency_mhz))) if len(self) > 1 else 0.0
 
     def where(self, chosen: NDArray[Any] | slice) -> ObservedSpectrum:
-        """The channels that a slice or a mask chooses."""
+        """The channels selected by a slice or a mask."""
         return replace(
             self, frequency_mhz=self.frequency_mhz[chosen], intensity=self.intensity[chosen], noise=self.noise[chosen]
         )
 
     def between(self, first_mhz: float, last_mhz: float) -> ObservedSpectrum:
-        """The channels of a range of frequencies; ValueError where there are none."""
+        """The channels in a range of frequencies; ValueError if there are none."""
         inside = (self.frequency_mhz >= first_mhz) & (self.frequency_mhz <= last_mhz)
         if not inside.any():
             raise ValueError(
@@ -106,7 +106,7 @@ def observed_spectrum(
     noise : float or (n,) array, optional
         One standard deviation; by default estimated from the line-free channels.
     source : str, optional
-        Where the numbers are from, for messages.
+        Origin of the numbers, for messages.
     **facts :
         unit, rest_mhz, frame, beam_arcsec, notes and header of `ObservedSpectrum`.
 
@@ -117,7 +117,7 @@ def observed_spectrum(
     Raises
     ------
     ValueError
-        For columns of different lengths, fewer than two finite channels, two channels at one frequency, noise that is not above 0, and an
+        For columns of different length, fewer than two finite channels, two channels at the same frequency, noise not above 0, and an
         unknown unit.
 
     Examples
@@ -166,7 +166,7 @@ def _refuse_bad_axis(frequency: Floats, source: str) -> None:
 
 
 def line_free(intensity: Floats, widen: int = 2) -> NDArray[np.bool_]:
-    """Channels (n,) without a line, by clipping at three deviations; `widen` neighbours of each clipped channel go with it."""
+    """Mask (n,) of line-free channels, by clipping at three deviations together with `widen` neighbours of each clipped channel."""
     selected = np.ones(len(intensity), dtype=np.bool_)
     for _ in range(50):
         middle, deviation = _middle(intensity[selected])
@@ -188,22 +188,22 @@ def _middle(values: Floats) -> tuple[float, float]:
 
 
 def noise_level(intensity: Floats) -> float:
-    """Standard deviation of the line-free channels, corrected for what clipping a Gaussian at three deviations removes."""
+    """Standard deviation of the line-free channels, corrected for the clipping of a Gaussian at three deviations."""
     free = intensity[line_free(intensity)]
     clipped = 0.98658  # √(1 - 6 φ(3)/(2 Φ(3) - 1)): the deviation of a Gaussian cut at three deviations
     return max(_middle(free)[1], float(np.std(free)) / clipped) if len(free) > 1 else float(np.std(intensity))
 
 
 def without_baseline(spectrum: ObservedSpectrum, order: int) -> ObservedSpectrum:
-    """The spectrum less a Legendre polynomial of an order through its line-free channels, its noise estimated anew.
+    """The spectrum minus a Legendre polynomial of this order through its line-free channels, with a new estimate of the noise.
 
-    Raises ValueError for an order below 0, and for fewer than four line-free channels a coefficient.
+    Raises ValueError for an order below 0, and for fewer than four line-free channels for each coefficient.
     """
     if order < 0:
         raise ValueError(f"baseline order {order}: expected 0 or more")
     x = 2 * (spectrum.frequency_mhz - spectrum.frequency_mhz[0]) / np.ptp(spectrum.frequency_mhz) - 1
     flat = spectrum.intensity
-    for _ in range(5):  # lines are found better on what is already flat
+    for _ in range(5):  # lines are detected better after a baseline is subtracted
         free = line_free(flat)
         if free.sum() < 4 * (order + 1):
             raise ValueError(

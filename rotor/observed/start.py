@@ -1,8 +1,8 @@
-"""Where a fit begins: velocity and width by correlation, temperatures and column densities by linear least squares.
+"""Start of a fit: velocity and width by correlation, temperatures and column densities by linear least squares.
 
-The spectrum is correlated with the thin spectrum of each species on a grid even in ln ν, where a velocity is a shift. At the best shift
-column densities that are not negative follow from linear least squares (C. L. Lawson and R. J. Hanson, Solving Least Squares Problems,
-1974, chapter 23, as `scipy.optimize.nnls`) for each of a few temperatures, one species after the other.
+The spectrum is correlated with the optically thin spectrum of each species on a grid even in ln ν, where a velocity is a shift. At the best
+shift, nonnegative least squares (C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23, as `scipy.optimize.nnls`)
+gives the column densities for each of a few temperatures, one species after the other.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from rotor.spectra.emission import planck_k
 TEMPERATURES_K = (10.0, 20.0, 40.0, 80.0, 160.0, 300.0)
 WIDTHS_KM_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
 WIDEST_SHIFT_KM_S = 200.0
-_UNIT_COLUMN = 1e6  # thin for every line; templates are per column density
+_UNIT_COLUMN = 1e6  # column density of templates, thin for all lines
 _MIDDLE_K = 80.0
 _MOST_POINTS = 1 << 20
 _CORRELATED_K = (30.0, 80.0, 150.0, 300.0)
-_CLEAR = 0.8  # of the width at which a velocity stands out most
-_APART = 3.0  # widths from the best shift, beyond which another is an alternative
-_CLIPPED = 8.0  # standard deviations
+_CLEAR = 0.8  # smallest contrast of a velocity, relative to that of the width with the largest contrast
+_APART = 3.0  # smallest distance of an alternative shift from the best one, in widths
+_CLIPPED = 8.0  # largest intensity in the correlation, in standard deviations
 
 
 def start_components(
@@ -39,23 +39,23 @@ def start_components(
     excitation_k: float | None = None,
     size_arcsec: float | None = None,
 ) -> list[Component]:
-    """A component for each species, to begin a fit with.
+    """Start of a fit: a component for each species.
 
     Parameters
     ----------
     spectrum : ObservedSpectrum
-        In K.
+        Spectrum in K.
     species : sequence of SpeciesLines
     sight : Sight, optional
     velocity_km_s, fwhm_km_s, excitation_k : float, optional
-        Where they are known; otherwise estimated from the spectrum, one velocity and width for all species.
+        Known values; by default estimated from the spectrum, with a common velocity and width of all species.
     size_arcsec : float, optional
-        Of every component.
+        Size of all components.
 
     Returns
     -------
     list of Component
-        Of species that show nothing the column density is that of a third of the noise.
+        The column density of a species without visible lines corresponds to a third of the noise.
     """
     sight = sight or Sight()
     velocity, width = velocity_and_width(spectrum, species, velocity_km_s, fwhm_km_s, sight)
@@ -82,7 +82,7 @@ def thin_templates(
     width: float,
     sight: Sight,
 ) -> Floats:
-    """Thin brightness per column density over the noise, at each temperature, (t, n); 0 where Q(T) is not known."""
+    """Optically thin brightness per column density over the noise at each temperature (t, n); 0 if Q(T) is not known."""
     grid = spectrum.frequency_mhz * (1 + sight.redshift)
     out = np.zeros((len(temperatures_k), len(grid)))
     low, high = species.partition.range_k
@@ -101,7 +101,7 @@ def thin_templates(
 def best_temperatures(
     spectrum: ObservedSpectrum, templates: Sequence[Floats], rounds: int = 2
 ) -> tuple[list[int], Floats]:
-    """For each species the temperature with the least χ² while the others stay, and the column densities at the end."""
+    """Temperatures with the smallest χ², varied one species at a time, and the column densities at the end."""
     from scipy.optimize import nnls
 
     data = spectrum.intensity / spectrum.noise
@@ -132,9 +132,9 @@ def velocity_and_width(
     fwhm_km_s: float | None = None,
     sight: Sight | None = None,
 ) -> tuple[float, float]:
-    """Velocity and width (km/s) at which the spectrum correlates best with the lines of all species; what is given stays.
+    """Velocity and width (km/s) with the best correlation of the spectrum with the lines of all species; given values do not change.
 
-    The width is that of the best score among those at which a velocity stands out clearly.
+    The width has the best score among those with a clear maximum of the velocity.
     """
     if velocity_km_s is not None and fwhm_km_s is not None:
         return velocity_km_s, fwhm_km_s
@@ -148,7 +148,7 @@ def velocity_and_width(
     allowed = np.arange(len(shifts))
     if velocity_km_s is not None:
         allowed = np.array([int(np.argmin(np.abs(velocities - velocity_km_s)))])
-    peaks: list[tuple[float, float, float, float]] = []  # how far it stands out, score, velocity, width
+    peaks: list[tuple[float, float, float, float]] = []  # contrast, score, velocity, width
     for width in widths:
         score = _score(data, grid * (1 + sight.redshift), species, width, shifts)
         place = int(allowed[np.argmax(score[allowed])])
@@ -160,9 +160,10 @@ def velocity_and_width(
 
 
 def _score(data: Floats, grid: Floats, species: Sequence[SpeciesLines], width: float, shifts: Ints) -> Floats:
-    """Σ over species of the fourth power of what the spectrum has along each: at a wrong shift lines match one at a time.
+    """Score of each shift: Σ over species of the fourth power of the projection of the spectrum on the species.
 
-    The brightest lines count no more than others, and the mean is taken out, with which a crowded spectrum matches anything.
+    The fourth power favours shifts at which many lines of a species match; at a wrong shift single lines match by chance. Intensities are
+    limited, so that the brightest lines do not dominate. The mean is subtracted, because a crowded spectrum with its mean matches anything.
     """
     length = 1 << int(len(data) + np.abs(shifts).max(initial=0)).bit_length()
     clipped = np.minimum(data, _CLIPPED)

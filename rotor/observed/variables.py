@@ -1,7 +1,7 @@
-"""Free parameters of a source model: which there are, which components share them, and how they enter a search.
+"""Free parameters of a source model as search variables, some of them shared by several components.
 
-A search moves ln N, ln T, v, ln Δv and ln θ: what is above 0 stays above 0, and the errors of a column density or a temperature are
-closer to those of a Gaussian.
+The search variables are ln N, ln T, v, ln Δv and ln θ: positive parameters stay positive, and the errors of the logarithms of column
+densities and temperatures are closer to a Gaussian.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from rotor.observed.model import PARAMETERS, Component
 from rotor.statistics.least_squares import Evaluate, Minimum, minimise
 
 LOGARITHMIC = ("column_per_cm2", "excitation_k", "fwhm_km_s", "size_arcsec")
-_ROUND_OFF = 1e-12  # of the exponential of a logarithm
+_ROUND_OFF = 1e-12  # relative rounding error of exp(ln x)
 DEFAULT_FREE = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
 
 
 @dataclass(frozen=True)
 class Variable:
-    """A number of the search: the parameter it stands for, and the components that share it."""
+    """A search variable: its parameter, and the components that share it."""
 
     name: str
     components: tuple[int, ...]
 
     @property
     def logarithmic(self) -> bool:
-        """Whether the search moves its logarithm."""
+        """Whether the search variable is the logarithm of the parameter."""
         return self.name in LOGARITHMIC
 
     def forward(self, value: float) -> float:
-        """Parameter to search."""
+        """Search variable from the parameter."""
         return math.log(value) if self.logarithmic else value
 
     def back(self, value: float) -> float:
-        """Search to parameter; ValueError beyond what a double holds."""
+        """Parameter from the search variable; ValueError beyond the range of doubles."""
         if self.logarithmic and abs(value) > 300:
             raise ValueError(f"{self.name}: e^{value:g} is out of range")
         return math.exp(value) if self.logarithmic else value
@@ -55,17 +55,17 @@ class Variables:
         return len(self.items)
 
     def names(self, components: Sequence[Component]) -> tuple[str, ...]:
-        """Such as `CO column_per_cm2`; a number follows where a species has several components."""
+        """Names such as `CO column_per_cm2`; with a number if a species has several components."""
         return tuple(f"{_who(variable, components)} {variable.name}" for variable in self.items)
 
     def values(self, components: Sequence[Component]) -> Floats:
-        """What the search moves (m,), at the values of components; of shared ones the first counts."""
+        """Search variables (m,) of components; a shared one is that of the first component."""
         return np.array(
             [variable.forward(getattr(components[variable.components[0]], variable.name)) for variable in self.items]
         )
 
     def applied(self, components: Sequence[Component], values: Floats) -> list[Component]:
-        """The components with the values (m,) of a search; ValueError where one is out of bounds."""
+        """The components with the values (m,) of a search; ValueError if a value is out of bounds."""
         changes: list[dict[str, float]] = [{} for _ in components]
         for variable, value in zip(self.items, values.tolist(), strict=True):
             for k in variable.components:
@@ -76,15 +76,16 @@ class Variables:
         ]
 
     def within(self, components: Sequence[Component], values: Floats) -> tuple[Floats, Ints]:
-        """Values (m,) with temperatures moved to where Q(T) of all their species is known, and at which end each is: -1, 1, else 0."""
+        """Values (m,) with temperatures limited to the range of Q(T), and the end at which each is: -1, 1, or 0 inside."""
         low, high = np.array([_temperatures(variable, components) for variable in self.items]).reshape(-1, 2).T
         inside = np.clip(values, low, np.maximum(low, high))
         return inside, (inside >= high).astype(np.int64) - (inside <= low)
 
     def minimum(self, evaluate: Evaluate, components: Sequence[Component], **choices: Any) -> Minimum:
-        """The least squares of a function of what the search moves, from components.
+        """Least squares over the search variables, started from components.
 
-        A temperature at an end of its Q(T) stays there while χ² falls outwards (its column is 0: not determined), and the others go on.
+        A temperature at an end of its Q(T) is held while χ² falls outwards (its column is 0, so that it is not determined); the other
+        variables continue.
         """
 
         def projected(values: Floats) -> tuple[Floats, Floats]:
@@ -96,20 +97,22 @@ class Variables:
         return replace(end, parameters=self.within(components, end.parameters)[0])
 
     def jacobian(self, components: Sequence[Component], slopes: Floats) -> Floats:
-        """Derivatives (n, m) of the brightness by what the search moves, from the slopes (k, 5, n) of `model`."""
+        """Derivatives (n, m) of the brightness with respect to the search variables, from the slopes (k, 5, n) of `model`."""
         out = np.zeros((slopes.shape[2], len(self)))
         for column, variable in enumerate(self.items):
             place = PARAMETERS.index(variable.name)
             for k in variable.components:
                 scale = getattr(components[k], variable.name) if variable.logarithmic else 1.0
                 out[:, column] += scale * slopes[k, place]
-            if variable.name == "size_arcsec":  # a layer has one size; every member has the slope of the whole layer
+            if (
+                variable.name == "size_arcsec"
+            ):  # a layer has a single size; each member has the slope of the whole layer
                 out[:, column] /= _members(variable, components)
         return out
 
 
 def _temperatures(variable: Variable, components: Sequence[Component]) -> tuple[float, float]:
-    """First and last ln T at which Q(T) is known for all species of a variable, round-off inside; of others -inf and inf."""
+    """Range of ln T in which Q(T) is known for all species of a variable, less round-off; -inf to inf for other variables."""
     if variable.name != "excitation_k":
         return -math.inf, math.inf
     lowest, highest = zip(*(components[k].species.partition.range_k for k in variable.components), strict=True)
@@ -145,9 +148,9 @@ def variables(
     free : sequence of str
         Names of `PARAMETERS` that are free; `size_arcsec` is shared by the components of a layer.
     shared : sequence of str, optional
-        Names that all components have in common.
+        Names of parameters that all components share.
     fixed : sequence of (int, str), optional
-        Parameters of single components that stay as they are.
+        Parameters of single components that are not fitted.
 
     Returns
     -------

@@ -119,7 +119,9 @@ def _draw(axes: Any, panel: Panel, letters: int) -> list[Places]:
         colour, marker = (BLUE, "o") if few else (PALETTE[number % len(PALETTE)], MARKERS[number % len(MARKERS)])
         errors = _curve(axes, curve, floor, (colour, marker, name), panel.joined)
         drawn.append(list(zip(curve, errors, strict=True)))
-    axes.set(xscale="log", yscale="log", xlabel="Processor time (s)", ylabel=textwrap.fill(f"Error of {panel.of}", letters))
+    axes.set(
+        xscale="log", yscale="log", xlabel="Processor time (s)", ylabel=textwrap.fill(f"Error of {panel.of}", letters)
+    )
     axes.margins(x=0.25, y=0.15)
     _scale(axes)
     if any(point.error == 0.0 for point in points):

@@ -292,7 +292,7 @@ def _in_order_of_energy(
 
 
 def _by_upper(pairs: list[Pair]) -> Iterator[tuple[Block, list[Block]]]:
-    """Each upper block with the lower blocks of its lines; a block with itself comes alone."""
+    """Each upper block with all lower blocks of its lines; lines inside a block are a separate item."""
     lows_of: dict[int, tuple[Block, list[Block]]] = {}
     for up, low in pairs:
         if up is low:

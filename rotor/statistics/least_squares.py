@@ -1,4 +1,4 @@
-"""Nonlinear least squares by the Levenberg-Marquardt method in scaled variables, with a statement how the search ended.
+"""Nonlinear least squares by the Levenberg-Marquardt method in scaled variables, with a statement of how the search ended.
 
 With residuals r(p) = (observed - calculated)/σ and the Jacobian J = ∂(calculated/σ)/∂p, the step δ minimises
 

@@ -210,7 +210,7 @@ def test_a_coupling_that_starts_at_zero_is_found(case):
     start = TWO_STATES.replace('"G_c[0,1]" = 20.0\n', "")
     (case / "zero.toml").write_text(start)
     request = fit_of_lines("lines.csv", rotor.read("zero.toml"), names(FREE))
-    assert "know the square alone" in request.notes[-1]
+    assert "only the square of these" in request.notes[-1]
     fit = answer_fit(request).fit
     assert abs(abs(fit.named["G_c[0,1]"]) - 20.0) < 4 * fit.named.uncertainties["G_c[0,1]"]
     same, moved = beside_zero(with_names(fit.named, ["C_aa(14N)"]), ["C_aa(14N)"], fit.lines)
@@ -231,9 +231,9 @@ def test_half_integers_are_read_in_three_ways(folder):
         assert again.upper.tolist() == lines.upper.tolist()
         assert again.lower.tolist() == lines.lower.tolist()
     (folder / "l.csv").write_text(head + "1,2,0,3/2,10,1\n")
-    with pytest.raises(ValueError, match=r"f_upper reads '2'; this .* is a half-integer: write 5/2 or 2\.5"):
+    with pytest.raises(ValueError, match=r"f_upper reads '2'; expected a half-integer: 5/2, 2\.5"):
         read_assigned_lines("l.csv", ("n", "f"), {"f"})
-    with pytest.raises(ValueError, match="f_lower reads '3/2'; this quantum number is whole here"):
+    with pytest.raises(ValueError, match="f_lower reads '3/2'; expected a whole number"):
         read_assigned_lines("l.csv", ("n", "f"))
 
 

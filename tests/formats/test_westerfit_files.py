@@ -134,7 +134,7 @@ def test_the_input_of_2_butynoic_acid_has_the_constants_of_its_fit(tmp_path):
         ("NFOLD = 3", "NFOLD = 2", "threefold"),
         ("A;  ", "Q;  ", "line 10: Q: known are A"),
         ("η;                           0.0", "η;  1.0", "η = 1"),
-        ("S = 1.5", "S = 0", "expected the spin S"),
+        ("S = 1.5", "S = 0", "set S to the spin"),
         ("0;   0;   6;   0;  -1", "0;   0;   6;   1;  -1", "V6 with a power of sin"),
         ("0;   0;   6;   0;  -1", "0;   6;   0;  -1", "8 or 9 powers"),
         ("-33.12269362671913", "-33.1x", "is no number"),

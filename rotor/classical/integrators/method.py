@@ -147,8 +147,8 @@ def integrate(
 class KickDrift(Method):
     """Drifts of the free body between kicks of the torques: half a kick, a drift, half a kick, composed.
 
-    With moments that change, each drift takes those of its middle; inner momenta turn the body by -h/I dt before and
-    after it. All three are symmetric, so compositions raise the order. The torque is evaluated once per drift.
+    If the moments change in time, a drift uses those at its middle; inner momenta rotate the body by -h/I dt before and
+    after a drift. All parts are symmetric in time, so that compositions raise the order. The torque is evaluated once per drift.
     """
 
     step: float

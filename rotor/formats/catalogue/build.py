@@ -315,7 +315,7 @@ def _insert_columns(engine: DuckDBPyConnection, table: str, columns: Mapping[str
 
 
 def _sort(engine: DuckDBPyConnection) -> None:
-    """All lines in order of frequency, and the file without the space of what was removed."""
+    """Sort the lines by frequency, and free the space of removed rows in the file."""
     engine.execute("SET preserve_insertion_order = true")
     engine.execute("CREATE TABLE sorted AS SELECT * FROM lines ORDER BY frequency_mhz")
     engine.execute("DROP TABLE lines")

@@ -169,7 +169,9 @@ class SpinWeights:
             return {"A": 1, "E": 2, "F": 3}[irrep[0]]
         self._require(("irrep",), "a spherical top")
         if "G" in self.classes:
-            raise ValueError("spin weights of an icosahedral top: a tensor of fourth rank does not split its levels")
+            raise ValueError(
+                "spin weights of an icosahedral top do not apply here: a tensor of fourth rank does not split its levels"
+            )
         return int(self._whole_numbers()[self.classes.index(irrep if irrep in self.classes else irrep[0])])
 
     def of_j(self, j: ArrayLike) -> NDArray[np.int64]:
