@@ -33,7 +33,7 @@ def acted_on(top: Top, acts_on: str) -> Floats:
     if acts_on == "dipole":
         dipole = np.array(top.dipole_abc_debye if top.dipole_abc_debye is not None else (0.0, 0.0, 0.0), dtype=float)
         if not dipole.any():
-            raise ValueError(f"{name} has no known dipole other than 0; a field needs a dipole to act on")
+            raise ValueError(f"{name} has no dipole, or an unknown one; a field needs a dipole to act on")
         return dipole
     if top.polarizability_abc_angstrom3 is None:
         raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")

@@ -91,7 +91,7 @@ def test_several_tops(tmp_path, ntop):
         ("\\F(1) ", " Dpi2J 1E-6\n\\F(1) ", "Dpi2J.*which no term here does"),
         ("\\F(1) ", " chi_z 1E-3\n\\F(1) ", "chi_aa beside spin 0: expected spin 2"),
         ("reduc 1", "reduc 1\nspin 2\nspin2 2", "spin2 2: rotor reads a single nucleus"),
-        ("\\F(1) ", " C+ 1E-6\n\\F(1) ", r"C\+: such terms"),
+        ("\\F(1) ", " C+ 1E-6\n\\F(1) ", r"C\+: these terms"),
     ],
 )
 def test_what_is_not_read_is_named_with_the_file(mtbe, old, new, text):

@@ -90,7 +90,7 @@ def test_no_degree_has_no_temperature():
         ([WATER], 4, "4 totals removed"),
         ([WATER], -1, "-1 totals removed"),
         ([[0.0, 0.0, 1.0]], 0, "a single moment above 0"),
-        ([[-1.0, 1.0, 1.0]], 0, "not negative"),
+        ([[-1.0, 1.0, 1.0]], 0, "numbers of 0 or more"),
         ([[math.nan] * 3], 0, "finite"),
         (WATER, 0, "have shape"),
     ],
