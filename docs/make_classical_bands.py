@@ -6,7 +6,7 @@ python docs/make_classical_bands.py
 from __future__ import annotations
 
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def main() -> None:
     save(figure, path, "Classical bands over quantum lines", {"made by": "docs/make_classical_bands.py"})
 
 
-def draw(axes: object, name: str, temperature_k: float, fwhm_cm: float, last_cm: float, factors: tuple[str, ...]) -> None:
+def draw(axes: Any, name: str, temperature_k: float, fwhm_cm: float, last_cm: float, factors: tuple[str, ...]) -> None:
     """One gas: its lines, smoothed, and its classical bands."""
     top, grid_cm = rigid(rotor.read(name)), np.linspace(0.0, last_cm, 600)
     grid, fwhm = grid_cm * MHZ_PER_CM, fwhm_cm * MHZ_PER_CM

@@ -28,7 +28,14 @@ CONTENTS = {
     "How-to": ["how_to/*"],
     "Explanation": [],  # all pages of docs/ that no other part names
     "Reference: command line": ["command_line", "options", "scenes", "verbs/*"],
-    "Reference: data and conventions": ["conventions", "library", "spcat_codes", "spin_weights", "migration", "dependencies"],
+    "Reference: data and conventions": [
+        "conventions",
+        "library",
+        "spcat_codes",
+        "spin_weights",
+        "migration",
+        "dependencies",
+    ],
     "Reference: API": ["api/index", "api/rotor*"],
     "Validation": ["validation/*"],
 }

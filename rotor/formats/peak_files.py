@@ -24,8 +24,8 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
     """The peaks of a file.
 
     A .csv file, packed or not, has two or three columns: frequency, intensity, and the standard error of the frequency; a heading is
-    optional. Frequencies are in MHz, or in the unit of their heading (frequency_ghz, f (cm-1)). A .npy file has the same as columns or rows. Frequencies in equal steps are a spectrum, whose peaks are found; FITS is one
-    always.
+    optional. Frequencies are in MHz, or in the unit of their heading (frequency_ghz, f (cm-1)). A .npy file has the same as columns
+    or rows. Frequencies in equal steps are a spectrum, whose peaks are found; a FITS file is always a spectrum.
 
     Parameters
     ----------
