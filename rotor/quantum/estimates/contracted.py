@@ -24,7 +24,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import Plan, SpinBlock
+from rotor.quantum.spins.blocks import Plan, SpinBlock, coefficients_by_f
 from rotor.quantum.spins.linear_blocks import Unit, unit_matrices
 from rotor.quantum.spins.parts import SpinPart, assigned, named_states
 from rotor.quantum.spins.rotor import Channel
@@ -261,7 +261,8 @@ def contracted_levels(
     used = {number for block, _ in blocks for number in (part.number for part in block.parts)}
     rotors = {i: plan.blocks[i] for i in sorted(used)}
     rotations, couplings = unit_matrices(top, effects, names, plan.shared, rotors)
-    known_blocks = tuple(_Block(block.parts, _coefficients(plan, block), targets) for block, targets in blocks)
+    coefficients = coefficients_by_f(plan, {block.twice_f: block.patterns for block, _ in blocks})
+    known_blocks = tuple(_Block(block.parts, coefficients[block.twice_f], targets) for block, targets in blocks)
     contracted = ContractedLevels(len(rows), rotors, rotations, couplings, known_blocks, 0.0)
     window = _window(contracted, values_mhz)
     spread = min(float(np.ptp(block.energies_mhz)) for block, _ in blocks)
@@ -287,12 +288,6 @@ def _blocks_with(plan: Plan, levels: Levels, rows: Ints) -> list[tuple[SpinBlock
             targets.append(_Target(place, part, pattern, tuple(block.labels[function, :3].tolist())))
         with_targets.append((block, tuple(targets)))
     return with_targets
-
-
-def _coefficients(plan: Plan, block: SpinBlock) -> dict[Channel, Floats]:
-    """Coupling coefficients of a block by channel, from the cache of the plan."""
-    coefficients: dict[Channel, Floats] = plan.shared.cache["coupling", block.twice_f]
-    return coefficients
 
 
 def _window(levels: ContractedLevels, values_mhz: Floats) -> float:

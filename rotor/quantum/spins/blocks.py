@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -25,10 +25,10 @@ from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import Block, SolvedBlock, Used
 from rotor.quantum.spins.axial import Exist, are_axial, contracted_operators, existing_functions
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stacks_of
-from rotor.quantum.spins.coupling import coefficients, for_every_f, powers_between
 from rotor.quantum.spins.families import families_of, links_of_stacks
 from rotor.quantum.spins.many_f import Group
 from rotor.quantum.spins.parts import SpinPart, named_states
+from rotor.quantum.spins.pattern_tables import couplings_of
 from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 
     from rotor.tops.top import Top
 
-FEW = 100  # with more patterns of an F, coefficients are computed one F at a time
 Operators = dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]
 """Matrices between two blocks of the rotation, each with the channels that share it."""
 InStacks = list[tuple[list[Contracted], list[Channel]]]
@@ -257,14 +256,9 @@ def parts_of_f(plan: Plan, patterns: Ints) -> Iterator[tuple[SpinPart, ...]]:
 
 def functions_of_blocks(plan: Plan, every_f: Iterable[int]) -> list[SpinBlock]:
     """Basis functions of the blocks of all F, without vectors: labels and energies are those of the rotational states."""
-    cache, tables = plan.shared.cache, {f: plan.shared.scheme.patterns(f) for f in every_f}
-    cache["patterns"] = tables
-    coefficients = couplings_of_all(plan, tables)
     out = []
-    for twice_f, patterns in tables.items():
-        cache["coupling", twice_f] = (
-            coefficients[twice_f] if coefficients else couplings(plan, {twice_f: patterns})[twice_f]
-        )
+    for twice_f in every_f:
+        patterns = plan.shared.scheme.patterns(twice_f)
         for parts in parts_of_f(plan, patterns):
             energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
             labels = np.concatenate([_labels_of_functions(part, patterns[part.patterns]) for part in parts])
@@ -279,33 +273,11 @@ def _labels_of_functions(part: SpinPart, part_patterns: Ints) -> Ints:
     return np.concatenate([np.column_stack([names, np.tile(pattern, (len(names), 1))]) for pattern in part_patterns])
 
 
-def couplings_of_all(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
-    """Coefficients of all channels for many F at once, by F; empty where patterns are too many or have a total spin."""
-    few = not plan.shared.scheme.equivalent and max(map(len, tables.values()), default=0) <= FEW
-    return couplings(plan, tables) if few and tables else {}
-
-
-def couplings(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
+def coefficients_by_f(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
     """c(p', p) of all channels by F, then by channel."""
     acting = {channel for by_channel in plan.operators.values() for _, channels in by_channel for channel in channels}
     by_channel = {channel: couplings_of(plan.shared.scheme, channel, tables) for channel in acting}
     return {f: {channel: by_f[f] for channel, by_f in by_channel.items()} for f in tables}
-
-
-@lru_cache(maxsize=1024)
-def _coefficients_of_f(scheme: Scheme, channel: Channel, twice_f: int) -> Floats:
-    """c(p', p) of a channel over all patterns of one F; read-only, shared by levels and derivatives."""
-    coefficients = coefficients_of(scheme, channel, scheme.patterns(twice_f))
-    coefficients.flags.writeable = False
-    return coefficients
-
-
-def couplings_of(scheme: Scheme, channel: Channel, tables: dict[int, Ints]) -> dict[int, Floats]:
-    """c(p', p) of a channel by F, from the patterns of each F."""
-    if scheme.equivalent:
-        return {f: _coefficients_of_f(scheme, channel, f) for f in tables}
-    both = {f: (patterns, patterns) for f, patterns in tables.items()}
-    return for_every_f(both, lambda bra, ket: _between(scheme, channel, bra, ket))
 
 
 def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]:
@@ -323,40 +295,3 @@ def product(left: Floats, right: Floats) -> Floats:
     """The Kronecker product of two matrices."""
     rows, columns = left.shape[0] * right.shape[0], left.shape[1] * right.shape[1]
     return (left[:, None, :, None] * right[None, :, None, :]).reshape(rows, columns)
-
-
-def coefficients_of(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
-    """c(p', p) of a channel between all patterns (..., n, columns) of an F, with its powers of N·S."""
-    if not scheme.equivalent:
-        return _between(scheme, channel, patterns, patterns)
-    return _with_conserved_and_powers(scheme, channel, patterns, patterns, _with_total(scheme, channel, patterns))
-
-
-def _between(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints) -> Floats:
-    """c(p', p) between any patterns that are coupled one by one."""
-    values = coefficients(scheme.twice, channel.acting, channel.rank, bra, ket)
-    return _with_conserved_and_powers(scheme, channel, bra, ket, values)
-
-
-def _with_conserved_and_powers(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints, values: Floats) -> Floats:
-    """Set elements between different conserved sums to zero, and multiply by powers of N·S."""
-    for column in scheme.conserved_columns:
-        values = np.where(bra[..., :, None, column] == ket[..., None, :, column], values, 0.0)
-    powers = channel.ns, channel.n2
-    return np.asarray(values * powers_between(scheme.twice[0], powers, bra, ket)) if channel.ns else values
-
-
-def _one_by_one(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
-    """c(p', p) between patterns coupled one by one, without powers."""
-    return coefficients(scheme.twice, channel.acting, channel.rank, patterns, patterns)
-
-
-def _with_total(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
-    """c(p', p) over patterns with a total spin; for two equivalent spins ½(value ± value with both exchanged)."""
-    plain, turn = scheme.recoupling(int(patterns[0, -1]))
-    values = _one_by_one(scheme, channel, plain)
-    b = len(scheme.spins) - 1
-    turned = tuple(sorted({b: b - 1, b - 1: b}.get(place, place) for place in channel.acting))
-    if turned != channel.acting and scheme.equivalent == 2:
-        values = (values + channel.exchange * _one_by_one(scheme, channel._replace(acting=turned), plain)) / 2
-    return np.asarray(turn.T @ values @ turn)

@@ -20,8 +20,9 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
 from rotor.quantum.spins.axial import are_axial, contracted_operators, powers_of_axial
-from rotor.quantum.spins.blocks import Shared, SpinBlock, couplings_of
+from rotor.quantum.spins.blocks import Shared, SpinBlock
 from rotor.quantum.spins.contraction import Contracted, stacks_of
+from rotor.quantum.spins.pattern_tables import couplings_of
 from rotor.quantum.spins.rotor import Channel, Channels, parameter_channels
 
 if TYPE_CHECKING:

@@ -14,17 +14,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats
 from rotor.quantum.spins.axial import contracted_tensors
 from rotor.quantum.spins.blocks import Shared, SpinBlock, product
 from rotor.quantum.spins.contraction import by_numbers
-from rotor.quantum.spins.coupling import for_every_f, moment_coefficients
 from rotor.quantum.spins.parts import SpinPart
-from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.spins.pattern_tables import coefficients_of_step, tensor_coefficients
 from rotor.quantum.tensors import Tensors, rank_of
 
 _FEW = 10_000  # with more elements between two F, they are computed one pair of F at a time
-ROUND_OFF = 1e-13  # round-off of sums of products of a few coefficients of size 1
 
 
 Acting = list[tuple[SpinPart, SpinPart, Floats]]
@@ -146,26 +144,8 @@ def _coefficients_of_step(
 ) -> dict[tuple[str, int, int, int], Floats]:
     """t(p', p) between these two F and, where patterns are few, between all F with this difference."""
     if shared.scheme.equivalent or "patterns" not in shared.cache or len(up.patterns) * len(low.patterns) > _FEW:
-        only = coefficients_between(shared.scheme, rank, up.patterns, low.patterns)
+        only = tensor_coefficients(shared.scheme, rank, up.patterns, low.patterns)
         return {("tensor", rank, up.twice_f, low.twice_f): only}
     step = up.twice_f - low.twice_f
     by_f = coefficients_of_step(shared.scheme, shared.cache["patterns"], rank, step)
     return {("tensor", rank, f + step, f): coefficients for f, coefficients in by_f.items()}
-
-
-def coefficients_of_step(scheme: Scheme, patterns: dict[int, Ints], rank: int, step: int) -> dict[int, Floats]:
-    """t(p', p) of a tensor between doubled F' = F + step and F, by F, where both have patterns."""
-    tables = {f: (patterns[f + step], patterns_of_f) for f, patterns_of_f in patterns.items() if f + step in patterns}
-    if scheme.equivalent:
-        return {f: coefficients_between(scheme, rank, *bra_and_ket) for f, bra_and_ket in tables.items()}
-    return for_every_f(tables, lambda bra, ket: coefficients_between(scheme, rank, bra, ket))
-
-
-def coefficients_between(scheme: Scheme, rank: int, bra: Ints, ket: Ints, acting: int | None = None) -> Floats:
-    """t(p', p) between patterns of two F, with or without a total spin, of the vector of a spin if one acts (see `coupling`)."""
-    if not scheme.equivalent:
-        return moment_coefficients(scheme.twice, rank, acting, bra, ket)
-    (up, left), (low, right) = (scheme.recoupling(int(patterns[0, -1])) for patterns in (bra, ket))
-    values = left.T @ moment_coefficients(scheme.twice, rank, acting, up, low) @ right
-    values *= scheme.count_of(() if acting is None else (acting,))
-    return np.where(np.abs(values) > ROUND_OFF, values, 0.0)

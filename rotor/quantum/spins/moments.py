@@ -21,9 +21,10 @@ from rotor.arrays import Floats
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins.blocks import SpinBlock
-from rotor.quantum.spins.lines import Acting, between_states, coefficients_between
+from rotor.quantum.spins.lines import Acting, between_states
 from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_elements
 from rotor.quantum.spins.parts import SpinPart
+from rotor.quantum.spins.pattern_tables import tensor_coefficients
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.spins.written_moments import written_elements
 from rotor.quantum.tensors import BodyTensor, body_tensor
@@ -68,7 +69,7 @@ class SpinMoments:
         rank, acting = (0 if plain else 2, self.scheme.place(moment.spin)) if moment.spin else (1, None)
         key = (rank, acting, up.twice_f, low.twice_f)
         if key not in self._cache:
-            self._cache[key] = coefficients_between(self.scheme, rank, up.patterns, low.patterns, acting)
+            self._cache[key] = tensor_coefficients(self.scheme, rank, up.patterns, low.patterns, acting)
         coefficients: Floats = self._cache[key]
         return coefficients
 

@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.blocks import couplings_of
-from rotor.quantum.spins.lines import coefficients_of_step
+from rotor.quantum.spins.coupling import coefficients, for_every_f, moment_coefficients, powers_between
 from rotor.quantum.spins.rotor import Channel
 from rotor.quantum.spins.scheme import Scheme
+
+ROUND_OFF = 1e-13  # round-off of sums of products of a few coefficients of size 1
 
 
 class PatternTable(NamedTuple):
@@ -78,3 +79,64 @@ def _by_f(table: PatternTable, coefficients: Mapping[int, Floats], step: int) ->
         out[(f - first) // 2, table.places[f + step][:, None], table.places[f]] = values
     out.flags.writeable = False
     return out
+
+
+@lru_cache(maxsize=1024)
+def _couplings_of_f(scheme: Scheme, channel: Channel, twice_f: int) -> Floats:
+    """c(p', p) of a channel over all patterns of one F with a total spin; read-only, shared by levels and derivatives."""
+    patterns = scheme.patterns(twice_f)
+    values = coefficients_between(scheme, channel, patterns, patterns)
+    values.flags.writeable = False
+    return values
+
+
+def couplings_of(scheme: Scheme, channel: Channel, tables: Mapping[int, Ints]) -> dict[int, Floats]:
+    """c(p', p) of a channel by F, from the patterns of each F."""
+    if scheme.equivalent:
+        return {f: _couplings_of_f(scheme, channel, f) for f in tables}
+    both = {f: (patterns, patterns) for f, patterns in tables.items()}
+    return for_every_f(both, lambda bra, ket: coefficients_between(scheme, channel, bra, ket))
+
+
+def coefficients_between(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints) -> Floats:
+    """c(p', p) of a channel between patterns (..., n, columns), with its powers of N·S; 0 between different conserved sums."""
+    values = _with_total(scheme, channel, bra) if scheme.equivalent else _one_by_one(scheme, channel, bra, ket)
+    for column in scheme.conserved_columns:
+        values = np.where(bra[..., :, None, column] == ket[..., None, :, column], values, 0.0)
+    powers = channel.ns, channel.n2
+    return np.asarray(values * powers_between(scheme.twice[0], powers, bra, ket)) if channel.ns else values
+
+
+def _one_by_one(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints) -> Floats:
+    """c(p', p) between patterns coupled one by one, without powers."""
+    return coefficients(scheme.twice, channel.acting, channel.rank, bra, ket)
+
+
+def _with_total(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
+    """c(p', p) over all patterns of an F with a total spin; for two equivalent spins ½(value ± value with both exchanged)."""
+    plain, turn = scheme.recoupling(int(patterns[0, -1]))
+    values = _one_by_one(scheme, channel, plain, plain)
+    b = len(scheme.spins) - 1
+    turned = tuple(sorted({b: b - 1, b - 1: b}.get(place, place) for place in channel.acting))
+    if turned != channel.acting and scheme.equivalent == 2:
+        exchanged = _one_by_one(scheme, channel._replace(acting=turned), plain, plain)
+        values = (values + channel.exchange * exchanged) / 2
+    return np.asarray(turn.T @ values @ turn)
+
+
+def coefficients_of_step(scheme: Scheme, patterns: dict[int, Ints], rank: int, step: int) -> dict[int, Floats]:
+    """t(p', p) of a tensor between doubled F' = F + step and F, by F, where both have patterns."""
+    tables = {f: (patterns[f + step], patterns_of_f) for f, patterns_of_f in patterns.items() if f + step in patterns}
+    if scheme.equivalent:
+        return {f: tensor_coefficients(scheme, rank, *bra_and_ket) for f, bra_and_ket in tables.items()}
+    return for_every_f(tables, lambda bra, ket: tensor_coefficients(scheme, rank, bra, ket))
+
+
+def tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints, acting: int | None = None) -> Floats:
+    """t(p', p) between patterns of two F, with or without a total spin, of the vector of a spin if one acts (see `coupling`)."""
+    if not scheme.equivalent:
+        return moment_coefficients(scheme.twice, rank, acting, bra, ket)
+    (up, left), (low, right) = (scheme.recoupling(int(patterns[0, -1])) for patterns in (bra, ket))
+    values = left.T @ moment_coefficients(scheme.twice, rank, acting, up, low) @ right
+    values *= scheme.count_of(() if acting is None else (acting,))
+    return np.where(np.abs(values) > ROUND_OFF, values, 0.0)

@@ -16,13 +16,11 @@ from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.axial_levels import axial_states
 from rotor.quantum.spins.blocks import (
-    FEW,
     Member,
     Plan,
     SpinBlock,
     States,
-    couplings,
-    couplings_of_all,
+    coefficients_by_f,
     diagonalised,
     parts_of_f,
     product,
@@ -31,6 +29,8 @@ from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, between, fram
 from rotor.quantum.spins.parts import SpinPart, labels_by_shares, names_of_tables, over_functions
 from rotor.quantum.spins.pattern_tables import PatternTable, couplings_by_f, pattern_table
 from rotor.quantum.spins.rotor import Channel
+
+FEW = 100  # with more patterns of an F, coefficients are computed one F at a time
 
 
 def solved_blocks(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock]:
@@ -109,10 +109,11 @@ def _states(plan: Plan, members: Sequence[Member], table: PatternTable) -> Itera
 
 def _block_by_block(plan: Plan, members: Sequence[Member], patterns: dict[int, Ints]) -> Iterator[States]:
     """States of blocks whose matrices are computed one at a time."""
-    coefficients = couplings_of_all(plan, patterns)
+    few = not plan.shared.scheme.equivalent and max(map(len, patterns.values()), default=0) <= FEW
+    coefficients = coefficients_by_f(plan, patterns) if few else {}
     for number, (f, parts, *_) in enumerate(members):
         if f not in coefficients:
-            coefficients = couplings(plan, {f: patterns[f]})
+            coefficients = coefficients_by_f(plan, {f: patterns[f]})
         if plan.shared.state_by_state and len(parts) == 1:
             energies, vectors = _state_by_state(plan, parts[0], coefficients[f])
             yield States([number], energies[None], vectors[None])

@@ -24,9 +24,10 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.connected import part_numbers
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.axial import Exist
-from rotor.quantum.spins.blocks import Member, Plan, States, coefficients_of, diagonalised
+from rotor.quantum.spins.blocks import Member, Plan, States, diagonalised
 from rotor.quantum.spins.contraction import stacks_of
 from rotor.quantum.spins.parts import SpinPart
+from rotor.quantum.spins.pattern_tables import ROUND_OFF, coefficients_between
 from rotor.quantum.spins.rotor import ALONE, Channel
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.wang.basis import Part, WangBlock
@@ -34,7 +35,6 @@ from rotor.quantum.wang.j_operators import phase
 from rotor.tops.operators import axes_of
 
 _ZERO = 1e-12  # smaller elements, relative to the largest, are round-off of sums that cancel
-_ROUND_OFF = 1e-13  # round-off of coefficients, which are sums of products of a few numbers of size 1
 _OF_THE_AXIS = 1e-9  # limit of elements that break the threefold axis, relative to the largest; round-off is smaller
 
 
@@ -238,8 +238,8 @@ def _coupling(plan: Plan, channel: Channel, patterns: Ints) -> Floats:
     """The coefficients of a channel without round-off, which times rotational energies would connect states of different symmetry."""
     if channel == ALONE:
         return np.eye(len(patterns))
-    values = coefficients_of(plan.shared.scheme, channel, patterns)
-    return np.where(np.abs(values) > _ROUND_OFF, values, 0.0)
+    values = coefficients_between(plan.shared.scheme, channel, patterns, patterns)
+    return np.where(np.abs(values) > ROUND_OFF, values, 0.0)
 
 
 def _connected(matrix: Floats, sub_block: Ints) -> list[Ints]:
