@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import typer
 
@@ -118,10 +118,11 @@ def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer
             app.command(verb, short_help=VERBS[verb])(_listed)
             continue
         from rotor.cli.shared.command import PanelCommand, command_of
+        from rotor.cli.shared.runner import run_verb
 
-        declared, carry_out = declaration(verb)
+        declared = declaration(verb)
         app.command(verb, cls=PanelCommand, short_help=VERBS[verb] or declared.about, epilog=folded(declared.examples))(
-            command_of(declared, carry_out)
+            command_of(declared, run_verb)
         )
     return app
 
@@ -130,13 +131,11 @@ def _listed() -> None:
     """Placeholder of a verb in the list of verbs."""
 
 
-def declaration(name: str) -> tuple[Verb, Any]:
-    """The declaration of a verb and the function that carries it out."""
-    from rotor.cli.shared.runner import run_verb
-
+def declaration(name: str) -> Verb:
+    """The declaration of a verb."""
     folder = "cli" if find_spec(f"rotor.verbs.{name}") is None else "verbs"
-    module = import_module(f"rotor.{folder}.{FILES.get(name, name)}")
-    return module.VERB, getattr(module, "run_declared", run_verb)
+    verb: Verb = import_module(f"rotor.{folder}.{FILES.get(name, name)}").VERB
+    return verb
 
 
 def _print_version(requested: bool) -> None:

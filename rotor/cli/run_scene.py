@@ -7,26 +7,23 @@ import sys
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import NoAnswerError
-from rotor.cli.shared import process
-from rotor.cli.shared.output import Files, answering, deliver, note
 from rotor.cli.shared.workers import MOST_WORKERS
-from rotor.reports.screen import Table, evenly, json_with_rows, show_parts, show_table
+from rotor.reports.error_table import error_parts
+from rotor.reports.progress import elapsed_time, progress_bar
+from rotor.reports.screen import Part, Table, evenly, json_with_rows
 from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, declared
-from rotor.requests.fill import Entries
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Place
+from rotor.verbs.verb import Report, Work, verb_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
-
-    import typer
 
     from rotor.scenes.scene import Scene, SceneResult
     from rotor.scenes.sweep import SweepResult
@@ -80,14 +77,88 @@ class Options:
     errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", panel=OUTPUT)
 
 
-def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -> None:
-    """Run a scene, write the files that it names, and report; a sweep resumes where it stopped."""
-    from rotor.cli.shared.runner import refuse_overwriting
+@dataclass(frozen=True)
+class SceneRun:
+    """A scene that was run."""
+
+    options: Options
+    result: SceneResult
+    failure: str = ""
+
+    @cached_property
+    def report(self) -> Report:
+        """The report of the scene's verb."""
+        from rotor.scenes.calculation import Calculation
+
+        head = {"scene": self.options.scene, "kind_of_scene": self.result.scene.kind}
+        return Calculation(self.result.scene).report(self.result.answer, head)
+
+    @property
+    def notes(self) -> list[str]:
+        """Remarks on the molecule and on the answer, each once."""
+        top = getattr(self.result.request, "top", None)
+        return list(dict.fromkeys([*(top.notes if top is not None else ()), *self.report.content.get("notes", ())]))
+
+    def facts(self) -> dict[str, Any]:
+        """The facts of the answer, and those of the run."""
+        accuracy = None if self.result.reached is None else asdict(self.result.reached)
+        return {**self.report.content, "accuracy": accuracy, "seconds": self.result.seconds}
+
+    def json(self, content: Mapping[str, Any]) -> str:
+        """The JSON of the verb."""
+        files = [str(path) for path in self.result.files]
+        return verb_of(self.result.scene.kind).json(self.result.answer, {**content, "files": files})
+
+    def parts(self, content: Mapping[str, Any]) -> Iterator[Part | None]:
+        """The title of the scene and the report of its verb, then files and seconds of the run."""
+        result = self.result
+        parts = [*verb_of(result.scene.kind).show(result.answer, replace(self.report, content=content))]
+        if title := result.scene.title:
+            heading = parts.pop(0) if parts and isinstance(parts[0], str) else ""
+            yield f"{title}\n{heading}".rstrip()
+        yield from parts
+        files = ", ".join(map(str, result.files)) or "none: [outputs] names none"
+        yield [("files", files), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)]
+        if self.options.errors:
+            yield from error_parts(content)
+
+
+@dataclass(frozen=True)
+class SweepRun:
+    """A sweep that was run. record: file of the finished points."""
+
+    options: Options
+    kind: str
+    result: SweepResult
+    record: str
+    notes: tuple[str, ...] = ()
+
+    @property
+    def failure(self) -> str:
+        """The failed points, grouped by reason."""
+        return _failures(self.result, self.record) if self.result.failed else ""
+
+    def facts(self) -> dict[str, Any]:
+        """Points computed now and points that failed."""
+        failed = [{"values": dict(point["values"]), "error": point["error"]} for point in self.result.failed]
+        counts = {"record": self.record, "computed": self.result.computed, "failed": failed}
+        return {"scene": self.options.scene, "kind_of_scene": self.kind, **counts}
+
+    def json(self, content: Mapping[str, Any]) -> str:
+        """The facts and all points."""
+        return json_with_rows(self.result, "points", {**content, "files": list(self.result.files)})
+
+    def parts(self, content: Mapping[str, Any]) -> list[Part | None]:
+        """A table of points."""
+        return [_sampled_rows(self.result)]
+
+
+def answer(options: Options, _: Work) -> SceneRun | SweepRun:
+    """Run a scene, or the points of its sweep that are not done."""
     from rotor.scenes.outputs import refuse_outside
     from rotor.scenes.scene_file import read_scene
     from rotor.scenes.sweep import is_sweep
 
-    options: Options = verb.read(Entries(typed, "option"), Place())[0]
     if not Path(options.out).is_dir():
         raise ValueError(f"--out {options.out}: there is no such folder; make it first")
     scene = read_scene(options.scene)
@@ -98,15 +169,8 @@ def run_declared(verb: Tool, context: typer.Context, typed: Mapping[str, Any]) -
     if swept and options.errors:
         raise ValueError("--errors: needs a single scene; files of a sweep hold the errors of each point")
     refuse_outside(scene, options.out)
-    files = Files()
-    files.ask_json(typed.get("json"))
-    refuse_overwriting(files, {"scene": options.scene})
-    process.begin_work()
     with _workers(options) as pool:
-        if swept:
-            _sweep(scene, options, files, pool, context.obj)
-        else:
-            _single(scene, options, files, pool, context.obj)
+        return _sweep(scene, options, pool) if swept else _single(scene, options, pool)
 
 
 @contextmanager
@@ -151,49 +215,11 @@ def _folder(options: Options) -> Path:
     return Path(options.scene).parent
 
 
-def _single(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
-    from rotor.reports.progress import elapsed_time
+def _single(scene: Scene, options: Options, pool: Executor | None) -> SceneRun:
     from rotor.scenes.run import run_scene
 
     with elapsed_time("computing"):
-        result = run_scene(scene, folder=_folder(options), out=options.out, executor=pool)
-    for remark in _notes(result):
-        note(remark)
-    _deliver(result, options, files, command)
-
-
-def _deliver(result: SceneResult, options: Options, files: Files, command: str) -> None:
-    """Print the report of the verb, then files and seconds of the run."""
-    from rotor.reports.error_table import error_parts
-    from rotor.scenes.calculation import Calculation
-
-    scene, calculation = result.scene, Calculation(result.scene)
-    verb = calculation.verb
-    head = {"command": command, "input": options.scene, "scene": options.scene, "kind_of_scene": scene.kind}
-    with answering():
-        report = calculation.report(result.answer, head)
-    content = {**report.content, **_run_facts(result)}
-
-    def show() -> None:
-        """The report, after the title of the scene."""
-        if scene.title:
-            print(scene.title)
-        files_text = ", ".join(map(str, result.files)) or "none: [outputs] names none"
-        run = [("files", files_text), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)]
-        show_parts([*verb.show(result.answer, report), run, *(error_parts(content) if options.errors else [])])
-
-    deliver(files, {}, lambda: verb.json(result.answer, content), show)
-
-
-def _run_facts(result: SceneResult) -> dict[str, Any]:
-    accuracy = None if result.reached is None else asdict(result.reached)
-    return {"accuracy": accuracy, "seconds": result.seconds, "files": [str(path) for path in result.files]}
-
-
-def _notes(result: SceneResult) -> list[str]:
-    top = getattr(result.request, "top", None)
-    facts = result.answer.facts()
-    return list(dict.fromkeys([*(top.notes if top is not None else ()), *facts.get("notes", ())]))
+        return SceneRun(options, run_scene(scene, folder=_folder(options), out=options.out, executor=pool))
 
 
 def _accuracy(result: SceneResult) -> list[tuple[str, str]]:
@@ -221,9 +247,7 @@ def _cell(value: Any) -> str:
     return ("-" if math.isnan(value) else f"{value:.8g}") if number else str(value)
 
 
-def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, command: str) -> None:
-    import rotor
-    from rotor.reports.progress import progress_bar
+def _sweep(scene: Scene, options: Options, pool: Executor | None) -> SweepRun:
     from rotor.scenes.sweep import run_sweep
 
     record = options.record or str(Path(options.out) / f"{Path(options.scene).stem}.sweep.jsonl")
@@ -238,15 +262,8 @@ def _sweep(scene: Scene, options: Options, files: Files, pool: Executor | None, 
             retry_failed=options.retry_failed,
             progress=advance,
         )
-    seconds = time.monotonic() - start
-    head = {"rotor_version": rotor.__version__, "command": command, "scene": options.scene, "kind_of_scene": scene.kind}
-    failed = [{"values": dict(point["values"]), "error": point["error"]} for point in result.failed]
-    content = {**head, "record": record, "computed": result.computed, "failed": failed, "files": list(result.files)}
-    text = lambda: json_with_rows(result, "points", content)  # noqa: E731
-    deliver(files, {}, text, lambda: _show_sweep(result))
-    print(_summary(result, record, seconds), file=sys.stderr)
-    if failed:
-        raise NoAnswerError(_failures(result, record))
+    print(_summary(result, record, time.monotonic() - start), file=sys.stderr)
+    return SweepRun(options, scene.kind, result, record)
 
 
 def _summary(result: SweepResult, record: str, seconds: float) -> str:
@@ -276,16 +293,17 @@ def _failures(result: SweepResult, record: str) -> str:
     )
 
 
-def _show_sweep(result: SweepResult) -> None:
-    show_table(_sampled_rows(result))
-
-
 VERB = Tool(
     name="run",
     about="Run a scene, write the files that it names, and report; a sweep resumes where it stopped.",
     examples=EXAMPLES,
     request=Options,
     of="scene",
-    answer=lambda request, work: None,
-    show=lambda answer, report: (),
+    answer=answer,
+    notes=lambda answer: answer.notes,
+    failure=lambda answer: answer.failure,
+    text=lambda answer, content: answer.json(content),
+    show=lambda answer, report: answer.parts(report.content),
+    lists_files=True,
+    stepwise=True,
 )

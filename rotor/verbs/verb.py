@@ -222,6 +222,7 @@ class Verb:
     content: further keys of the JSON. notes: remarks on an answer. failure: reason why an answer is not a result.
     outputs: files. withheld: reasons why some of them are not written. stated: keys of the JSON in the provenance of files.
     show: the parts of the report, which are printed with blank lines about tables. stepwise: whether every step is shown from the start.
+    lists_files: whether the report names its files by itself.
     drawn: unit of the picture's horizontal axis, None if it cannot be changed. spectral: whether the picture is a spectrum.
     scaled: whether it has --plot-scale. nothing: reason why there is nothing to draw.
     workers: what --workers shares out. short: whether plain Python answers before the compiler would be loaded.
@@ -264,6 +265,7 @@ class Verb:
     read_extras: Callable[[Mapping[str, Any]], Mapping[str, Any]] | None = None
     records: Callable[[Any], Table | None] | None = None
     stepwise: bool = False
+    lists_files: bool = False
     stated: tuple[str, ...] = ()
     other: Verb | None = None
     instead: str = ""

@@ -570,7 +570,7 @@ if __name__ == "__main__":
     (point,) = points(read_scene("s.toml"))
     os.mkdir("all.parquet.points")
     with worker_processes(1) as pool:
-        print(pool.submit(loaded_by, Job("k" * 64, point.values, point.content, ".", ".", ("all.parquet",))).result())
+        print(pool.submit(loaded_by, Job("k" * 64, point, ".", ".", ("all.parquet",))).result())
 """
 
 

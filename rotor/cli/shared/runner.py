@@ -75,7 +75,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
 def show_answer(verb: Verb, answer: Any, report: Report) -> None:
     """The report of a verb and the files written, with the table of errors where it is requested."""
     parts = [*verb.show(answer, report)]
-    if report.content.get("files"):
+    if report.content.get("files") and not verb.lists_files:
         parts.append([("files", ", ".join(report.content["files"]))])
     if getattr(report.shown, "errors", False):
         from rotor.reports.error_table import error_parts
@@ -87,7 +87,7 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
 def places_of(verb: Verb) -> set[str]:
     """The options that say where results go, not what is computed: files, pictures, processes."""
     files = {each.name for each in verb.outputs} | {each.option for each in verb.extras if each.files is not None}
-    return files | {"json", "save_scene", "workers", *PLOT_NAMES}
+    return files | ({"json", "save_scene", "workers", *PLOT_NAMES} - verb.fields.keys())
 
 
 def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
