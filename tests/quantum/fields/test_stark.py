@@ -280,6 +280,19 @@ def test_diabatic_labels_converge_and_tend_to_those_of_the_symmetric_molecule():
     )  # adiabatic ones do cross over
 
 
+def test_states_that_take_the_label_of_a_followed_level_are_listed():
+    """At crossings labels of J = 2 pass to states of J = 3, whose energies have no bound; a label stands once at a field."""
+    settings = {"j_highest": 2, "m_values": (1,), "tolerance_mhz": 1.0, "diabatic_gap_mhz": 5.0}
+    states = stark_map(nearly_c2v(1e-4), np.linspace(0, 25, 3), **settings)
+    beyond = np.isnan(states.truncation_mhz)
+    assert set(states.label[beyond]) == {"3 0 3", "3 1 3", "3 1 2"}
+    followed = {label for label in states.label if label[0] < "3"}
+    for field in states.fields:
+        labels = states.diabatic_label[states.field == field].tolist()
+        assert followed <= set(labels)
+        assert len(labels) == len(set(labels))
+
+
 def test_two_crossings_between_two_fields_are_seen():
     """sin(9x + 0.4) crosses 0 at (π - 0.4)/9 and (2π - 0.4)/9; a level far off, which has no slope, does not stop the search."""
 
