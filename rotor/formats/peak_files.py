@@ -89,8 +89,8 @@ def _from_csv(path: Path) -> Floats:
     text, name = load(path)
     rows, heading, factor = list[list[float]](), True, 1.0
     lines = text.decode("utf-8", "replace").splitlines()
-    for number, row in enumerate(csv.reader(line.replace(";", ",") for line in lines), 1):
-        cells = [cell.strip() for cell in row if cell.strip()]
+    for number, line in enumerate(lines, 1):
+        cells = [cell.strip() for cell in _cells(line) if cell.strip()]
         if not cells or cells[0].startswith("#"):
             continue
         try:
@@ -112,6 +112,13 @@ def _from_csv(path: Path) -> Floats:
     columns = np.array(rows)
     columns[:, [0, 2][: columns.shape[1] - 1]] *= factor
     return columns
+
+
+def _cells(line: str) -> list[str]:
+    """The cells of a line. Where they stand between semicolons, a comma is a decimal point."""
+    if ";" in line:
+        return line.replace(",", ".").split(";")
+    return next(csv.reader([line]), [])
 
 
 def _unit_of_heading(text: str) -> float:

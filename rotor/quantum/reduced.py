@@ -50,6 +50,11 @@ def connected_pairs(blocks: Iterable[AnyBlock], tensors: Tensors) -> Iterator[tu
     if blocks[0].alone:
         yield from connected_wang_blocks(blocks, tensors[0, 0])
         return
+    if not isinstance(blocks[0], SolvedBlock | MomentBlock):
+        from rotor.quantum.spins.lines import connected_blocks
+
+        yield from connected_blocks(blocks, tensors)
+        return
     yield from pairs_where(blocks, rank_of(tensors), lambda up, low: _connects(up, low, tensors))
 
 
@@ -71,10 +76,6 @@ def pairs_where(
 def _connects(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> bool:
     if isinstance(up, MomentBlock):
         return up.connects(low, tensors)
-    if not isinstance(up, SolvedBlock):
-        from rotor.quantum.spins import lines
-
-        return lines.connected(up, low, tensors)
     tensors_of_parts = ((tensor_between(tensors, p.v, q.v), p, q) for p in up.parts for q in low.parts)
     return any(tensor is not None and tensor.between(p.basis, q.basis) is not None for tensor, p, q in tensors_of_parts)
 

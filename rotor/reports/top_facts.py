@@ -159,10 +159,15 @@ def vector_text(vector: Sequence[float] | None, names: Sequence[str] = ("μa", "
     return ", ".join(f"{name} {round(x, 6) + 0.0:.6g}" for name, x in zip(names, vector, strict=True)) + " D"
 
 
+def is_estimated_dipole(top: Top) -> bool:
+    """Whether the dipole is estimated, with an error of 0.2 D."""
+    return top.dipole_source.startswith("estimate")
+
+
 def dipole_text(top: Top) -> str:
     """The dipole of a top; an estimated dipole has one decimal, since its error is 0.2 D."""
     vector = top.dipole_abc_debye
-    if vector is None or not top.dipole_source.startswith("estimate"):
+    if vector is None or not is_estimated_dipole(top):
         return vector_text(vector)
     return vector_text([round(x, 1) for x in vector]) + " (estimated)"
 

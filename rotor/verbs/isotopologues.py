@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from rotor.formats.molecules.isotopologue_request import IsotopologuesAnswer, IsotopologuesRequest, answer_isotopologues
 from rotor.reports.screen import Part, Table, record_table
-from rotor.reports.top_facts import error_facts, known_digits
+from rotor.reports.top_facts import error_facts, is_estimated_dipole, known_digits
 from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.isotopes.isotopologues import Isotopologue
 from rotor.tops.top import Top
@@ -66,7 +66,7 @@ def _rigid_texts(top: Top) -> list[str]:
 def _row(isotopologue: Isotopologue) -> list[str]:
     top = isotopologue.top
     weights = ", ".join(f"{name} {weight}" for name, weight in top.spin_weights.to_mapping().items())
-    dipole = top.dipole_abc_debye
+    dipole, decimals = top.dipole_abc_debye, 1 if is_estimated_dipole(top) else 4
     return [
         isotopologue.label,
         f"{isotopologue.abundance:.3e}",
@@ -77,7 +77,7 @@ def _row(isotopologue: Isotopologue) -> list[str]:
         *_rigid_texts(top),
         isotopologue.axes,
         f"{isotopologue.turned_degrees:.2f}",
-        *(["-"] * 3 if dipole is None else [f"{round(mu, 4) + 0.0:.4f}" for mu in dipole]),
+        *(["-"] * 3 if dipole is None else [f"{round(mu, decimals) + 0.0:.{decimals}f}" for mu in dipole]),
         weights or "all equal",
     ]
 

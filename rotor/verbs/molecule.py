@@ -359,7 +359,12 @@ def _with_internal_rotation(top: Top, text: str, reading: Reading) -> Top:
         return with_internal_rotation(top, (reading.inputs.calculator or "mmff") if text.strip() == "scan" else None)
     from rotor.tops.internal_rotation import InternalRotationConstants
 
-    return replace(top, internal_rotation=InternalRotationConstants.parse(text))
+    try:
+        return replace(top, internal_rotation=InternalRotationConstants.parse(text))
+    except ValueError as error:
+        if "=" in text:
+            raise
+        raise ValueError(f"{error}; or one of the words geometry and scan") from None
 
 
 _STEPS: Mapping[str, Callable[[Top, Any, Reading], Top]] = {

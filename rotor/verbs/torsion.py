@@ -59,7 +59,14 @@ def show(answer: TorsionAnswer, report: Report) -> Iterable[Part | None]:
 
 def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
     low, high = record["reduced_moment_range_u_angstrom2"]
-    turn = f"a turn of {record['symmetry_number']} equal positions" if answer.scan is None else "the relaxed scan"
+    count = record["symmetry_number"]
+    turn = (
+        "the relaxed scan"
+        if answer.scan is not None
+        else f"a turn of {count} equal positions"
+        if count > 1
+        else "a turn"
+    )
     spread = f" of the geometry; {low:.6g} to {high:.6g} over {turn}" if high - low > 1e-6 * high else ""
     wells = [f"{well['angle_degrees']:.4g}° ({round(well['energy_cm'], 6):.4g} cm⁻¹)" for well in record["wells"]]
     quanta = sorted({round(well["harmonic_cm"], 1) for well in record["wells"]})
@@ -71,7 +78,10 @@ def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, 
         ("minima", ", ".join(wells) + f"; harmonic {harmonic} cm⁻¹" if wells else "none: a free rotor"),
         ("reduced moment", f"{record['reduced_moment_u_angstrom2']:.6g} u Å²{spread}"),
         ("F", f"{record['f_mhz'] / units.MHZ_PER_CM:.6g} cm⁻¹ ({record['f_mhz']:.6g} MHz)"),
-        ("symmetry", f"{record['symmetry_number']} equal positions in a turn"),
+        (
+            "symmetry",
+            f"{count} equal positions in a turn" if count > 1 else "none: no two positions in a turn are equal",
+        ),
     ]
     if record["scan_misfit_cm"] is not None:
         facts.append(("scan", f"Fourier series within {record['scan_misfit_cm']:.2g} cm⁻¹ (root mean square)"))

@@ -607,3 +607,12 @@ def test_conformers_show_no_digits_beyond_their_error(call):
     row = out.split("conformer ")[1].splitlines()[1].split()
     assert [float(cell) % 10 for cell in row[2:3]] == [0.0]
     assert all("." not in cell for cell in row[2:5])
+
+
+def test_an_estimated_dipole_of_isotopologues_has_the_digits_that_are_known(call):
+    """0.2 D uncertain, and printed as 2.3754: `rotor info` prints 2.4."""
+    code, out, _ = call("isotopologues", "SMILES:CC=O")
+    assert code == 0
+    (parent,) = [line for line in out.splitlines() if line.startswith("C2H4O ")]
+    assert " 2.4 " in parent
+    assert not re.search(r"\d\.\d{4}  ", parent.partition(" abc ")[2].partition(" ")[2])

@@ -147,3 +147,24 @@ def test_a_heading_has_the_unit_of_the_frequencies(folder, heading, factor):
     np.testing.assert_allclose(peaks.frequency_mhz, frequencies, rtol=1e-12)
     np.testing.assert_allclose(peaks.uncertainty_mhz, 0.01, rtol=1e-9)
     assert peaks.intensity.tolist() == [1, 2, 3, 4]
+
+
+@pytest.mark.parametrize(
+    "text", ["f;I\n8100,25;1,5\n8211,5;2\n9301,125;3,25\n", "8100.25;1.5\n8211.5;2\n9301.125;3.25\n"]
+)
+def test_a_comma_between_semicolons_is_a_decimal_point(folder, text):
+    """8100,25;1,5 was read as a peak at 8100 MHz of intensity 25 and error 1 MHz, without a word."""
+    Path("p.csv").write_text(text)
+    peaks = read_peaks("p.csv")
+    np.testing.assert_array_equal(peaks.frequency_mhz, [8100.25, 8211.5, 9301.125])
+    np.testing.assert_array_equal(peaks.intensity, [1.5, 2, 3.25])
+
+
+def test_a_spectrum_with_decimal_commas(folder):
+    from rotor.formats.spectra.text import read_text_spectrum
+
+    rows = [f"{8 + n / 10:.1f};{n}.5".replace(".", ",") for n in range(5)]
+    Path("s.csv").write_text("\n".join(["frequency_ghz;intensity_k", *rows]) + "\n")
+    spectrum = read_text_spectrum(Path("s.csv"))
+    np.testing.assert_allclose(spectrum.frequency_mhz, 8000 + 100 * np.arange(5))
+    np.testing.assert_array_equal(spectrum.intensity, np.arange(5) + 0.5)

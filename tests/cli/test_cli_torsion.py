@@ -104,3 +104,10 @@ def test_moments_of_the_geometry_and_over_a_turn(call):
     assert "u Å² of the geometry; 0.635004 to 0.635623 over a turn of 3 equal positions" in " ".join(out.split())
     _, out, _ = call("torsion", "CH3OH", "--bond", "1-2")
     assert "over the relaxed scan" in " ".join(out.split())
+
+
+def test_a_bond_without_symmetry_says_so(call):
+    """1 equal positions in a turn."""
+    _, out, _ = call("torsion", "SMILES:CCO", "--bond", "2-3", "--potential", "V1=0.1 V3=1 kcal/mol")
+    assert "none: no two positions in a turn are equal" in out
+    assert "1 equal positions" not in out

@@ -136,7 +136,9 @@ def _numbers(body: str) -> list[float] | None:
 
 
 def _items(body: str) -> list[str]:
-    """Fields between commas, which may be empty, or between blanks."""
+    """Fields between commas, which may be empty, or between blanks. Between semicolons a comma is a decimal point."""
+    if ";" in body:
+        return [item.strip() for item in body.replace(",", ".").split(";")]
     return [item.strip() for item in body.split(",")] if "," in body else _SEPARATOR.split(body)
 
 
@@ -148,8 +150,8 @@ def _names_and_labels(heading: list[str]) -> tuple[list[str], dict[str, str]]:
         if match := _LABEL.match(line):
             if bracket := _IN_BRACKETS.findall(match.group(2)):
                 labels[match.group(1).lower()] = bracket[-1] if match.group(1).lower() == "x" else bracket[0]
-        elif "," in line and ":" not in line:
-            names = [item.strip() for item in line.split(",")]
+        elif ("," in line or ";" in line) and ":" not in line:
+            names = [item.strip() for item in re.split("[,;]", line)]
         elif _SUFFIX.search(line.split()[0] if line.split() else ""):
             names = line.split()
     for axis, name in zip("xy", names[:2], strict=False):

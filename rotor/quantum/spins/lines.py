@@ -9,7 +9,7 @@ see `coupling.moment_coefficients`. Elements of the rotation are computed once f
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -66,11 +66,6 @@ def acting_on(vectors: Floats, coefficients: Floats, element: Floats) -> Floats:
     return np.asarray((coefficients @ each).reshape(target * up, -1))
 
 
-def connected(up: SpinBlock, low: SpinBlock, tensors: Tensors) -> bool:
-    """Whether the tensors have an element between two blocks."""
-    return bool(_acting(up, low, tensors, rank_of(tensors)))
-
-
 @dataclass(frozen=True)
 class Elements:
     """Elements of tensors between rotational blocks, and the parts of spin blocks between which they act.
@@ -100,6 +95,28 @@ class Elements:
             if number in sources
             for source in sources[number]
         ]
+
+
+def connected_blocks(blocks: Sequence[SpinBlock], tensors: Tensors) -> Iterator[tuple[SpinBlock, SpinBlock]]:
+    """The pairs (up, low) of blocks with elements of the tensors, as `reduced.connected_pairs` lists them.
+
+    Only blocks with a rotational block that the tensors reach from the other are tested: all pairs of two F are too many.
+    """
+    rank, elements = rank_of(tensors), _elements(blocks[0].shared, tensors)
+    by_f: dict[int, list[SpinBlock]] = {}
+    holders: dict[int, dict[int, list[int]]] = {}  # places of the blocks of an F that have a rotational block
+    for block in blocks:
+        blocks_of_f = by_f.setdefault(block.twice_f, [])
+        for number in block.by_number:
+            holders.setdefault(block.twice_f, {}).setdefault(number, []).append(len(blocks_of_f))
+        blocks_of_f.append(block)
+    for twice_f, lows in sorted(by_f.items()):
+        for first, low in enumerate(lows):
+            reached = elements.reached_from(low)
+            for rise in range(rank + 1):
+                ups, of_number = by_f.get(twice_f + 2 * rise, []), holders.get(twice_f + 2 * rise, {})
+                places = {place for number in reached for place in of_number.get(number, ()) if rise or place >= first}
+                yield from ((ups[i], low) for i in sorted(places) if _acting(ups[i], low, tensors, rank))
 
 
 def _elements(shared: Shared, tensors: Tensors) -> Elements:
