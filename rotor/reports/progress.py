@@ -71,6 +71,16 @@ def sum_progress() -> Callable[[int, int], None] | None:
 
 
 @contextmanager
+def rewritten_line(width: int) -> Iterator[Callable[[str], None] | None]:
+    """Function that rewrites a line on standard error with a text; None where that is no terminal. The line is cleared at the end."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    yield lambda text: print(f"\r{text[-width:]:{width}s}", end="", file=sys.stderr)
+    print("\r" + " " * width + "\r", end="", file=sys.stderr)
+
+
+@contextmanager
 def counting(total: int, what: str) -> Iterator[Callable[[int], object] | None]:
     """Function that advances a bar by a count; None where standard error is no terminal."""
     if not sys.stderr.isatty():

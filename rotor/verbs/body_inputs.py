@@ -27,25 +27,22 @@ def _body(name: Any) -> NamedBody:
 
 def three(raw: Any, unit: str = "") -> Three:
     """Three finite numbers; a text may carry a unit, else `unit` holds."""
-    if isinstance(raw, str):
-        if raw.count(",") != 2 or ":" in raw:
-            raise ValueError(f"{raw!r}: expected three numbers, such as 0.6,0.8,1.0")
-        raw = parse_grid(raw, unit)
-    values = [float(number) for number in raw]
-    if len(values) != 3:
-        raise ValueError(f"{values}: expected three numbers")
-    x, y, z = values
+    x, y, z = _numbers(raw, 3, "three numbers, such as 0.6,0.8,1.0", unit)
     return x, y, z
 
 
 def _four(raw: Any) -> tuple[float, float, float, float]:
-    if isinstance(raw, str) and (raw.count(",") != 3 or ":" in raw):
-        raise ValueError(f"{raw!r}: expected four numbers, such as 1,0,0,0")
-    values = [float(number) for number in (parse_grid(raw, "") if isinstance(raw, str) else raw)]
-    if len(values) != 4:
-        raise ValueError(f"{values}: expected four numbers, such as 1,0,0,0")
-    w, x, y, z = values
+    w, x, y, z = _numbers(raw, 4, "four numbers, such as 1,0,0,0")
     return w, x, y, z
+
+
+def _numbers(raw: Any, count: int, expected: str, unit: str = "") -> list[float]:
+    if isinstance(raw, str) and (raw.count(",") != count - 1 or ":" in raw):
+        raise ValueError(f"{raw!r}: expected {expected}")
+    values = [float(number) for number in (parse_grid(raw, unit) if isinstance(raw, str) else raw)]
+    if len(values) != count:
+        raise ValueError(f"{values}: expected {expected}")
+    return values
 
 
 def _moments(raw: Any) -> Three:

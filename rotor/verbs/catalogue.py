@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
@@ -85,10 +85,8 @@ def add(request: CatalogueRequest, work: Work) -> Added:
     from rotor.formats.catalogue.build import SourceFacts, add_sources
 
     facts = SourceFacts(request.database, request.licence, request.citation)
-    progress = (lambda name: print(f"\r{name[-70:]:70s}", end="", file=sys.stderr)) if sys.stderr.isatty() else None
-    report = add_sources(request.catalogue, request.words, facts, catdir=request.catdir, progress=progress)
-    if progress:
-        print(file=sys.stderr)
+    with rewritten_line(70) as progress:
+        report = add_sources(request.catalogue, request.words, facts, catdir=request.catdir, progress=progress)
     faults = [entry for entry in report if entry.fault]
     for entry in faults:
         work.note(f"left out: {entry.fault}")

@@ -195,16 +195,11 @@ def content(answer: FitAnswer, shown: FitShown) -> dict[str, Any]:
     """Constants, correlations, lines and analyses, by the keys of docs/verbs."""
     from rotor.formats.fit_further import trial_record
 
-    fit, names = answer.fit, ("kind", "reduction", "representation", "constants_mhz", "uncertainties_mhz")
-    constants: Any = fit.constants
-    values = [None] * 5
-    if constants is not None:
-        values = [getattr(constants, name) for name in names[:3]] + [
-            dict(constants.values),
-            dict(constants.uncertainties),
-        ]
+    fit, constants = answer.fit, answer.fit.constants
     return {
-        **dict(zip(names, values, strict=True)),
+        **{name: getattr(constants, name, None) for name in ("kind", "reduction", "representation")},
+        "constants_mhz": None if constants is None else dict(constants.values),
+        "uncertainties_mhz": None if constants is None else dict(constants.uncertainties),
         "bootstrap_errors": list(answer.spread) or None,
         "correlations": fit.statistics.correlations,
         "chosen": [trial_record(trial) for trial in answer.steps],

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, identical, part
@@ -104,10 +104,8 @@ def answer(request: IdentifyRequest, work: Work) -> Identified:
     observed = request.spectrum.read(request.file, request.range_mhz)
     sight = request.spectrum.sight(observed, request.background_k, request.redshift)
     candidates = _candidates(request.catalogue, padded(observed, request.redshift))
-    progress = (lambda name: print(f"\r{name[:60]:60s}", end="", file=sys.stderr)) if sys.stderr.isatty() else None
-    identification = identify(observed, candidates, sight, choices, progress=progress)
-    if progress:
-        print("\r" + " " * 60 + "\r", end="", file=sys.stderr)
+    with rewritten_line(60) as progress:
+        identification = identify(observed, candidates, sight, choices, progress=progress)
     return Identified(observed, sight, identification, request.model_error)
 
 

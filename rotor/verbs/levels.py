@@ -39,7 +39,7 @@ class LevelsShown(Shown):
     unit: str = declared(
         "cm-1", Text(tuple(COLUMNS), "UNIT"), "Unit of the table and the diagram: MHz, cm-1 or K", panel=OUTPUT
     )
-    top_levels: int = declared(60, Whole(0), "Number of lowest levels shown", option="--top", panel=OUTPUT)
+    top_levels: int = declared(30, Whole(0), "Number of lowest levels shown", option="--top", panel=OUTPUT)
 
 
 def _span(name: str) -> Any:

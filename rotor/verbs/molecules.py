@@ -85,7 +85,12 @@ def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
     from rotor.formats.molecules.molecule_file import read_molecule_file
 
     file = read_molecule_file(path, listed=not symmetry)
-    top = _top_of(file) if symmetry or file.constants is None else _top_of_constants(file)
+    if symmetry or file.constants is None:
+        from rotor.formats.read_write import top_of_file
+
+        top = top_of_file(file)
+    else:
+        top = _top_of_constants(file)
     return {
         "name": file.name,
         "names": list(file.names),
@@ -107,12 +112,6 @@ def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
         "file": str(path),
         "own": _is_own(path.parent),
     }
-
-
-def _top_of(file: MoleculeFile) -> Top:
-    from rotor.formats.read_write import top_of_file
-
-    return top_of_file(file)
 
 
 def _top_of_constants(file: MoleculeFile) -> Top:

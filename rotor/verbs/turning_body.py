@@ -11,7 +11,7 @@ from rotor.requests.fill import Entries, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, Grid, Quantity
 from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL
 from rotor.verbs.body_inputs import BODY, MOTION, BodyInput, MotionInput, in_si, three
-from rotor.verbs.molecule import Reading, read_molecule, top_of
+from rotor.verbs.molecule import FIELDS, Reading, read_molecule, top_of
 from rotor.verbs.subjects import OneMolecule, optional_molecule, saved_molecule
 from rotor.verbs.verb import Place, Subject
 
@@ -124,11 +124,8 @@ def read_body(entries: Entries) -> Body | None:
             else f"a molecule and {called['moments' if named is None else 'body']}: give one of them"
         )
     if entries.values.get("molecule.isotopes"):
-        raise ValueError(
-            "--isotope: bare moments have no atoms; give the moments of the isotopologue itself".replace(
-                "--isotope", "--isotope" if entries.style == "option" else "isotopes"
-            )
-        )
+        isotopes = FIELDS["isotopes"].called(entries.style)
+        raise ValueError(f"{isotopes}: bare moments have no atoms; give the moments of the isotopologue itself")
     if entries.has(MOTION["temperature_k"]):
         raise ValueError(
             f"{called['temperature_k']}: bare moments have no units for a temperature; give {momentum} alone"

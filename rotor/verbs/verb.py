@@ -367,10 +367,6 @@ class Verb:
         """Content of a scene in the folder that repeats the request, by dotted key."""
         return {**self.subject.saved(request, subject, folder), **written_fields(request)}
 
-    def stated_in(self, content: Mapping[str, Any]) -> dict[str, Any]:
-        """The part of the JSON content that files record in their provenance."""
-        return {name: plain(content[name]) for name in self.stated if name in content}
-
     def json(self, answer: Any, content: Mapping[str, Any]) -> str:
         """The content as JSON text, with all rows."""
         table = self.table(answer) if self.records is None else self.records(answer)
@@ -402,8 +398,8 @@ def report_of(
     """Data of the report, the JSON and the files. head: command or scene, and input."""
     shown = verb.read_shown(entries)
     content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
-    provenance = {**head, **{name: content[name] for name in ("errors",) if name in content}, **verb.stated_in(content)}
-    return Report(content, shown, entries, provenance, view, bool(getattr(shown, "sources", False)), executor)
+    stated = {name: plain(content[name]) for name in ("errors", *verb.stated) if name in content}
+    return Report(content, shown, entries, {**head, **stated}, view, bool(getattr(shown, "sources", False)), executor)
 
 
 def tables(what: str, stem: str) -> tuple[Output, Output]:
