@@ -267,6 +267,17 @@ chi_aa = -4.3
 """
 
 
+def test_a_scene_of_zeeman_keeps_the_tensors_as_entered(call, folder):
+    inputs = ("--constants", "B=6081.5 MHz", "--g", "-0.03", "--field", "0,1T", "--states", "J<=1")
+    code, _, err = call("zeeman", *inputs, "--save-scene", "s.toml")
+    assert code == 0, err
+    scene = (folder / "s.toml").read_text()
+    assert "[magnetic]\ng = [-0.03]\n" in scene
+    (folder / "s.toml").write_text(scene + '\n[outputs]\ncsv = "scene.csv"\n')
+    assert call("zeeman", *inputs, "--csv", "verb.csv")[0] == call("run", "s.toml")[0] == 0
+    assert (folder / "scene.csv").read_text() == (folder / "verb.csv").read_text()
+
+
 def test_a_tensor_in_two_forms_is_refused(call):
     Path("m.toml").write_text(NITRILE.replace("g = -0.01", "g = -0.01\ng_perpendicular = -0.01"))
     code, _, err = call("zeeman", "m.toml", "--field", "1 T", "--states", "J<=1")
