@@ -50,8 +50,8 @@ class OneMolecule(SubjectKind):
     @property
     def options(self) -> Mapping[str, Field]:
         """The inputs for which the verb has options."""
-        kept = {field.identity: field for name, field in FIELDS.items() if name not in self.without}
-        return {**kept, **self._further_fields}
+        common = {field.identity: field for name, field in FIELDS.items() if name not in self.without}
+        return {**common, **self._further_fields}
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read the molecule and prepare its top."""
