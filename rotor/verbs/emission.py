@@ -14,9 +14,10 @@ from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
-from rotor.reports.top_facts import error_facts, with_option
+from rotor.reports.top_facts import error_facts, left_out_facts, with_option
 from rotor.requests.field import OUTPUT, Field, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, written_fields
+from rotor.requests.plan import MOST_LEFT_OUT
 from rotor.requests.readers import Quantity, Text, Whole
 from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
 from rotor.tops.top import Top
@@ -256,17 +257,21 @@ def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
 
 
 def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
-    """Neglected effects: of the source, and the largest of each molecule."""
+    """Neglected effects: of the source, and the largest of each molecule; of many molecules, those of the largest."""
     from rotor.quantum.estimates.limits import model_limits, populated_j
 
-    request = answer.request
-    facts = [("left out", "departures from one excitation temperature; structure of the source in the beam")]
+    request, largest = answer.request, []
     for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
-        if not isinstance(top, Top):
-            continue
-        limits = model_limits(top, populated_j(top, source.excitation_k), lines.effects)
-        facts += [("", f"{name}: {with_option(limit.sentence, 'emission')}") for limit in limits[:1]]
-    return facts
+        limits = model_limits(top, populated_j(top, source.excitation_k), lines.effects) if isinstance(top, Top) else ()
+        largest += [(name, limit) for limit in limits[:1]]
+    if len(largest) >= MOST_LEFT_OUT:
+        largest.sort(key=lambda pair: -(pair[1].size_mhz or 0.0))
+    shown = largest if len(largest) < MOST_LEFT_OUT else largest[: MOST_LEFT_OUT - 2]
+    sentences = ["departures from one excitation temperature; structure of the source in the beam"]
+    sentences += [f"{name}: {with_option(limit.sentence, 'emission')}" for name, limit in shown]
+    if others := [f"{name}: {limit.name}" for name, limit in largest[len(shown) :]]:
+        sentences.append(f"smaller or not estimated: {', '.join(others)}")
+    return left_out_facts(sentences)
 
 
 def _table(answer: EmissionAnswer, shown: int) -> Table:
