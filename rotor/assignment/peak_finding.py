@@ -36,7 +36,8 @@ def noise_of(intensity: Floats) -> Floats:
 def peaks_of_spectrum(frequency_mhz: ArrayLike, intensity: ArrayLike, source: str = "") -> PeakList:
     """Peaks of a spectrum.
 
-    Raises ValueError for frequencies that do not increase in equal steps, for fewer than two peaks, and for more than 20,000.
+    Raises ValueError for frequencies below 500 MHz or without equal rising steps, for lines that point down, and for more than 20,000
+    peaks. A spectrum of noise has none.
 
     >>> f = np.arange(6000.0, 6100.0, 0.02)
     >>> lines = sum(np.exp(-(((f - f0) / 0.06) ** 2)) for f0 in (6020.011, 6071.3))
@@ -58,10 +59,17 @@ def peaks_of_spectrum(frequency_mhz: ArrayLike, intensity: ArrayLike, source: st
     smooth = np.convolve(x, kernel, mode="same")
     quiet = noise * float(np.sqrt((kernel**2).sum()))
     top = _maxima(smooth, quiet)
-    if not 2 <= len(top) <= MOST_PEAKS:
+    if len(top) > MOST_PEAKS:
         raise ValueError(
-            f"{where}{len(top)} peaks above {THRESHOLD:g} times the noise; from 2 to {MOST_PEAKS} can be searched"
+            f"{where}{len(top)} peaks above {THRESHOLD:g} times the noise; at most {MOST_PEAKS} can be searched"
         )
+    if len(top) < 2:
+        down = len(_maxima(-smooth, quiet))
+        if down > 2:
+            raise ValueError(
+                f"{where}{len(top)} peaks above {THRESHOLD:g} times the noise and {down} below: the lines point down; change the sign"
+            )
+        return PeakList(f[top], x[top], np.full(len(top), step), (float(f[0]), float(f[-1])), source)
     shift, bend, centre = _parabola(smooth, top)
     height = np.sqrt(2) * np.exp(centre - 0.5 * bend * shift**2)  # smoothing made the line √2 wider and lower
     error = noise[top] / height * np.sqrt(2 * width / np.sqrt(np.pi)) * step

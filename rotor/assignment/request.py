@@ -13,7 +13,7 @@ from rotor.arrays import Floats, Ints
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.confirmation import confirmed
 from rotor.assignment.doublets import with_centres
-from rotor.assignment.evidence import NOT_FOUND, differs, probability, probability_of_isotopologue, word
+from rotor.assignment.evidence import FEWEST, NOT_FOUND, differs, probability, probability_of_isotopologue, word
 from rotor.assignment.families import MOST, SAMPLES, Bounds, Family, families
 from rotor.assignment.growth import Grown, grown_anew
 from rotor.assignment.guesses import guess_values
@@ -190,6 +190,9 @@ def answer_assign(request: AssignRequest) -> AssignAnswer:
     The method is described in docs/assign.md. Only asymmetric tops with lines of J up to 30 are found. The answer is reproducible unless
     the time limit ends the search.
     """
+    if len(request.peaks) < FEWEST:
+        none = np.zeros(len(request.peaks), dtype=bool)
+        return AssignAnswer(request, (), ~none, none)
     search = _Search(request, spurs(request.peaks))
     search.main_species()
     if request.isotopologues:

@@ -66,7 +66,7 @@ def peaks_of_columns(columns: Floats, band_mhz: tuple[float, float] | None = Non
 
 def _in_band(peaks: PeakList, band_mhz: tuple[float, float] | None) -> PeakList:
     """The peaks inside a band, which replaces the band of the file."""
-    if band_mhz is None:
+    if band_mhz is None or len(peaks) < 2:  # noise has none
         return peaks
     inside = (peaks.frequency_mhz >= band_mhz[0]) & (peaks.frequency_mhz <= band_mhz[1])
     return peak_list(

@@ -109,16 +109,20 @@ def test_a_spectrum_on_a_grid(suffix: str, tmp_path: Path) -> None:
     assert is_right(answer_assign(AssignRequest(peaks, seconds=120)), 0, TRUTH)
 
 
-def test_noise_alone_has_no_peaks() -> None:
-    """10⁶ points of noise: none is above six times the noise but by a chance of 1e-3."""
+def test_noise_alone_has_no_species(call: Call) -> None:
+    """10⁶ points of noise: none is above six times the noise but by a chance of 1e-3; the answer is "not found"."""
     noise = np.random.default_rng(7).normal(size=1_000_000)
-    with pytest.raises(ValueError, match="0 peaks above 6 times the noise"):
-        peaks_of_spectrum(6000 + 0.01 * np.arange(1_000_000), noise)
+    grid = 6000 + 0.01 * np.arange(1_000_000)
+    assert len(peaks_of_spectrum(grid, noise)) == 0
+    np.save("noise.npy", np.column_stack([grid, noise]))
+    code, out, _ = call("assign", "noise.npy", "--csv", "peaks.csv", "--plot", "noise.png", "--json", "noise.json")
+    assert code == 0
+    assert "not found: no species stands above chance" in out
 
 
 @pytest.mark.parametrize(
     ("factor", "sign", "message"),
-    [(1e-3, 1.0, "if they are in GHz, multiply by 1000"), (1.0, -1.0, "0 peaks above 6 times the noise")],
+    [(1e-3, 1.0, "if they are in GHz, multiply by 1000"), (1.0, -1.0, "the lines point down; change the sign")],
 )
 def test_a_grid_in_ghz_and_an_inverted_one(factor: float, sign: float, message: str) -> None:
     grid, x = gridded()
