@@ -48,8 +48,8 @@ Mask = NDArray[np.bool_]
 @dataclass(frozen=True, eq=False)
 class Places:
     """Places of a group: the constants without it (8,), covariance (8, 8), movement (8,) of the constants for t = 1; t (n,) with ln of the
-    posterior density of each, not normalised; t of the present place; the largest movement of a line in MHz for t = 1, and in the second
-    direction."""
+    posterior density of each, not normalised; t of the present place; the largest movement of a matched line in MHz for t = 1, and of a
+    line in the second direction."""
 
     constants: Floats
     covariance: Floats
@@ -141,11 +141,12 @@ def _places(seen: Field, species: Grown, taken: Mask, column: int, least: int, s
     variances = slopes @ covariance @ slopes.T
     values, vectors = np.linalg.eigh(variances)
     move = vectors[:, -1] * np.sqrt(max(float(values[-1]), 0.0))
-    largest = float(np.abs(move).max())
+    movement = covariance @ slopes.T @ vectors[:, -1] / np.sqrt(max(float(values[-1]), 1e-30))
+    largest = float(np.abs(slopes_of(seen, species.rows[taken], species.constants) @ movement).max())
     second = float(np.abs(vectors[:, -2:-1]).max(initial=0.0) * np.sqrt(max(float(values[:-1].max(initial=0.0)), 0.0)))
     if not FREE * sigma0 < largest < FARTHEST_MHZ:
         return None
-    t = np.linspace(-REACH, REACH, int(min(2 * REACH * largest / sigma0 * 2, MOST_STEPS)) + 1)
+    t = np.linspace(-REACH, REACH, int(min(4 * REACH * float(np.abs(move).max()) / sigma0, MOST_STEPS)) + 1)
     present = float(move @ slopes @ (species.constants - constants) / (move @ move))
     rest = np.sqrt(np.maximum(np.diag(variances) - move**2, 0.0) + sigma0**2)
     free = np.setdiff1d(np.arange(len(seen.peaks)), species.peak[~taken])
@@ -158,7 +159,6 @@ def _places(seen: Field, species: Grown, taken: Mask, column: int, least: int, s
         )
         for n, x in enumerate(t.tolist(), 1)
     ]  # fmt: skip
-    movement = covariance @ slopes.T @ vectors[:, -1] / np.sqrt(values[-1])
     return Places(constants, covariance, movement, t, np.array(ratios) - 0.5 * t**2, present, largest, second)
 
 

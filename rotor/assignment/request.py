@@ -13,7 +13,15 @@ from rotor.arrays import Floats, Ints
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.confirmation import confirmed
 from rotor.assignment.doublets import with_centres
-from rotor.assignment.evidence import FEWEST, NOT_FOUND, differs, probability, probability_of_isotopologue, word
+from rotor.assignment.evidence import (
+    FEWEST,
+    NOT_FOUND,
+    UNDETERMINED,
+    differs,
+    probability,
+    probability_of_isotopologue,
+    word,
+)
 from rotor.assignment.families import MOST, SAMPLES, Bounds, Family, families
 from rotor.assignment.growth import Grown, grown_anew
 from rotor.assignment.guesses import guess_values
@@ -275,6 +283,8 @@ class _Search:
         twins = [other for other in rivals[1:] if other.evidence > first.evidence - 10 and differs(first, other)]
         p = probability_of_isotopologue(best) if isotopologue else probability(best)
         p /= 1 + sum(float(np.exp(other.evidence - first.evidence)) for other in twins)
+        if word(p) == NOT_FOUND:  # without the groups that have no clear place
+            best, p = first, UNDETERMINED * probability(first)
         if word(p) == NOT_FOUND:
             return False
         refined = refine(best, peaks, self.table)

@@ -106,8 +106,6 @@ def test_one_peak_does_not_determine_a_constant() -> None:
     assert abs(wrong.constants[5] - values[5]) > 4 * np.sqrt(wrong.covariance[5, 5])  # DK is wrong and looks certain
     checked = confirmed(seen, wrong)
     assert foreign not in checked.peak
-    assert checked.evidence <= wrong.evidence
-    assert checked.moved < wrong.moved
     assert (np.abs(checked.constants - values) < 5 * np.sqrt(np.diag(checked.covariance)))[:3].all()
 
 
