@@ -94,7 +94,7 @@ def draw(answer: AccuracyAnswer, path: Path, report: Report) -> None:
     from rotor.scenes.accuracy_panels import panels_of
 
     facts = {name: report.content[name] for name in ("command", "scene", "references")}
-    plot_work_precision(panels_of(answer.table), path, title=_title(answer.scene), facts=facts)
+    plot_work_precision(panels_of(answer.table), path, title=answer.scene.heading, facts=facts)
 
 
 def write_rows(answer: AccuracyAnswer, path: Path, report: Report) -> None:
@@ -104,14 +104,10 @@ def write_rows(answer: AccuracyAnswer, path: Path, report: Report) -> None:
     write(answer.table, path)
 
 
-def _title(scene: Scene) -> str:
-    return scene.title or f"a scene of the kind {scene.kind}"
-
-
 def show(answer: AccuracyAnswer, _: Any) -> Iterable[Part | None]:
     """A table for each knob, then the references and remarks."""
     table = answer.table
-    yield _title(answer.scene)
+    yield answer.scene.heading
     for (knob, error_of, unit), rows in table.curves().items():
         columns = {
             "setting": "{0.setting}",

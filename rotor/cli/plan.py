@@ -56,8 +56,8 @@ def show(answer: PlanAnswer, _: Any) -> Iterable[Part | None]:
     """The plan."""
     from rotor.requests.plan import larger_items
 
-    scene, plan = answer.scene, answer.plan
-    yield scene.title or f"a scene of the kind {scene.kind}"
+    plan = answer.plan
+    yield answer.scene.heading
     facts: list[tuple[str, str]] = [
         ("effects", "; ".join(plan.effects)),
         ("conserved" if plan.kind in ("tumble", "gas", "fluid") else "good numbers", ", ".join(plan.good) or "none"),

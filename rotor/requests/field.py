@@ -11,7 +11,7 @@ request, the names in errors, and the reference page. A field that is made from 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from dataclasses import field as dataclass_field
 from functools import cache
@@ -216,7 +216,6 @@ def check_fields(request: Any) -> None:
         field.check(getattr(request, name))
 
 
-def names_of(structure: Any, style: str) -> Iterator[tuple[str, str]]:
-    """Pairs of a field's name and its name in errors, for all fields of a request."""
-    for field in all_fields(structure).values():
-        yield field.name, field.called(style)
+def names_of(structure: Any, style: str) -> dict[str, str]:
+    """Names in errors of all fields of a request, by the name of the field."""
+    return {field.name: text for field in all_fields(structure).values() if (text := field.called(style))}

@@ -75,7 +75,7 @@ def read_instance(structure: Any, entries: Entries, subject: Any = None) -> Any:
 @contextmanager
 def called(structure: Any, style: str) -> Iterator[None]:
     """Context in which a ValueError names fields of a request in the user's style."""
-    with renaming({name: text for name, text in names_of(structure, style) if text}):
+    with renaming(names_of(structure, style)):
         yield
 
 

@@ -48,6 +48,11 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
         """Name of the kind, such as spectrum or stark; `rotor.verbs.names.SCENE_VERBS` lists all."""
         return str(self.__struct_config__.tag)
 
+    @property
+    def heading(self) -> str:
+        """The title, or the kind in words."""
+        return self.title or f"a scene of the kind {self.kind}"
+
     def run(
         self,
         *,

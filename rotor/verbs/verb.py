@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.reports.screen import Part, json_text, json_with_rows, plain
 from rotor.requests.field import Field, all_fields, declared
-from rotor.requests.fill import Entries, read_fields, read_instance, renaming, written_fields
+from rotor.requests.fill import Entries, called, read_fields, read_instance, renaming, written_fields
 from rotor.requests.readers import Flag
 from rotor.table import Table
 from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
@@ -345,10 +345,7 @@ class Verb:
         )
         check_early(self.request, early)
         subject = self.subject.read(entries, place, self)
-        names = {
-            declaration.name: declaration.called(entries.style) for declaration in all_fields(self.request).values()
-        }
-        with renaming(names):
+        with called(self.request, entries.style):
             if self.build is not None:
                 return self.build(self, entries, subject), subject
             values = read_fields(self.request, entries, subject)

@@ -50,7 +50,7 @@ def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
     from rotor.tops.magnetic import MagneticTensors, tensor_for
 
     magnetic = read_instance(MagneticInput, entries)
-    called = dict(names_of(MagneticInput, entries.style))
+    called = names_of(MagneticInput, entries.style)
 
     def tensor(name: str) -> Tensor | None:
         numbers = getattr(magnetic, name)
