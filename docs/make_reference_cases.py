@@ -9,18 +9,23 @@ import gzip
 import math
 import sys
 from collections import Counter, defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.formats.read_write import read_spcat_top
 from rotor.formats.spcat.compare import compare
-from rotor.formats.spcat.predict import Prediction, predict_file, summed_q
+from rotor.formats.spcat.model import FOLD
+from rotor.formats.spcat.predict import Prediction, predict_file
 from rotor.formats.spcat.text.cat import format_lines, read_cat
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.par import read_par
-from rotor.units import MHZ_PER_CM
+from rotor.quantum.solve import solve_levels
+from rotor.thermodynamics import PartitionFunction, partition_function
+from rotor.units import MHZ_PER_CM, MHZ_PER_K
 
 PAGE = Path(__file__).with_name("validation") / "reference_cases.md"
 CASES = (
@@ -154,11 +159,22 @@ def close_to_their_partner(ours: Prediction) -> int:
     return 2 * sum(len(pair) == 2 and abs(pair[0] - pair[1]) < 1e-4 for pair in pairs.values())
 
 
+def summed_q(path: Path, temperature_k: float) -> PartitionFunction:
+    """Q summed from the levels as an .int file counts it: unreduced weights, energies from the Hamiltonian's zero."""
+    top, options = read_spcat_top(path), read_par(path).options[0]
+    common = math.gcd(options.wtpl, options.wtmn, options.ewt if options.iax in FOLD else 0)
+    summed = partition_function(top, temperature_k)
+    ground_k = (
+        solve_levels(top, 3, vectors=False).ground_mhz / MHZ_PER_K
+    )  # for any weights some level has J of 3 or below
+    return replace(summed, q=summed.q * common * math.exp(-ground_k / temperature_k))
+
+
 def q_row_of(case: str, folder: Path, ours: Prediction) -> str:
     """The row of one case in the second table."""
     t, fend = ours.request.temperature_k, ours.request.fend
     try:
-        summed = summed_q(ours.lines.top, read_par(folder / f"{case}.var").options[0], t)
+        summed = summed_q(folder / f"{case}.var", t)
     except ValueError as error:
         return f"| {case} | {t:g} | {ours.q:g} | - | - | - | no sum: {str(error).split(';')[0]} |\n"
     change = math.log10(ours.q / summed.q)

@@ -143,11 +143,11 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
     return content
 
 
-def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
+def read_spcat_top(path: Path, *, errors: bool = False, alone: bool = True) -> Top:
     """The top of a .par or .var file with the dipole of the .int file of the same name, or of an .int file likewise.
 
     Constants in cm⁻¹ (FLAGS of the .int file) become MHz. errors: of files with spins or several states, whether errors of parameters
-    become uncertainties.
+    become uncertainties. alone: whether levels are those of the constants, with every K, which a note says where the file has fewer K.
     """
     from rotor.formats.spcat.hamiltonian.states import has_one_state, states_of
     from rotor.formats.spcat.model import names_what_is_not_there, top_of
@@ -169,7 +169,8 @@ def read_spcat_top(path: Path, *, errors: bool = False) -> Top:
         file, light = files_in_mhz(file, light)
     plain = has_one_state(file) and not names_what_is_not_there(file)
     top = top_of(file, light) if plain else named_top(file, light, errors=errors)
-    return replace(top, notes=(*top.notes, *notes_of_range(states_of(file), parameters.name)), symmetry_checked=False)
+    notes = notes_of_range(states_of(file), parameters.name) if alone else []
+    return replace(top, notes=(*top.notes, *notes), symmetry_checked=False)
 
 
 def _read_standard_input(isotopes: Isotopes | None) -> Top:

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.checks import NoAnswerError
 from rotor.requests.fill import Entries
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
 from rotor.verbs.verb import Note, Report
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction
-    from rotor.formats.spcat.text.egy import LevelList
 
 # inputs of the verb that the .int or its parameter file already determines -> field of the files
 ANSWERED = {
@@ -96,10 +94,8 @@ def with_names(prediction: Prediction, source: Path) -> Prediction:
     from rotor.quantum.effects.of_top import effects_of
 
     lines = prediction.lines
-    if lines.levels.of_named_constants:
-        return prediction
     try:
-        top = read_spcat_top(source)
+        top = read_spcat_top(source, alone=False)
         effects = effects_of(top, top.spin_constants is not None)
     except ValueError:
         return prediction
@@ -145,26 +141,11 @@ def write_levels(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     from rotor.formats.provenance import record_of, write_beside
     from rotor.formats.spcat.text.egy import write_egy
 
-    levels = _levels_of(answer)
+    prediction = _prediction(answer)
+    levels = prediction.levels
     write_egy(levels, path)
-    record = record_of(_prediction(answer).lines, dict(report.provenance))
+    record = record_of(prediction.lines, dict(report.provenance))
     write_beside(path, record | {"levels": len(levels)})
-
-
-def _levels_of(answer: SpectrumAnswer) -> LevelList:
-    """Levels as SPCAT lists them; solved now if the prediction did not need them."""
-    request = answer.request
-    assert isinstance(request, PredictedRequest)
-    from rotor.formats.spcat.predict import levels_of_file
-
-    listed = request.prediction.levels
-    if listed is not None:
-        levels: LevelList = listed
-        return levels
-    try:
-        return levels_of_file(request.source, **dict(request.basis))
-    except ValueError as error:
-        raise NoAnswerError(str(error)) from error
 
 
 def _prediction(answer: SpectrumAnswer) -> Prediction:

@@ -205,10 +205,10 @@ def test_nothing_is_written_where_levels_are_not_reached(tmp_path, monkeypatch):
     def failing(*args, **options):
         raise ValueError("no levels")
 
-    monkeypatch.setattr(predict, "levels_of_file", failing)
+    monkeypatch.setattr(predict, "as_level_list", failing)
     copy = copied("ocs", tmp_path)
     before = sorted(tmp_path.iterdir())
-    assert run(["spectrum", str(copy), "--egy", str(tmp_path / "a.egy"), "--cat", str(tmp_path / "a.cat")]) == 1
+    assert run(["spectrum", str(copy), "--egy", str(tmp_path / "a.egy"), "--cat", str(tmp_path / "a.cat")]) == 2
     assert sorted(tmp_path.iterdir()) == before
 
 

@@ -16,11 +16,9 @@ from typing import Any
 import numpy as np
 from places import ORACLES
 
-from rotor.formats.spcat.model import common_weight
 from rotor.formats.spcat.predict import Prediction, predict_file
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
-from rotor.formats.spcat.text.par import read_par
 from rotor.spectra.lines import Lines, line_list
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
@@ -124,14 +122,11 @@ def disagreements(reference: Catalogue, ours: Catalogue) -> list[str]:
     return out
 
 
-def level_disagreements(reference: LevelList, ours: Prediction, common: int) -> list[str]:
-    """Levels of an .egy file that are missing from ours or differ: 1e-6 cm⁻¹, half a digit of print with it; degeneracy.
-
-    common: the divisor taken out of the weights.
-    """
+def level_disagreements(reference: LevelList, ours: Prediction) -> list[str]:
+    """Levels of an .egy file that are missing from ours or differ: 1e-6 cm⁻¹, half a digit of print with it; degeneracy."""
     levels = ours.lines.levels
     energy = (levels.energy_mhz / MHZ_PER_CM).tolist()
-    g = (levels.degeneracy * common // levels.components).tolist()
+    g = (levels.degeneracy // levels.components).tolist()
     labels = ours.lines.quanta(np.arange(len(levels), dtype=np.int32)).tolist()
     index = {tuple(label): row for row, label in enumerate(labels)}
     out = []
@@ -161,7 +156,3 @@ def coupled_level_disagreements(reference: LevelList, ours: Prediction) -> list[
         ):
             out.append(f"{level} is not {near is not None and ours.levels.energy_cm[near]}")
     return out
-
-
-def common_of(folder: Path) -> int:
-    return common_weight(read_par(folder / f"{folder.name}.var").options[0])

@@ -14,6 +14,7 @@ from rotor.arrays import Floats, Indices, Ints, end_to_end, rising_order, rows_o
 from rotor.formats.spcat.block_numbers import Blocks, sub_blocks
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format, quanta_of
+from rotor.formats.spcat.solved_groups import SolvedGroup
 from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import BLANK
@@ -45,7 +46,7 @@ class GroupLines:
 _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower", "error_mhz")
 
 
-def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> Transitions:
+def transitions_of(group: Group, levels: Levels, request: Request) -> Transitions:
     """The transitions between existing levels of equal weight in a group that may pass the cut of an .int file.
 
     Parameters
@@ -55,9 +56,7 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
     levels : Levels
         Their levels.
     request : Request
-        Temperature and limits.
-    q : float
-        Partition function as the file counts it.
+        Temperature, partition function and limits.
 
     Returns
     -------
@@ -71,7 +70,7 @@ def transitions_of(group: Group, levels: Levels, request: Request, q: float) -> 
         levels,
         dict(group.effect.moments),
         (0.0, request.fqlim_ghz * 1e3),
-        cut=_wide_cut(levels, request, q),
+        cut=_wide_cut(levels, request),
         moments=group.effect.others,
     )
     exists = np.ones(len(transitions.lower), dtype=bool)
@@ -93,12 +92,15 @@ def _rows(transitions: Transitions, rows: Ints) -> Transitions:
     )
 
 
-def _wide_cut(levels: Levels, request: Request, q: float) -> IntensityCut | None:
+def _wide_cut(levels: Levels, request: Request) -> IntensityCut | None:
     """An intensity cut below all lines of the file; None if STR0 underflows."""
     kt, least = request.temperature_k * units.MHZ_PER_K, _NEARLY * 10.0**request.str0
     with np.errstate(over="ignore"):  # far below zero and cold: every line passes
         populated = (
-            LGINT_NM2_MHZ / q * np.max(levels.weight // levels.components, initial=0) * np.exp(-levels.energy_mhz / kt)
+            LGINT_NM2_MHZ
+            / request.qrot
+            * np.max(levels.weight // levels.components, initial=0)
+            * np.exp(-levels.energy_mhz / kt)
         )
     population = np.asarray(populated, dtype=float)
     return IntensityCut(population, kt, least) if least > 0 and np.isfinite(population).all() else None
@@ -166,13 +168,13 @@ def equally_weighted(levels: Levels, upper: Indices, lower: Indices) -> NDArray[
 _NEARLY = (
     0.999  # factor of a preliminary cut; the selected lines are tested with full precision and both terms of the cut
 )
-LEAST_MHZ = 0.00005  # the program does not list lines that would print as 0.0000
 _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
 
 
 def within(request: Request, frequency_mhz: Floats, intensity: Floats) -> NDArray[np.bool_]:
     """Whether lines are below FQLIM and strong enough."""
-    limits = (frequency_mhz > LEAST_MHZ) & (frequency_mhz < request.fqlim_ghz * 1e3)
+    least, most = request.range_mhz
+    limits = (frequency_mhz > least) & (frequency_mhz < most)
     return np.asarray(limits & (intensity > least_intensity(request, frequency_mhz)))
 
 
@@ -182,13 +184,7 @@ def least_intensity(request: Request, frequency_mhz: Floats) -> Floats:
 
 
 def lines_of(
-    group: Group,
-    levels: Levels,
-    transitions: Transitions,
-    form: Format,
-    request: Request,
-    q: float,
-    spread: Floats | None = None,
+    group: Group, levels: Levels, spread: Floats | None, transitions: Transitions, form: Format, request: Request
 ) -> GroupLines:
     """The lines of a group within the limits of an .int file, one for each component of a K doublet.
 
@@ -198,23 +194,21 @@ def lines_of(
         The connected states.
     levels : Levels
         Their levels.
+    spread : (levels, k) array or None
+        ∂E/∂p F in MHz; the length of a difference of rows is the error of a line. Without it errors are 0.
     transitions : Transitions
         Frequencies in MHz and strengths in D² between them.
     form : Format
         Which quantum numbers there are.
     request : Request
-        Temperature and limits.
-    q : float
-        Partition function as the file counts it.
-    spread : (levels, k) array, optional
-        ∂E/∂p F in MHz; the length of a difference of rows is the error of a line. Without it errors are 0.
+        Temperature, partition function and limits.
 
     Returns
     -------
     GroupLines
         Frequencies and lower energies in MHz, intensities in nm² MHz.
     """
-    intensity = _intensity(group, levels, transitions, request, q)
+    intensity = _intensity(group, levels, transitions, request)
     listed = within(request, transitions.frequency_mhz, intensity)
     if not listed.all():
         chosen = np.flatnonzero(listed)
@@ -228,16 +222,17 @@ def lines_of(
     return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error, transitions)
 
 
-def _intensity(group: Group, levels: Levels, transitions: Transitions, request: Request, q: float) -> Floats:
+def _intensity(group: Group, levels: Levels, transitions: Transitions, request: Request) -> Floats:
     """The intensity of one component of each line in nm² MHz."""
     kt = request.temperature_k * units.MHZ_PER_K
-    out = LGINT_NM2_MHZ / q * transitions.frequency_mhz
+    out = LGINT_NM2_MHZ / request.qrot * transitions.frequency_mhz
     out *= transitions.strength_debye2
     if (levels.components > 1).any():
         out /= np.maximum(levels.components[transitions.upper], levels.components[transitions.lower])
     out *= weights_of_lines(group, levels, transitions)
     below = np.expm1(-transitions.frequency_mhz / kt)
-    below *= -np.exp(-levels.energy_mhz / kt)[transitions.lower]
+    with np.errstate(over="ignore"):  # far below zero and cold, where no line may start
+        below *= -np.exp(-levels.energy_mhz / kt)[transitions.lower]
     out *= below
     return out
 
@@ -265,7 +260,7 @@ def _one_component_each(
     return index, np.concatenate([piece[1] for piece in pieces]), np.concatenate([piece[2] for piece in pieces])
 
 
-def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr: int) -> Catalogue:
+def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, *, linear: bool) -> Catalogue:
     """Lines of all groups, each with its QNFMT, in order of frequency.
 
     Parameters
@@ -276,8 +271,8 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
         Which quantum numbers there are.
     tag : int
         Tag of the species.
-    dr : int
-        2 if all states are linear, else 3.
+    linear : bool
+        Whether all states are linear, so that DR is 2.
 
     Returns
     -------
@@ -307,7 +302,7 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, dr
         "energy_lower_cm": joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
         "g_upper": joined["g_upper"][order],
     }
-    return catalogue_of(numbers, quanta["upper"], quanta["lower"], qnfmt[order].astype(np.int32), tag, linear=dr == 2)
+    return catalogue_of(numbers, quanta["upper"], quanta["lower"], qnfmt[order].astype(np.int32), tag, linear=linear)
 
 
 def _rising(frequency_mhz: Floats) -> Ints | slice:
@@ -321,22 +316,15 @@ _EVERY = 99  # quantum numbers; no file has as many
 _RANKS = 9999  # the largest number of four digits
 
 
-def as_level_list(
-    solved: list[tuple[Group, Levels]],
-    form: Format,
-    spreads: Sequence[Floats | None] | None = None,
-    blocks: Blocks | None = None,
-) -> LevelList:
+def as_level_list(solved: Sequence[SolvedGroup], form: Format, blocks: Blocks | None = None) -> LevelList:
     """The levels of all groups as in an .egy file: ±K separate, by block and place, with all quantum numbers.
 
     Parameters
     ----------
-    solved : list of (Group, Levels)
-        The groups with their levels.
+    solved : sequence of SolvedGroup
+        The groups with their levels and spreads; the lengths of rows of a spread are the errors of the energies, else they are 0.
     form : Format
         Which quantum numbers there are.
-    spreads : sequence of (levels, k) array, optional
-        For each group, in MHz; the lengths of rows are the errors of the energies. Without them errors are 0.
     blocks : Blocks, optional
         Block numbers of SPCAT; without them a block has 9999 levels, by F and energy.
 
@@ -345,7 +333,7 @@ def as_level_list(
     LevelList
     """
     tables: list[list[Any]] = []
-    for (group, levels), spread in zip(solved, spreads or [None] * len(solved), strict=True):
+    for group, levels, spread in solved:
         error = np.zeros(len(levels)) if spread is None else np.linalg.norm(spread, axis=1) / units.MHZ_PER_CM
         mixing = np.ones(len(levels)) if levels.mixing is None else levels.mixing
         for negative in (False, True) if (levels.components > 1).any() else (False,):

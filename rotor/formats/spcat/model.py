@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import reduce
-from math import gcd
 
 from rotor.formats.spcat.hamiltonian.codes import (
     NOT_YET,
@@ -207,11 +205,3 @@ def intensity_file(top: Top, request: Request) -> IntensityFile:
         if value
     )
     return IntensityFile(top.name, request, dipoles)
-
-
-def common_weight(options: Options) -> int:
-    """The common divisor of WTPL, WTMN and EWT, which `weights_of` removes and Q in the .int file contains."""
-    if is_linear(options) and options.iax == 1:  # every level has the one weight
-        return options.wtpl if options.vsym % 2 == 0 else options.wtmn
-    used = [options.wtpl, options.wtmn] + ([abs(options.ewt)] if options.iax in FOLD else [])
-    return reduce(gcd, used)

@@ -8,7 +8,7 @@ from oracle_cases import SAMPLES
 
 from rotor.formats.spcat.block_numbers import _reach
 from rotor.formats.spcat.hamiltonian.codes import Digits
-from rotor.formats.spcat.predict import levels_of_file, predict
+from rotor.formats.spcat.predict import predict, predict_file
 from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
@@ -35,7 +35,7 @@ def numbers(levels) -> list[tuple[int, ...]]:
 
 @pytest.mark.parametrize("case", OPTION_CARDS)
 def test_samples_of_every_reference_case(case):
-    ours = levels_of_file(SAMPLES / case / f"{case}.int", as_spcat=True)
+    ours = predict_file(SAMPLES / case / f"{case}.int", as_spcat=True).levels
     reference = numbers(read_egy(SAMPLES / case / "sample.egy"))
     assert set(reference) <= set(numbers(ours))
     assert len(set(zip(ours.block.tolist(), ours.rank.tolist(), strict=True))) == len(ours)
@@ -87,6 +87,6 @@ def test_a_file_of_transition_dipoles_is_refused_by_name():
 def test_l_doubled_states_count_by_energy():
     """Their blocks are not known here: block 1."""
     folder = SAMPLES / "kinds" / "l_doubled_weights"
-    levels = levels_of_file(next(folder.glob("*.int")), as_spcat=True)
+    levels = predict_file(next(folder.glob("*.int")), as_spcat=True).levels
     assert set(levels.block.tolist()) == {1}
     assert np.array_equal(levels.rank, np.arange(1, len(levels) + 1))

@@ -10,8 +10,8 @@ import pytest
 from changed_files import mutated
 from oracle_cases import SAMPLES
 
-from rotor.formats.spcat.model import common_weight
-from rotor.formats.spcat.predict import least_intensity, predict, predict_file
+from rotor.formats.spcat.file_lines import least_intensity
+from rotor.formats.spcat.predict import predict, predict_file
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
 
@@ -60,7 +60,6 @@ def test_weights_stand_as_the_file_has_them_and_q_with_them():
     np.testing.assert_allclose(thrice.lgint, once.lgint, atol=1e-12)  # round-off
     unchanged_q = predict(threefold, request).catalogue
     assert unchanged_q.lgint.max() - once.lgint.max() == pytest.approx(np.log10(3), abs=1e-12)  # round-off
-    assert common_weight(threefold.options[0]) == 3
 
 
 def test_energies_count_from_zero_where_the_lowest_level_does_not_exist():
@@ -86,14 +85,6 @@ def test_k_doublets_are_parted_as_the_program_parts_them():
     assert listed.g_upper[four].tolist() == [18, 18, 9, 9, 9, 9, 18]
 
 
-def test_own_q_is_that_of_the_file():
-    """QROT of the case was summed by the program from the same levels to F = 20; the last digit is rounded."""
-    parameters, request = files("h2co")
-    value, prediction = predict(parameters, request, own_q=True), predict(parameters, request)
-    assert value.q == pytest.approx(prediction.q, rel=1e-4)  # the file's Q is summed to J = 40
-    np.testing.assert_allclose(value.catalogue.lgint, prediction.catalogue.lgint[: len(value.catalogue)], atol=1e-4)
-
-
 def test_what_the_program_does_in_silence_is_said():
     assert water().notes == ()
     assert (
@@ -102,7 +93,7 @@ def test_what_the_program_does_in_silence_is_said():
     quartic = b" 2000 -974.0 0\n 1100 173.0 0\n 200 -37.6 0\n"
     text = (PAR % (0, quartic)).replace(b" 3 0 0 0", b" 6 0 0 0").replace(b"0 9 0", b"0 30 0")
     request = read_int(INT % (0, 25, b"-20 -20"))
-    assert "from J = " in predict(read_par(text), request).notes[0]
+    assert "from N = " in predict(read_par(text), request).notes[0]
     assert predict(read_par(text.replace(b"1 3 0 1 0", b"1 3 0 1 3")), request).notes == ()
     assert (
         "NPAR = 5, but the file has 3 parameters"

@@ -17,7 +17,7 @@ from places import ORACLES
 from rotor.cli import run
 from rotor.fitting.fit import fit_lines
 from rotor.formats.spcat.fits.fit_input import spfit_input
-from rotor.formats.spcat.predict import Prediction, levels_of_file, predict
+from rotor.formats.spcat.predict import Prediction, predict, predict_file
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import read_par
@@ -125,8 +125,8 @@ def test_a_fit_says_which_constants_it_passes_over(tmp_path):
 def test_levels_have_the_basis_of_the_lines(tmp_path):
     (tmp_path / "a.var").write_bytes(TOP % (b"1", 0, 3))
     (tmp_path / "a.int").write_bytes(REQUEST % 8)
-    all_levels = levels_of_file(tmp_path / "a.int", full_basis=True)
-    cut = levels_of_file(tmp_path / "a.int")
+    all_levels = predict_file(tmp_path / "a.int", full_basis=True).levels
+    cut = predict_file(tmp_path / "a.int").levels
     assert len(all_levels) == sum(2 * j + 1 for j in range(9))
     assert len(cut) == sum(min(2 * j + 1, 7) for j in range(9))
     for option, levels in (([], cut), (["--full-basis"], all_levels)):
@@ -240,7 +240,7 @@ def test_the_share_that_names_a_level_is_that_of_a_function_or_of_its_wang_block
     text = (TOP % (b"1", 0, 60)).replace(b" 1 1 1 0 1 0\n", b" 1 1 1 0 1 %d\n" % diag)
     (tmp_path / "a.var").write_bytes(text)
     (tmp_path / "a.int").write_bytes(REQUEST % 8)
-    mixing = levels_of_file(tmp_path / "a.int").mixing
+    mixing = predict_file(tmp_path / "a.int").levels.mixing
     assert mixing.max() == pytest.approx(1.0, abs=1e-12)  # J = 0; round-off
     assert (mixing.min() > 1 - 1e-12) == whole
     assert (mixing.min() < 0.9) != whole

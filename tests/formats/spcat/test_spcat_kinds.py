@@ -13,7 +13,7 @@ from places import ORACLES
 from rotor.formats.spcat.file_model import groups_of, left_out
 from rotor.formats.spcat.hamiltonian.dipole_codes import moment_of, split_dipole
 from rotor.formats.spcat.hamiltonian.operators import operator_of
-from rotor.formats.spcat.predict import levels_of_file, predict
+from rotor.formats.spcat.predict import predict, predict_file
 from rotor.formats.spcat.text.cat import format_lines, read_cat
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, read_int
@@ -82,7 +82,7 @@ def test_no_line_is_missing_or_extra(name):
 )
 def test_levels_hold_the_lower_states_of_all_lines(name):
     """Energies, labels and degeneracies of the list of levels; of the last one's one state too, whose levels have other names here."""
-    levels = levels_of_file(KINDS / name / f"{name}.int", as_spcat=True)
+    levels = predict_file(KINDS / name / f"{name}.int", as_spcat=True).levels
     results = {}
     for quanta, energy in zip(levels.quanta.tolist(), levels.energy_cm, strict=True):
         results.setdefault(tuple(q for q in quanta if q >= -99), []).append(energy)
@@ -95,7 +95,7 @@ def test_levels_hold_the_lower_states_of_all_lines(name):
 def test_a_state_with_quantum_numbers_of_its_own_has_no_number_of_a_pattern():
     """Beside states of more spins; the program lists -1 there."""
     name = "spin_of_size_zero_beside_three"
-    levels = levels_of_file(KINDS / name / f"{name}.int", as_spcat=True)
+    levels = predict_file(KINDS / name / f"{name}.int", as_spcat=True).levels
     assert levels.pattern is not None
     in_state = levels.quanta[:, 3] == 0
     assert set(levels.pattern[in_state].tolist()) == {-1}

@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotor.formats.spcat.file_model import groups_of
 from rotor.formats.spcat.predict import Prediction, predict
-from rotor.formats.spcat.predict_states import summed_q
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
-from rotor.thermodynamics import partition_function
-from rotor.tops.top import Top
 
 ABC = "10099 9400.0\n20099 3100.0\n30099 2500.0\n"
 
@@ -77,21 +73,3 @@ def test_lines_of_states_apart_stand_in_order_of_frequency():
     assert set(listed.quanta_upper[:, 3].tolist()) == {0, 1}
     assert listed.quanta_upper[0, 3] == 0
     assert (np.diff(listed.frequency_mhz) >= 0).all()
-
-
-def test_q_of_states_apart_is_summed_to_the_highest_f_of_all():
-    """State 1 has ten times the constants of state 0, so that its sum ends at a lower F; each is that of a top by itself."""
-    small, large = (9400.0, 3100.0, 2500.0), (94000.0, 31000.0, 25000.0)
-    codes = (10000, 20000, 30000, 10011, 20011, 30011)
-    values = "".join(f"{code} {value} 0\n" for code, value in zip(codes, small + large, strict=True))
-    par = read_par(f"limits\n7 1 1 0\na 1 2 0 99\n{values}11 0.0 0\n".encode())
-    groups = groups_of(par, read_int(b"limits\n0 1 1000 0 3 -15 -15 99999 100\n1 1.0\n111 1.0\n"))
-    both, single = summed_q(groups, 100.0), [summed_q([group], 100.0) for group in groups]
-    for state, (a, b, c) in zip(single, (small, large), strict=True):
-        assert state.q == pytest.approx(
-            partition_function(Top.from_constants(f"A={a} B={b} C={c} MHz"), 100.0).q, rel=1e-6
-        )
-    assert single[0].jmax > single[1].jmax
-    assert both.jmax == single[0].jmax
-    assert both.q == pytest.approx(single[0].q + single[1].q, rel=1e-12)
-    assert f"summed from levels to F = {both.jmax}" in both.source

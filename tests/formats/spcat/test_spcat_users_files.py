@@ -16,6 +16,7 @@ from rotor.formats.spcat.file_lines import as_level_list
 from rotor.formats.spcat.file_model import groups_of
 from rotor.formats.spcat.file_quanta import format_of
 from rotor.formats.spcat.predict import Prediction, predict
+from rotor.formats.spcat.solved_groups import SolvedGroup
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.egy import format_egy, format_level, read_egy
 from rotor.formats.spcat.text.int_file import read_int
@@ -107,7 +108,7 @@ def test_levels_with_more_than_six_quanta_have_all_of_them():
     file = read_par((KINDS / "patterns_of_i_tot" / "patterns_of_i_tot.var").read_bytes())
     request = read_int((KINDS / "patterns_of_i_tot" / "patterns_of_i_tot.int").read_bytes())
     group = groups_of(file, replace(request, request=replace(request.request, fend=0)), as_spcat=True)[0]
-    levels = as_level_list([(group, group.levels((0, 0)))], format_of(file, [group]))
+    levels = as_level_list([SolvedGroup(group, group.levels((0, 0)), None)], format_of(file, [group]))
     written = format_level(levels.level(0))
     assert written[63:].startswith(":(")
     assert len(written[63:].rstrip()) == 1 + 5 + 3 * 8
@@ -123,7 +124,7 @@ def test_a_list_of_many_levels_fits_its_columns():
     file = read_par(SYMMETRIC.replace(b"s 1 1 0 50", b"s 1 1 0 200"))
     request = read_int(b"a top\n1 1 1000.0 0 104 -9 -9 60.0 300.0\n1 1.2\n")
     group = groups_of(file, request)[0]
-    solved, form = [(group, group.levels((0, 208)))], format_of(file, [group])
+    solved, form = [SolvedGroup(group, group.levels((0, 208)), None)], format_of(file, [group])
     levels = as_level_list(solved, form, blocks=blocks_of(file, [group]))
     assert (len(levels), levels.block.max(), levels.rank.max()) == (105**2, 4 * 105, 53)
     others = as_level_list(solved, form)

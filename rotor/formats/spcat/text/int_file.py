@@ -34,6 +34,11 @@ class Request:
     maxv: int = -1
     text: str = field(default="", compare=False)
 
+    @property
+    def range_mhz(self) -> tuple[float, float]:
+        """Limits of the frequencies of lines; the program does not list those that would print as 0.0000."""
+        return _LEAST_MHZ, self.fqlim_ghz * 1e3
+
 
 @dataclass(frozen=True)
 class Dipole:
@@ -60,6 +65,7 @@ _REQUEST = {
     "flags": 0, "tag": 999, "qrot": 1000.0, "fbgn": 0, "fend": 0,
     "str0": -100.0, "str1": -100.0, "fqlim_ghz": 9999.99, "temperature_k": 300.0, "maxv": -1,
 }  # fmt: skip
+_LEAST_MHZ = 0.00005
 _NAMES = ("FLAGS", "TAG", "QROT", "FBGN", "FEND", "STR0", "STR1", "FQLIM", "TEMP", "MAXV")
 
 

@@ -1,0 +1,183 @@
+"""Levels of the groups of an .int file, with their errors, and its lines with one table of levels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rotor import units
+from rotor.arrays import Floats, Ints, end_to_end
+from rotor.formats.spcat.file_model import Group, groups_of, line_names
+from rotor.formats.spcat.file_quanta import Format
+from rotor.formats.spcat.hamiltonian.codes import constants_of, split_code
+from rotor.formats.spcat.hamiltonian.states import states_of
+from rotor.formats.spcat.text.int_file import IntensityFile, Request
+from rotor.formats.spcat.text.par import ParameterFile
+from rotor.formats.spcat.variances import variance_factor
+from rotor.quantum.estimates.derivatives import level_derivatives
+from rotor.quantum.levels import Levels
+from rotor.spectra.lines import Lines
+from rotor.spectra.transitions import Transitions
+from rotor.thermodynamics import PartitionFunction
+from rotor.tops.top import Top
+
+
+def groups_to_solve(
+    parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool, full_basis: bool
+) -> list[Group]:
+    """The groups for the levels of an .int file, which reach N = FEND + the sum of the spins."""
+    highest = highest_n(parameters, intensities.request)
+    return groups_of(parameters, intensities, as_spcat=as_spcat, full_basis=full_basis, highest_n=highest)
+
+
+def highest_n(parameters: ParameterFile, request: Request) -> int:
+    """The highest N of the levels up to FEND."""
+    return request.fend + max(sum(state.spins) for state in states_of(parameters)) // 2
+
+
+class SolvedGroup(NamedTuple):
+    """A group with its levels, and ∂E/∂p F for each level, (levels, k) in MHz, whose rows give errors of levels and lines.
+
+    F Fᵀ is the covariance of the parameters p of the file; without one the spread is None.
+    """
+
+    group: Group
+    levels: Levels
+    spread: Floats | None
+
+    @property
+    def numbers(self) -> Ints:
+        """The state in the file of each level."""
+        numbers = np.array([state.number for state in self.group.states])
+        return np.asarray(numbers[self.levels.quanta.get("v", np.zeros(len(self.levels), dtype=np.int64))])
+
+
+def solved_groups(parameters: ParameterFile, groups: list[Group], request: Request, form: Format) -> list[SolvedGroup]:
+    """The levels of all groups from FBGN to FEND, with their errors; levels of states above MAXV have weight 0.
+
+    Raises ValueError if there is no level with a weight.
+    """
+    factor, names = variance_factor(parameters), line_names(parameters)
+    solved = []
+    for group in _with_levels(groups, request):
+        levels = group.levels(_f_range(group, request))
+        solved_group = SolvedGroup(group, levels, _spread(group, levels, names, factor))
+        if request.maxv >= 0 and form.states:
+            weight = np.where(solved_group.numbers <= request.maxv, levels.weight, 0)
+            solved_group = solved_group._replace(levels=replace(levels, weight=weight))
+        solved.append(solved_group)
+    if not any((each.levels.weight > 0).any() for each in solved):
+        raise ValueError(
+            f"no level has a weight from FBGN = {request.fbgn} to FEND = {request.fend}, MAXV = {request.maxv}; give other limits or "
+            "weights (WTPL, WTMN, EWT)"
+        )
+    return solved
+
+
+def _with_levels(groups: list[Group], request: Request) -> list[Group]:
+    """The groups with levels from FBGN to FEND; ValueError if there are none."""
+    present = [group for group in groups if group.has_levels(_f_range(group, request))]
+    if not present:
+        limits = sorted({(state.kmin, state.plus, state.minus) for group in groups for state in group.states})
+        raise ValueError(
+            f"no level exists from FBGN = {request.fbgn} to FEND = {request.fend}: N must reach KNMIN and a weight be above 0; "
+            f"KNMIN, WTPL, WTMN of the states are {limits}"
+        )
+    return present
+
+
+def _f_range(group: Group, request: Request) -> tuple[int, int]:
+    """The doubled F from FBGN to FEND, which are rounded up."""
+    half = sum(group.spins) % 2
+    return max(half, 2 * request.fbgn - half), 2 * request.fend - half
+
+
+def _spread(group: Group, levels: Levels, names: Sequence[str], factor: Floats | None) -> Floats | None:
+    """∂E/∂p F of the levels of a group; names: of the rows of F."""
+    if factor is None:
+        return None
+    parameters = tuple(group.effect.parameters(group.top))
+    rows = [names.index(name) for name in parameters]
+    return np.asarray(level_derivatives(group.top, levels, parameters) @ factor[rows])
+
+
+def joined_lines(
+    parameters: ParameterFile,
+    solved: Sequence[SolvedGroup],
+    transitions: Sequence[Transitions],
+    form: Format,
+    request: Request,
+) -> Lines:
+    """The lines of the catalogue with one table of levels for all groups and one line for both components of ±K."""
+    starts = np.cumsum([0, *(len(each.levels) for each in solved[:-1])]).astype(np.int32)
+    levels, spreads = _joined(solved, form), [each.spread for each in solved if each.spread is not None]
+    t = request.temperature_k
+    above = math.exp(levels.ground_mhz / units.MHZ_PER_K / t)  # Q counts from zero, `Lines` from the lowest level
+    return Lines(
+        top=_shown(parameters, solved[0].group),
+        levels=levels,
+        frequency_mhz=end_to_end([each.frequency_mhz for each in transitions]),
+        strength_debye2=end_to_end([each.strength_debye2 for each in transitions]),
+        upper=end_to_end([each.upper + start for each, start in zip(transitions, starts, strict=True)]),
+        lower=end_to_end([each.lower + start for each, start in zip(transitions, starts, strict=True)]),
+        temperature_k=t,
+        min_lgint=request.str0,
+        range_mhz=request.range_mhz,
+        given_partition=PartitionFunction(t, request.qrot * above, None, math.nan, "given"),
+        given_spread=np.concatenate(spreads) if spreads else None,
+    ).sorted()
+
+
+def _joined(solved: Sequence[SolvedGroup], form: Format) -> Levels:
+    """The levels of all groups in one table, with v of the file; a level without a spin that others have repeats its last sum."""
+    tables = [each.levels for each in solved]
+    most = max(tables, key=lambda levels: len(levels.quanta))
+    quanta: dict[str, Ints] = {}
+    if form.states:
+        quanta["v"] = np.concatenate([each.numbers for each in solved])
+    for name in [name for name in most.quanta if name != "v"]:
+        quanta[name] = np.concatenate([_column(levels, name, most) for levels in tables])
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(levels, name) for levels in tables])
+        for name in ("energy_mhz", "multiplicity", "components", "weight")
+    }
+    mixing = [np.ones(len(levels)) if levels.mixing is None else levels.mixing for levels in tables]
+    return replace(most, quanta=quanta, blocks=(), mixing=np.concatenate(mixing), **joined)
+
+
+def _column(levels: Levels, name: str, most: Levels) -> Ints:
+    if name in levels.quanta:
+        return np.asarray(levels.quanta[name])
+    if name in ("n", "j"):
+        return levels.rotational
+    if name in ("k", "ka"):
+        return np.asarray(levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64)))
+    if name == "kc":
+        return np.asarray(levels.rotational - levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64)))
+    total = (levels.multiplicity - 1).astype(np.int64)
+    return np.asarray(total if name in most.halves else total // 2)
+
+
+def _shown(parameters: ParameterFile, group: Group) -> Top:
+    """The top of the lowest state with named constants, if they have names; else the top that represents its symmetry."""
+    states = max(abs(parameters.options[0].nvib), 1)
+    parameters_of_state = []
+    for parameter in parameters.parameters:
+        d = split_code(parameter.code, states)
+        wild = d.v1 == d.v2 and d.v1 >= states
+        if not (d.i1 or d.i2 or d.ns) and d.typ < 12 and any(d[:8]) and (wild or d.v1 == d.v2 == 0):
+            code = (d.typ * 10 + d.ksq) * 1000 + d.nsq * 100
+            parameters_of_state.append(replace(parameter, code=code, constrained=False, text=""))
+    first = parameters.options[0]
+    option = replace(first, spind=-1 if first.spind < 0 else 1, nvib=-1 if first.nvib < 0 else 1, knmin=0, text="")
+    if group.states[0].linear:
+        option = replace(option, spind=-1, knmax=0)
+    try:
+        constants = constants_of(replace(parameters, options=(option,), parameters=tuple(parameters_of_state)))
+    except ValueError:
+        return group.top
+    return replace(group.top, constants=constants)
