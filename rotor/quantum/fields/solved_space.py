@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -157,20 +158,25 @@ class SolvedFieldBlock(FieldBlock):
         triangle: only from F to F' ≥ F. All others follow from T_q† = (-1)^q T_-q of Hermitian tensors.
         """
         space, q = self.space, (self.twice_m - low.twice_m) // 2
-        here, there = ({sector: i for i, sector in enumerate(block.members)} for block in (self, low))
+        below, here, there = space.below(operator), self._placed, low._placed
         for first in dict.fromkeys((*self.members, *low.members)):
-            for second, odd in space.below(operator).get(first, ()):
-                for bra, ket, adjoint in ((first, second, False), (second, first, True)):
-                    if bra not in here or ket not in there or (adjoint and (first == second or triangle)):
-                        continue
-                    i, k = here[bra], there[ket]
-                    m, step = (self.twice_m, -q) if adjoint else (low.twice_m, q)
-                    elements = space.between(operator, first, second, m, step)
-                    if elements is None:
-                        continue
-                    turns = low.colours[k] - self.colours[i] + (-odd if adjoint else odd)
-                    elements = (-1) ** q * elements.conj().T if adjoint else elements
-                    yield slice(*self.starts[i : i + 2]), slice(*low.starts[k : k + 2]), _turned(turns, elements)
+            for second, odd in below.get(first, ()):
+                if first in here and second in there:
+                    elements = space.between(operator, first, second, low.twice_m, q)
+                    if elements is not None:
+                        (rows, colour), (columns, other) = here[first], there[second]
+                        yield rows, columns, _turned(other - colour + odd, elements)
+                if not triangle and first != second and second in here and first in there:
+                    elements = space.between(operator, first, second, self.twice_m, -q)
+                    if elements is not None:
+                        (rows, colour), (columns, other) = here[second], there[first]
+                        yield rows, columns, _turned(other - colour - odd, (-1) ** q * elements.conj().T)
+
+    @cached_property
+    def _placed(self) -> dict[int, tuple[slice, int]]:
+        """Places of the states of each member, and its colour."""
+        places = [slice(a, b) for a, b in pairwise(self.starts.tolist())]
+        return dict(zip(self.members, zip(places, self.colours, strict=True), strict=True))
 
 
 def _turned(turns: int, matrix: NDArray[Any]) -> NDArray[Any]:
