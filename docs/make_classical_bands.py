@@ -18,10 +18,10 @@ from rotor.spectra.spectrum import Spectrum
 from rotor.units import MHZ_PER_CM
 
 PANELS = (
-    ("water", 300.0, 60.0, 700.0, ("harmonic", "standard")),
-    ("OCS", 300.0, 2.0, 60.0, ("harmonic",)),
-    ("water", 30.0, 20.0, 240.0, ("harmonic", "schofield")),
-    ("OCS", 3.0, 0.2, 7.0, ("harmonic",)),
+    ("water", 300.0, 60.0, 1000.0, ("harmonic", "standard")),
+    ("OCS", 300.0, 2.0, 90.0, ("harmonic",)),
+    ("water", 30.0, 20.0, 330.0, ("harmonic", "schofield")),
+    ("OCS", 3.0, 0.2, 9.0, ("harmonic",)),
 )  # molecule, temperature (K), width of the Gaussian and end of the axis (cm⁻¹), factors of detailed balance
 MOLECULES = 50_000  # scatter of about 2 % of the peak for water
 
@@ -51,7 +51,8 @@ def draw(axes: Any, name: str, temperature_k: float, fwhm_cm: float, last_cm: fl
         axes.plot(grid_cm, band.intensity, color=colour, label=f"classical, {factor}")
     axes.set(xlim=(0.0, last_cm), ylim=(0.0, None), xlabel="Wavenumber (cm⁻¹)", ylabel="Cross section (nm²)")
     axes.set_title(f"{name}, {temperature_k:g} K, smoothed to {fwhm_cm:g} cm⁻¹", fontsize=9.0)
-    axes.legend(fontsize=7.5)
+    axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
+    axes.legend(fontsize=7.5, loc="upper right", handlelength=1.2, borderaxespad=0.0)
 
 
 if __name__ == "__main__":

@@ -78,7 +78,7 @@ def choose_basis(scene: Any, request: Any, allowed: float) -> Choice:
 
 
 def _least_basis(request: Any, tolerance: float, trace: Any, allowed: float) -> Choice:
-    """The smallest J max that is within what the other errors leave, looked for on one block and confirmed by a run."""
+    """The smallest J max whose error fits into the accuracy left by other errors; estimated on one block, confirmed by a run."""
     first, truncation = least_jmax(trace, allowed - truncation_apart(trace))
     for jmax in range(first, min(first + MOST_CONFIRMED, trace.jmax)):
         smaller = replace(request, tolerance=tolerance, jmax=jmax)

@@ -30,7 +30,7 @@ def _named(name: str) -> Iterator[None]:
 def chosen_fit(request: FitRequest, candidates: Sequence[str], by_order: bool) -> FitAnswer:
     """The fit with the constants that the lines require, and the steps of the choice; after an interrupt the steps so far."""
     if request.spfit is not None:
-        raise ValueError("choose: start from a line list and constants, whose free ones are the base of the model")
+        raise ValueError("choose: needs a line list and start constants; the free constants are the base of the model")
     assert request.constants is not None  # a list of lines has constants to start from
     full_name = request.constants.own_name
     idle = [name for name in candidates if full_name(name) in request.parameters.names]

@@ -20,7 +20,7 @@ from rotor.table import counted
 REMAINING = 2.0  # times the next step: each step at least halves the distance to the minimum
 NO_LENGTH = ErrorTerm(None, "no bond length follows from these moments")
 VIBRATION = {
-    "rs": "what vibration adds to the moments, of which Costain's error is a part",
+    "rs": "effect of vibration on the moments; Costain's error is a part of it",
     "r0": "what vibration adds to the moments",
     "rm1": "vibration beyond c √I", "rm2": "vibration beyond c √I and d",
     "re": "the corrections of the constants are taken as they are",

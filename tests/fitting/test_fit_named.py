@@ -336,7 +336,7 @@ def test_wrong_columns_are_one_line(case, call, change, said):
         ('"G_c[0,1]" = 20.0', '"G_c[0,1]" = 20.0\n"G_c[1,0]" = 1.0', "[states]: G_c[0,1] and G_c[1,0] are one coupling; give it once"),
         ("chi_aa = -4.0", '"chi_aa[4]" = 1.0\nchi_aa = -4.0', "chi_aa(14N)[4]: there is no state 4"),
         ("[spins.14N]\nchi_aa = -4.0\nchi_bb-cc = 1.2\n", "", "the constants to start from have none; give them there"),
-        ('DeltaJ = 0.001 }', "}", 'DeltaJ[1]: the constants of the first state are rigid and say no reduction'),
+        ('DeltaJ = 0.001 }', "}", 'DeltaJ[1]: the constants of the first state are rigid and have no reduction'),
     ],
 )  # fmt: skip
 def test_wrong_files_are_one_line(case, call, old, new, said):

@@ -251,7 +251,7 @@ def test_what_cannot_be_resumed_is_refused(folder):
         run_fluid(box(), replace(settings, step_fs=2.0), FILES, resume=True)
     with pytest.raises(ValueError, match="another box"):
         run_fluid(box(8), settings, FILES, resume=True)
-    with pytest.raises(ValueError, match=r"wrote these files: csv, run\.traj, run\.xyz"):
+    with pytest.raises(ValueError, match=r"wrote other files: csv, run\.traj, run\.xyz"):
         run_fluid(box(), settings, replace(FILES, csv=None), resume=True)
     with pytest.raises(ValueError, match="after the 5 steps"):
         run_fluid(box(), replace(settings, steps=5), FILES, resume=True)

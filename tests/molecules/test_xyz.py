@@ -85,7 +85,7 @@ def test_a_file_cut_anywhere_is_refused_or_whole(molecule, data):
         (WATER, "\n \n", "the file is empty"),
         (WATER, WATER + WATER, "line 6: a second structure begins here"),
         ("water", "Properties=species:S", "line 2: .* is not a list of name:type:columns"),
-        ("water", "Properties=species:S:1", "line 2: .* names no columns species and pos"),
+        ("water", "Properties=species:S:1", "line 2: .* has no columns species and pos"),
         ("water", "=1 Properties=species:S:1:pos:R:3", "line 2: .* is not a list of key=value"),
         ("water", "Properties=species:S:1:pos:R:3 charge=x", "charge: expected a number"),
     ],

@@ -59,7 +59,7 @@ def with_quadrupole(molecule: Molecule, output: Output) -> Molecule:
 
 
 def _axes(output: Output, table: int, molecule: Molecule) -> Superposition | None:
-    """The superposition of the table on the geometry."""
+    """Rotation and translation from the axes of a printed table of atoms to those of the geometry; None if they do not match."""
     rows = []
     for line in output.lines[table + ROWS_AFTER :]:
         words = line.split()

@@ -141,7 +141,7 @@ def _extended(comment: str, where: str) -> tuple[dict[str, Any], _Columns]:
     widths = [int(word) for word in words[2::3]]
     first = dict(zip(words[0::3], np.cumsum([0, *widths[:-1]]).tolist(), strict=True))
     if "species" not in first or "pos" not in first:
-        raise ValueError(f"{where}: Properties={':'.join(words)} names no columns species and pos")
+        raise ValueError(f"{where}: Properties={':'.join(words)} has no columns species and pos")
     return info, _Columns(first["species"], first["pos"], first.get("masses"), sum(widths))
 
 

@@ -48,7 +48,8 @@ def _refuse_reduced(states: StateConstants, v: int) -> None:
     reduced = [name for name in states.of_state(v) if name not in ("E", "A", "B", "C") and not powers_of_spelled(name)]
     if reduced:
         raise ValueError(
-            f'{reduced[0]}[{v}]: the constants of the first state are rigid and say no reduction; give it to them, reduction = "A" or "S"'
+            f"{reduced[0]}[{v}]: the constants of the first state are rigid and have no reduction; "
+            'add it to the first state, reduction = "A" or "S"'
         )
 
 
