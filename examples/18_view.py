@@ -109,6 +109,7 @@ pd.DataFrame(
     }
 ).transpose().round(4)
 
+# %%
 figure, axes = plt.subplots(2, 1, figsize=(8, 4.5), sharex=True)
 axes[0].plot(frequency[::5], intensity[::5], lw=0.5)
 axes[0].set_ylabel("Intensity")
