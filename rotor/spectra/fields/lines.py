@@ -162,7 +162,7 @@ def field_lines(
     temperature_k : float
         Temperature of the populations.
     populations : str
-        "equilibrium" in the field, or "adiabatic": populations of the free top, kept by each state as it enters the field, as in a beam.
+        "equilibrium" in the field, or "adiabatic": populations of the free top, which each state carries into the field, as in a beam.
     intensity_w_per_cm2 : float
         Intensity of a laser polarized along Z, far from resonance.
     direction : (3,)
