@@ -10,11 +10,12 @@ from itertools import groupby
 from pathlib import Path
 
 from rotor.formats.spcat.file_model import groups_of
-from rotor.formats.spcat.hamiltonian.codes import AXES, split_code
+from rotor.formats.spcat.hamiltonian.code_table import split_code
+from rotor.formats.spcat.hamiltonian.codes import AXES
 from rotor.formats.spcat.hamiltonian.dipole_codes import moment_of, split_dipole
 from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
 from rotor.formats.spcat.hamiltonian.operators import operator_of
-from rotor.formats.spcat.hamiltonian.series import Series, is_constant, is_series, term_of
+from rotor.formats.spcat.hamiltonian.series import Series, term_of
 from rotor.formats.spcat.hamiltonian.states import states_of
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import read_par
@@ -238,9 +239,9 @@ def answer(of: Callable[[], object]) -> str:
 def operator_answer(code: int) -> str:
     """Whether the operator of a code is known."""
     digits = split_code(code)
-    if is_constant(digits):
+    if digits.is_constant:
         return "a constant of a series"
-    if is_series(digits):
+    if digits.is_series:
         return answer(lambda: term_of(digits, AXES["Ir"], Series(), (0, 0)))
     return answer(lambda: operator_of(digits, AXES["Ir"]))
 

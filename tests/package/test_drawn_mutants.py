@@ -74,7 +74,7 @@ def test_codes_without_names_are_refused(code, what):
 )
 def test_codes_without_an_operator_are_refused_with_their_meaning(fields, what):
     """Another operator would be computed in their place."""
-    from rotor.formats.spcat.hamiltonian.codes import Digits
+    from rotor.formats.spcat.hamiltonian.code_table import Digits
     from rotor.formats.spcat.hamiltonian.operators import operator_of
 
     with pytest.raises(ValueError, match=f"{what}.* is read but not computed yet"):

@@ -24,9 +24,7 @@ import numpy as np
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_model import Group
-from rotor.formats.spcat.hamiltonian.code_types import TURNS, axis_of
-from rotor.formats.spcat.hamiltonian.codes import Digits, split_code
-from rotor.formats.spcat.hamiltonian.series import is_constant
+from rotor.formats.spcat.hamiltonian.code_table import TURNS, Digits, Kind, split_code
 from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.formats.spcat.pattern_numbers import pattern_numbers, pattern_steps
 from rotor.formats.spcat.text.par import ParameterFile
@@ -127,7 +125,7 @@ def blocks_of(file: ParameterFile, groups: Sequence[Group]) -> Blocks | None:
         subs,
         options_by_state,
         rises,
-        [_reach(d, len(states), oblate) for d in digits if not is_constant(d)],
+        [_reach(d, len(states), oblate) for d in digits if not d.is_constant],
         file,
         oblate,
     )
@@ -178,14 +176,11 @@ class _Reach(NamedTuple):
 
 def _reach(d: Digits, states: int, oblate: bool) -> _Reach:
     """The sub-blocks that a code connects."""
-    low, high = sorted((d.v1, d.v2))
-    species = int(_SPECIES[TURNS[axis_of(d.typ)]])
+    species = int(_SPECIES[TURNS[d.symmetry(oblate).axis]])
     if oblate:
         species = (0, 3, 2, 1)[species]
-    if d.ff and (d.ff - 1) // 10 % 2:  # a sine of K
-        species = 3 - species
-    spins = sorted(place for place in ((1,) if d.ns > 4 else (d.i1, d.i2)) if place)
-    return _Reach(None if low >= states else (low, high), species, _ranks(spins, d))
+    spins = (1,) if d.projects_spin else tuple(sorted(d.spins))
+    return _Reach(d.states(states), species, _ranks(spins, d))
 
 
 def _ranks(spins: Sequence[int], d: Digits) -> tuple[int, ...]:
@@ -193,7 +188,7 @@ def _ranks(spins: Sequence[int], d: Digits) -> tuple[int, ...]:
     if not spins:
         return ()
     first, last = spins[0], spins[-1]
-    rotational_rank = 0 if d.typ == 0 and d.ns < 5 else 1 if len(spins) == 1 else 2
+    rotational_rank = 0 if d.kind is Kind.SCALAR and not d.projects_spin else 1 if len(spins) == 1 else 2
     return (*([2 * rotational_rank] * first), *([2] * (last - first)))
 
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_spins import coupled_spins, lines_of_coupled_spins, with_their_spins
-from rotor.formats.spcat.hamiltonian.code_types import axis_of
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, dipoles_of, moment_of
 from rotor.formats.spcat.hamiltonian.file_effect import (
@@ -217,7 +216,9 @@ def moments_within_states(
         if code.axis in (1, 2, 3) and len(set(code.states)) == 1
     ]
     return [
-        (axis, odd) for v, axis, odd in plain if v in members or some_weights_agree(20 * axis, states[v], states[v])
+        (axis, odd)
+        for v, axis, odd in plain
+        if v in members or some_weights_agree("abc"[axis - 1], states[v], states[v])
     ]
 
 
@@ -275,12 +276,12 @@ def allowed(
             del_l = abs(l_of.get(low, 0) - l_of.get(high, 0)) * (-1 if line.reversed_ else 1)
             both_states = states[low], states[high]
             why.append(
-                forbidden(line.typ, *both_states, del_l, oblate, bool({low, high} & set(l_of)), line.operator.spins)
+                forbidden(line.symmetry, *both_states, del_l, bool({low, high} & set(l_of)), line.operator.spins)
             )
         if all(why):
             reasons.append(line.left_out(why[0]))
             continue
-        folded = line.typ in (1, 2, 3) and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
+        folded = line.symmetry.square and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
         axes = basis_axes(oblate)
         acting.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
     return acting, list(dict.fromkeys(reasons))  # a line of the file may be one for each state
@@ -379,7 +380,7 @@ def _apart(states: list[StateOptions], pairs: tuple[Pair, ...]) -> dict[tuple[in
 
 def _turned(lines: Iterable[CodedLine], light: Light, doubled: list[Pair]) -> str:
     """The axis whose half turn accompanies time reversal if operators within one state are odd, else ""."""
-    turned = turned_axis([axis_of(line.typ) for line in lines], light.phases.odd)
+    turned = turned_axis([line.symmetry.axis for line in lines], light.phases.odd)
     if turned and doubled:
         raise ValueError(
             f"operators that are odd under time reversal within one state, or PHASE, with l-doubled states "

@@ -87,8 +87,8 @@ def _by_exchange(line: CodedLine, of: Mapping[int, StateOptions]) -> list[CodedL
     if not line.operator.spins:
         return [line]
     if line.states:
-        return [line._replace(exchange=exchange_of(line.typ, *(of[v] for v in line.states)))]
-    part_by_state = {v: exchange_of(line.typ, state, state) for v, state in of.items()}
+        return [line._replace(exchange=exchange_of(line.symmetry.axis, *(of[v] for v in line.states)))]
+    part_by_state = {v: exchange_of(line.symmetry.axis, state, state) for v, state in of.items()}
     if len(set(part_by_state.values())) == 1:
         return [line._replace(exchange=next(iter(part_by_state.values())))]
     return [line._replace(states=(v, v), exchange=part) for v, part in part_by_state.items()]

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from rotor.formats.spcat.hamiltonian.code_table import split_code, state_digits
 from rotor.formats.spcat.hamiltonian.codes import (
     NOT_YET,
     PLURAL_NOT_YET,
     constants_of,
     is_linear,
     parameters_of,
-    split_code,
-    state_digits,
 )
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import Header, Options, ParameterFile
@@ -177,9 +176,7 @@ def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) 
 def names_what_is_not_there(parameters: ParameterFile) -> bool:
     """Whether a file with one state and no spin has parameters of a spin or another state, which SPCAT ignores."""
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
-    return any(
-        d.i1 or d.i2 or (d.v1 != d.v2 and 9 not in (d.v1, d.v2)) or (d.v1 == d.v2 and 0 < d.v1 < 9) for d in digits
-    )
+    return any(d.spins or (not d.is_place_holder(1) and d.missing_state(1) is not None) for d in digits)
 
 
 def parameter_file(top: Top, kmax: int) -> ParameterFile:

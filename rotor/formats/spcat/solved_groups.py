@@ -13,7 +13,8 @@ from rotor import units
 from rotor.arrays import Floats, Ints, end_to_end
 from rotor.formats.spcat.file_model import Group, groups_of, line_names
 from rotor.formats.spcat.file_quanta import Format
-from rotor.formats.spcat.hamiltonian.codes import constants_of, split_code
+from rotor.formats.spcat.hamiltonian.code_table import join_code, split_code
+from rotor.formats.spcat.hamiltonian.codes import constants_of
 from rotor.formats.spcat.hamiltonian.states import states_of
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
@@ -168,9 +169,8 @@ def _shown(parameters: ParameterFile, group: Group) -> Top:
     parameters_of_state = []
     for parameter in parameters.parameters:
         d = split_code(parameter.code, states)
-        wild = d.v1 == d.v2 and d.v1 >= states
-        if not (d.i1 or d.i2 or d.ns) and d.typ < 12 and any(d[:8]) and (wild or d.v1 == d.v2 == 0):
-            code = (d.typ * 10 + d.ksq) * 1000 + d.nsq * 100
+        if d.is_orthorhombic and not d.is_energy and d.states(states) in ((0, 0), None):
+            code = join_code(d._replace(v1=0, v2=0))
             parameters_of_state.append(replace(parameter, code=code, constrained=False, text=""))
     first = parameters.options[0]
     option = replace(first, spind=-1 if first.spind < 0 else 1, nvib=-1 if first.nvib < 0 else 1, knmin=0, text="")

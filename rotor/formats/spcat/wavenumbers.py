@@ -11,8 +11,8 @@ import math
 from dataclasses import replace
 
 from rotor import units
-from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, split_code
-from rotor.formats.spcat.hamiltonian.series import is_constant
+from rotor.formats.spcat.hamiltonian.code_table import split_code
+from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW
 from rotor.formats.spcat.text.catalogue import Catalogue, Layout
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
@@ -39,7 +39,7 @@ def parameters_in_mhz(file: ParameterFile) -> ParameterFile:
 
 
 def _in_mhz(parameter: Parameter, states: int) -> Parameter:
-    if is_constant(split_code(parameter.code, states)):  # ρ, a and b of a series are pure numbers
+    if split_code(parameter.code, states).is_constant:  # ρ, a and b of a series are pure numbers
         return parameter
     held = parameter.error is None or parameter.error < HELD_BELOW
     error = parameter.error if held else parameter.error * units.MHZ_PER_CM  # type: ignore[operator]

@@ -7,7 +7,7 @@ import pytest
 from oracle_cases import SAMPLES
 
 from rotor.formats.spcat.block_numbers import _reach
-from rotor.formats.spcat.hamiltonian.codes import Digits
+from rotor.formats.spcat.hamiltonian.code_table import Digits
 from rotor.formats.spcat.predict import predict, predict_file
 from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import read_int

@@ -193,7 +193,7 @@ def test_option_fields_by_commas_are_those_in_full():
 
 
 def test_codes_of_eighteen_states_name_two_of_them():
-    from rotor.formats.spcat.hamiltonian.codes import split_code
+    from rotor.formats.spcat.hamiltonian.code_table import split_code
 
     code = split_code(40010405, 18)
     assert sorted((code.v1, code.v2)) == [4, 5]

@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rotor.formats.spcat.hamiltonian.codes import Digits, is_held, split_code
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, split_code
+from rotor.formats.spcat.hamiltonian.codes import is_held
 from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
-from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
 from rotor.formats.spcat.hamiltonian.states import states_of
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.connected import connected_parts
 
 _SYMMETRIES = range(4)  # species of the group of twofold rotations; an operator of symmetry s connects t with s ^ t
-_OF_TYP = 20  # TYP from 20, 40 and 60 on have the symmetry of N_a, N_b and N_c
-_HIGHEST_TYP = 80
 
 Place = tuple[int, int, int]  # the two states and the symmetry of an operator
 
@@ -50,10 +48,10 @@ def _places(file: ParameterFile) -> list[Place | None]:
 
 def _place(digits: Digits, states: int) -> Place | None:
     """States and symmetry of a code; None with spins or for all states."""
-    low, high = sorted((digits.v1, digits.v2))
-    if is_series(digits) or is_constant(digits) or digits.typ >= _HIGHEST_TYP:
+    both = digits.states(states)
+    if digits.is_series or digits.is_constant or digits.kind is Kind.LEVEL or both is None or max(both) >= states:
         return None
-    return None if high >= states else (low, high, digits.typ // _OF_TYP)
+    return (*both, ("", "a", "b", "c").index(digits.tensor.axis))
 
 
 def _sets(places: Iterable[Place], states: int) -> dict[int, int]:

@@ -7,19 +7,21 @@ from collections.abc import Sequence
 from rotor.fitting.fit import Fit
 from rotor.fitting.publication import Row, value_text
 from rotor.formats.spcat.fits.fit_input import SpfitInput
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, join_code, split_code
 from rotor.formats.spcat.hamiltonian.codes import (
     A_REDUCTION,
     LINEAR,
+    MEAN,
     S_REDUCTION,
+    SQUARES,
     SYMMETRIC,
-    Digits,
     Named,
     is_linear,
-    split_code,
 )
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 
-_RIGID = (Named("A", 10000, 1), Named("B", 20000, 1), Named("C", 30000, 1))
+_RIGID = tuple(Named(name, code, 1) for code, name in SQUARES.items())
+_B = Named("B", MEAN, 1)
 
 
 def publication_rows(fit_input: SpfitInput, fit: Fit) -> list[Row]:
@@ -65,24 +67,24 @@ def _leader(parameters: Sequence[Parameter], place: int) -> Parameter:
 
 def _rotational(digits: Digits) -> int:
     """The code without its states; -1 for terms with spins, series or between states."""
-    if digits.v1 != digits.v2 or any((digits.ex, digits.ff, digits.i2, digits.i1, digits.ns)):
+    if digits.v1 != digits.v2 or digits.has_spin or digits.ex or digits.ff:
         return -1
-    return 10000 * digits.typ + 1000 * digits.ksq + 100 * digits.nsq
+    return join_code(digits._replace(v1=0, v2=0))
 
 
 def _names(file: ParameterFile) -> tuple[Named, ...]:
     """The published names of the codes of a file; empty if its terms fit no single reduction."""
-    codes = {_rotational(split_code(p.code, len(file.options))) for p in file.parameters}
+    digits = [split_code(p.code, len(file.options)) for p in file.parameters]
+    rotational = [d for d in digits if _rotational(d) >= 0]
     if all(is_linear(options) for options in file.options):
-        return (Named("B", 100, 1), *LINEAR)
-    if not any(code >= 10000 for code in codes):
-        return (Named("B", 100, 1), *SYMMETRIC)
-    in_a = any(40000 <= code < 50000 and code % 10000 >= 1000 for code in codes)
-    in_s = any(code >= 50000 for code in codes)
-    rigid = _RIGID if {10000, 20000, 30000} <= codes else ()
-    if in_a == in_s:
+        return (_B, *LINEAR)
+    if all(d.kind is Kind.SCALAR for d in rotational):
+        return (_B, *SYMMETRIC)
+    rigid = _RIGID if set(SQUARES) <= {_rotational(d) for d in rotational} else ()
+    letters = frozenset().union(*(d.reductions for d in rotational))
+    if len(letters) != 1:
         return rigid
-    return (*rigid, *(A_REDUCTION if in_a else S_REDUCTION))
+    return (*rigid, *(A_REDUCTION if "A" in letters else S_REDUCTION))
 
 
 def _states(digits: Digits, count: int) -> str:

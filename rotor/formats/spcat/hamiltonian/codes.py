@@ -1,13 +1,7 @@
 """Codes of SPFIT's parameters: from digits to operators, and from named constants to codes and signs.
 
-A code is read in decimal digits, EX FF I2 I1 NS TYP KSQ NSQ V2 V1 (H. M. Pickett, documentation of SPFIT and SPCAT;
-J. Mol. Spectrosc. 148, 371 (1991)). The parameter c of a code without spins and series multiplies
-
-    TYP = 0         N^2p Nz^2q                      p = NSQ, q = KSQ
-    TYP = 1, 2, 3   Na², Nb², Nc²
-    TYP = 3 + n     ½{Nz^2q, N₊^2n + N₋^2n} N^2p
-
-so that the codes of Watson's constants are 10000 (n > 0: 3 + n) + 1000 q + 100 p, with the signs of his Hamiltonian: -ΔJ, -DJ, -δJ, -δK,
+The codes of `code_table` without spins and series multiply N^2p Nz^2q, Na², Nb², Nc² and ½{Nz^2q, N₊^2n + N₋^2n} N^2p (p = NSQ, q = KSQ),
+so that each of Watson's constants has one code, with the sign of his Hamiltonian: -ΔJ, -DJ, -δJ, -δK,
 all others plus. The basis is Iʳ (z, x, y = a, b, c), or IIIˡ (z, x, y = c, b, a) if NVIB is negative; a constant has the sign published
 for that representation.
 """
@@ -20,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, join_code, split_code, typ_of_ladder, typ_of_square
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.tops import operators as published
 from rotor.tops.constants import Constants
@@ -37,21 +32,6 @@ def basis_axes(oblate: bool) -> str:
     return AXES["IIIl" if oblate else "Ir"]
 
 
-class Digits(NamedTuple):
-    """The fields of a code."""
-
-    ex: int
-    ff: int
-    i2: int
-    i1: int
-    ns: int
-    typ: int
-    ksq: int
-    nsq: int
-    v2: int
-    v1: int
-
-
 class Named(NamedTuple):
     """A constant's name in one vocabulary, its code, and the sign with which it enters the file."""
 
@@ -60,46 +40,13 @@ class Named(NamedTuple):
     sign: int
 
 
-def state_digits(states: int) -> int:
-    """Number of digits of V1 and of V2 in a code: one up to 9 states, two up to 99, else three."""
-    return 1 if states <= 9 else 2 if states <= 99 else 3
-
-
-def split_code(code: int, states: int = 1) -> Digits:
-    """The fields of a code in a file with this number of vibrational states.
-
-    >>> split_code(110010099)
-    Digits(ex=0, ff=0, i2=1, i1=1, ns=0, typ=1, ksq=0, nsq=0, v2=9, v1=9)
-    """
-    left, fields = code, []
-    for width in (state_digits(states), state_digits(states), 1, 1, 2, 1, 1, 1, 2, 1):
-        left, digits = divmod(left, 10**width)
-        fields.append(digits)
-    if left or code < 0:
-        raise ValueError(
-            f"parameter code {code}: a code has at most {10 + 2 * state_digits(states)} digits and no sign"
-        )
-    return Digits._make(reversed(fields))
-
-
-def join_code(digits: Digits, states: int = 1) -> int:
-    """The code with these fields, the inverse of `split_code`."""
-    widths = (1, 2, 1, 1, 1, 2, 1, 1, state_digits(states), state_digits(states))
-    code = 0
-    for value, width, name in zip(digits, widths, Digits._fields, strict=True):
-        if not 0 <= value < 10**width:
-            raise ValueError(f"{name.upper()} = {value} does not fit {width} digit{'s' if width > 1 else ''} of a code")
-        code = code * 10**width + value
-    return code
-
-
 def code_of_term(p: int, q: int, n: int) -> int:
     """The code of ½{Jz^2q, J₊^2n + J₋^2n} J^2p (n = 0: Jz^2q J^2p) in the lowest state.
 
     >>> [code_of_term(*term) for term in ((1, 0, 0), (0, 1, 0), (1, 0, 1), (0, 0, 4))]
     [100, 1000, 40100, 70000]
     """
-    return join_code(Digits(0, 0, 0, 0, 0, typ=3 + n if n else 0, ksq=q, nsq=p, v2=0, v1=0))
+    return join_code(Digits(0, 0, 0, 0, 0, typ=typ_of_ladder(n), ksq=q, nsq=p, v2=0, v1=0))
 
 
 def _named(terms: Iterable[tuple[str, Operators]]) -> tuple[Named, ...]:
@@ -125,12 +72,12 @@ def _whole_code(parameter: Parameter) -> int:
     d = split_code(parameter.code)
     label = f" /{parameter.label}" if parameter.label else ""
     reasons = {
-        "a Fourier or Euler series": d.ex or d.ff or d.typ >= 90,
-        "a spin": d.i1 or d.i2 or d.ns,
-        "a level of its own": 80 <= d.typ < 90,
-        "a Coriolis term, or one that turns the axes,": 11 < d.typ < 80,
-        "another vibrational state": (d.v1, d.v2) not in ((0, 0), (9, 9)),
-        "a vibrational energy": not any(d[:8]),
+        "a Fourier or Euler series": d.ex or d.ff or d.kind is Kind.EULER,
+        "a spin": d.has_spin,
+        "a level of its own": d.kind is Kind.LEVEL,
+        "a Coriolis term, or one that turns the axes,": d.kind is Kind.TENSOR,
+        "another vibrational state": d.states(1) not in ((0, 0), None),
+        "a vibrational energy": d.is_energy,
     }
     for what, applies in reasons.items():
         if applies:
@@ -169,7 +116,7 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
     named: dict[str, Any] = _rigid_constants(options, rigid, kind)
     named |= {names[code].name: names[code].sign * value for code, value in values.items()}
 
-    codes = {item.name: item.code for item in names.values()} | {name: c for c, name in _RIGID_NAMES[kind].items()}
+    codes = {item.name: item.code for item in names.values()} | {name: c for c, name in _rigid_names(kind).items()}
     uncertainties = {name: spreads.get(codes[name]) for name in named if name in codes} if errors else {}
     return Constants(
         kind=kind,
@@ -228,21 +175,21 @@ def _names_of(codes: Iterable[int], kind: str, reduction: str | None) -> dict[in
 def _spelled_code(code: int, kind: str, reduction: str | None) -> str:
     """The spelled operator of a code."""
     d = split_code(code)
-    n = d.typ - 3 if d.typ > 3 else 0
-    if (d.typ and not n) or (n and kind != "asymmetric") or (d.ksq and kind in ("linear", "spherical")):
+    n = d.ladder
+    if d.kind is Kind.SQUARE or (n and kind != "asymmetric") or (d.ksq and kind in ("linear", "spherical")):
         whose = f"the {reduction}-reduction" if reduction else f"a top of kind {kind}"
         raise ValueError(f"parameter {code}: no constant of {whose} has this operator; it {NOT_YET}")
     return spelled_term(d.nsq, d.ksq, n)
 
 
-_RIGID = (10000, 20000, 30000, 100, 1000, 40000)
-_RIGID_NAMES: dict[str, dict[int, str]] = {
-    "asymmetric": {10000: "A", 20000: "B", 30000: "C"},
-    "prolate": {100: "B"},
-    "oblate": {100: "B"},
-    "spherical": {100: "B"},
-    "linear": {100: "B"},
-}
+SQUARES = {join_code(Digits(0, 0, 0, 0, 0, typ_of_square(x), 0, 0, 0, 0)): x.upper() for x in "abc"}
+MEAN, ALONG, ACROSS = code_of_term(1, 0, 0), code_of_term(0, 1, 0), code_of_term(0, 0, 1)  # N², Nz², N₊² + N₋²
+_RIGID = (*SQUARES, MEAN, ALONG, ACROSS)
+
+
+def _rigid_names(kind: str) -> dict[int, str]:
+    """Codes of rotational constants that are one parameter each."""
+    return SQUARES if kind == "asymmetric" else {MEAN: "B"}
 
 
 def _representation(options: Options) -> str:
@@ -259,25 +206,28 @@ def _kind(options: Options, rigid: Mapping[int, float], distortion: Mapping[int,
     """Kind of top; if all terms are diagonal in K the constants decide, not the basis of the file."""
     if is_linear(options):
         return "linear"
-    if any(code >= 10000 for code in (*rigid, *distortion)):
+    digits = [split_code(code) for code in (*rigid, *distortion)]
+    if any(d.kind is not Kind.SCALAR for d in digits):
         return "asymmetric"
-    if not any(code >= 1000 for code in (*rigid, *distortion)):
+    if not any(d.ksq for d in digits):
         return "spherical"
-    return "prolate" if rigid.get(1000, 0.0) >= 0 else "oblate"
+    return "prolate" if rigid.get(ALONG, 0.0) >= 0 else "oblate"
 
 
 def _rigid_constants(options: Options, rigid: Mapping[int, float], kind: str) -> dict[str, float]:
     """A, B, C from Na², Nb², Nc² and from N², Nz², N₊² + N₋² = 2 (Nx² - Ny²)."""
-    mean, along, across = (rigid.get(code, 0.0) for code in (100, 1000, 40000))
+    mean, along, across = (rigid.get(code, 0.0) for code in (MEAN, ALONG, ACROSS))
     if kind in ("linear", "spherical"):
-        useless = next((code for code in rigid if code != 100), None)
+        useless = next((code for code in rigid if code != MEAN), None)
         if useless is not None:
-            raise ValueError(f"parameter {useless} does nothing in a {kind} top, whose constant is 100; leave it out")
+            raise ValueError(
+                f"parameter {useless} does nothing in a {kind} top, whose constant is {MEAN}; leave it out"
+            )
         return {"B": mean}
     if kind in ("prolate", "oblate"):
         return {"A": mean + along, "B": mean} if kind == "prolate" else {"B": mean, "C": mean + along}
     x, y, z = (axis.upper() for axis in AXES[_representation(options)])
-    constants = {name: rigid.get(code, 0.0) + mean for code, name in _RIGID_NAMES["asymmetric"].items()}
+    constants = {name: rigid.get(code, 0.0) + mean for code, name in SQUARES.items()}
     constants[z] += along
     constants[x] += 2 * across
     constants[y] -= 2 * across
@@ -286,8 +236,7 @@ def _rigid_constants(options: Options, rigid: Mapping[int, float], kind: str) ->
 
 def _reduction(options: Options, distortion: Mapping[int, float]) -> str | None:
     """A if K² multiplies an off-diagonal term, S if K changes by more than two, else the letter of the file."""
-    in_a = [code for code in distortion if 40000 <= code < 50000 and code % 10000 >= 1000]
-    in_s = [code for code in distortion if code >= 50000]
+    in_a, in_s = ([code for code in distortion if letter in split_code(code).reductions] for letter in "AS")
     if in_a and in_s:
         raise ValueError(
             f"parameters {in_a} belong to Watson's A-reduction, {in_s} to his S-reduction; such a mixture {NOT_YET}"
@@ -323,13 +272,12 @@ def parameters_of(constants: Constants) -> tuple[Parameter, ...]:
 def _rigid_parameters(constants: Constants) -> tuple[Parameter, ...]:
     spread = constants.uncertainties
     if constants.kind == "asymmetric":
-        names = _RIGID_NAMES["asymmetric"].items()
-        return tuple(Parameter(code, constants[name], spread.get(name, FIXED), name) for code, name in names)
+        return tuple(Parameter(code, constants[name], spread.get(name, FIXED), name) for code, name in SQUARES.items())
     b = constants["B"]
-    lines = [Parameter(100, b, spread.get("B", FIXED), "B")]
+    lines = [Parameter(MEAN, b, spread.get("B", FIXED), "B")]
     axis = {"prolate": "A", "oblate": "C"}.get(constants.kind)
     if axis:
-        lines.insert(0, Parameter(1000, constants[axis] - b, spread.get(axis, FIXED), f"{axis}-B"))
+        lines.insert(0, Parameter(ALONG, constants[axis] - b, spread.get(axis, FIXED), f"{axis}-B"))
     return tuple(lines)
 
 

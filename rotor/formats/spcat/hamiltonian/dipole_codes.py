@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, state_digits
+from rotor.formats.spcat.hamiltonian.code_table import state_digits
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.hamiltonian.moment_words import imaginary, tensor_of, words_of
 from rotor.formats.spcat.hamiltonian.series import Series, angles_by_k, factor_of_k
 from rotor.formats.spcat.text.int_file import Dipole

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rotor.formats.spcat.hamiltonian.code_types import axis_of
-from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, Digits, basis_axes, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Symmetry, split_code
+from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k
@@ -21,11 +21,8 @@ from rotor.formats.spcat.hamiltonian.phases import half_turned
 from rotor.formats.spcat.hamiltonian.series import (
     Series,
     coded_operator,
-    is_constant,
-    is_series,
     refuse_within_pairs,
     series_of,
-    symmetry_type,
 )
 from rotor.formats.spcat.hamiltonian.spin_operators import plain_of_j
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
@@ -50,8 +47,8 @@ _STORED_TO = 100  # J; the operators of a higher J take too much memory together
 class CodedLine(NamedTuple):
     """One parameter line: name, value, operator, and the two states, lower first (None: all states).
 
-    reversed_: whether the code has V2 > V1. typ: TYP of the code. exchange: part of an operator with one of two equivalent spins that acts:
-    1 the part that is even under their exchange, -1 the odd part, 0 both.
+    reversed_: whether the code has V2 > V1. symmetry: of the code. exchange: part of an operator with one of two equivalent spins that
+    acts: 1 the part that is even under their exchange, -1 the odd part, 0 both.
     """
 
     name: str
@@ -59,7 +56,7 @@ class CodedLine(NamedTuple):
     operator: CodedOperator
     states: tuple[int, int] | None
     reversed_: bool = False
-    typ: int = 0
+    symmetry: Symmetry = Symmetry()
     exchange: int = 0
 
     @property
@@ -97,20 +94,19 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     ValueError
         With the line, for an unknown operator or one that violates time reversal.
     """
-    options, wild = file.options[0], 10 ** state_digits(states) - 1
+    options = file.options[0]
     if not 0 <= options.xopt < 80:
         raise ValueError(f"XOPT = {options.xopt}: expected PHASE + 10 NEWLZ + 20 NOFC + 40 G12, 0 to 79")
     series = series_of(file, states, pairs)
     result: list[CodedLine] = []
     for place, parameter in enumerate(file.parameters, 1):
         digits = split_code(parameter.code, states)
-        low, high = sorted((digits.v1, digits.v2))
-        if parameter.value == 0.0 or (high == wild and low != wild) or is_constant(digits) or states <= high != wild:
+        missing = digits.is_place_holder(states) or digits.missing_state(states) is not None
+        if parameter.value == 0.0 or digits.is_constant or missing:
             continue
         label = f" /{parameter.label}" if parameter.label else ""
         try:
-            pair_of_states = None if low == wild else (low, high)
-            coded = _lines_of(digits, pair_of_states, states, series, options)
+            coded = _lines_of(digits, states, series, options)
             lines = [_within_pairs(line, digits, pairs, options) for line in coded]
         except ValueError as error:
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
@@ -120,27 +116,26 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
 
 def reasons_of_states(file: ParameterFile, states: int) -> list[str]:
     """A sentence for each parameter of a state that does not exist, which SPCAT ignores."""
-    wild, reasons = 10 ** state_digits(states) - 1, list[str]()
+    reasons = list[str]()
     for parameter in file.parameters:
-        digits = split_code(parameter.code, states)
-        high = max(digits.v1, digits.v2)
-        if states <= high != wild and parameter.value:
-            why = f"state {high} does not exist, NVIB = {states} counts from 0"
+        missing = split_code(parameter.code, states).missing_state(states)
+        if missing is not None and parameter.value:
+            why = f"state {missing} does not exist, NVIB = {states} counts from 0"
             reasons.append(f"parameter {parameter.code} is left out, as SPCAT does: {why}")
     return reasons
 
 
-def _lines_of(
-    digits: Digits, states: tuple[int, int] | None, count: int, series: Series, options: Options
-) -> list[CodedLine]:
+def _lines_of(digits: Digits, count: int, series: Series, options: Options) -> list[CodedLine]:
     """The lines of a code; a series in all states gives one line for each state, with its constants."""
     oblate = options.nvib < 0
-    typ, axes = symmetry_type(digits, oblate), basis_axes(oblate)
+    symmetry, axes, states = digits.symmetry(oblate), basis_axes(oblate), digits.states(count)
     targets: list[tuple[int, int] | None] = [states]
-    if states is None and is_series(digits):
+    if states is None and digits.is_series:
         targets = [(v, v) for v in range(count)]
     back = digits.v2 > digits.v1
-    return [CodedLine("", 0.0, coded_operator(digits, axes, series, target), target, back, typ) for target in targets]
+    return [
+        CodedLine("", 0.0, coded_operator(digits, axes, series, target), target, back, symmetry) for target in targets
+    ]
 
 
 def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], options: Options) -> CodedLine:
@@ -155,10 +150,10 @@ def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], option
         refuse_within_pairs(digits, states, members)
     if not states or states[0] != states[1] or states[0] not in members:
         return line
-    v, newlz = states[0], options.newlz
-    if newlz and v in firsts and 80 <= digits.typ < 90:
+    v, newlz, level = states[0], options.newlz, digits.kind is Kind.LEVEL
+    if newlz and v in firsts and level:
         return _half_difference(line, digits, firsts[v], options)
-    if newlz and line.operator.odd != (v in firsts) and not 80 <= digits.typ < 90:
+    if newlz and line.operator.odd != (v in firsts) and not level:
         raise ValueError(
             "with NEWLZ an operator that time reversal turns around is named by the state with K l ≤ 0, any other by the one with K l > 0"
         )
@@ -167,7 +162,7 @@ def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], option
 
 def _half_difference(line: CodedLine, digits: Digits, first: int, options: Options) -> CodedLine:
     """TYP 80 to 89 of the state with K l ≤ 0, with NEWLZ: half the difference of the energies of one K with K l > 0 and K l < 0."""
-    operator = energy_of_k(10 * (digits.typ - 80) + digits.ksq, digits.nsq, 1j if options.nvib > 0 else -1j)
+    operator = energy_of_k(digits.k_of_level, digits.nsq, 1j if options.nvib > 0 else -1j)
     return line._replace(operator=CodedOperator(by_j=operator, odd=True), states=(first, first))
 
 
@@ -199,7 +194,7 @@ def real_lines(
     """
     acting, reasons = list[CodedLine](), list[str]()
     for line in lines:
-        axis, between = axis_of(line.typ), bool(line.states and line.states[0] != line.states[1])
+        axis, between = line.symmetry.axis, bool(line.states and line.states[0] != line.states[1])
         within_plain_state = not between and not (line.states and line.states[0] in doubled)
         if within_plain_state and not axis and line.operator.odd:
             raise ValueError(
@@ -342,7 +337,7 @@ class FileEffect(QuantumEffect):
 
     def _is_turned(self, line: CodedLine) -> bool:
         """Whether a half turn about the axis of the phases changes the sign of the operator of a line."""
-        return bool(self.turned) and axis_of(line.typ) not in ("", self.turned)
+        return bool(self.turned) and line.symmetry.axis not in ("", self.turned)
 
     def _with_pairs(self, line: CodedLine, states: tuple[int, int]) -> list[Coupling]:
         """Couplings of a line with l-doubled states."""

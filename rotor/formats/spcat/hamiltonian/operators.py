@@ -26,9 +26,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from rotor.formats.spcat.hamiltonian.code_types import CROSS, ODD, factor_below, is_odd_type, order_of, shape_of
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits
-from rotor.formats.spcat.hamiltonian.spin_operators import multiplied, tensor_with_spins
+from rotor.formats.spcat.hamiltonian.code_table import SPIN_ALONG_Z, Digits, Kind, Tensor, typ_of_square
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET
+from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, tensor_with_spins
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
@@ -68,24 +68,23 @@ def operator_of(digits: Digits, axes: str) -> CodedOperator:
     Raises ValueError, with the meaning of the code, if it is not supported.
     """
     _refuse(digits)
-    spins = tuple(place for place in (digits.i1, digits.i2) if place)
-    ns, typ = digits.ns, digits.typ
-    if ns > 4:  # N_z S_z of the first spin: with TYP 0 the product of both projections on z
-        spins, typ, ns = (1,), "abc".index(axes[2]) + 1, ns - 5
-    if spins and 80 <= typ < 90:
-        product = _with_spins(digits._replace(typ=0, ksq=0), spins, axes)
-        k_of_code = 10 * (typ - 80) + digits.ksq
+    if digits.projects_spin:  # N_z S_z of the first spin: the product of both projections on z
+        digits = digits._replace(i1=1, typ=typ_of_square(axes[2]), ns=digits.ns - SPIN_ALONG_Z)
+    level = digits.kind is Kind.LEVEL
+    if level and digits.spins:
+        product = _with_spins(digits._replace(typ=0, ksq=0), axes)
+        k = digits.k_of_level
         assert product.rotor is not None
         restricted = multiplied(
-            product.rotor, lambda m, n, above, below: 1.0 * ((abs(above) == k_of_code) & (above == below)), 1.0, False
+            product.rotor, lambda m, n, above, below: 1.0 * ((abs(above) == k) & (above == below)), 1.0, False
         )
         return replace(product, rotor=restricted)
-    if spins or ns:
-        return _with_spins(digits._replace(typ=typ, ns=ns), spins, axes)
-    if 80 <= typ < 90:
-        return CodedOperator(by_j=energy_of_k(10 * (typ - 80) + digits.ksq, digits.nsq))
-    if 12 <= typ < 80:
-        return CodedOperator(by_j=_operator_by_j(digits, axes), odd=is_odd_type(typ))
+    if digits.has_spin:
+        return _with_spins(digits, axes)
+    if level:
+        return CodedOperator(by_j=energy_of_k(digits.k_of_level, digits.nsq))
+    if digits.kind is Kind.TENSOR:
+        return CodedOperator(by_j=_operator_by_j(digits, axes), odd=digits.tensor.odd)
     return CodedOperator(plain=_plain(digits, axes))
 
 
@@ -104,9 +103,9 @@ def _refuse(d: Digits) -> None:
     """Raise ValueError for codes that are not supported."""
     reasons = {
         "commutator": d.i1 == 0 and d.i2 > 0,
-        "own": 80 <= d.typ < 90 and bool(d.ns),
-        "series": bool(d.ff or d.ex) or d.typ >= 90,
-        "szsz": d.ns > 4 and (d.typ != 0 or d.i1 > 0 or d.i2 > 0),
+        "own": d.kind is Kind.LEVEL and bool(d.ns),
+        "series": bool(d.ff or d.ex) or d.kind is Kind.EULER,
+        "szsz": d.projects_spin and (d.kind is not Kind.SCALAR or bool(d.spins)),
     }
     for reason, applies in reasons.items():
         if applies:
@@ -114,13 +113,11 @@ def _refuse(d: Digits) -> None:
 
 
 def _plain(d: Digits, axes: str) -> Operators:
-    """TYP 0 to 11 by powers (p, q, n): Nx² = ½(N² - Nz²) + ¼(N₊² + N₋²), Ny² with -¼."""
+    """Scalars, ladders and squares by powers (p, q, n): Nx² = ½(N² - Nz²) + ¼(N₊² + N₋²), Ny² with -¼."""
     p, q = d.nsq, d.ksq
-    if d.typ == 0:
-        return {(p, q, 0): 1.0}
-    if d.typ > 3:
-        return {(p, q, d.typ - 3): 1.0}
-    place = axes.index("abc"[d.typ - 1])
+    if d.kind is not Kind.SQUARE:
+        return {(p, q, d.ladder): 1.0}
+    place = axes.index(d.axis_of_square)
     if place == 2:
         return {(p, q + 1, 0): 1.0}
     return {(p + 1, q, 0): 0.5, (p, q + 1, 0): -0.5, (p, q, 1): 0.25 if place == 0 else -0.25}
@@ -129,74 +126,72 @@ def _plain(d: Digits, axes: str) -> Operators:
 def _operator_by_j(d: Digits, axes: str) -> OperatorOfJ:
     """Operators by J with half anticommutators of the powers, and the factor i (-i in an oblate basis) if odd under time reversal."""
     powers = ParameterName("", d.nsq, d.ksq)
-    factor = (1j if axes[2] == "a" else -1j) if is_odd_type(d.typ) else 1.0
+    factor = imaginary(axes, d.tensor.odd)
 
     def operator(j: int, representation: str) -> JOperator:
-        return with_powers(factor * _tensor_of_j(d.typ, j, representation, axes[2]), powers)
+        return with_powers(factor * _tensor_of_j(d.tensor, j, representation, axes[2]), powers)
 
     return operator
 
 
 @lru_cache(maxsize=1024)
-def _tensor_of_j(typ: int, j: int, representation: str, z: str) -> JOperator:
+def _tensor_of_j(tensor: Tensor, j: int, representation: str, z: str) -> JOperator:
     """`_tensor_of_n` of one J, cached for the parameters of one TYP."""
-    return _tensor_of_n(typ, components(j, representation), z)
+    return _tensor_of_n(tensor, components(j, representation), z)
 
 
-def _tensor_of_n(typ: int, of: Mapping[str, JOperator], z: str) -> JOperator:
-    """The Hermitian operator of TYP 12 to 79, from Na, Nb, Nc.
+def _tensor_of_n(tensor: Tensor, of: Mapping[str, JOperator], z: str) -> JOperator:
+    """The Hermitian operator of a tensor, from Na, Nb, Nc.
 
     With X, Y, Z = Nc, Nb, Na (prolate) or Na, Nb, Nc (oblate), E = (X + iY)^K and {A, B} = AB + BA,
 
         K = L:      ½ (E + E†), or (E - E†)/2i
-        K = L - 1:  ¼ √(2L) {Z, E + E†}, or {Z, E - E†}/i in its place;  Z where L = 1;  twice that for TYP 12 to 19
+        K = L - 1:  ¼ √(2L) {Z, E + E†}, or {Z, E - E†}/i in its place;  Z where L = 1;  twice that without an axis
 
     the tensor T^L_K(N) normalised as N^L times the spherical harmonic C^L_K, divided by C^L_L of its stretched component. The species
     decides between the two forms: operators along X have X, {Y, Z}, ...; along Y: Y, {X, Z}, ...; along Z: Z, {X, Y}, ...
     """
     x, y = ("c", "b") if z == "a" else ("a", "b")
-    order, (k, cosine) = order_of(typ), shape_of(typ, z)
+    k, cosine = tensor.shape(z)
     if k == 0:
         return of[z]
     raised, lowered = (of[x] + 1j * of[y]) ** k, (of[x] - 1j * of[y]) ** k
     pair = raised + lowered if cosine else -1j * (raised - lowered)
-    return 0.5 * pair if k == order else factor_below(typ) * anticommutator(of[z], pair)
+    return 0.5 * pair if k == tensor.rank else tensor.factor_below() * anticommutator(of[z], pair)
 
 
-def _with_spins(d: Digits, spins: tuple[int, ...], axes: str) -> CodedOperator:
+def _with_spins(d: Digits, axes: str) -> CodedOperator:
     """The operator of a code with spins."""
+    spins, kind, along = d.spins, d.kind, d.tensor
     powered = CodedOperator(spins=spins, n2=d.nsq, nz2=d.ksq, ns=d.ns)
-    if not spins:
-        if d.typ >= 12:
-            tensor = tensor_with_spins(d.typ, 0, axes)
-            return replace(powered, rotor=tensor, odd=tensor.odd)
+    twice = len(spins) == 2 and spins[0] == spins[1]
+    vector = kind is Kind.TENSOR and along.rank == 1
+    if not spins and kind is not Kind.TENSOR:
         plain = _plain(d._replace(nsq=0, ksq=0), axes)
         return replace(powered, rotor=Scalar(tuple(plain.items())))
-    if len(spins) == 2 and d.typ == 0:
-        if spins[0] == spins[1]:
-            raise ValueError(f"the square of one spin, a constant, {NOT_YET}")
+    if twice and (kind is Kind.SCALAR or vector):
+        times_n = " times N" if vector else ""
+        raise ValueError(f"the square of one spin, a constant,{times_n} {NOT_YET}")
+    if len(spins) == 2 and kind is Kind.SCALAR:
         return replace(powered, rotor=Scalar())
-    if len(spins) == 2 and d.typ in ODD and spins[0] == spins[1]:
-        raise ValueError(f"the square of one spin, a constant, times N {NOT_YET}")
-    if d.typ > 4 and d.typ not in CROSS and (len(spins) == 2 or d.typ not in ODD):
-        acting = 0 if d.typ in ODD else len(spins)  # of rank 0: I1·I2 times N
-        tensor = tensor_with_spins(d.typ, acting, axes)
-        return replace(powered, rotor=tensor, odd=tensor.odd)
-    if d.typ in ODD:
+    if vector and len(spins) == 1:
         sign = 1.0 if axes[2] == "a" else -1.0  # as of Na, Nb, Nc between states
-        vector: Vector = tuple(sign * float(axis == ODD[d.typ]) for axis in "abc")  # type: ignore[assignment]
-        return replace(powered, rotor=Cosines(vector), odd=True)
-    matrix = _matrix(d.typ, axes)
-    return replace(powered, rotor=CosinesWithN(matrix) if len(spins) == 1 else Cosines(matrix))
+        components: Vector = tuple(sign * float(axis == along.axis) for axis in "abc")  # type: ignore[assignment]
+        return replace(powered, rotor=Cosines(components), odd=True)
+    if spins and along.rank <= 2 and not vector:
+        matrix = _matrix(d, axes)
+        return replace(powered, rotor=CosinesWithN(matrix) if len(spins) == 1 else Cosines(matrix))
+    tensor = tensor_with_spins(along, 0 if vector else len(spins), axes)  # of rank 0: I1·I2 times N
+    return replace(powered, rotor=tensor, odd=tensor.odd)
 
 
-def _matrix(typ: int, axes: str) -> Matrix:
-    """c_ij of TYP 0 to 4 and the products of two axes."""
-    if typ == 0:
+def _matrix(d: Digits, axes: str) -> Matrix:
+    """c_ij of scalars, squares, N₊² + N₋² and the products of two axes."""
+    if d.kind is Kind.SCALAR:
         return matrix_of("iso")
-    if typ <= 3:
-        return matrix_of("abc"[typ - 1] * 2)
-    if typ == 4:  # N₊² + N₋² = 2 (Nx² - Ny²)
+    if d.kind is Kind.SQUARE:
+        return matrix_of(d.axis_of_square * 2)
+    if d.kind is Kind.LADDER:  # N₊² + N₋² = 2 (Nx² - Ny²)
         plain = matrix_of(f"{axes[0] * 2}-{axes[1] * 2}")
         return tuple(tuple(2 * value for value in row) for row in plain)  # type: ignore[return-value]
-    return matrix_of(CROSS[typ])
+    return matrix_of("abc".replace(d.tensor.axis, ""))

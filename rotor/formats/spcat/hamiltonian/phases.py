@@ -19,33 +19,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from rotor.formats.spcat.hamiltonian.code_types import axis_of, is_odd_type
-from rotor.formats.spcat.hamiltonian.codes import Digits, split_code, state_digits
-from rotor.formats.spcat.hamiltonian.series import harmonic, is_constant, symmetry_type
+from rotor.formats.spcat.hamiltonian.code_table import split_code
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator, half_turn
 
 AXES_OF_PHASE = {False: "cba", True: "abc"}  # axes of PHASE 1, 2, 4; the key is whether the basis is oblate
-
-
-class Kind(NamedTuple):
-    """Axis of an operator ("" in orthorhombic symmetry), and whether θ changes its sign."""
-
-    axis: str
-    odd: bool
-
-
-def kind_of(d: Digits, oblate: bool) -> Kind:
-    """The kind of a code.
-
-    >>> from rotor.formats.spcat.hamiltonian.codes import split_code
-    >>> [kind_of(split_code(code), False) for code in (200_000, 11_000_400_000)]  # a sine times Nb is even and along c
-    [Kind(axis='a', odd=True), Kind(axis='c', odd=False)]
-    """
-    sine = bool(d.ff) and harmonic(d.ff)[0]
-    commutator = d.i1 == 0 and d.i2 > 0
-    return Kind(axis_of(symmetry_type(d, oblate)), (is_odd_type(d.typ) != sine) != commutator)
 
 
 class Phases(NamedTuple):
@@ -74,12 +53,15 @@ def phases_of(file: ParameterFile, states: int, doubled: frozenset[int]) -> Phas
         odd = frozenset(axis for bit, axis in enumerate(AXES_OF_PHASE[oblate]) if first.phase >> bit & 1)
         return Phases(odd, frozenset("abc"))
     more: dict[str, int] = {}
-    wild = 10 ** state_digits(states) - 1
     for parameter in file.parameters:
         d = split_code(parameter.code, states)
-        count = len(set(range(states)) - doubled) if d.v1 == wild else int(d.v1 < states and d.v1 not in doubled)
-        kind = kind_of(d, oblate)
-        if d.v1 == d.v2 and count and kind.axis and not is_constant(d):
+        count = (
+            len(set(range(states)) - doubled)
+            if d.states(states) is None
+            else int(d.v1 < states and d.v1 not in doubled)
+        )
+        kind = d.symmetry(oblate)
+        if d.v1 == d.v2 and count and kind.axis and not d.is_constant:
             more[kind.axis] = more.get(kind.axis, 0) + (count if kind.odd else -count)
     return Phases(frozenset(axis for axis, count in more.items() if count > 0), frozenset(more))
 

@@ -28,16 +28,15 @@ from math import pi
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.hamiltonian.code_types import order_of
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, Digits, split_code, state_digits
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Tensor, split_code
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of
-from rotor.formats.spcat.hamiltonian.spin_operators import multiplied, plain_of_j
+from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, plain_of_j
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
 
 Factor = Callable[[int, Floats, Floats], Floats]  # function of J, K' and K''
-_PAIR_TYPES = (*range(12), 20)  # TYP of operators that may have a series within l-doubled states
 
 
 @dataclass(frozen=True)
@@ -49,16 +48,6 @@ class Series:
     b: dict[tuple[int, int, int], float] = field(default_factory=dict)
     nofc: bool = False
     g12: bool = False
-
-
-def is_constant(d: Digits) -> bool:
-    """Whether a code names a constant of a series, which is not an operator and is not fitted."""
-    return d.typ > 90 and d.typ % 2 == 1 and d.ksq < 2
-
-
-def is_series(d: Digits) -> bool:
-    """Whether a code names a term of a series."""
-    return bool(d.ff or d.ex) or (d.typ >= 90 and not is_constant(d))
 
 
 def series_of(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]] = ()) -> Series:
@@ -83,14 +72,14 @@ def series_of(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]]
     ValueError
         For a code with TYP 91 to 99 that is not a constant.
     """
-    options, wild = file.options[0], 10 ** state_digits(states) - 1
+    options = file.options[0]
     series = Series(nofc=options.nofc, g12=options.g12)
     for parameter in file.parameters:
         d = split_code(parameter.code, states)
-        if not is_constant(d):
+        if not d.is_constant:
             continue
-        low, high = sorted((d.v1, d.v2))
-        for pair in [(v, v) for v in range(states)] if low == wild else [(low, high)]:
+        both = d.states(states)
+        for pair in [both] if both else [(v, v) for v in range(states)]:
             _set(series, d, parameter, pair)
     for pair in pairs:
         lower, other = min(pair), max(pair)
@@ -102,16 +91,16 @@ def series_of(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]]
 
 def _set(series: Series, d: Digits, parameter: Parameter, pair: tuple[int, int]) -> None:
     """Store the constant of a series."""
-    number = (d.typ - 91) // 2
-    if d.i1 or d.i2 or d.ns or d.ff or d.ex:
+    number = d.ladder
+    if d.has_spin or d.ff or d.ex:
         raise ValueError(f"parameter {parameter.code}: a constant of a series has no spin, no FF and no EX")
     if (d.ksq, d.nsq) == (1, 0):
         series.a[number, *pair] = parameter.value
     elif (d.ksq, d.nsq) == (0, 1):
         series.b[number, *pair] = parameter.value
-    elif (d.typ, d.ksq, d.nsq) == (91, 0, 0) and pair[0] == pair[1]:
+    elif (number, d.ksq, d.nsq) == (0, 0, 0) and pair[0] == pair[1]:
         series.rho[pair[0]] = parameter.value
-    elif (d.typ, d.ksq, d.nsq) != (99, 0, 0):  # 9900 is a place holder
+    elif (d.typ, d.ksq, d.nsq) != (d.row.last, 0, 0):  # a place holder
         raise ValueError(
             f"parameter {parameter.code}: TYP {d.typ} with KSQ = {d.ksq}, NSQ = {d.nsq} is no constant of a series; expected "
             "9100 (ρ of one state), 9110 (a) or 9101 (b), and for further series 93, 95, 97, 99 in place of 91"
@@ -142,12 +131,13 @@ def term_of(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Co
     ValueError
         For two series at once, and for an unsupported base operator.
     """
-    if d.typ > 90 and (d.i1 or d.i2):
+    euler = d.kind is Kind.EULER
+    if euler and d.spins and d.typ != d.row.first:
         raise ValueError(f"a spin with TYP {d.typ}, which SPCAT passes over: EX with TYP 4 and above has one")
-    if 80 <= d.typ < 90 or (d.ff and (d.ex or d.typ >= 90)) or (d.ex and d.typ >= 90):
+    if d.kind is Kind.LEVEL or (d.ff and (d.ex or euler)) or (d.ex and euler):
         raise ValueError("a code has one series alone, and no energy of one K (TYP 80 to 89) with it")
     if d.ff:
-        sine, n = harmonic(d.ff)
+        sine, n = d.sine, d.harmonic
         base = operator_of(d._replace(ff=0), axes)
         sampled = _sampled(n, sine) if series.nofc else _fourier(n, sine, series, states)
         return _multiplied(base, sampled, sine, axes)
@@ -156,19 +146,9 @@ def term_of(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Co
 
 def coded_operator(d: Digits, axes: str, series: Series, states: tuple[int, int] | None) -> CodedOperator:
     """The operator of a code, with a series between two states; see `operator_of` and `term_of`."""
-    if states is None or not is_series(d):
+    if states is None or not d.is_series:
         return operator_of(d, axes)
     return term_of(d, axes, series, states)
-
-
-def harmonic(ff: int) -> tuple[bool, int]:
-    """Whether FF is a sine, and n.
-
-    >>> [harmonic(ff) for ff in (1, 10, 11, 20, 21, 31)]
-    [(False, 1), (False, 10), (True, 1), (True, 10), (False, 11), (True, 11)]
-    """
-    half = (ff - 1) // 10
-    return half % 2 == 1, ff - 10 * ((half + 1) // 2)
 
 
 def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float, float]:
@@ -228,21 +208,15 @@ def _sampled(n: int, sine: bool) -> Factor:
 
 def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> CodedOperator:
     """The operator of a term of an Euler series."""
-    plain = d._replace(ex=0, ksq=0, nsq=0)
-    if d.typ >= 90:
-        number = (d.typ - 90) // 2
-        extra = number > 0
-        ksq = d.ksq + 8 if d.typ % 2 else d.ksq
-        plain = plain._replace(typ=3 + number if number else 0)
-    else:
-        number, ksq = d.ex - 1, d.ksq
-        extra = d.ex > 1 or d.typ > 0 or bool(d.i1 or d.ns)
-        if not extra and not (d.ksq or d.nsq):
-            raise ValueError("EX = 1 with TYP, KSQ and NSQ of 0 is a constant; an energy has no EX")
+    number, ksq = d.euler
+    alone = d.kind is Kind.SCALAR and d.ex == 1 and not d.has_spin
+    extra = number > 0 if d.kind is Kind.EULER else not alone
+    if alone and not (d.ksq or d.nsq):
+        raise ValueError("EX = 1 with TYP, KSQ and NSQ of 0 is a constant; an energy has no EX")
     if number > 4:
         raise ValueError(f"EX = {d.ex}: there are five Euler series, EX 1 to 5")
     a, b = (constants.get((number, *states), 0.0) for constants in (series.a, series.b))
-    base = operator_of(plain, axes)
+    base = operator_of(d.base, axes)
     if base.rotor is not None:
         function = _euler_function(a, b, d.nsq, ksq, extra)
         mean = lambda m, n, above, below: (function(m, above) + function(n, below)) / 2  # noqa: E731
@@ -287,7 +261,7 @@ def _summed(parts: Sequence[OperatorOfJ]) -> OperatorOfJ:
 
 def _multiplied(base: CodedOperator, factor: Factor, sine: bool, axes: str) -> CodedOperator:
     """An operator times the factor of a series."""
-    phase = (1j if axes[2] == "a" else -1j) if sine else 1.0
+    phase = imaginary(axes, sine)
     whole = 1.0 / phase if base.odd else phase
     if base.rotor is not None:
         alike = multiplied(base.rotor, lambda m, n, above, below: factor(n, above, below), whole, base.odd != sine)
@@ -307,29 +281,9 @@ def _by_elements(of: OperatorOfJ, factor: Factor, whole: complex) -> OperatorOfJ
     return operator
 
 
-def symmetry_type(d: Digits, oblate: bool) -> int:
-    """The TYP of an operator of the same species and ΔK as a term of a series.
-
-    >>> from rotor.formats.spcat.hamiltonian.codes import split_code
-    >>> codes = (1_000_040_000, 11_000_000_000, 11_000_040_000, 11_000_200_000, 920_000)
-    >>> [symmetry_type(split_code(code), False) for code in codes]
-    [4, 20, 21, 0, 4]
-    """
-    typ = (3 + (d.typ - 90) // 2 if d.typ >= 92 else 0) if d.typ >= 90 else d.typ
-    if not d.ff or not harmonic(d.ff)[0]:
-        return typ
-    along = 60 if oblate else 20
-    if typ < 20:  # no axis; a sine adds the axis z
-        step = 0 if typ < 4 else 2 * (typ - 3) if typ < 12 else 2 * (typ - 11)
-        return along + max(step, 1) - 1
-    if along <= typ < along + 20:
-        step = order_of(typ) - order_of(typ) % 2
-        return 3 + step // 2 if step else 0
-    across = {20: 40, 40: 20} if oblate else {40: 60, 60: 40}
-    return across[typ // 20 * 20] + typ % 20
-
-
 def refuse_within_pairs(d: Digits, states: Sequence[int], doubled: frozenset[int]) -> None:
     """Raise ValueError for l-doubled states with a series of an operator above second order, or along x or y."""
-    if is_series(d) and set(states) & doubled and d.typ < 90 and d.typ not in _PAIR_TYPES:
+    n_a = d.kind is Kind.TENSOR and d.tensor == Tensor(1, "a")
+    supported = d.kind in (Kind.SCALAR, Kind.SQUARE, Kind.LADDER, Kind.EULER) or n_a
+    if d.is_series and set(states) & doubled and not supported:
         raise ValueError(f"a series of this operator within l-doubled states {NOT_YET}")

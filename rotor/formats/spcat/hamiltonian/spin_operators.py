@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.hamiltonian.code_types import factor_below, order_of, shape_of
+from rotor.formats.spcat.hamiltonian.code_table import Tensor
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName
 from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Rotor, Scalar
@@ -32,29 +32,26 @@ OverK = Callable[[int, int, str], Complexes]  # function of N', N and the repres
 
 
 @lru_cache(maxsize=256)
-def tensor_with_spins(typ: int, spins: int, axes: str) -> ByElements:
-    """The operator of TYP 5 to 79 with one or two different spins, with a factor i (-i in an oblate basis) for odd L.
-
-    Raises ValueError for TYP 20, 40, 60 with two spins, whose scalar product has another rank.
-    """
-    order = order_of(typ)
+def tensor_with_spins(tensor: Tensor, spins: int, axes: str) -> ByElements:
+    """A tensor above second order with one or two different spins, or none, with a factor i (-i in an oblate basis) for odd rank."""
+    order = tensor.rank
     rank = min(order, spins)
-    if typ < 12:
+    if not tensor.axis and not tensor.odd:
         frame = (axes[0], axes[1], axes[2])
         return ByElements(rank, lambda m, n, rep: _with_conjugate(order, order, rank, True, frame, (m, n, rep)))
-    k, cosine = shape_of(typ, axes[2])
+    k, cosine = tensor.shape(axes[2])
     frame = ("c", "b", "a") if axes[2] == "a" else ("a", "b", "c")
-    factor = (0.5 if k == order else factor_below(typ)) * _imaginary(axes, order % 2 == 1)
+    factor = (0.5 if k == order else tensor.factor_below()) * imaginary(axes, tensor.odd)
 
     def matrix(m: int, n: int, representation: str) -> Complexes:
         if order == 1 and k == 0:
-            return _imaginary(axes, True) * _vector(frame[2], rank, (m, n, representation))
+            return imaginary(axes, True) * _vector(frame[2], rank, (m, n, representation))
         return factor * _with_conjugate(order, k, rank, cosine, frame, (m, n, representation))
 
-    return ByElements(rank, matrix, order % 2 == 1)
+    return ByElements(rank, matrix, tensor.odd)
 
 
-def _imaginary(axes: str, odd: bool) -> complex:
+def imaginary(axes: str, odd: bool) -> complex:
     """1, or i (-i in an oblate basis) for odd L."""
     if not odd:
         return 1.0

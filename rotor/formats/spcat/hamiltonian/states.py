@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, split_code
+from rotor.formats.spcat.hamiltonian.code_table import split_code
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 
@@ -255,10 +256,8 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
     if min(first.wtpl, first.wtmn) < 0 or (first.iax in _FOLDS and first.wtpl != first.wtmn):
         return False
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
-    orthorhombic = all(
-        not (d.i1 or d.i2 or d.ns or d.ff or d.ex) and d.typ < 12 and (d.v1, d.v2) in ((0, 0), (9, 9)) for d in digits
-    )
-    energies = any(not any(d[:8]) for d in digits)
-    mixed = any(d.typ == 4 and d.ksq for d in digits) and any(d.typ > 4 for d in digits)  # terms of both reductions
+    orthorhombic = all(d.is_orthorhombic and d.states(1) in ((0, 0), None) for d in digits)
+    energies = any(d.is_energy for d in digits)
+    mixed = len(frozenset().union(*(d.reductions for d in digits))) > 1  # terms of both reductions
     plain_dipoles = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
     return orthorhombic and plain_dipoles and not energies and not mixed

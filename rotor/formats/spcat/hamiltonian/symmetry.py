@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rotor.formats.spcat.hamiltonian.code_types import TURNS, axis_of, delta_k
+from rotor.formats.spcat.hamiltonian.code_table import TURNS, Symmetry
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator
 from rotor.formats.spcat.hamiltonian.states import StateOptions
@@ -31,20 +31,18 @@ def l_values(states: Sequence[StateOptions], pairs: Sequence[Pair]) -> dict[int,
 
 
 def forbidden(
-    typ: int, low: StateOptions, high: StateOptions, del_l: int, oblate: bool, doubled: bool, spins: Sequence[int] = ()
+    symmetry: Symmetry, low: StateOptions, high: StateOptions, del_l: int, doubled: bool, spins: Sequence[int] = ()
 ) -> str:
     """The reason why symmetry forbids an operator between two states, or within one; empty if it is allowed.
 
     Parameters
     ----------
-    typ : int
-        TYP of its code.
+    symmetry : Symmetry
+        Of its code.
     low, high : StateOptions
         Of the two states; the same twice within one state.
     del_l : int
         |Δl|, negative where Δk Δl < 0.
-    oblate : bool
-        Whether z is the c axis.
     doubled : bool
         Whether one of the states is l-doubled; the species of its levels are not tested.
     spins : sequence of int, optional
@@ -62,28 +60,28 @@ def forbidden(
         among = sorted(spin for spin in spins if spin >= first)
         named = set(among) == {first} or among == [first, first + 1] == sorted(spins)
         return "" if named else "of three equivalent spins the first is named, or the first and the second"
-    if low.fold > 2 and (delta_k(typ, oblate) - del_l) % low.fold:
+    if low.fold > 2 and (symmetry.delta_k - del_l) % low.fold:
         return f"its Δk - Δl is no multiple of {low.fold}"
     on_total = low.equivalent == 2 and max(spins, default=0) > len(low.spins) - 2
     turns = (0, 1) if on_total else (0,)  # of the function of two equivalent spins
-    if not doubled and not any(some_weights_agree(typ, low, high, odd) for odd in turns):
+    if not doubled and not any(some_weights_agree(symmetry.axis, low, high, odd) for odd in turns):
         return "it connects levels of unequal nuclear-spin weights"
     return ""
 
 
-def exchange_of(typ: int, low: StateOptions, high: StateOptions) -> int:
+def exchange_of(axis: str, low: StateOptions, high: StateOptions) -> int:
     """The part of an operator with one of two equivalent spins that connects levels of equal weight: 1 even, -1 odd, 0 both."""
-    even, odd = (some_weights_agree(typ, low, high, turned) for turned in (0, 1))
+    even, odd = (some_weights_agree(axis, low, high, turned) for turned in (0, 1))
     return int(even) - int(odd)
 
 
-def some_weights_agree(typ: int, low: StateOptions, high: StateOptions, odd_spins: int = 0) -> bool:
-    """Whether an operator of a TYP (20, 40, 60: species of Na, Nb, Nc) connects levels of equal weight.
+def some_weights_agree(axis: str, low: StateOptions, high: StateOptions, odd_spins: int = 0) -> bool:
+    """Whether an operator along an axis connects levels of equal weight.
 
     Parameters
     ----------
-    typ : int
-        TYP of its code.
+    axis : str
+        Its axis, "" for none.
     low, high : StateOptions
         Of the two states; the same twice within one state.
     odd_spins : int, optional
@@ -94,7 +92,7 @@ def some_weights_agree(typ: int, low: StateOptions, high: StateOptions, odd_spin
     bool
         Whether such levels exist.
     """
-    turn = TURNS[axis_of(typ)]
+    turn = TURNS[axis]
     for species in _SPECIES:
         other = (species[0] ^ turn[0], species[1] ^ turn[1])
         ours, theirs = _weights(low, *species), _weights(high, *other, odd_spins)

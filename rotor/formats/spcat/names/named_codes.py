@@ -20,17 +20,18 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.fitting.top_constants import TopConstants
-from rotor.formats.spcat.hamiltonian.code_types import CROSS, PAIRS, TYPES_BETWEEN
-from rotor.formats.spcat.hamiltonian.codes import (
-    AXES,
+from rotor.formats.spcat.hamiltonian.code_table import (
+    PAIRS,
+    TYPES_BETWEEN,
     Digits,
-    basis_axes,
-    constants_and_matrix,
+    every_state,
     join_code,
-    parameters_of,
     split_code,
-    state_digits,
+    typ_across,
+    typ_of_ladder,
+    typ_of_square,
 )
+from rotor.formats.spcat.hamiltonian.codes import AXES, basis_axes, constants_and_matrix, parameters_of
 from rotor.formats.spcat.model import options_of
 from rotor.formats.spcat.text.par import Header, ParameterFile
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
@@ -42,7 +43,7 @@ from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 
-_CROSS = {PAIRS[letters]: typ for typ, letters in CROSS.items()}
+_CROSS = {places: typ_across(letters) for letters, places in PAIRS.items()}
 _KINDS = (NuclearQuadrupole, SpinRotation, SpinSpin)
 
 Codes = dict[int, dict[str, float]]  # factors of the named constants in the value of each code
@@ -133,7 +134,7 @@ def _spin_codes(
     """The codes of a spin constant, from the matrix c_ij that it multiplies."""
     states, places = _states(constants), [scheme.place(spin) + 1 for spin in term.spins]
     i1, i2 = max(places), (min(places) if len(places) == 2 else 0)
-    wild = 0 if states == 1 else 10 ** state_digits(states) - 1
+    wild = 0 if states == 1 else every_state(states)
     v1, v2 = (wild, wild) if parts.states is None else (max(parts.states), min(parts.states))
     base = Digits(0, 0, i2, i1, parts.ns, 0, parts.nz2, parts.n2, v2, v1)
     rotor = term.rotor
@@ -160,10 +161,11 @@ def _matrix_codes(c: Floats, whole: bool, oblate: bool, acts_on_three: bool) -> 
     diagonal, times = np.diag(c), 2.0 if acts_on_three else 1.0
     mean, across = float(diagonal[x] + diagonal[y]) / 2, times * float(diagonal[x] - diagonal[y]) / 4
     factors = {typ: times * float(c[i, k]) for (i, k), typ in _CROSS.items()}
+    along, ladder = typ_of_square("abc"[z]), typ_of_ladder(1)
     if not whole:
-        factors |= {z + 1: float(diagonal[z]) - mean, 4: across}
+        factors |= {along: float(diagonal[z]) - mean, ladder: across}
     elif acts_on_three or diagonal[0] == diagonal[1] == diagonal[2] or diagonal[x] == -diagonal[y]:
-        factors |= {0: mean, z + 1: float(diagonal[z]) - mean, 4: across}
+        factors |= {0: mean, along: float(diagonal[z]) - mean, ladder: across}
     else:
-        factors |= {i + 1: float(diagonal[i]) for i in range(3)}
+        factors |= {typ_of_square("abc"[i]): float(diagonal[i]) for i in range(3)}
     return {typ: factor for typ, factor in factors.items() if abs(factor) > 1e-12}

@@ -18,12 +18,11 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.formats.spcat.file_model import allowed
 from rotor.formats.spcat.file_spins import with_their_spins
-from rotor.formats.spcat.hamiltonian.code_types import PAIRS, TYPES_BETWEEN, axis_of
-from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, basis_axes, constants_of, is_linear, join_code, split_code
+from rotor.formats.spcat.hamiltonian.code_table import PAIRS, TYPES_BETWEEN, Kind, join_code, split_code
+from rotor.formats.spcat.hamiltonian.codes import ALONG, HELD_BELOW, MEAN, basis_axes, constants_of, is_linear
 from rotor.formats.spcat.hamiltonian.dipole_codes import dipoles_of
 from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, real_lines, reasons_of_states
 from rotor.formats.spcat.hamiltonian.phases import phases_of
-from rotor.formats.spcat.hamiltonian.series import is_constant, is_series
 from rotor.formats.spcat.hamiltonian.states import StateOptions, options_of_state, states_of
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
 from rotor.formats.spcat.model import NO_NAME, fold_parts, weights_of
@@ -36,8 +35,10 @@ from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.top import Top
 
-_BETWEEN = {typ: symbol for symbol, typ in TYPES_BETWEEN.items() if typ >= 20}
-_LADDERS = {max(typ - 3, 0): symbol for symbol, typ in TYPES_BETWEEN.items() if typ < 20}  # by n of N₊^2n + N₋^2n
+_BETWEEN = {typ: symbol for symbol, typ in TYPES_BETWEEN.items() if not symbol.startswith("W")}
+_LADDERS = {
+    int(symbol[4:] or 0) // 2: symbol for symbol in TYPES_BETWEEN if symbol.startswith("W")
+}  # by n of N₊^2n + N₋^2n
 
 
 def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, errors: bool = False) -> Top:
@@ -70,7 +71,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     lines, imaginary = real_lines(lines, odd, frozenset())
     lines, without_spins = with_their_spins(lines, states)
     left_out += imaginary + without_spins + reasons_of_states(file, len(states))
-    if odd and any(axis_of(line.typ) for line in lines):
+    if odd and any(line.symmetry.axis for line in lines):
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
     rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
 
@@ -79,8 +80,8 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     for v, parameters in enumerate(parameters_of_states):
         option = replace(options_of_state(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
         option = replace(option, nvib=-1 if first.nvib < 0 else 1, vsym=0, text="")
-        energies.append(sum(p.value for p in parameters if not any(split_code(p.code)[:8])))
-        plain = tuple(p for p in parameters if any(split_code(p.code)[:8]))
+        energies.append(sum(p.value for p in parameters if split_code(p.code).is_energy))
+        plain = tuple(p for p in parameters if not split_code(p.code).is_energy)
         constants.append(_constants_of_state(v, replace(file, options=(option,), parameters=plain), errors))
     _refuse_unlike(constants)
     turned = (constants[0].kind, first.nvib < 0) in (("prolate", True), ("oblate", False))
@@ -104,7 +105,7 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...]) -> None:
     first = file.options[0]
     digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
     reasons = {
-        "FF, EX, TYP 90 to 99: a Fourier or Euler series": any(is_series(d) or is_constant(d) for d in digits),
+        "FF, EX, TYP 90 to 99: a Fourier or Euler series": any(d.is_series or d.is_constant for d in digits),
         f"IXX = {first.ixx}: a sum of angular momenta that is held for conserved": first.ixx != 0,
         f"IAX = {first.iax}: a total spin of three nuclei with unlike weights": any(
             s.equivalent == 3 and s.plus != s.minus for s in states
@@ -138,9 +139,8 @@ def _refuse_unlike(constants: list[Constants]) -> None:
 def _letter(file: ParameterFile, rows: list[tuple[CodedLine, Parameter]]) -> str:
     """The letter of the reduction of all states: the one that a state shows, else that of the file."""
     plain = [split_code(p.code, abs(file.options[0].nvib)) for line, p in rows if line.operator.plain is not None]
-    if any(d.typ > 4 for d in plain):
-        return "s"
-    return "a" if any(d.typ == 4 and d.ksq for d in plain) else file.options[0].chr
+    letters = frozenset().union(*(d.reductions for d in plain))
+    return "s" if "S" in letters else "a" if letters else file.options[0].chr
 
 
 def _own_parameters(rows: list[tuple[CodedLine, Parameter]], count: int) -> list[list[Parameter]]:
@@ -154,8 +154,11 @@ def _own_parameters(rows: list[tuple[CodedLine, Parameter]], count: int) -> list
         digits = split_code(parameter.code, count)._replace(v1=0, v2=0)
         plain = replace(parameter, code=join_code(digits), constrained=False, text="")
         parts = [plain]
-        if digits.typ in (1, 2, 3) and len(line.operator.plain) == 2:  # across an axis of more than two folds
-            parts = [replace(plain, code=100, value=plain.value / 2), replace(plain, code=1000, value=-plain.value / 2)]
+        if digits.kind is Kind.SQUARE and len(line.operator.plain) == 2:  # across an axis of more than two folds
+            parts = [
+                replace(plain, code=MEAN, value=plain.value / 2),
+                replace(plain, code=ALONG, value=-plain.value / 2),
+            ]
         for v in range(count) if line.states is None else line.states[:1]:
             by_state[v] += parts
     return by_state
@@ -172,7 +175,7 @@ def _couplings(rows: list[tuple[CodedLine, Parameter]], count: int, first: Optio
             raise ValueError(f"parameter {parameter.code}: a coupling of states whose symmetry axis is not z {NO_NAME}")
         digits, terms = split_code(parameter.code, count), dict[str, float]()
         if digits.typ in _BETWEEN:
-            factor = sign if digits.typ % 20 == 0 else 1.0
+            factor = sign if digits.tensor.odd else 1.0
             terms[_with_powers(_BETWEEN[digits.typ], digits.nsq, digits.ksq)] = factor
         for (p, q, n), factor in (line.operator.plain or {}).items():
             if n not in _LADDERS:
