@@ -31,7 +31,7 @@ from rotor.assignment.growth import (
 )
 from rotor.assignment.search import DETECTED, SPREAD, Field
 
-CLEAR = 0.999  # probability of a place that is kept
+CLEAR = 0.999  # least probability of a clear place
 REACH = 4.0  # standard deviations over which places are compared
 FREE = 3.0  # standard errors of a line by which a group moves that the other lines do not place
 SECOND = 5.0  # standard errors of a line by which a group may move in other directions and be left out
