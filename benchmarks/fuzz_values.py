@@ -96,7 +96,7 @@ def _examples() -> list[str]:
     """The command lines in the help of every verb, with bars for quotes."""
     from rotor.cli import VERBS, declaration
 
-    texts = "\n".join(declaration(verb)[0].examples for verb in VERBS).replace('"', "|")
+    texts = "\n".join(declaration(verb).examples for verb in VERBS).replace('"', "|")
     return [line.strip()[6:] for line in texts.splitlines() if line.strip().startswith("rotor ") and ">" not in line]
 
 

@@ -95,7 +95,7 @@ class MapRequest:
         return 2 * max(term.operator.rank for term in self.terms)
 
     def space(self, jmax: int) -> FieldSpace:
-        """The states up to a J max; the last two are kept, since the search ends one J max beyond the one that is used."""
+        """The states up to a J max. The last two spaces stay in memory, since the search ends one J max beyond the result."""
         if jmax not in self._spaces:
             for older in list(self._spaces)[:-1]:
                 del self._spaces[older]

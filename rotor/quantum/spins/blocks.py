@@ -199,7 +199,7 @@ class Plan:
         return Plan(shared, self.blocks, families, operators)
 
 
-def plan_of(
+def contracted_plan(
     top: Top,
     effects: tuple[QuantumEffect, ...],
     nmin: int,

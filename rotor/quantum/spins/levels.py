@@ -12,7 +12,7 @@ from rotor.arrays import hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, placed, weights_by_state
 from rotor.quantum.spins.axial import Exist
-from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, functions_of_blocks, plan_of
+from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, contracted_plan, functions_of_blocks
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.quantum.spins.simplify import simplified
@@ -51,7 +51,7 @@ def levels_of_f(
     """
     hold_freed_memory()
     lowest, highest = _range_of_n(top, effects, every_f)
-    plan = simplified(plan_of(top, effects, lowest, highest, executor, exist), effects, every_f)
+    plan = simplified(contracted_plan(top, effects, lowest, highest, executor, exist), effects, every_f)
     solved = solved_blocks(plan, every_f, exist)
     if n_range:
         solved = [_within(block, n_range) for block in solved]
@@ -65,7 +65,7 @@ def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequen
     They are labelled as solved levels are, without vectors; the plan has the operators and the coupling coefficients of these F.
     """
     lowest, highest = _range_of_n(top, effects, every_f)
-    plan = plan_of(top, effects, lowest, highest, None)
+    plan = contracted_plan(top, effects, lowest, highest, None)
     if plan.shared.scheme.equivalent == 3:
         raise ValueError(
             "functions of three equivalent nuclei are not products of a rotational state and a coupling pattern"
