@@ -194,7 +194,7 @@ def test_a_run_that_stops_has_exit_code_one(call, folder, monkeypatch):
 def test_steps_too_long_are_told_with_their_number_and_length(call, folder):
     code, out, err = call(*VAPOUR[:-2], "--step", "2ps", "--steps", "50", "--checkpoint", "a.npz")
     assert (code, out) == (1, "")
-    assert "take a shorter step" in err
+    assert "use a shorter step" in err
     assert "of 50, 2000 fs each" in err
     assert err.endswith("a.npz is of step 0, resume from it\n")
 

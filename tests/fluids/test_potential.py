@@ -400,5 +400,5 @@ def test_settings_are_checked(wrong: dict, words: str) -> None:
 
 
 def test_charges_of_a_model_must_cancel() -> None:
-    with pytest.raises(ValueError, match=r"charges add to 0\.5 e"):
+    with pytest.raises(ValueError, match=r"charges add up to 0\.5 e"):
         RigidModel("ion", (Site("Na", (0.0, 0.0, 0.0), 0.5),), "none")

@@ -69,7 +69,7 @@ def test_an_output_serves_wherever_a_molecule_is_named(output, call):
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("DJ      =  0.0", "DJ      =  1.0", "DJ: read are OA"),
+        ("DJ      =  0.0", "DJ      =  1.0", "DJ: rotor reads OA"),
         (" RHORHO  =  5.000000000000000E-002\n", "", "RHORHO missing"),
     ],
 )

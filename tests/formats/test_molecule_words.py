@@ -61,7 +61,7 @@ def test_isotopes_of_a_library_molecule_carry_its_constants_over():
     assert heavy.rotational_constants_mhz == pytest.approx(
         (701931.5, 272912.6, 192055.25), rel=0.006
     )  # HDO, ratio from r_e
-    assert any("the ratio of those calculated" in note for note in heavy.notes)
+    assert any("the ratio calculated from its geometry" in note for note in heavy.notes)
     assert any("no distortion constants" in note for note in heavy.notes)
     assert abs(heavy.dipole_abc_debye[0]) == pytest.approx(0.67, abs=0.005)
     again = rotor.read(rotor.read("water"), isotopes={2: "2H"})
@@ -83,7 +83,7 @@ def test_isotopes_of_constants_alone_cannot_change(tmp_path):
     ("source", "words"),
     [
         ("no/such.xyz", "no such file"), ("nosuchmolecule", "nosuchmolecule"), ("SMILES:C(", "SMILES"),
-        (".", "folder"), (3.14, "is no molecule"),
+        (".", "folder"), (3.14, "is not a molecule"),
     ],
 )  # fmt: skip
 def test_nonsense(source, words):

@@ -108,7 +108,7 @@ def test_chi_turns_with_the_axes_and_scales_with_q():
     assert not np.allclose(parent.frame.axes, deuterated.frame.axes, atol=1e-3)
     assert np.allclose(*fixed, rtol=0, atol=1e-5)  # 1e-6 of χ is taken for round-off of the frame
     assert "chi_ab(14N)" in deuterated.spin_constants.values
-    assert any("off the diagonal are not known" in note for note in deuterated.notes)
+    assert any("off-diagonal elements of χ are not known" in note for note in deuterated.notes)
     assert isotopologue(parent, {nitrogen: "15N"}).top.spin_constants is None
 
 

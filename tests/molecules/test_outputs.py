@@ -270,7 +270,7 @@ def test_of_another_program_the_geometry_alone_and_no_cut_file(tmp_path):
     molecule = read_output(written(tmp_path, mopac("== MOPAC DONE ==")))
     assert np.allclose(molecule.positions_angstrom, WATER, atol=1e-7)  # printed to 1e-8 Å
     assert molecule.dipole_debye is None
-    with pytest.raises(ValueError, match=r"line 8: MOPAC does not say"):
+    with pytest.raises(ValueError, match=r"line 8: MOPAC does not report a normal end"):
         read_output(written(tmp_path, mopac("")))
 
 

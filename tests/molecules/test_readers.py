@@ -47,7 +47,7 @@ def test_isotopes_at_the_door():
 
 
 def test_what_is_no_molecule():
-    with pytest.raises(ValueError, match="a float is no molecule"):
+    with pytest.raises(ValueError, match="a float is not a molecule"):
         read_molecule(1.5)
     with pytest.raises(ValueError, match=r"near it: .*CH3CHO"):
         read_molecule("CH3CH0")

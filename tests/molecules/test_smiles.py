@@ -170,7 +170,7 @@ def test_sdf_text(end):
         (sdf().replace("0.5865", "0,5865"), "w.sdf, line 6: .* is not a coordinate"),
         (sdf().replace("0.5865", "      "), "w.sdf, line 6: .* is not a coordinate"),
         (sdf().replace("0.5865", "nan   "), "w.sdf, line 6: .* is not a coordinate"),
-        (sdf().replace("1  3  1", "1  9  1"), "w.sdf: no mol or sdf file .Range Error"),
+        (sdf().replace("1  3  1", "1  9  1"), "w.sdf: not a mol or sdf file .Range Error"),
         (sdf() + "$$$$\n" + sdf() + "$$$$\n", "w.sdf: 2 molecules"),
         ((sdf() + "$$$$\n" + sdf()).replace("\n", "\r"), "w.sdf: 2 molecules"),
         ("", "w.sdf: 0 molecules"),

@@ -231,7 +231,7 @@ REFUSED = [
     ),
     (
         FluidScene(conditions=FluidConditions(molecules=27), numerics=FluidNumerics(engine="openmm"), accuracy="1 K"),
-        "the engine openmm is not swept",
+        "not available for the engine openmm",
     ),
     (StarkScene(molecule="OCS", accuracy="1e-12 MHz"), "accuracy: 1e-12: the finest that is possible here is 1e-09"),
     (StarkScene(molecule="OCS", accuracy="1 D"), "accuracy: '1 D': unit 'D' does not measure the same thing"),

@@ -137,7 +137,7 @@ def test_what_stays_is_no_absorption():
         (lambda: linear_band(OCS, np.array([1.0]), CM, "wigner"), "is none of harmonic"),
         (
             lambda: band_from_correlation(np.arange(9) ** 2.0, np.ones(9), 1.0, [1.0], fwhm_mhz=1.0, temperature_k=1.0),
-            "even ones",
+            "evenly spaced times",
         ),
         (
             lambda: band_from_correlation(np.arange(9.0), np.ones(9), 1.0, [1.0], fwhm_mhz=1.0, temperature_k=1.0),

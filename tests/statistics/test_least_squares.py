@@ -49,7 +49,7 @@ def test_it_does_not_say_that_it_has_converged_when_it_has_not():
     cut = minimise(rosenbrock, np.array([-1.2, 1.0]), most_iterations=1)
     assert not cut.converged
     assert cut.status == "too many iterations"
-    assert "1 iteration was not enough" in cut.reason
+    assert "not converged after 1 iteration" in cut.reason
 
     def downhill_forever(p):  # the Jacobian has the wrong sign: every step leads up
         r, j = rosenbrock(p)

@@ -156,7 +156,7 @@ def test_names_of_species():
     assert ortho.to_mapping() == {"even": 2, "odd": 0}
     along_c = spin_species(SpinWeights.from_mapping({"ee": 3, "eo": 1, "oe": 3, "oo": 1}))  # half turn about c
     assert along_c["para"].to_mapping() == {"ee": 0, "eo": 1, "oe": 0, "oo": 1}
-    with pytest.raises(ValueError, match="all levels of carbon monoxide are of one"):
+    with pytest.raises(ValueError, match="all levels of carbon monoxide belong to the same"):
         thermodynamic_functions(rotor.read("CO"), [10.0], species="normal")
     with pytest.raises(ValueError, match="equilibrium, normal, A, E, F"):
         thermodynamic_functions(rotor.read("CH4"), [10.0], species="ortho")

@@ -79,7 +79,7 @@ def parameters_beside(path: str | os.PathLike[str]) -> Path:
 def predict(
     parameters: ParameterFile, intensities: IntensityFile, *, as_spcat: bool = False, full_basis: bool = False
 ) -> Prediction:
-    """The catalogue that SPCAT makes of its two input files, from true eigenvalues.
+    r"""The catalogue that SPCAT makes of its two input files, from true eigenvalues.
 
     A line is listed when both its J (F, without nuclear spins) lie from FBGN to FEND, its two levels have one nuclear-spin
     weight, its frequency lies below FQLIM, and its intensity, that of one component of a K doublet, is above
