@@ -28,13 +28,17 @@ class RotationalSum(NamedTuple):
     """A sum over rotational levels that replaces one over levels split by spins, times a number of spin functions.
 
     effects: without spins, or all if no such sum exists; then functions is 1. weights: number of spin functions by K, reduced, instead of
-    those of the top; None without equivalent nuclei. first_order: whether the mean shift of a level does not vanish.
+    those of the top; None without equivalent nuclei.
     """
 
     effects: tuple[QuantumEffect, ...]
     functions: int
     weights: SpinWeights | None = None
-    first_order: bool = False
+
+    @property
+    def first_order(self) -> bool:
+        """Whether the mean shift of a level may not vanish: that of one species of three equivalent nuclei."""
+        return self.weights is not None
 
     @property
     def is_original(self) -> bool:
@@ -63,7 +67,7 @@ def rotational_sum(top: Top, effects: Sequence[QuantumEffect]) -> RotationalSum:
     if not three:
         return RotationalSum(rest, functions)
     weights, common = weights_of_three(coupled[0].twice)
-    return RotationalSum(rest, functions * common, weights, first_order=True)
+    return RotationalSum(rest, functions * common, weights)
 
 
 def weights_of_three(twice_i: int) -> tuple[SpinWeights, int]:

@@ -184,7 +184,7 @@ def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], ro
     numbers = distinct(np.searchsorted(starts, rows, side="right") - 1)
     blocks = sorted((levels.blocks[i] for i in numbers.tolist()), key=lambda block: block.basis.size)
     out = np.empty((len(levels), len(terms)))
-    for alike in _of_like_size(blocks):
+    for alike in _blocks_by_size(blocks):
         sizes = [block.basis.size for block in alike]
         diagonals = unit_diagonals([block.basis for block in alike], sizes, terms)
         vectors = np.zeros((len(alike), sizes[-1], sizes[-1]))
@@ -199,7 +199,7 @@ def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], ro
     return out[rows]
 
 
-def _of_like_size(blocks: Sequence[SolvedBlock]) -> Iterator[Sequence[SolvedBlock]]:
+def _blocks_by_size(blocks: Sequence[SolvedBlock]) -> Iterator[Sequence[SolvedBlock]]:
     """Blocks in order of size, in pieces of similar size and bounded memory."""
     start = 0
     while start < len(blocks):
