@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -80,6 +80,29 @@ def whole_of_lower(lower: Floats) -> Floats:
     [[1.0, 2.0], [2.0, 3.0]]
     """
     return np.asarray(lower + np.tril(lower, -1).swapaxes(-1, -2))
+
+
+def runs_of_similar_size(
+    sizes: Sequence[int], ratio: float, small: int = 0, most: float = math.inf, costs: Sequence[int] | None = None
+) -> Iterator[slice]:
+    """Runs of successive matrices that share an array, padded to the largest of them.
+
+    In a run, sizes differ by at most `ratio` or are all up to `small`, and the largest cost, by default the square of the size, times the
+    number of matrices is at most `most`.
+
+    >>> [(run.start, run.stop) for run in runs_of_similar_size([1, 3, 4, 9, 10, 11], 1.5, small=4, most=200)]
+    [(0, 3), (3, 5), (5, 6)]
+    """
+    start, least, largest, cost = 0, 0, 0, 0
+    for place, size in enumerate(sizes):
+        own = size * size if costs is None else costs[place]
+        least, largest, cost = min(least, size), max(largest, size), max(cost, own)
+        if place == start or largest > max(ratio * least, small) or (place + 1 - start) * cost > most:
+            if place > start:
+                yield slice(start, place)
+            start, least, largest, cost = place, size, size, own
+    if len(sizes):
+        yield slice(start, len(sizes))
 
 
 def end_to_end(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:

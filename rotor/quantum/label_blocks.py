@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
 
 _MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
+_LIKE, _SMALL = 2.0, 8  # largest ratio of sizes of blocks that are worked on together, and sizes that all are
 _MOST_STATES = 0.6  # of all states of a block: where labels are fewer, they alone are looked at
 
 
@@ -76,19 +77,8 @@ def _cut(basis: WangBlock, kmax: int | None) -> int:
 
 def chunks_of(blocks: Sequence[Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> list[Chunk]:
     """Blocks in order of size, cut into pieces of bounded memory and of sizes within a factor of two."""
-    out, start = [], 0
-    while start < len(blocks):
-        stop = start
-        while (
-            stop < len(blocks)
-            and (stop - start + 1) * blocks[stop].size ** 2 <= _MOST_PADDED
-            and blocks[stop].size <= max(2 * blocks[start].size, 8)
-        ):
-            stop += 1
-        stop = max(stop, start + 1)
-        out.append(_chunk(blocks[start:stop], units, powers))
-        start = stop
-    return out
+    sizes = [block.size for block in blocks]
+    return [_chunk(blocks[run], units, powers) for run in runs_of_similar_size(sizes, _LIKE, _SMALL, _MOST_PADDED)]
 
 
 def _chunk(blocks: Sequence[Occurring], units: Sequence[tuple[int, int]], powers: Sequence[int]) -> Chunk:

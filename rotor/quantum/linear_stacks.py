@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints, Workspace, whole_of_lower
+from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size, whole_of_lower
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 _LIKE = 1.5  # sizes of blocks that stand side by side
@@ -168,16 +168,9 @@ class LinearStack:
 def stack_numbers(blocks: Sequence[LinearBlock]) -> list[Ints]:
     """Positions of the blocks that are worked on together: of like size, of like numbers of elements, of bounded memory."""
     order = sorted(range(len(blocks)), key=lambda i: (blocks[i].size, len(blocks[i].rows), blocks[i].factors.shape[1]))
-    out, numbers, least, most = list[Ints](), list[int](), 0, 0
-    for i in order:
-        block = blocks[i]
-        most = max(most, len(block.rows) * max(block.factors.shape[1], block.size))
-        if numbers and (block.size > _LIKE * least or (len(numbers) + 1) * most > _AT_ONCE):
-            out.append(np.array(numbers))
-            numbers, most = [], len(block.rows) * max(block.factors.shape[1], block.size)
-        least = block.size if not numbers else least
-        numbers.append(i)
-    return [*out, np.array(numbers)] if numbers else out
+    sizes = [blocks[i].size for i in order]
+    costs = [len(blocks[i].rows) * max(blocks[i].factors.shape[1], blocks[i].size) for i in order]
+    return [np.array(order[run]) for run in runs_of_similar_size(sizes, _LIKE, most=_AT_ONCE, costs=costs)]
 
 
 class WeightedElements(NamedTuple):

@@ -9,18 +9,18 @@ blocks of like size are computed together.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Workspace, distinct
+from rotor.arrays import Floats, Workspace, distinct, runs_of_similar_size
 from rotor.quantum.basis.state_elements import linear_blocks_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
 from rotor.quantum.label_blocks import unit_diagonals
-from rotor.quantum.levels import Levels, MomentBlock, SolvedBlock
+from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.linear_stacks import LinearStack, stack_numbers
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
@@ -184,7 +184,8 @@ def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], ro
     numbers = distinct(np.searchsorted(starts, rows, side="right") - 1)
     blocks = sorted((levels.blocks[i] for i in numbers.tolist()), key=lambda block: block.basis.size)
     out = np.empty((len(levels), len(terms)))
-    for alike in _blocks_by_size(blocks):
+    for run in runs_of_similar_size([block.basis.size for block in blocks], _LIKE, _SMALL, _AT_ONCE):
+        alike = blocks[run]
         sizes = [block.basis.size for block in alike]
         diagonals = unit_diagonals([block.basis for block in alike], sizes, terms)
         vectors = np.zeros((len(alike), sizes[-1], sizes[-1]))
@@ -197,18 +198,3 @@ def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], ro
         for place, block in enumerate(alike):
             out[block.start : block.start + sizes[place]] = total[place, : sizes[place]]
     return out[rows]
-
-
-def _blocks_by_size(blocks: Sequence[SolvedBlock]) -> Iterator[Sequence[SolvedBlock]]:
-    """Blocks in order of size, in pieces of similar size and bounded memory."""
-    start = 0
-    while start < len(blocks):
-        stop, largest = start + 1, max(_LIKE * blocks[start].basis.size, _SMALL)
-        while (
-            stop < len(blocks)
-            and blocks[stop].basis.size <= largest
-            and (stop - start + 1) * blocks[stop].basis.size ** 2 <= _AT_ONCE
-        ):
-            stop += 1
-        yield blocks[start:stop]
-        start = stop

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.operators import Basis, Rotor
 from rotor.quantum.spins.rotor import Piece, acts
@@ -20,7 +20,7 @@ from rotor.quantum.spins.stack_elements import Pairs, Section, power_matrices, r
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 from rotor.quantum.wang.basis import WangBlock
 
-_SMALL = 16  # blocks of up to so many functions share a stack; among larger blocks sizes differ by at most half
+_LIKE, _SMALL = 1.5, 16  # largest ratio of sizes of blocks that share a stack, and sizes that all do
 
 
 class Stack(NamedTuple):
@@ -62,26 +62,17 @@ def stacks_of(blocks: Sequence[SolvedBlock]) -> list[Stack]:
     alike: dict[tuple[tuple[int, ...], ...], list[int]] = {}
     for number, block in enumerate(blocks):
         alike.setdefault(tuple((part.v, *_kind(part.basis)) for part in block.parts), []).append(number)
-    kinds = enumerate(alike.values())
-    return [
-        _stack(blocks, kind, similar) for kind, members in kinds for similar in _runs_of_similar_size(blocks, members)
-    ]
+    stacks = list[Stack]()
+    for kind, members in enumerate(alike.values()):
+        rising = sorted(members, key=lambda number: blocks[number].j)
+        sizes = [len(blocks[number].energies_mhz) for number in rising]
+        stacks += [_stack(blocks, kind, rising[run]) for run in runs_of_similar_size(sizes, _LIKE, _SMALL)]
+    return stacks
 
 
 def _kind(basis: Basis) -> tuple[int, ...]:
     """First K and sign of Wang functions."""
     return (basis.first_k, basis.sign) if isinstance(basis, WangBlock) else ()
-
-
-def _runs_of_similar_size(blocks: Sequence[SolvedBlock], members: list[int]) -> Iterator[list[int]]:
-    """Runs of blocks of similar size, by rising N."""
-    run: list[int] = []
-    for number in sorted(members, key=lambda number: blocks[number].j):
-        if run and len(blocks[number].energies_mhz) > max(_SMALL, 1.5 * len(blocks[run[0]].energies_mhz)):
-            yield run
-            run = []
-        run.append(number)
-    yield run
 
 
 def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: list[int]) -> Stack:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.axial_levels import axial_derivatives
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
-_AT_ONCE = 1 << 19  # largest density at a time (numbers): 4 MB, about the cache of a core
 _PADDED = 1 << 21  # largest array of vectors (numbers): 16 MB
 _LIKE = 1.5  # largest ratio of sizes of blocks whose vectors share an array
 
@@ -64,7 +63,8 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
         for channel, elements in _unit_tables(top, levels, names, shared, frame)
     ]
     for group, blocks in groups:
-        for alike in _runs_of_similar_size(blocks):
+        for run in runs_of_similar_size([len(block.vectors) for block in blocks], _LIKE, most=_PADDED):
+            alike = blocks[run]
             states = states_of_group(group, alike, len(levels))
             total = np.zeros((len(alike), len(names), states.rows.shape[1]))
             for coefficients, elements in tables:
@@ -83,18 +83,6 @@ def _frame_and_groups(blocks: Sequence[SpinBlock], shared: Shared) -> tuple[Fram
     frame = frame_of(shared.stacks, table.places, table.distances)
     grouped = groups_of([(block.twice_f, block.parts) for block in blocks], frame)
     return frame, [(group, [blocks[i] for i in numbers]) for group, numbers in grouped]
-
-
-def _runs_of_similar_size(blocks: Sequence[SpinBlock]) -> Iterator[list[SpinBlock]]:
-    """Runs of blocks of similar size whose vectors share an array of bounded memory, in the order of F."""
-    run: list[SpinBlock] = []
-    for block in blocks:
-        sizes = [len(member.vectors) for member in (*run, block)]
-        if run and (max(sizes) > _LIKE * min(sizes) or len(sizes) * max(sizes) ** 2 > _PADDED):
-            yield run
-            run = []
-        run.append(block)
-    yield run
 
 
 def _unit_tables(
