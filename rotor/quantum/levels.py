@@ -77,31 +77,70 @@ class Block(ABC):
         return None
 
 
-class MomentBlock(Block):
-    """States solved together that know the elements of molecule-fixed tensors with other blocks of their kind."""
+class SpeciesMoments(ABC):
+    """Elements of molecule-fixed tensors between the blocks of one species, and derivatives of its states."""
 
+    @property
+    @abstractmethod
+    def combined(self) -> bool:
+        """Whether functions of K and -K are combined."""
+
+    @abstractmethod
+    def connect(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> bool:
+        """Whether tensors, by pairs of states, have elements between the states of two blocks of the species."""
+
+    @abstractmethod
+    def reduced(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
+        """Reduced elements (n_up, n_low) of one component; those of odd rank without their factor i where functions are `combined`."""
+
+    @abstractmethod
+    def slopes(self, block: MomentBlock, names: Sequence[str]) -> Floats:
+        """∂E/∂c (n, names) of the states of a block by constants of the Hamiltonian."""
+
+
+@dataclass(frozen=True, eq=False)
+class MomentBlock(Block):
+    """States of one total angular momentum solved together, of a species that has its own moments.
+
+    twice_j: twice this momentum. number: of the solved block in its species. states: which of its states these are, as the moments of the
+    species count them. components: 2 where the states σ and -σ coincide.
+    """
+
+    twice_j: int
+    number: int
+    states: Ints
+    energies_mhz: Floats
+    start: int
     components: int
+    moments: SpeciesMoments
+
+    @property
+    def twice_total(self) -> int:
+        """Twice the total angular momentum."""
+        return self.twice_j
+
+    @property
+    def stop(self) -> int:
+        """The row behind the last state."""
+        return self.start + len(self.states)
+
+    @property
+    def combined(self) -> bool:
+        """Whether functions of K and -K are combined."""
+        return self.moments.combined
 
     @property
     def paired(self) -> bool:
         """σ and -σ coincide."""
         return self.components > 1
 
-    @abstractmethod
     def connects(self, low: MomentBlock, tensors: Tensors) -> bool:
         """Whether tensors, by pairs of states, have elements between the states of this block and another one."""
-
-    @abstractmethod
-    def reduced(self, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
-        """Reduced elements (n_up, n_low) of one component; those of odd rank without their factor i where functions are `combined`."""
+        return low.moments is self.moments and self.moments.connect(self, low, tensors)
 
     def amplitudes(self, low: MomentBlock, tensors: Tensors) -> Floats:
         """Magnitudes of reduced elements (n_up, n_low), whose squares are the strengths of all components together."""
-        return np.asarray(np.sqrt(self.components) * np.abs(self.reduced(low, tensors)))
-
-    @abstractmethod
-    def slopes(self, names: Sequence[str]) -> Floats:
-        """∂E/∂c (n, names) of the states by constants of the Hamiltonian."""
+        return np.asarray(np.sqrt(self.components) * np.abs(self.moments.reduced(self, low, tensors)))
 
 
 @dataclass(frozen=True, eq=False)

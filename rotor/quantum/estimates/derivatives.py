@@ -77,7 +77,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
 
     if levels.blocks and isinstance(levels.blocks[0], MomentBlock):
-        return np.concatenate([block.slopes(names) for block in levels.blocks])[rows]
+        return np.concatenate([block.moments.slopes(block, names) for block in levels.blocks])[rows]
     if "f" in levels.quanta or are_with_spins(levels):
         from rotor.quantum.spins.derivatives import derivatives
 

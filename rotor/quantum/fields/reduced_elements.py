@@ -103,7 +103,7 @@ class ReducedElements:
         if first.alone:
             return wang_amplitudes(first, second, tensors[0, 0])
         if isinstance(first, MomentBlock):
-            return first.reduced(second, tensors)
+            return first.moments.reduced(first, second, tensors)
         elements = amplitudes(first, second, tensors)
         return elements / np.sqrt(2.0) if self.paired[up] else elements  # that of one sign of K
 

@@ -18,7 +18,7 @@ from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
 from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_tops
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
-from rotor.quantum.levels import Levels, MomentBlock
+from rotor.quantum.levels import Levels, MomentBlock, SpeciesMoments
 from rotor.quantum.operators.rotation import body_tensor
 from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
 from rotor.tops.internal_rotation import InternalRotationConstants, species_of_tops
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 TurningTops = RamModel | SeveralTops
+Columns = dict[str, NDArray[Any]]
 FEW = 1 << 14  # up to so many elements a dense matrix is faster than a sparse one
 MOST_POPULATED = 2  # products of three tops below the limit of a sum, of which blocks of any size are solved
 MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a whole for a sum
@@ -35,30 +36,56 @@ REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
 
 
 @dataclass(frozen=True, eq=False)
-class SpeciesMoments:
-    """Reduced elements of molecule-fixed tensors between the blocks of one species, computed at first use."""
+class TorsionMoments(SpeciesMoments):
+    """Moments of one species without spins; elements between functions are computed at first use."""
 
     levels: SpeciesLevels
     model: TurningTops
     _cache: dict[tuple[complex, ...], dict[tuple[int, int], Entries]] = field(default_factory=dict)
 
-    def between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
-        """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
-        components = tuple(tensors[0, 0].components)
-        if components not in self._cache:
-            self._cache[components] = self._elements(components, tensors[0, 0].rank)
-        return self._cache[components]
+    @property
+    def combined(self) -> bool:
+        """Whether functions of K and -K are combined."""
+        return self.levels.functions.folded
 
-    def slopes(self, rows: Ints, names: Sequence[str]) -> Floats:
-        """∂E/∂c (rows, names) of levels, `rows` being their places among the solved states."""
+    def connect(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> bool:
+        """Whether a tensor has elements between two blocks."""
+        return (up.number, low.number) in self._between(tensors)
+
+    def reduced(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
+        """Reduced elements (n_up, n_low) of a tensor."""
+        entries = self._between(tensors)[up.number, low.number]
+        bra, ket = self._vectors(up), self._vectors(low)
+        shape = len(bra), len(ket)
+        if shape[0] * shape[1] <= FEW:
+            matrix: Any = np.zeros(shape, dtype=entries.values.dtype)
+            matrix[entries.rows, entries.columns] = entries.values[0]
+        else:
+            from scipy.sparse import csr_array
+
+            matrix = csr_array((entries.values[0], (entries.rows, entries.columns)), shape=shape)
+        return np.asarray(bra.conj().T @ (matrix @ ket))
+
+    def slopes(self, block: MomentBlock, names: Sequence[str]) -> Floats:
+        """∂E/∂c (n, names) of the states of a block, by the constants of the top and of the internal rotor."""
         constants = list(self.model.values)
-        slopes = self.levels.slopes(rows) @ self.model.jacobian
+        slopes = self.levels.slopes(block.states) @ self.model.jacobian
         return np.asarray(slopes[:, [constants.index(name) for name in names]])
 
-    def _elements(self, components: tuple[complex, ...], rank: int) -> dict[tuple[int, int], Entries]:
-        turned = _turned(np.array(components), self.model.angle)
-        elements = self.levels.functions.elements([[Product(body_tensor(turned))]], rank, half=True)
-        return self.levels.solved.linear.between_blocks(elements)
+    def _vectors(self, block: MomentBlock) -> NDArray[Any]:
+        """The states of a block over its functions (functions, n)."""
+        solved = self.levels.solved
+        return solved.vectors(block.number)[1][:, solved.linear.rank[block.states]]
+
+    def _between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
+        """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
+        body = tensors[0, 0]
+        components = tuple(body.components)
+        if components not in self._cache:
+            turned = _turned(np.array(components), self.model.angle)
+            elements = self.levels.functions.elements([[Product(body_tensor(turned))]], body.rank, half=True)
+            self._cache[components] = self.levels.solved.linear.between_blocks(elements)
+        return self._cache[components]
 
 
 def _turned(components: NDArray[Any], angle: float) -> NDArray[Any]:
@@ -75,59 +102,6 @@ def turned_by(body: Floats, angle: float) -> Floats:
     return np.asarray(turn @ body if body.ndim == 1 else turn @ body @ turn.T)
 
 
-@dataclass(frozen=True, eq=False)
-class TorsionBlock(MomentBlock):
-    """States of one J and one connected block of a species: energies (n,) in MHz, rising, and vectors (functions, n).
-
-    components: 2 for E, whose states σ = ±1 coincide.
-    """
-
-    j: int
-    number: int
-    energies_mhz: Floats
-    vectors: NDArray[Any]
-    start: int
-    moments: SpeciesMoments
-    components: int
-    rows: Ints
-
-    @property
-    def twice_total(self) -> int:
-        """Twice the total angular momentum."""
-        return 2 * self.j
-
-    def connects(self, low: MomentBlock, tensors: Tensors) -> bool:
-        """Whether a tensor has elements between this block and another one."""
-        return (
-            isinstance(low, TorsionBlock)
-            and low.moments is self.moments
-            and (self.number, low.number) in self.moments.between(tensors)
-        )
-
-    @property
-    def combined(self) -> bool:
-        """Whether functions of K and -K are combined."""
-        return self.moments.levels.functions.folded
-
-    def reduced(self, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
-        """Reduced elements (n_up, n_low) of a tensor."""
-        assert isinstance(low, TorsionBlock)
-        entries = self.moments.between(tensors)[self.number, low.number]
-        shape = len(self.vectors), len(low.vectors)
-        if shape[0] * shape[1] <= FEW:
-            matrix: Any = np.zeros(shape, dtype=entries.values.dtype)
-            matrix[entries.rows, entries.columns] = entries.values[0]
-        else:
-            from scipy.sparse import csr_array
-
-            matrix = csr_array((entries.values[0], (entries.rows, entries.columns)), shape=shape)
-        return np.asarray(self.vectors.conj().T @ (matrix @ low.vectors))
-
-    def slopes(self, names: Sequence[str]) -> Floats:
-        """∂E/∂c (n, names) of the states, by the constants of the top and of the internal rotor."""
-        return self.moments.slopes(self.rows, names)
-
-
 def torsion_rotation_levels(
     top: Top, constants: InternalRotationConstants, effects: tuple[QuantumEffect, ...], jmin: int, jmax: int
 ) -> Levels:
@@ -138,28 +112,23 @@ def torsion_rotation_levels(
     refuse_axes(top)
     model = turning_tops(top, constants)
     degeneracies = Degeneracies.of(model, constants)
-    blocks: list[TorsionBlock] = []
-    quanta: dict[str, list[NDArray[Any]]] = {}
-    start = 0
+    blocks, pieces = list[MomentBlock](), list[Columns]()
     for name in model.species:
         species = species_blocks(model, name, jmin, jmax, constants.functions).solve_once(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
         components = degeneracies.components(name)
-        species_levels = _blocks(species, model, start, components)
-        columns = {
-            "species": np.full(len(species.rows), name),
-            "components": np.full(len(species.rows), components),
-            "weight": degeneracies.weights(name, species.functions, species.rows),
-            **{key: species.quanta[key] for key in ("vt", "j", "ka", "kc")},
-        }
-        for key, column in columns.items():
-            quanta.setdefault(key, []).append(column)
-        start += len(species.rows)
-        blocks += species_levels
-    joined = {name: np.concatenate(columns) for name, columns in quanta.items()}
+        blocks += _blocks(species, model, blocks[-1].stop if blocks else 0, components)
+        pieces.append(
+            {
+                "species": np.full(len(species.rows), name),
+                "components": np.full(len(species.rows), components),
+                "weight": degeneracies.weights(name, species.functions, species.rows),
+                **{key: species.quanta[key] for key in ("vt", "j", "ka", "kc")},
+            }
+        )
     energies = np.concatenate([block.energies_mhz for block in blocks])
-    return _table(top, effects, jmax, joined, energies, tuple(blocks))
+    return table_of_pieces(top, effects, jmax, pieces, energies, tuple(blocks))
 
 
 def energies_alone(
@@ -205,8 +174,7 @@ def energies_alone(
             "kc": kc,
         }
         pieces.append(columns)
-    quanta = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
-    return _table(top, effects, jmax, quanta, np.concatenate(energies), ())
+    return table_of_pieces(top, effects, jmax, pieces, np.concatenate(energies))
 
 
 def _refuse_long_sums(size: int) -> None:
@@ -218,21 +186,24 @@ def _refuse_long_sums(size: int) -> None:
         )
 
 
-def _table(
-    top: Top, effects: tuple[QuantumEffect, ...], jmax: int, columns: dict[str, NDArray[Any]], energies: Floats,
-    blocks: tuple[TorsionBlock, ...],
+def table_of_pieces(
+    top: Top, effects: tuple[QuantumEffect, ...], jmax: int, pieces: Sequence[Columns], energies: Floats,
+    blocks: tuple[MomentBlock, ...] = (), halves: frozenset[str] = frozenset(),
 ) -> Levels:  # fmt: skip
-    """Levels from columns of quantum numbers, components and weights."""
+    """Levels from columns of quantum numbers, components and weights, piece by piece; sums with spins are doubled."""
+    columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     components, weight = columns.pop("components"), columns.pop("weight")
+    multiplicity = columns["f"] + 1 if "f" in columns else 2 * columns["j"] + 1
     return Levels(
         kind=top.kind,
         representation=REPRESENTATION,
         jmax=jmax,
         energy_mhz=energies,
         quanta=columns,
-        multiplicity=2 * columns["j"] + 1,
+        multiplicity=multiplicity,
         components=components,
         weight=weight,
+        halves=halves,
         effects=effects,
         blocks=blocks,
     )
@@ -331,20 +302,15 @@ class Degeneracies:
         return np.full(len(rows), weights[species] // int(np.gcd.reduce(list(weights.values()))))
 
 
-def _blocks(species: SpeciesLevels, model: TurningTops, start: int, components: int) -> list[TorsionBlock]:
+def _blocks(species: SpeciesLevels, model: TurningTops, start: int, components: int) -> list[MomentBlock]:
     """Blocks of one species with the states that are levels, in the order of its rows."""
-    moments, blocks = SpeciesMoments(species, model), []
-    linear = species.solved.linear
-    chosen = linear.block[species.rows]
+    moments, linear, blocks = TorsionMoments(species, model), species.solved.linear, list[MomentBlock]()
+    number_of = linear.block[species.rows]
     for number in species.blocks:
-        rows = species.rows[chosen == number]
-        members, vectors = species.solved.vectors(number)
+        rows = species.rows[number_of == number]
         if len(rows):
-            retained = vectors[:, linear.rank[rows]]
-            j = int(linear.labels["J"][members[0]])
-            blocks.append(
-                TorsionBlock(j, number, species.solved.energies[rows], retained, start, moments, components, rows)
-            )
+            twice_j, energies = 2 * int(linear.labels["J"][rows[0]]), species.solved.energies[rows]
+            blocks.append(MomentBlock(twice_j, number, rows, energies, start, components, moments))
             start += len(rows)
     return blocks
 
