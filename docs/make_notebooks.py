@@ -56,11 +56,19 @@ def notebook_of(script: Path) -> Any:
 
 
 def without_checks(notebook: Any) -> Any:
-    """The notebook without its assert statements and without cells that had nothing else."""
-    for cell in notebook.cells:
+    """The notebook without its assert statements, and without cells that served them alone."""
+    later_names: set[str] = set()
+    kept = []
+    for cell in reversed(notebook.cells):
         if cell["cell_type"] == "code":
-            cell["source"] = _story(cell["source"])
-    notebook.cells = [cell for cell in notebook.cells if cell["cell_type"] != "code" or cell["source"].strip()]
+            story = _story(cell["source"])
+            prepares = story != cell["source"] and _is_preparation(story, later_names)
+            if prepares or not re.sub(r"^# long: \d+$", "", story).strip():
+                continue
+            cell["source"] = story
+            later_names |= _names(story)
+        kept.append(cell)
+    notebook.cells = kept[::-1]
     code = [cell for cell in notebook.cells if cell["cell_type"] == "code"]
     for cell in code:
         cell["outputs"] = [output for output in cell.get("outputs", []) if not _is_bare_object(output)]
@@ -86,10 +94,33 @@ def _is_bare_object(output: Any) -> bool:
 
 def _story(source: str) -> str:
     """The source of a cell without asserts, and without loops and branches that consist of asserts."""
-    plain = re.sub(r"^[%!]", "#", source, flags=re.MULTILINE)  # of the same length: magics are no Python
-    dropped = {line for node in ast.parse(plain).body for line in _lines_of_checks(node)}
+    dropped = {line for node in ast.parse(_without_magics(source)).body for line in _lines_of_checks(node)}
     left = [line for number, line in enumerate(source.splitlines(), 1) if number not in dropped]
     return re.sub(r"\n{3,}", "\n\n", "\n".join(left)).strip("\n")
+
+
+def _is_preparation(story: str, later_names: set[str]) -> bool:
+    """Whether a cell without its checks only sets variables that no later cell reads."""
+    nodes = ast.parse(_without_magics(story)).body
+    return not later_names & _bound(nodes) and all(_sets_variables(node) for node in nodes)
+
+
+def _sets_variables(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Assign) or (isinstance(node, ast.For) and all(map(_sets_variables, node.body)))
+
+
+def _bound(nodes: list[ast.stmt]) -> set[str]:
+    inner = [node for statement in nodes for node in ast.walk(statement)]
+    return {node.id for node in inner if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+
+
+def _names(source: str) -> set[str]:
+    return {node.id for node in ast.walk(ast.parse(_without_magics(source))) if isinstance(node, ast.Name)}
+
+
+def _without_magics(source: str) -> str:
+    """The source as Python: magics become comments of the same length."""
+    return re.sub(r"^[%!]", "#", source, flags=re.MULTILINE)
 
 
 def _lines_of_checks(node: ast.stmt) -> set[int]:

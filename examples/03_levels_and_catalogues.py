@@ -11,6 +11,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import MHZ_PER_CM, read_egy
@@ -66,14 +67,18 @@ for block in levels.blocks:
 
 # %%
 cases = ("abc_sred", "abc_ared6", "h2co", "so2", "h2o_sextic", "h2o_octic", "pyridine_oblate_s", "hard_nearsym_j150")
-off = {}
+off, by_case = {}, {}
 for case in cases:
     top, printed = rotor.read(oracles / case / f"{case}.var"), read_egy(oracles / case / "sample.egy")
     j, ka, kc = printed.quanta.T
     levels = rotor.api.solve_levels(top, int(j.max()))
     rows = levels.rows_of(j=j, ka=ka, kc=kc)
     off[case] = levels.energy_mhz[rows] / MHZ_PER_CM - printed.energy_cm
-    print(f"{case:18} {len(j)} levels to J = {j.max():3}, largest difference {np.abs(off[case]).max():.1e} cm⁻¹")
+    by_case[case] = {
+        "levels": len(j),
+        "highest J": j.max(),
+        "largest difference (cm⁻¹)": f"{np.abs(off[case]).max():.1e}",
+    }
 
 figure, axes = plt.subplots(figsize=(8, 3.5), layout="constrained")
 for place, values in enumerate(off.values()):
@@ -81,6 +86,7 @@ for place, values in enumerate(off.values()):
 axes.axhspan(-0.5, 0.5, color="gray", alpha=0.2, lw=0)
 axes.set_xticks(range(len(off)), [case.replace("_", "\n", 1) for case in off], fontsize=8)
 axes.set(ylabel="Calculated - SPCAT (10⁻⁶ cm⁻¹)", title="Energies; grey: what rounding to six decimals allows")
+pd.DataFrame(by_case).transpose()
 
 # %%
 assert all(np.abs(values).max() < 5.1e-7 for values in off.values())  # half of the last printed digit, and 1 % for ties
@@ -106,14 +112,17 @@ orders = {
     "decic": ("PJ", "PJJK", "PJK", "PKJ", "PKKJ", "PK"),
 }
 taken: tuple[str, ...] = ("A", "B", "C")
-off = {}
+off, by_order = {}, {}
 for order, names in orders.items():
     taken += names
     part = {name: value for name, value in water.constants.values.items() if name in taken}
     levels = rotor.api.solve_levels(rotor.Top(rotor.Constants(**part, reduction="S", representation="Ir")), 10)
     calculated = levels.energy_mhz[levels.rows_of(**upper)] - levels.energy_mhz[levels.rows_of(**lower)]
     off[order] = np.abs(calculated - measured.frequency_mhz)
-    print(f"{order:8} median {np.median(off[order]):12.3f} MHz, worst {off[order].max():14.3f} MHz")
+    by_order[order] = {
+        "median difference (MHz)": f"{np.median(off[order]):.3f}",
+        "largest difference (MHz)": f"{off[order].max():.3f}",
+    }
 
 figure, axis = plt.subplots(figsize=(7, 4), layout="constrained")
 for i, values in enumerate(off.values()):
@@ -121,6 +130,7 @@ for i, values in enumerate(off.values()):
     axis.semilogy([i - 0.3, i + 0.3], [np.median(values)] * 2, color="#D55E00", lw=2)
 axis.set_xticks(range(len(off)), list(off))
 axis.set(ylabel="|Calculated - measured| (MHz)", title="110 measured lines of water, order by order (orange: median)")
+pd.DataFrame(by_order).transpose()
 
 # %%
 medians = [float(np.median(values)) for values in off.values()]
@@ -159,5 +169,7 @@ assert ((published.quanta_upper[:, 1] + published.quanta_upper[:, 2]) % 2 == 0).
 
 # %%
 mixed = rotor.read("SO2", isotopes="2=18O")
+mixed_levels = rotor.api.solve_levels(mixed, 20)
+print(f"¹⁸O=S=¹⁶O to J = 20: {int((mixed_levels.weight > 0).sum())} of {len(mixed_levels)} levels exist")
 assert mixed.spin_weights.to_mapping() == {}
-assert (rotor.api.solve_levels(mixed, 20).weight > 0).all()
+assert (mixed_levels.weight > 0).all()

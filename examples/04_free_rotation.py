@@ -10,6 +10,7 @@ import math
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import (
@@ -43,6 +44,7 @@ book = np.sort(plate.tensor.diagonal())
 assert np.allclose(book / book[0], [1, 2, 3], rtol=1e-14)
 
 turn_per_s = 2 * math.pi
+table = {}
 for axis, fixed in enumerate(fixed_axes(book, 1.0)):
     spin = book[axis] * turn_per_s * np.cos(0.01) * np.eye(3)[axis]
     aside = book[axis] * turn_per_s * np.sin(0.01) * (1 - np.eye(3)[axis]) / math.sqrt(2)
@@ -50,15 +52,19 @@ for axis, fixed in enumerate(fixed_axes(book, 1.0)):
     momentum, attitude = motion.at(np.linspace(0, 60, 6001))  # a minute
     direction = momentum / np.linalg.norm(momentum[0])
     tipped = np.degrees(np.arccos(np.clip(direction[:, axis], -1, 1)).max())
-    print(
-        f"axis {axis + 1}: {fixed.kind:8s} in a minute L leaves it by at most {tipped:6.2f}°, period {motion.period:.3f} s"
-    )
+    table[f"axis {axis + 1}"] = {
+        "motion": fixed.kind,
+        "largest angle between L and the axis (°)": f"{tipped:.2f}",
+        "period (s)": f"{motion.period:.3f}",
+    }
     assert (tipped < 1.2) == (fixed.kind == "stable")  # 0.57° to start with
     assert (tipped > 178) == (fixed.kind == "unstable")  # turned over
 
     conserved = invariants(momentum, attitude, book)
     assert np.ptp(conserved.energy) < 1e-14 * conserved.energy[0]
     assert np.abs(conserved.space_momentum - (spin + aside)).max() < 1e-14 * conserved.momentum[0]
+
+pd.DataFrame(table).transpose()
 
 # %% [markdown]
 # ## Rates in closed form
@@ -67,6 +73,7 @@ for axis, fixed in enumerate(fixed_axes(book, 1.0)):
 # for the stable axes, and for the one between them the growth along the separatrix from 10⁻⁷ to 10⁻⁴ of |L|.
 
 # %%
+rates = {}
 for axis in (0, 2):
     size = book[axis] * turn_per_s  # of L: one turn per second
     nudged = rotor.api.free_motion(book, size * (np.eye(3)[axis] + 1e-5 * (1 - np.eye(3)[axis])))
@@ -74,7 +81,7 @@ for axis in (0, 2):
     assert np.allclose(later[2], later[0], atol=1e-15 * size)  # back after a period,
     assert np.abs(later[1] - later[0]).max() > 1e-5 * size  # and not before
     rate = fixed_axes(book, size)[axis].rate
-    print(f"axis {axis + 1}: 2π/period = {2 * math.pi / nudged.period:.9f}, closed form {rate:.9f} rad/s")
+    rates[f"axis {axis + 1}: oscillation, 2π/period (rad/s)"] = (2 * math.pi / nudged.period, rate)
     assert abs(2 * math.pi / nudged.period / rate - 1) < 1e-8  # amplitude squared is 1e-10
 
 size = book[1] * turn_per_s
@@ -84,9 +91,10 @@ leaving = rotor.api.free_motion(book, size * (np.eye(3)[1] + 1e-7 * out / np.lin
 times = np.linspace(0, math.log(1e3) / sigma, 50)
 apart = np.linalg.norm(leaving.at(times)[0][:, [0, 2]], axis=1)
 slope = np.polyfit(times, np.log(apart), 1)[0]
-print(f"axis 2: growth measured {slope:.6f}, closed form {sigma:.6f} 1/s")
+rates["axis 2: growth (1/s)"] = (slope, sigma)
 assert abs(slope / sigma - 1) < 1e-6
 assert abs(sigma / turn_per_s - math.sqrt(1 / 3)) < 1e-14  # a factor of 37.6 in every turn
+pd.DataFrame(rates, index=["measured", "closed form"]).transpose().map("{:.6f}".format)
 
 # %% [markdown]
 # ## Polhodes
@@ -115,11 +123,15 @@ problems = {
     (0.6, 0.8, 1.0): ((1.7659625085182075, -0.69546419703308912, 0.77955498148187109), 6.8626161780581164),
     (0.345, 0.653, 1.0): ((1.8057486941533169, -0.29315907005202235, 0.92915521481064942), 2.2146446558330431),
 }
+errors = {}
 figure, panels = plt.subplots(2, 1, figsize=(8, 5), sharex=True, layout="constrained")
 for panel, (moments, (expected, expected_period)) in zip(panels, problems.items(), strict=True):
     motion = rotor.api.free_motion(moments, (1.8, 0.4, -0.9))
     error = np.abs(motion.at(10.0)[0] - expected).max()
-    print(f"I = {moments}: error of L at t = 10 {error:.1e}, of the period {abs(motion.period - expected_period):.1e}")
+    errors[f"I = {moments}"] = {
+        "error of L at t = 10": f"{error:.1e}",
+        "error of the period": f"{abs(motion.period - expected_period):.1e}",
+    }
     assert error < 2e-14  # roundings, 2e-16 each, of numbers near 2 in some forty operations
     assert abs(motion.period - expected_period) < 5e-15
     panel.plot(np.linspace(0, 10, 500), motion.at(np.linspace(0, 10, 500))[0], label=["$L_1$", "$L_2$", "$L_3$"])
@@ -132,6 +144,7 @@ racket = np.array([0.3, 0.35, 0.4])
 period = float(rotor.api.free_motion(racket, racket * [0.1, 15.0, 0.1]).period)
 print(f"racket: it turns over every {period / 2:.6f} s")
 assert abs(period - 12.3349458093386) < 1e-9
+pd.DataFrame(errors).transpose()
 
 # %% [markdown]
 # ## Periodic, not chaotic
@@ -174,7 +187,6 @@ polhode_figure(
 )  # fmt: skip
 
 # %%
-print(f"{'':22s}{'book':>14s}{'water':>14s}")
 rows = {
     "moments": [" : ".join(f"{m:.3g}" for m in body / body[0]) for body in (book, moments)],
     "ω3/ω1 on separatrix": [f"{float(separatrix_ratio(body)):.4f}" for body in (book, moments)],
@@ -183,9 +195,9 @@ rows = {
     "one turn": ["1 s", f"{2 * math.pi * moments[1] / size * ASE_TIME_PS:.3f} ps"],
     "turned over after": [f"{tumbling.period / 2:.3f} s", f"{period_ps / 2:.3f} ps"],
 }
-for name, (first, second) in rows.items():
-    print(f"{name:22s}{first:>14s}{second:>14s}")
+pd.DataFrame(rows, index=["book", "water"]).transpose()
 
+# %%
 assert abs(size / HBAR_CLASSICAL - 4.298) < 0.001
 assert abs(float(separatrix_ratio(book)) - math.sqrt(1 / 3)) < 1e-14
 assert abs(period_ps - 1.798) < 0.001

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import (
@@ -51,6 +52,7 @@ tops = {name: rigid(rotor.read(name)) for name in ("water", "OCS")}  # distortio
 # %%
 kt = EV_PER_K * 300
 times_ps = np.linspace(0, 4, 41)
+correlations = {}
 for name, ends_at in (("OCS", 0.0), ("water", 0.0), ("NH3", None)):
     top = rotor.read(name)
     moments, dipole = top.moments_u_angstrom2, top.dipole_abc_debye
@@ -58,15 +60,19 @@ for name, ends_at in (("OCS", 0.0), ("water", 0.0), ("NH3", None)):
     gas = free_gas_correlations(moments, kt, times_ps / ASE_TIME_PS, vector=dipole, molecules=10_000, rng=rng)
     stays = plateau(moments, dipole)
     second = short_time(moments, kt, dipole).m2 / ASE_TIME_PS**2
-    print(
-        f"{name:6s} C1 = 1 - {second / 2:7.3f} t² + ..., ends at {stays:.4f}; at 4 ps {gas.c1[-1]:+.4f} ± {gas.c1_error[-1]:.4f}"
-    )
+    correlations[name] = {
+        "1 - C1 at short times (t in ps)": f"{second / 2:.3f} t²",
+        "C1 at 4 ps": f"{gas.c1[-1]:.4f} ± {gas.c1_error[-1]:.4f}",
+        "C1 at late times, closed form": f"{stays:.4f}",
+    }
     assert ends_at is None or stays == ends_at
     if name == "OCS":
         closed, _ = linear_curves(times_ps / ASE_TIME_PS, moments[1], kt)
         assert np.abs((gas.c1 - closed)[1:] / gas.c1_error[1:]).max() < 4  # standard errors
     else:
         assert abs(gas.c1[-1] - stays) < 4 * gas.c1_error[-1]
+
+pd.DataFrame(correlations).transpose()
 
 # %% [markdown]
 # ## One area for both
@@ -75,11 +81,14 @@ for name, ends_at in (("OCS", 0.0), ("water", 0.0), ("NH3", None)):
 # quantum, at any temperature: the sum over all lines shows it.
 
 # %%
+ratios = {name: {} for name in tops}
 for name, top in tops.items():
     for kelvin in (300, 30):
         total = lines_area(rotor.api.line_list(top, temperature_k=kelvin, min_lgint=-14))
-        print(f"{name:6s} {kelvin:4d} K: all lines over the closed form {total / dipole_band_area(top):.7f}")
+        ratios[name][f"sum of all lines / closed form, {kelvin} K"] = f"{total / dipole_band_area(top):.7f}"
         assert abs(total / dipole_band_area(top) - 1) < 3e-6  # lines below the cut
+
+pd.DataFrame(ratios).transpose()
 
 # %% [markdown]
 # ## Band over lines
@@ -94,7 +103,7 @@ cases = [
     ("water", 30, 20, 240, ("harmonic", "schofield"), 20_000),
     ("OCS", 3, 0.2, 7, ("harmonic",), 20_000),
 ]
-found, pairs = {}, []
+found, pairs, table = {}, [], []
 with ThreadPoolExecutor(2) as pool:
     for name, kelvin, width, end, corrections, molecules in cases:
         top, grid = tops[name], np.linspace(0, end, 901) * MHZ_PER_CM
@@ -107,14 +116,23 @@ with ThreadPoolExecutor(2) as pool:
                 rng=np.random.default_rng(6), executor=pool,
             )  # fmt: skip
             found[name, kelvin, correction] = beside = compare_bands(bands[correction], quantum)
-            print(
-                f"{name:6s} {kelvin:4d} K, {correction:9s}: area {beside.area:.4f}, mean frequency {beside.mean:.4f}, largest "
-                f"difference {100 * beside.largest:4.1f} % of the peak, at {beside.at_mhz / MHZ_PER_CM:.1f} cm⁻¹"
+            table.append(
+                {
+                    "gas": f"{name}, {kelvin} K",
+                    "correction": correction.replace("schofield", "Schofield"),
+                    "area, band / lines": f"{beside.area:.4f}",
+                    "mean frequency, band / lines": f"{beside.mean:.4f}",
+                    "largest difference (% of the peak)": f"{100 * beside.largest:.1f}",
+                    "at (cm⁻¹)": f"{beside.at_mhz / MHZ_PER_CM:.1f}",
+                }
             )
         named = {"Schofield" if each == "schofield" else each: band for each, band in bands.items()}
         pairs.append((f"{name}, {kelvin} K, smoothed to {width} cm⁻¹", named, quantum))
 
 band_figure(pairs)
+
+# %%
+pd.DataFrame(table).set_index(["gas", "correction"])
 
 # %%
 hot, cold = found["water", 300, "harmonic"], found["water", 30, "harmonic"]
@@ -202,11 +220,9 @@ right.set(
     xlabel="Temperature (K)", ylabel="Heat capacity $C_p/R$", title="Water: vibration begins at 300 K", ylim=(3.9, 5.1)
 )
 right.legend()
-print(
-    "H2, largest |difference| of C_p/R up to 400 K:",
-    {species: round(float(value), 4) for species, value in worst.items()},
-)
-print(f"water, C_p/R - JANAF at 100 and 200 K: {rotation[0] - values[0]:+.4f} {rotation[1] - values[1]:+.4f}")
+differences = {f"{species} hydrogen, largest to 400 K": value for species, value in worst.items()}
+differences |= {f"water, {t[row]:.0f} K": rotation[row] - values[row] for row in (0, 1)}
+pd.DataFrame({"C_p/R, calculated - published": differences}).map("{:.4f}".format)
 
 # %%
 assert worst["equilibrium"] < 4e-4  # 2.5e-3 J/(mol K), the last digits printed, in units of R

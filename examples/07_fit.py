@@ -8,6 +8,7 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor import Constants
@@ -52,13 +53,19 @@ assert not rigid.converged
 
 # %%
 fit, steps = choose_constants(lines, start, ["B"], ["D", "H", "L"])
-for step in steps:
-    print(f"{step.name}: F = {step.f_ratio:.3g}, weighted rms {step.fit.weighted_rms:.4g}")
 print(publication_table(fit))
 assert fit.converged
 assert [step.name for step in steps] == ["D", "H"]
 assert abs(fit.constants["B"] - 6081.492114) < 2e-6  # of this catalogue: 6081.492114(6) MHz
 assert fit.weighted_rms < 0.7
+pd.DataFrame(
+    {
+        f"with {step.name}": {"F ratio": f"{step.f_ratio:.3g}", "weighted rms": f"{step.fit.weighted_rms:.4g}"}
+        for step in steps
+    }
+).transpose()
+
+# %%
 fit_figure(fit, "OCS")
 
 # %% [markdown]
@@ -69,19 +76,32 @@ fit_figure(fit, "OCS")
 top = rotor.Top.from_constants(fit.constants, dipole_abc_debye=(0.715, 0, 0), covariance=fit.covariance)
 predicted = rotor.api.line_list(top, jmax=140, min_lgint=None)
 upper = predicted.levels.quanta["j"][predicted.upper]
-for j in (1, 30, 90, 140):
-    print(f"J = {j}: {predicted.frequency_mhz[upper == j][0]:.4f} ± {predicted.error_mhz[upper == j][0]:.1g} MHz")
 assert predicted.error_mhz[upper == 1][0] < 2e-5
 assert predicted.error_mhz[upper == 140][0] > 3 * predicted.error_mhz[upper == 90][0]
+pd.DataFrame(
+    {
+        f"J = {j} ← {j - 1}": {
+            "frequency (MHz)": f"{predicted.frequency_mhz[upper == j][0]:.6f}",
+            "error (kHz)": f"{1e3 * predicted.error_mhz[upper == j][0]:.2g}",
+        }
+        for j in (1, 30, 90, 140)
+    }
+).transpose()
 
 # %% [markdown]
 # The same errors without any assumption of normal errors: from fits to lines drawn anew.
 
 # %%
 _, spread = bootstrap(fit, 200, np.random.default_rng(1))
-for name, error, scaled, drawn in zip(fit.parameters.names, fit.errors, fit.scaled_errors, spread, strict=True):
-    print(f"{name}: {error:.2e} from the stated errors, {scaled:.2e} from the scatter, {drawn:.2e} from samples")
 assert np.all(spread / fit.scaled_errors < 3)
+pd.DataFrame(
+    {
+        "from the errors of the lines (MHz)": fit.errors,
+        "from the residuals (MHz)": fit.scaled_errors,
+        "from lines drawn anew (MHz)": spread,
+    },
+    index=fit.parameters.names,
+).map("{:.2e}".format)
 
 # %% [markdown]
 # ## SPFIT's files
@@ -92,9 +112,13 @@ assert np.all(spread / fit.scaled_errors < 3)
 asked = read_fit(samples / "co.par")
 co = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options)
 print(report_text(co, "CO").splitlines()[1])
-for parameter in fitted_file(asked, co, variances=True).parameters:
-    print(f"{parameter.code:8d} {parameter.value:22.15E} {parameter.error:.6E} {parameter.label}")
 assert abs(co.weighted_rms - 0.90566) < 5e-6  # as SPFIT prints it
+pd.DataFrame(
+    [
+        {"constant": row.label, "code": row.code, "value (MHz)": f"{row.value:.15E}", "error (MHz)": f"{row.error:.6E}"}
+        for row in fitted_file(asked, co, variances=True).parameters
+    ]
+).set_index("constant")
 
 # %% [markdown]
 # ## What the lines do not know
@@ -116,7 +140,8 @@ assert abs(blind.constants["B"] - 9198.9) < 5 * blind.constants.uncertainties["B
 
 # %% [markdown]
 # The R lines of a near-prolate chain do know A, through its small asymmetry, but badly: 138 MHz, and 201 MHz with distortion. A
-# pseudo-inverse of unscaled normal equations would report 1e-10 MHz.
+# pseudo-inverse of unscaled normal equations would report 1e-10 MHz. One line of another kind would settle it: the table says by how
+# much each unmeasured line reduces the error of A.
 
 # %%
 chain = Constants(A=300e3, B=4600.0, C=4500.0, DeltaJ=1e-3, DeltaJK=0.05, reduction="A")
@@ -130,17 +155,20 @@ for free, expected in ((["A", "B", "C"], 138.0), (["A", "B", "C", "DeltaJ", "Del
     print(f"{len(free)} constants: A ± {chain_fit.errors[0]:.0f} MHz")
     assert abs(chain_fit.errors[0] - expected) < 2
 
-# %% [markdown]
-# One line of another kind would settle it. Which? The tool says by how much each unmeasured line reduces the error of A.
-
-# %%
 upper, lower = np.array([[1, 1, 0], [2, 1, 1], [12, 3, 9]]), np.array([[1, 0, 1], [2, 0, 2], [11, 3, 8]])
-for one in suggest_lines(chain_fit, "A", upper, lower, error_mhz=0.005):
-    print(
-        f"{one.upper} - {one.lower}: {one.frequency_mhz:.1f} ± {one.error_mhz:.2g} MHz, error of A × {one.error_ratio:.2g}"
-    )
-best = suggest_lines(chain_fit, "A", upper, lower, error_mhz=0.005)[0]
-assert best.error_ratio < 1e-3  # a b-type line has A itself
+suggestions = suggest_lines(chain_fit, "A", upper, lower, error_mhz=0.005)
+assert suggestions[0].error_ratio < 1e-3  # a b-type line has A itself
+pd.DataFrame(
+    [
+        {
+            "line": "{}({},{}) ← {}({},{})".format(*line.upper, *line.lower),
+            "frequency (MHz)": f"{line.frequency_mhz:.1f}",
+            "its error (MHz)": f"{line.error_mhz:.3g}",
+            "factor on the error of A": f"{line.error_ratio:.2g}",
+        }
+        for line in suggestions
+    ]
+).set_index("line")
 
 # %% [markdown]
 # ## A line that is wrong

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 import qutip
 
 import rotor
@@ -45,14 +46,18 @@ period = revival_period_ps(ocs)
 
 # %%
 pulse, times = GaussianPulse(1e13, 0.05), np.linspace(-0.5, 2 * period, 4001)
+table = {}
 figure, axes = plt.subplots(figsize=(8, 3.5), layout="constrained")
 for kelvin, expected in ((0.0, 0.8870), (1.0, 0.7121), (10.0, 0.4875)):
     trace = align(ocs, pulse, times, temperature_k=kelvin)
     highest = trace.cosines["cos2theta"].max()
-    print(
-        f"{kelvin:4.0f} K: {trace.states:4d} states, J max {trace.jmax}, {trace.steps[0]} steps, highest <cos²θ> {highest:.4f}, "
-        f"error about {trace.error_estimate:.0e}"
-    )
+    table[f"{kelvin:.0f} K"] = {
+        "states": trace.states,
+        "highest J": trace.jmax,
+        "steps": trace.steps[0],
+        "highest ⟨cos²θ⟩": f"{highest:.4f}",
+        "estimated error": f"{trace.error_estimate:.0e}",
+    }
     assert abs(highest - expected) < 1e-3  # the grids of times differ
     axes.plot(times, trace.cosines["cos2theta"], lw=0.9, label=f"{kelvin:.0f} K")
     axes.axhline(expected, color=axes.lines[-1].get_color(), lw=0.6, ls=":")
@@ -60,13 +65,14 @@ for kelvin, file in ((0.0, "alignment_ocs_0k.csv"), (10.0, "alignment_ocs_10k.cs
     t, expected = np.loadtxt(oracles / "fields" / file, delimiter=",").T
     off = np.abs(align(ocs, pulse, t, temperature_k=kelvin).cosines["cos2theta"] - expected).max()
     axes.plot(t, expected, "k.", ms=3)
-    print(f"{kelvin:4.0f} K: largest difference from the independent program {off:.1e} at {len(t)} times")
+    table[f"{kelvin:.0f} K"]["difference from the independent program"] = f"{off:.1e}"
     assert off < 2e-5  # the tolerance of align, 1e-5, and the share of states left out
 axes.set(
     xlabel="Time (ps)", ylabel="⟨cos²θ⟩", title="OCS, 50 fs, 10 TW/cm²; dots: the independent program", ylim=(0.0, 1.05)
 )
 axes.legend(ncols=3)
 print(f"revival after {period:.3f} ps")
+pd.DataFrame(table).transpose().fillna("")
 
 # %% [markdown]
 # ## Quantum and classical
@@ -162,7 +168,7 @@ gas = linear_objects(ocs, 8)
 kick = (1.5j * gas.cosine_squared).expm()
 start = kick * gas.thermal(0.5) * kick.dag()
 times = np.linspace(0, period, 161)
-left = []
+left, table = [], {}
 figure, axes = plt.subplots(figsize=(8, 3.2), layout="constrained")
 for rate in (0.0, 0.01, 0.03):
     solved = qutip.mesolve(
@@ -176,7 +182,7 @@ for rate in (0.0, 0.01, 0.03):
     cosine = np.real(solved.expect[0])
     left.append(float(cosine[times > 0.8 * period].max()))
     axes.plot(times, cosine, lw=0.9, label=f"{rate:g} collisions a ps")
-    print(f"collisions turn the axis {rate:4.2f} times a ps: highest <cos²θ> at the revival {left[-1]:.4f}")
+    table[f"{rate:.2f}"] = {"highest ⟨cos²θ⟩ at the revival": f"{left[-1]:.4f}"}
 axes.axhline(1 / 3, color="black", lw=0.5, ls=":")
 axes.set(
     xlabel="Time (ps)", ylabel="⟨cos²θ⟩", title="OCS at 0.5 K after a kick, its axis turned by collisions (mesolve)"
@@ -184,3 +190,4 @@ axes.set(
 axes.legend()
 assert left[0] > left[1] > left[2]
 assert abs(rotor.read("OCS").constants["B"] - 6081.492) < 1e-3
+pd.DataFrame(table).transpose().rename_axis("collisions per ps")

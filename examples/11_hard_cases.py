@@ -13,6 +13,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import MHZ_PER_CM, RotationSplitting, growth_rate, integrate, read_egy, rotations
@@ -208,10 +209,15 @@ for axes in (left, right):
     axes.invert_xaxis()
 right.set(xlabel="Distance from the axis (rad)", ylabel="Error", title="Errors; 10⁻¹⁸ stands for 0")
 right.legend(fontsize=8)
+largest = {
+    "exact: return after a period": max(closed),
+    "exact: energy and |L| to 10⁵ periods": max(drift),
+    "stepped: return after a period": max(stepped),
+}
+pd.DataFrame({"largest error": largest}).map("{:.1e}".format)
 
 # %%
 assert abs(-slope / (4 / sigma * math.log(10)) - 1) < 1e-6
-print(f"largest drift {max(drift):.1e}, return after a period {max(closed):.1e} exact, {max(stepped):.1e} stepped")
 assert max(drift) < 1e-14
 assert max(closed) < 1e-12  # the period rounds to 1e-16 of itself, and L leaves the axis at a rate σ only near a turn
 assert stepped[-1] > 0.1  # the stepped motion is lost
@@ -229,14 +235,20 @@ assert np.allclose(
 
 # %%
 motion = rotor.api.free_motion(moments, [0.5, 0.75, 1.0])
+table = {}
 truth = {
     1e3: (0.89834997892268562, 0.024997933189805489, 0.10192471267223579, -0.42656039625418872),
     1e6: (0.18396472966240838, -0.12579834796681974, 0.37906201650949952, 0.89813347645481284),
 }
 for t, expected in truth.items():
     error = float(rotations.distance(motion.at(t)[1], expected))
-    print(f"t = {t:.0e}: {t / float(motion.period):8.0f} periods, attitude off by {error:.1e} rad")
+    table[f"t = {t:.0e}"] = {
+        "periods": f"{t / float(motion.period):.0f}",
+        "error of the attitude (rad)": f"{error:.1e}",
+    }
     assert error < 5e-15  # the quaternion's own rounding, twice
+
+pd.DataFrame(table).transpose()
 
 # %% [markdown]
 # ## Small rotations, and those by nearly π

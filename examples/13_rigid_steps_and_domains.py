@@ -7,6 +7,7 @@
 # %%
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import (
@@ -100,8 +101,10 @@ assert len(ALL) == 16
 means, covariances = (np.array([one[k] for one in ALL.values()]) for k in (0, 1))
 rise = means[:, 2].mean()
 spread = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2).mean(axis=0))
-print("shift, slide, rise, tilt, roll, twist; mean step:", means.mean(axis=0).round(2))
-print("its spread:", spread.round(2))
+pd.DataFrame(
+    {"mean step": means.mean(axis=0), "its spread": spread},
+    index=["shift (Å)", "slide (Å)", "rise (Å)", "tilt (°)", "roll (°)", "twist (°)"],
+).transpose().map("{:.2f}".format)
 
 # %% [markdown]
 # The steps of a random sequence are independent, so that ⟨z₀·zₙ⟩ = zᵀ⟨R⟩ⁿz with the mean ⟨R⟩ over steps and fluctuations: the
@@ -121,9 +124,19 @@ static = nanometres(to_matrix(step_pose(means)[0]).mean(axis=0))
 straight = angles * [0, 0, 1]  # no mean bend: fluctuations alone
 dynamic = nanometres(mean_rotation(straight, wobble).mean(axis=0))
 rule = 2 * rise / 10 / (np.radians(1) ** 2 * (wobble[:, 0, 0] + wobble[:, 1, 1]).mean())
-print(f"persistence length: {whole:.1f} nm = {whole * 10 / rise:.0f} base pairs")
-print(f"dynamic {dynamic:.1f} nm (2 rise/(var tilt + var roll): {rule:.1f} nm), static {static:.0f} nm")
-print(f"1/(1/dynamic + 1/static) = {1 / (1 / dynamic + 1 / static):.1f} nm")
+lengths = {
+    "fluctuations and sequence": whole,
+    "fluctuations alone (dynamic)": dynamic,
+    "dynamic, small bends: 2 rise/(var tilt + var roll)": rule,
+    "sequence alone (static)": static,
+    "1/(1/dynamic + 1/static)": 1 / (1 / dynamic + 1 / static),
+}
+pd.DataFrame(
+    {
+        "persistence length (nm)": {name: f"{length:.1f}" for name, length in lengths.items()},
+        "in base pairs": {name: f"{length * 10 / rise:.0f}" for name, length in lengths.items()},
+    }
+)
 
 # %%
 rng = np.random.default_rng(11)

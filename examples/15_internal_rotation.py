@@ -10,6 +10,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import (
@@ -93,15 +94,22 @@ names = ("j", "ka", "kc", "species", "vt")
 lines = assignments(names, rows[:, :5].astype(int), rows[:, 5:10].astype(int), rows[:, 10], 0.1)
 start = TopConstants(with_barrier(407.6))
 rigid = ["A", "B", "C", "delta", "V3"]
-fits = []
+fits, table = [], {}
 for free in (rigid, [*rigid, "DeltaJ", "DeltaJK", "DeltaK", "deltaJ"]):
     start = start.replace(**{name: 0.0 for name in free if name not in start})
     fits.append(fit_lines(lines, start, parameters(start, free), FitOptions(poor_rms=1e4)))
     start = fits[-1].constants
-    print(f"{len(free)} constants: rms {fits[-1].rms_mhz():.3f} MHz, V3 = {start['V3'] / CM:.2f} cm⁻¹")
+    table[f"{len(free)} constants"] = {
+        "lines": len(lines),
+        "rms (MHz)": f"{fits[-1].rms_mhz():.3f}",
+        **{f"{name} (MHz)": f"{start[name]:.2f}" for name in "ABC"},
+        "V3 (cm⁻¹)": f"{start['V3'] / CM:.2f}",
+        "angle of the axis, δ (°)": f"{np.degrees(start['delta']):.2f}",
+    }
 assert all(fit.converged for fit in fits)
 assert fits[-1].rms_mhz() < 0.25
 assert abs(start["V3"] / CM - 407.6) < 8  # of a fit with V6 and forty more terms: 407.598, with V6 = -11.64
+pd.DataFrame(table).transpose()
 
 # %%
 figure, axes = plt.subplots(1, 2, figsize=(10, 3.4))

@@ -118,7 +118,7 @@ def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: st
     with styled():
         rows = np.argsort(-heights, kind="stable")[:MOST_ROWS]
         rows = series_order(lines, rows[heights[rows] > 0])
-        figure = new_figure((6.0, 1.2 + 0.13 * len(rows)))
+        figure = new_figure((4.4, 1.2 + 0.14 * len(rows)))
         axes = figure.add_subplot()
         scale = np.log(peaks.intensity / peaks.intensity.min() + 1.0)
         size = 0.15 + 0.75 * scale / scale.max()
@@ -130,7 +130,7 @@ def loomis_wood_figure(lines: Lines, heights: Floats, peaks: PeakList, title: st
         axes.set_yticks(
             range(len(rows)),
             [line_text(lines.levels.quanta, lines.upper[row], lines.lower[row]) for row in rows.tolist()],
-            fontsize=5,
+            fontsize=8,
         )
         axes.set_ylim(len(rows) - 0.3, -0.7)
         axes.set_xlim(-WINDOW_MHZ, WINDOW_MHZ)
