@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import rotor
-from rotor.plots.heat_capacity import Panel, Points, curve_temperatures, plot_heat_capacity
+from rotor.plots.heat_capacity import Panel, Points, curve_temperatures, picture
 from rotor.thermodynamics import (
     GAS_CONSTANT,
     ThermoFunctions,
@@ -219,4 +219,4 @@ def panels() -> list[Panel]:
 
 if __name__ == "__main__":
     PAGE.write_text(page(), encoding="utf-8")
-    plot_heat_capacity(panels(), PICTURE, provenance={"command": "python docs/make_thermo.py"})
+    picture(panels()).save(PICTURE, {"command": "python docs/make_thermo.py"})

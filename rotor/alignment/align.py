@@ -72,6 +72,15 @@ class AlignmentTrace(Table):
         return {"t_ps": self.t_ps, **self.cosines}
 
     @property
+    def gas_text(self) -> str:
+        """The initial gas in words: its temperature and states, or its level."""
+        ensemble = self.ensemble
+        if ensemble.chosen is None:
+            return f"{ensemble.temperature_k:g} K, {self.states} states up to J = {ensemble.jmax}"
+        level = ", ".join(f"{name} = {value}" for name, value in ensemble.chosen.items())
+        return f"level {level}, " + ("all M" if ensemble.m is None else f"|M| = {ensemble.m}")
+
+    @property
     def provenance(self) -> dict[str, Any]:
         """Top, pulses, ensemble and accuracy."""
         top = self.top

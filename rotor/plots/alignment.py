@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,8 +10,9 @@ import numpy as np
 from rotor import units
 from rotor.alignment.align import AlignmentTrace
 from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, RAD_PER_PS_MHZ, DipolePulse, Kick
+from rotor.alignment.request import AlignAnswer
 from rotor.arrays import Floats
-from rotor.plots.picture import GREY, PALETTE, checked_suffix, joined, new_figure, save_described, styled
+from rotor.plots.picture import GREY, PALETTE, Picture, name_of_top, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 
 SIZE_INCHES = (7.2, 4.6)
@@ -37,42 +37,24 @@ def alignment_figure(trace: AlignmentTrace, *, classical: Mapping[str, Floats] |
     return figure
 
 
-def plot_alignment(
-    trace: AlignmentTrace,
-    path: str | os.PathLike[str],
+def picture(
+    thing: AlignmentTrace | AlignAnswer,
     *,
     classical: Mapping[str, Floats] | None = None,
-    title: str = "",
+    title: str | None = None,
     view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw `alignment_figure` into a .png, .pdf or .svg file.
+) -> Picture:
+    """The picture of a trace, or of the answer that has it.
 
-    Parameters
-    ----------
-    trace : AlignmentTrace
-        At least two times.
-    path : path
-        Its suffix chooses the format.
-    classical : mapping, optional
-        Cosines of a classical gas at the same times, by the same names.
-    title : str
-        Title of the picture.
-    view : View
-        Range of times (ps) and cosines, and another title.
-    provenance : mapping, optional
-        Further facts for the metadata.
-
-    Raises
-    ------
-    ValueError
-        For a trace with fewer than two times, and for another suffix.
+    classical: cosines of a classical gas at the same times. title: by default name and gas. view: of times (ps) and cosines.
     """
-    checked_suffix(path)
-    title = title if view.title is None else view.title
-    figure = alignment_figure(trace, classical=classical, title=title)
+    if isinstance(thing, AlignAnswer):
+        classical, thing = classical or thing.classical, thing.trace
+    default = ", ".join(filter(None, (name_of_top(thing.top), thing.gas_text)))
+    title = (default if title is None else title) if view.title is None else view.title
+    figure = alignment_figure(thing, classical=classical, title=title)
     show_part(figure.axes[1], view)  # the cosines; both panels share the times
-    save_described(figure, path, title, joined(provenance, trace.provenance))
+    return Picture(figure, title, thing.provenance)
 
 
 def _pulses(axes: Any, trace: AlignmentTrace) -> None:

@@ -2,44 +2,19 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
-from rotor.plots.picture import GREY, PALETTE, checked_suffix, new_figure, save, styled
+from rotor.plots.picture import GREY, PALETTE, Picture, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 
 
-def plot_assignment(
-    answer: AssignAnswer,
-    path: str | os.PathLike[str],
-    *,
-    view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw an assignment.
-
-    Parameters
-    ----------
-    answer : AssignAnswer
-    path : path
-        A .png, .pdf or .svg file.
-    view : View
-        Range of frequencies (MHz) and intensities, and another title.
-    provenance : mapping, optional
-        Content of the file's metadata.
-
-    Raises
-    ------
-    ValueError
-        For another suffix, and for an empty view.
-    """
-    checked_suffix(path)
-    figure = assignment_figure(answer, view.title or "", view)
-    save(figure, path, figure.axes[0].get_title("left"), dict(provenance or {}))
+def picture(answer: AssignAnswer, *, title: str | None = None, view: View = WHOLE) -> Picture:
+    """The picture of an assignment; view: of frequencies (MHz) and intensities."""
+    figure = assignment_figure(answer, view.title or title or "", view)
+    return Picture(figure, figure.axes[0].get_title("left"))
 
 
 def assignment_figure(answer: AssignAnswer, title: str = "", view: View = WHOLE) -> Any:

@@ -3,47 +3,25 @@
 from __future__ import annotations
 
 import math
-import os
 from typing import Any
 
 import numpy as np
 
 from rotor.formats.spcat.compare import in_mhz
 from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.plots.picture import BLUE, MOST_VECTOR_STICKS, ORANGE, checked_suffix, legend_below, panel, save, styled
+from rotor.plots.picture import BLUE, MOST_VECTOR_STICKS, ORANGE, Picture, legend_below, panel, styled
 from rotor.plots.view import WHOLE, View, show_part
 
 MEASURED = ORANGE
 
 
-def plot_catalogue(
-    lines: Catalogue, path: str | os.PathLike[str], *, title: str = "", view: View = WHOLE, command: str = ""
-) -> None:
-    """Draw log10 of the intensity against frequency, with measured lines (negative tags) in another colour.
-
-    Parameters
-    ----------
-    lines : Catalogue
-        Lines to draw.
-    path : path
-        A .png, .pdf or .svg file.
-    title : str, optional
-        Title of the picture.
-    view : View
-        Range of frequencies (MHz) and log10 of intensities, and another title.
-    command : str, optional
-        Written into the file's metadata.
-
-    Raises
-    ------
-    ValueError
-        For another suffix.
-    """
-    checked_suffix(path)
-    title = title if view.title is None else view.title
-    figure = catalogue_figure(lines, title=title, least=math.inf if view.vertical is None else view.vertical[0])
-    show_part(figure.axes[0], view, scale=1e-3)
-    save(figure, path, title, {"command": command})
+def picture(lines: Catalogue, *, title: str | None = None, view: View = WHOLE, **options: Any) -> Picture:
+    """The picture of a catalogue; view: of frequencies (MHz) and log10 of intensities. options: of `catalogue_figure`."""
+    title = (title or "") if view.title is None else view.title
+    least = math.inf if view.vertical is None else view.vertical[0]
+    figure = catalogue_figure(lines, **{"title": title, "least": least, **options})
+    show_part(options["axes"] if options.get("axes") else figure.axes[0], view, scale=1e-3)
+    return Picture(figure, title)
 
 
 def catalogue_figure(lines: Catalogue, *, title: str = "", least: float = math.inf, axes: Any = None) -> Any:

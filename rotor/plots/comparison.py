@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 import numpy as np
@@ -10,57 +9,20 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.compare import Comparison
 from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.plots.picture import (
-    BLUE,
-    GREY,
-    MOST_VECTOR_STICKS,
-    ORANGE,
-    checked_suffix,
-    name_text,
-    new_figure,
-    save,
-    styled,
-)
+from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, ORANGE, Picture, name_text, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 
 UNPAIRED = ORANGE
 _DIFFERENCES = ((1e-1, 1e3, "kHz"), (1e2, 1.0, "MHz"), (np.inf, 1e-3, "GHz"))  # largest in MHz, factor, name
 
 
-def plot_comparison(
-    comparison: Comparison,
-    path: str | os.PathLike[str],
-    *,
-    names: tuple[str, str] = ("", ""),
-    view: View = WHOLE,
-    command: str = "",
-) -> None:
-    """Draw a comparison of two line lists.
-
-    Parameters
-    ----------
-    comparison : Comparison
-        Comparison to draw, see `comparison_figure`.
-    path : path
-        A .png, .pdf or .svg file.
-    names : (str, str), optional
-        Names of the two lists.
-    view : View
-        Range of frequencies (MHz), and a title; the lists fix the vertical limits.
-    command : str, optional
-        Written into the file's metadata.
-
-    Raises
-    ------
-    ValueError
-        For another suffix.
-    """
-    checked_suffix(path)
+def picture(comparison: Comparison, *, names: tuple[str, str] = ("", ""), view: View = WHOLE) -> Picture:
+    """The picture of a comparison; view: of frequencies (MHz); the lists fix the vertical limits."""
     figure = comparison_figure(comparison, names=names)
     show_part(figure.axes[0], View(horizontal=view.horizontal), scale=1e-3)
     if view.title is not None:
         figure.axes[0].set_title(view.title, loc="left")
-    save(figure, path, view.title or " and ".join(filter(None, names)), {"command": command})
+    return Picture(figure, view.title or " and ".join(filter(None, names)))
 
 
 def comparison_figure(comparison: Comparison, *, names: tuple[str, str] = ("", "")) -> Any:

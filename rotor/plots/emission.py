@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from rotor.plots.names import SPACE, Peak, name_peaks
-from rotor.plots.picture import GREY, PALETTE, checked_suffix, legend_below, name_of_top, panel, save, styled
+from rotor.plots.picture import GREY, PALETTE, Picture, legend_below, name_of_top, panel, styled
 from rotor.plots.spectrum import UNITS, thinned
 from rotor.plots.view import Limits, View, show_part
 from rotor.quantum.quanta import line_text
@@ -20,27 +18,9 @@ LEAST_NAMED = 0.01  # relative to the brightest line; weaker lines are invisible
 MOST_TRIED = 100  # lines, from the brightest down, for which a name is tried
 
 
-def plot_emission(
-    answer: EmissionAnswer, path: str | os.PathLike[str], *, provenance: Mapping[str, Any] | None = None, **options: Any
-) -> None:
-    """Draw a spectrum of brightness temperature.
-
-    Parameters
-    ----------
-    answer : EmissionAnswer
-    path : path
-    provenance : mapping, optional
-        Written into the metadata of the file.
-    options :
-        title, unit, range_mhz, log and vertical, as in `emission_figure`.
-
-    Raises
-    ------
-    ValueError
-        For a suffix other than .png, .pdf, .svg.
-    """
-    checked_suffix(path)
-    save(emission_figure(answer, **options), path, options.get("title") or _title(answer), provenance or {})
+def picture(answer: EmissionAnswer, **options: Any) -> Picture:
+    """The picture of an answer; options: of `emission_figure`."""
+    return Picture(emission_figure(answer, **options), options.get("title") or _title(answer))
 
 
 def emission_figure(

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
 from rotor.fitting.fit import Fit
-from rotor.plots.picture import BLUE, GREY, ORANGE, checked_suffix, new_figure, save, styled
+from rotor.formats.fit_request import FitAnswer
+from rotor.plots.picture import BLUE, GREY, ORANGE, Picture, new_figure, styled
 from rotor.table import counted
 
 _HEADINGS = {
@@ -53,31 +53,13 @@ def _title(fit: Fit, title: str) -> str:
     return f"{title or fit.lines.source}: weighted rms {fit.weighted_rms:.3g}, {count}{status}"
 
 
-def plot_fit(
-    fit: Fit, path: str | os.PathLike[str], *, title: str = "", provenance: Mapping[str, Any] | None = None
-) -> None:
-    """Draw `fit_figure`, with the provenance in its metadata.
-
-    Parameters
-    ----------
-    fit : Fit
-        A finished fit.
-    path : path
-        A .png, .pdf or .svg file.
-    title : str, optional
-        Title of the picture.
-    provenance : mapping, optional
-        Content of the metadata besides constants, rms and convergence.
-
-    Raises
-    ------
-    ValueError
-        For another suffix.
-    """
-    checked_suffix(path)
-    names = fit.constants.text() if fit.constants else fit.parameters.names
-    facts = {"constants": names, "weighted_rms": fit.weighted_rms, "converged": fit.converged}
-    save(fit_figure(fit, title), path, _title(fit, title), {**(provenance or {}), **facts})
+def picture(thing: Fit | FitAnswer, *, title: str | None = None) -> Picture:
+    """The picture of a finished fit, or of the answer that has it."""
+    if isinstance(thing, FitAnswer):
+        title, thing = title or thing.request.title, thing.fit
+    names = thing.constants.text() if thing.constants else thing.parameters.names
+    facts = {"constants": names, "weighted_rms": thing.weighted_rms, "converged": thing.converged}
+    return Picture(fit_figure(thing, title or ""), _title(thing, title or ""), facts)
 
 
 def _draw(axes: Any, fit: Fit, x: np.ndarray[Any, Any]) -> None:

@@ -2,55 +2,44 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from rotor.fluids.analysis import PairDistribution
+from rotor.fluids.analysis import PairDistribution, pair_distribution
 from rotor.fluids.record import FluidRecord
-from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, checked_suffix, new_figure, save, styled
+from rotor.fluids.request import FluidAnswer
+from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, Picture, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.units import KJ_PER_MOL_EV
 
 TIME = "Time (ps)"
 
 
-def plot_fluid(
-    record: FluidRecord,
-    shells: PairDistribution | None,
-    molecules: int,
-    path: str | os.PathLike[str],
-    *,
-    title: str = "",
-    view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw a run.
+def picture(answer: FluidAnswer, *, title: str | None = None, view: View = WHOLE, centres: Any = None) -> Picture:
+    """The picture of a run; view: of times (ps) and temperatures.
 
-    Parameters
-    ----------
-    record, shells, molecules, title :
-        As in `fluid_figure`.
-    path : path
-    view : View
-        Range of times (ps) and temperatures, and another title.
-    provenance : mapping, optional
-        Written into the metadata of the file.
-
-    Raises
-    ------
-    ValueError
-        For a suffix other than .png, .pdf, .svg.
+    centres: of mass (frames, n, 3) in Å; with them, a periodic box also has its pair distribution.
     """
-    checked_suffix(path)
-    title = title if view.title is None else view.title
-    figure = fluid_figure(record, shells, molecules, title=title)
+    settings, molecules = answer.request.settings, len(np.unique(answer.atoms.arrays["molecule"]))
+    shells = None if centres is None else _shells(answer.atoms, centres)
+    default = f"{molecules} molecules, {settings.model}, {settings.ensemble}, by {answer.request.engine}"
+    if shells is not None:
+        default += f"; g(r) of {len(centres)} frame{'s' if len(centres) > 1 else ''}"
+    title = (default if title is None else title) if view.title is None else view.title
+    figure = fluid_figure(answer.record, shells, molecules, title=title)
     temperature_axes, energy_axes = (panel for panel in figure.axes if panel.get_xlabel() == TIME)
     show_part(temperature_axes, view)
     show_part(energy_axes, View(horizontal=view.horizontal))
-    save(figure, path, title, provenance or {})
+    return Picture(figure, title)
+
+
+def _shells(atoms: Any, centres: Any) -> PairDistribution | None:
+    """The pair distribution of the centres; None without a right-angled periodic box, or for a single molecule."""
+    if not (atoms.pbc.all() and atoms.cell.orthorhombic and centres.shape[1] > 1):
+        return None
+    edges = atoms.cell.lengths()
+    return pair_distribution(centres, edges, float(edges.min()) / 2, 120)
 
 
 def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules: int, *, title: str = "") -> Any:

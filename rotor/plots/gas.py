@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,15 +14,16 @@ from rotor.plots.picture import (
     GREY,
     ORANGE,
     SIZE_INCHES,
-    checked_suffix,
+    Picture,
+    name_of_top,
     name_text,
     new_figure,
-    save,
     styled,
 )
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.spectra.spectrum import Spectrum
 from rotor.statistics.equipartition import Equipartition
+from rotor.thermodynamics.classical_gas import GasAnswer
 from rotor.units import MHZ_PER_CM
 
 
@@ -60,51 +60,32 @@ def band_figure(pairs: Sequence[tuple[str, Mapping[str, Spectrum], Spectrum]], c
     return figure
 
 
-def plot_gas(
-    test: Equipartition,
-    curves: Correlations | None,
-    path: str | os.PathLike[str],
-    *,
-    title: str = "",
-    plateau: float | None = None,
-    view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw the test of equipartition and, if given, the correlation functions.
+def picture(
+    thing: GasAnswer | Correlations | Equipartition, *, title: str | None = None, view: View = WHOLE
+) -> Picture:
+    """The test of equipartition and the correlation functions of a gas, or one of them; view: of times (ps) and correlations."""
+    title = title if view.title is None else view.title
+    if isinstance(thing, GasAnswer):
+        request = thing.request
+        title = title or f"{name_of_top(request.top)}, {request.temperature_k:g} K, {request.molecules:,} molecules"
+        return Picture(_gas_figure(thing, title, view), title)
+    title = title or ""
+    if isinstance(thing, Correlations):
+        return Picture(correlation_figure({title: thing}), title)
+    return Picture(equipartition_figure({title: thing}), title)
 
-    Parameters
-    ----------
-    test : Equipartition
-        Test of all degrees of freedom.
-    curves : Correlations or None
-        C1 and C2.
-    path : path
-        A .png, .pdf or .svg file.
-    title : str, optional
-        Title of the picture.
-    plateau : float, optional
-        Final value of C1, drawn as a line.
-    view : View
-        Range of times (ps) and correlations, and another title.
-    provenance : mapping, optional
-        Written into the metadata.
 
-    Raises
-    ------
-    ValueError
-        For another suffix.
-    """
-    checked_suffix(path)
+def _gas_figure(gas: GasAnswer, title: str, view: View) -> Any:
+    test, curves = gas.test, gas.correlations
     figure, axes = _panels(1 if curves is None else 2, 2, SIZE_INCHES[1])
     with styled():
         verdict = "accepted" if test.accepted else "rejected"
         _draw_test(axes[0], test, f"Equipartition {verdict}, p = {test.p_value:.2g}")
         if curves is not None:
-            _draw_curves(axes[1], curves, "Correlation of orientation", plateau)
+            _draw_curves(axes[1], curves, "Correlation of orientation", gas.facts()["c1_plateau"])
             show_part(axes[1], view)
-        title = title if view.title is None else view.title
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
-        save(figure, path, title, provenance or {})
+    return figure
 
 
 def _panels(count: int, columns: int, height: float) -> tuple[Any, list[Any]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.plots.picture import PALETTE, SIZE_INCHES, checked_suffix, new_figure, save, styled
+from rotor.plots.picture import PALETTE, SIZE_INCHES, Picture, name_of_top, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.thermodynamics import ThermoFunctions
+from rotor.thermodynamics.request import ThermoAnswer, answer_thermo
 from rotor.version import version
 
 GREY = "#777777"
@@ -57,40 +57,24 @@ def heat_capacity_figure(panels: Sequence[Panel], columns: int = 2, view: View =
     return figure
 
 
-def plot_heat_capacity(
-    panels: Sequence[Panel],
-    path: str | os.PathLike[str],
+def picture(
+    thing: ThermoAnswer | ThermoFunctions | Sequence[Panel],
     *,
+    title: str | None = None,
     view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw `heat_capacity_figure` into a .png, .pdf or .svg file.
-
-    Parameters
-    ----------
-    panels : sequence of Panel
-        One panel each.
-    path : path
-        Its suffix selects the format.
-    view : View
-        Range of temperatures (K) and C_v/R, and whether the temperature axis is logarithmic.
-    provenance : mapping, optional
-        Content of the metadata besides program and version.
-
-    Raises
-    ------
-    ValueError
-        For another suffix, and for nothing to draw.
-    """
-    checked_suffix(path)
-    figure = heat_capacity_figure(panels, view=view)
-    curves = {panel.title: list(panel.curves) for panel in panels}
-    save(
-        figure,
-        path,
-        view.title or "heat capacity",
-        {"program": "rotor", "version": version(), "curves": curves, **(provenance or {})},
-    )
+    columns: int = 2,
+) -> Picture:
+    """The picture of heat capacities by panel, of functions, or of an answer, whose curve is computed at more temperatures."""
+    if isinstance(thing, ThermoAnswer):
+        grid = tuple(curve_temperatures(thing.functions.temperature_k).tolist())
+        thing = answer_thermo(replace(thing.request, temperatures_k=grid, pressure_bar=None)).functions
+    title = title if view.title is None else view.title
+    if isinstance(thing, ThermoFunctions):
+        label = "quantum" if thing.species == "equilibrium" else f"quantum, {thing.species}"
+        thing = [Panel(name_of_top(thing.top) if title is None else title, {label: thing})]
+    curves = {panel.title: list(panel.curves) for panel in thing}
+    facts = {"program": "rotor", "version": version(), "curves": curves}
+    return Picture(heat_capacity_figure(thing, columns, view), title or "heat capacity", facts)
 
 
 def curve_temperatures(temperatures_k: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:

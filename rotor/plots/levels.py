@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,16 +17,16 @@ from rotor.plots.picture import (
     MOST_VECTOR_STICKS,
     ORANGE,
     PALETTE,
-    checked_suffix,
+    Picture,
     legend_below,
     name_of_top,
     panel,
-    save,
     styled,
 )
 from rotor.plots.view import WHOLE, View, show_part
+from rotor.quantum.levels import Levels
 from rotor.quantum.quanta import heading, merged_text, of_rotation
-from rotor.quantum.request import SelectedLevels
+from rotor.quantum.request import LevelsAnswer, SelectedLevels
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
@@ -50,44 +48,21 @@ class _Species:
     name: str
 
 
-def plot_levels(
-    table: SelectedLevels,
-    top: Top,
-    path: str | os.PathLike[str],
+def picture(
+    thing: Levels | SelectedLevels | LevelsAnswer,
+    top: Top | None = None,
     *,
-    unit: str = "cm-1",
     title: str | None = None,
     view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw a term diagram.
-
-    Parameters
-    ----------
-    table : SelectedLevels
-        The levels, in columns of Ka (asymmetric top; Kc if nearer to oblate), of |K| (symmetric top), or of J (others).
-    top : Top
-        Its name and kind.
-    path : path
-        Its suffix selects the format.
-    unit : "MHz", "cm-1" or "K"
-        Unit of the energies, which count from the lowest existing level.
-    title : str, optional
-        Instead of name and formula.
-    view : View
-        Range of columns and energies, and another title.
-    provenance : mapping, optional
-        Content of the metadata besides program and version.
-
-    Raises
-    ------
-    ValueError
-        For another suffix, an unknown unit, or no levels.
-    """
-    checked_suffix(path)
+    **options: Any,
+) -> Picture:
+    """The term diagram of levels, or of the answer that has them; options: of `levels_figure`."""
+    if isinstance(thing, LevelsAnswer):
+        top, thing = top or thing.request.top, thing.table
+    table = SelectedLevels(thing, np.arange(len(thing))) if isinstance(thing, Levels) else thing
     title = title if view.title is None else view.title
-    figure = levels_figure(table, top, unit=unit, title=title, view=view)
-    save(figure, path, title or name_of_top(top), provenance or {})
+    figure = levels_figure(table, top, title=title, view=view, **options)
+    return Picture(figure, title or ("" if top is None else name_of_top(top)))
 
 
 def levels_figure(
@@ -99,7 +74,7 @@ def levels_figure(
     view: View = WHOLE,
     axes: Any = None,
 ) -> Any:
-    """A matplotlib figure of a term diagram; see `plot_levels`.
+    """A matplotlib figure of a term diagram: columns of Ka (asymmetric top; Kc if nearer to oblate), of |K| (symmetric top), or of J.
 
     Parameters
     ----------

@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -167,6 +168,19 @@ def legend_below(figure: Any, axes: Any, **options: Any) -> None:
         axes.legend(**options)
 
 
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A figure, and the title and facts in the metadata of its file."""
+
+    figure: Any
+    title: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
+
+    def save(self, path: str | os.PathLike[str], provenance: Mapping[str, Any] | None = None) -> None:
+        """Write a .png, .pdf or .svg file with the title, the provenance and the facts in its metadata."""
+        save(self.figure, path, self.title, {**(provenance or {}), **self.facts})
+
+
 def save(figure: Any, path: str | os.PathLike[str], title: str, facts: Mapping[str, Any]) -> None:
     """Write a figure with title and facts (as JSON) in its metadata; without a date, so that equal pictures give equal files.
 
@@ -186,28 +200,7 @@ def save(figure: Any, path: str | os.PathLike[str], title: str, facts: Mapping[s
     ValueError
         For another suffix.
     """
-    save_described(figure, path, title, json.dumps(dict(facts), ensure_ascii=False, default=str))
-
-
-def save_described(figure: Any, path: str | os.PathLike[str], title: str, description: str) -> None:
-    """Write a figure with title and description under the metadata keys of its format.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        Figure to write.
-    path : path
-        A .png, .pdf or .svg file.
-    title : str
-        Title; dollar signs of formulas are removed.
-    description : str
-        Content of the metadata.
-
-    Raises
-    ------
-    ValueError
-        For another suffix.
-    """
+    description = json.dumps(dict(facts), ensure_ascii=False, default=str)
     suffix, plain, program = checked_suffix(path), title.replace("$", ""), f"rotor {version()}"
     if suffix == ".png":
         metadata: dict[str, Any] = {"Software": program, "Title": plain, "Description": description}
@@ -246,16 +239,6 @@ def _widest(text: Any, separator: str = "\n") -> float:
     parts = text.get_text().replace(separator, "\n").split("\n")
     figure, font = text.figure, text.get_fontproperties()
     return max(float(Text(0, 0, part, fontproperties=font, figure=figure).get_window_extent().width) for part in parts)
-
-
-def joined(*facts: Mapping[str, Any] | None) -> str:
-    """Facts as one text; later facts replace earlier ones with the same name.
-
-    >>> joined({"command": "a", "jmax": 1}, {"jmax": 2}, None)
-    'command: a; jmax: 2'
-    """
-    merged = {name: value for mapping in facts for name, value in (mapping or {}).items()}
-    return "; ".join(f"{name}: {value}" for name, value in merged.items())
 
 
 def formula_text(formula: str) -> str:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.classical.free.free_motion import FreeMotion
-from rotor.plots.picture import checked_suffix, new_figure, save, styled
+from rotor.classical.tumble import PERIODS, TumbleAnswer
+from rotor.plots.picture import Picture, new_figure, styled
 from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL, draw_axes, draw_curve, draw_family, draw_sphere, view_of
 from rotor.version import version
 
@@ -83,48 +82,19 @@ def polhode_figure(
     return figure
 
 
-def plot_polhodes(
-    motion: FreeMotion,
-    times: ArrayLike,
-    path: str | os.PathLike[str],
-    *,
-    axis_names: tuple[str, str, str] = ("1", "2", "3"),
-    time_label: str = "Time",
-    time_factor: float = 1.0,
-    title: str = "",
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw `polhode_figure` into a picture, with the provenance in its metadata.
-
-    Parameters
-    ----------
-    motion : FreeMotion
-        Motion of one body, in any units.
-    times : (n,) array
-        Times in the units of the motion; only the first and last count.
-    path : path
-        A .png, .pdf or .svg file.
-    axis_names : (str, str, str), optional
-        Names of the principal axes.
-    time_label : str, optional
-        Label of the time axis.
-    time_factor : float, optional
-        Factor that converts the times to the unit of the label.
-    title : str, optional
-        Title of the picture.
-    provenance : mapping, optional
-        Entries of the metadata.
-
-    Raises
-    ------
-    ValueError
-        For a suffix other than .png, .pdf, .svg, and as `polhode_figure` does.
-    """
-    checked_suffix(path)
-    figure = polhode_figure(
-        motion, times, axis_names=axis_names, time_label=time_label, time_factor=time_factor, title=title
-    )
-    save(figure, path, title or "polhodes", {"program": "rotor", "version": version(), **(provenance or {})})
+def picture(thing: FreeMotion | TumbleAnswer, times: ArrayLike | None = None, **options: Any) -> Picture:
+    """The picture of a free motion, by default over the periods that an answer has, or of an answer; options: of `polhode_figure`."""
+    if isinstance(thing, TumbleAnswer):
+        units = thing.request.units
+        times = thing.table.times / units.time_factor if times is None else times
+        label = f"Time ({units.time})" if units.time else "Time"
+        options = {"axis_names": thing.request.axes, "time_label": label, "time_factor": units.time_factor, **options}
+        thing = thing.motion
+    if times is None:
+        period = float(thing.period)
+        times = [0.0, PERIODS * period if math.isfinite(period) else 20 * math.pi / float(thing.turning_rate)]
+    figure = polhode_figure(thing, times, **options)
+    return Picture(figure, options.get("title") or "polhodes", {"program": "rotor", "version": version()})
 
 
 def _shown(motion: FreeMotion, times: Floats) -> tuple[tuple[float, float], bool]:

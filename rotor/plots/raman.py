@@ -2,55 +2,31 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from rotor.plots.names import SPACE, Peak, name_peaks
-from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, panel, save, styled
+from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, Picture, name_of_top, panel, styled
 from rotor.plots.spectrum import MOST_DECADES, VISIBLE
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import state_text, without_nuclei
 from rotor.spectra.raman import RamanLines
+from rotor.spectra.raman_request import RamanAnswer
 
 MOST_TRIED = 100  # lines, from the strongest down, for which a name is tried
 
 
-def plot_raman(
-    lines: RamanLines,
-    path: str | os.PathLike[str],
-    *,
-    title: str | None = None,
-    view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw Raman lines as sticks at their shifts into a picture.
+def picture(
+    thing: RamanLines | RamanAnswer, *, title: str | None = None, view: View = WHOLE, axes: Any = None
+) -> Picture:
+    """The picture of Raman lines, or of the answer that has them. Lines below 0.4 % of the strongest do not stretch the axis.
 
-    Lines below 0.4 % of the strongest do not stretch the axis.
-
-    Parameters
-    ----------
-    lines : RamanLines
-        Lines to draw.
-    path : path
-        A .png, .pdf or .svg file.
-    title : str, optional
-        By default name, temperature and laser.
-    view : View
-        Shifts (cm⁻¹) and cross sections shown, another title, and whether the cross sections are on a logarithmic axis.
-    provenance : mapping, optional
-        Entries of the metadata besides version and settings.
-
-    Raises
-    ------
-    ValueError
-        For a suffix other than .png, .pdf, .svg, for an empty list, and for no line in the view.
+    title: by default name, temperature and laser. view: of shifts (cm⁻¹) and cross sections.
     """
-    checked_suffix(path)
+    lines = thing.lines if isinstance(thing, RamanAnswer) else thing
     title = title if view.title is None else view.title
-    save(raman_figure(lines, title, view), path, title or _title(lines), {**(provenance or {}), **_facts(lines)})
+    return Picture(raman_figure(lines, title, view, axes), title or _title(lines), _facts(lines))
 
 
 def raman_figure(lines: RamanLines, title: str | None = None, view: View = WHOLE, axes: Any = None) -> Any:

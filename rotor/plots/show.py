@@ -1,56 +1,37 @@
-"""`rotor.plot`: a matplotlib figure of any result of the package, for notebooks, or a picture in a file."""
+"""`rotor.plot`: a matplotlib figure of any result of the package, for notebooks, or a picture in a file.
+
+A module of this folder has a function `picture`, which draws the objects of its classes.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from functools import singledispatch
+from collections.abc import Mapping
+from importlib import import_module
 from typing import Any
 
-import numpy as np
+from rotor.plots.picture import Picture, checked_suffix, users_style, wrap_titles
 
-from rotor.alignment.align import AlignmentTrace
-from rotor.alignment.request import AlignAnswer
-from rotor.assignment.answer import AssignAnswer
-from rotor.classical.free.free_motion import FreeMotion
-from rotor.classical.gas.ensembles import Correlations
-from rotor.classical.tumble import PERIODS, TumbleAnswer
-from rotor.fitting.fit import Fit
-from rotor.fluids.request import FluidAnswer
-from rotor.formats.fit_request import FitAnswer
-from rotor.formats.spcat.compare import Comparison
-from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.formats.structure_request import StructureAnswer
-from rotor.plots.picture import name_text, save, users_style, wrap_titles
-from rotor.quantum.fields.field_map import FieldMap
-from rotor.quantum.fields.stark_request import StarkAnswer
-from rotor.quantum.fields.zeeman_request import ZeemanAnswer
-from rotor.quantum.levels import Levels
-from rotor.quantum.request import LevelsAnswer, SelectedLevels
-from rotor.spectra.emission_request import EmissionAnswer
-from rotor.spectra.lines import Lines
-from rotor.spectra.raman import RamanLines
-from rotor.spectra.raman_request import RamanAnswer
-from rotor.spectra.request import SpectrumAnswer
-from rotor.spectra.spectrum import Spectrum
-from rotor.statistics.equipartition import Equipartition
-from rotor.thermodynamics.classical_gas import GasAnswer
-from rotor.thermodynamics.functions import ThermoFunctions
-from rotor.thermodynamics.request import ThermoAnswer
-from rotor.thermodynamics.torsion_request import TorsionAnswer
-
-ONE_PANEL = (
-    Lines,
-    Spectrum,
-    SpectrumAnswer,
-    RamanLines,
-    RamanAnswer,
-    SelectedLevels,
-    Levels,
-    LevelsAnswer,
-    EmissionAnswer,
-    Catalogue,
-)
+MODULES = {
+    "alignment": ("AlignmentTrace", "AlignAnswer"),
+    "assign": ("AssignAnswer",),
+    "catalogue": ("Catalogue",),
+    "comparison": ("Comparison",),
+    "emission": ("EmissionAnswer",),
+    "fit": ("Fit", "FitAnswer"),
+    "fluid": ("FluidAnswer",),
+    "gas": ("GasAnswer", "Correlations", "Equipartition"),
+    "heat_capacity": ("ThermoAnswer", "ThermoFunctions"),
+    "levels": ("LevelsAnswer", "SelectedLevels", "Levels"),
+    "polhodes": ("TumbleAnswer", "FreeMotion"),
+    "raman": ("RamanAnswer", "RamanLines"),
+    "spectrum": ("SpectrumAnswer", "Spectrum", "Lines"),
+    "stark": ("StarkAnswer", "FieldMap", "FieldLines"),
+    "structure": ("StructureAnswer",),
+    "torsion": ("TorsionAnswer",),
+    "zeeman": ("ZeemanAnswer",),
+}  # classes by the module that draws them; a module is imported when it draws
+ONE_PANEL = ("catalogue", "emission", "levels", "raman", "spectrum")  # modules that draw on axes of the user
 
 
 def plot(
@@ -95,208 +76,46 @@ def plot(
     >>> figure.axes[0].get_xlabel()
     'Frequency (GHz)'
     """
+    module = _module_of(thing)
+    if path is not None:
+        checked_suffix(path)
     if ax is not None:
-        if not isinstance(thing, ONE_PANEL):
-            accepted = ", ".join(sorted(kind.__name__ for kind in ONE_PANEL))
+        if module not in ONE_PANEL:
+            accepted = ", ".join(sorted(kind for name in ONE_PANEL for kind in MODULES[name]))
             raise ValueError(
                 f"ax: the picture of a {type(thing).__name__} needs a figure of its own; ax is accepted for {accepted}"
             )
         options["axes"] = ax
     with users_style(style):
-        figure = _figure(thing, **options)
+        picture = _draw(module, thing, **options)
         if ax is None:
-            wrap_titles(figure)
+            wrap_titles(picture.figure)
         if path is not None:
-            save(figure, path, type(thing).__name__, {})
-    return figure
+            picture.save(path)
+    return picture.figure
 
 
-@singledispatch
-def _figure(thing: Any, **options: Any) -> Any:
-    drawable = ", ".join(sorted(kind.__name__ for kind in _figure.registry if kind is not object))
+def write_picture(
+    thing: Any, path: str | os.PathLike[str], provenance: Mapping[str, Any] | None = None, **options: Any
+) -> None:
+    """Draw an object into a .png, .pdf or .svg file, with the provenance in its metadata.
+
+    Raises ValueError for another suffix, and as `plot` does.
+    """
+    checked_suffix(path)
+    _draw(_module_of(thing), thing, **options).save(path, provenance)
+
+
+def _module_of(thing: Any) -> str:
+    """The module that draws an object."""
+    for kind in type(thing).__mro__:
+        for module, names in MODULES.items():
+            if kind.__name__ in names:
+                return module
+    drawable = ", ".join(sorted(name for names in MODULES.values() for name in names))
     raise ValueError(f"there is no picture of a {type(thing).__name__}; there are pictures of {drawable}")
 
 
-@_figure.register(Lines)
-@_figure.register(Spectrum)
-def _(thing: Lines | Spectrum, **options: Any) -> Any:
-    from rotor.plots.spectrum import spectrum_figure
-
-    return spectrum_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: SpectrumAnswer, **options: Any) -> Any:
-    return _figure(thing.lines if thing.request.shape == "sticks" else thing.spectrum, **options)
-
-
-@_figure.register
-def _(thing: RamanLines, **options: Any) -> Any:
-    from rotor.plots.raman import raman_figure
-
-    return raman_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: SelectedLevels, **options: Any) -> Any:
-    from rotor.plots.levels import levels_figure
-
-    return levels_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: Levels, **options: Any) -> Any:
-    return _figure(SelectedLevels(thing, np.arange(len(thing))), **options)
-
-
-@_figure.register
-def _(thing: LevelsAnswer, **options: Any) -> Any:
-    return _figure(thing.table, **({"top": thing.request.top} | options))
-
-
-@_figure.register
-def _(thing: FreeMotion, **options: Any) -> Any:
-    from rotor.plots.polhodes import polhode_figure
-
-    span = PERIODS * float(thing.period) if np.isfinite(thing.period) else 20 * np.pi / float(thing.turning_rate)
-    return polhode_figure(thing, **({"times": [0.0, span]} | options))
-
-
-@_figure.register
-def _(thing: TumbleAnswer, **options: Any) -> Any:
-    units = thing.request.units
-    shown = {
-        "times": thing.table.times / units.time_factor,
-        "axis_names": thing.request.axes,
-        "time_label": f"Time ({units.time})" if units.time else "Time",
-        "time_factor": units.time_factor,
-    }
-    return _figure(thing.motion, **(shown | options))
-
-
-@_figure.register
-def _(thing: ThermoFunctions, **options: Any) -> Any:
-    from rotor.plots.heat_capacity import Panel, heat_capacity_figure
-    from rotor.plots.picture import name_of_top
-
-    label = "quantum" if thing.species == "equilibrium" else f"quantum, {thing.species}"
-    return heat_capacity_figure([Panel(name_of_top(thing.top), {label: thing})], **options)
-
-
-@_figure.register
-def _(thing: Correlations, **options: Any) -> Any:
-    from rotor.plots.gas import correlation_figure
-
-    return correlation_figure({options.pop("title", ""): thing}, **options)
-
-
-@_figure.register
-def _(thing: Equipartition, **options: Any) -> Any:
-    from rotor.plots.gas import equipartition_figure
-
-    return equipartition_figure({options.pop("title", ""): thing}, **options)
-
-
-@_figure.register
-def _(thing: Catalogue, **options: Any) -> Any:
-    from rotor.plots.catalogue import catalogue_figure
-
-    return catalogue_figure(thing, **options)
-
-
-def _drawn_by_attribute(attribute: str) -> Callable[..., Any]:
-    """A function that draws an attribute of an answer instead of the answer."""
-
-    def figure(thing: Any, **options: Any) -> Any:
-        return _figure(getattr(thing, attribute), **options)
-
-    return figure
-
-
-@_figure.register
-def _(thing: EmissionAnswer, **options: Any) -> Any:
-    from rotor.plots.emission import emission_figure
-
-    return emission_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: FieldMap, **options: Any) -> Any:
-    from rotor.plots.stark import stark_figure
-
-    return stark_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: AlignmentTrace, **options: Any) -> Any:
-    from rotor.plots.alignment import alignment_figure
-
-    return alignment_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: AlignAnswer, **options: Any) -> Any:
-    return _figure(thing.trace, **({"classical": thing.classical} | options))
-
-
-@_figure.register
-def _(thing: Comparison, **options: Any) -> Any:
-    from rotor.plots.comparison import comparison_figure
-
-    return comparison_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: GasAnswer, **options: Any) -> Any:
-    return _figure(thing.test if thing.correlations is None else thing.correlations, **options)
-
-
-@_figure.register
-def _(thing: FluidAnswer, **options: Any) -> Any:
-    from rotor.plots.fluid import fluid_figure
-
-    molecules = len(np.unique(thing.atoms.arrays["molecule"]))
-    return fluid_figure(thing.record, None, molecules, **options)
-
-
-@_figure.register
-def _(thing: ZeemanAnswer, **options: Any) -> Any:
-    from rotor.plots.zeeman import zeeman_figure
-
-    return zeeman_figure(thing.states, spins=len(thing.request.spin_g), **options)
-
-
-@_figure.register
-def _(thing: Fit, **options: Any) -> Any:
-    from rotor.plots.fit import fit_figure
-
-    return fit_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: AssignAnswer, **options: Any) -> Any:
-    from rotor.plots.assign import assignment_figure
-
-    return assignment_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: TorsionAnswer, **options: Any) -> Any:
-    from rotor.plots.torsion import torsion_figure
-
-    return torsion_figure(thing, **options)
-
-
-@_figure.register
-def _(thing: StructureAnswer, **options: Any) -> Any:
-    from rotor.plots.structure import structure_figure
-
-    molecule, values, method = thing.geometry
-    title = f"{name_text(thing.request.file.family.name)}, {method}"
-    return structure_figure(molecule, **({"values": values, "title": title} | options))
-
-
-_figure.register(FitAnswer, _drawn_by_attribute("fit"))
-_figure.register(StarkAnswer, _drawn_by_attribute("states"))
-_figure.register(RamanAnswer, _drawn_by_attribute("lines"))
-_figure.register(ThermoAnswer, _drawn_by_attribute("functions"))
+def _draw(module: str, thing: Any, **options: Any) -> Picture:
+    picture: Picture = import_module(f"rotor.plots.{module}").picture(thing, **options)
+    return picture

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +12,11 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_one_of
 from rotor.plots.names import leave_or_remove
-from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, checked_suffix, name_of_top, panel, save, styled
+from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, Picture, name_of_top, panel, styled
 from rotor.plots.view import Limits, View, show_part
 from rotor.quantum.quanta import line_text, of_rotation
 from rotor.spectra.lines import Lines
+from rotor.spectra.request import SpectrumAnswer
 from rotor.spectra.spectrum import Spectrum, line_widths
 from rotor.units import MHZ_PER_CM
 
@@ -43,40 +42,13 @@ class _Axis:
         return (frequency_mhz >= self.first) & (frequency_mhz <= self.last)
 
 
-def plot_spectrum(
-    thing: Lines | Spectrum,
-    path: str | os.PathLike[str],
-    *,
-    range_mhz: tuple[float, float] | None = None,
-    title: str | None = None,
-    labels: int = 12,
-    unit: str | None = None,
-    log: bool | None = None,
-    vertical: Limits | None = None,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw lines as sticks, or a spectrum as a curve, into a .png, .pdf or .svg file.
-
-    Parameters
-    ----------
-    thing, range_mhz, title, labels, unit, log, vertical :
-        As in `spectrum_figure`.
-    path : path
-        Its suffix chooses the format.
-    provenance : mapping, optional
-        Entries of the metadata besides version, constants and settings.
-
-    Raises
-    ------
-    ValueError
-        For a suffix other than .png, .pdf, .svg, a spectrum without lines or with nothing in the range, an unknown unit.
-    """
-    checked_suffix(path)
-    figure = spectrum_figure(
-        thing, range_mhz=range_mhz, title=title, labels=labels, unit=unit, log=log, vertical=vertical
-    )
+def picture(thing: Lines | Spectrum | SpectrumAnswer, **options: Any) -> Picture:
+    """The picture of lines, of a spectrum, or of the answer that has them; options: of `spectrum_figure`."""
+    if isinstance(thing, SpectrumAnswer):
+        thing = thing.lines if thing.request.shape == "sticks" else thing.spectrum
     lines = thing if isinstance(thing, Lines) else thing.lines
-    save(figure, path, title or _title(thing, lines), {**(provenance or {}), **_facts(thing, lines)})
+    figure = spectrum_figure(thing, **options)
+    return Picture(figure, options.get("title") or _title(thing, lines), _facts(thing, lines))
 
 
 def spectrum_figure(

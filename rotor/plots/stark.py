@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.plots.picture import GREY, PALETTE, checked_suffix, joined, new_figure, save_described, styled
+from rotor.plots.picture import GREY, PALETTE, Picture, name_of_top, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.stark_request import StarkAnswer
 from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 
@@ -59,41 +58,16 @@ def stark_figure(field_map: FieldMap, title: str = "", unit: str = "kV/cm", view
     return figure
 
 
-def plot_stark(
-    field_map: FieldMap,
-    path: str | os.PathLike[str],
-    *,
-    title: str = "",
-    unit: str = "kV/cm",
-    view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw `stark_figure` into a .png, .pdf or .svg file.
-
-    Parameters
-    ----------
-    field_map : FieldMap
-        A map of at least two fields.
-    path : path
-        Its suffix chooses the format.
-    title : str
-        Title of the picture.
-    unit : str
-        Unit of the field.
-    view : View
-        Fields and energies (cm⁻¹) shown, and another title.
-    provenance : mapping, optional
-        Further entries of the metadata.
-
-    Raises
-    ------
-    ValueError
-        For a map of one field, and for a suffix other than .png, .pdf, .svg.
-    """
-    checked_suffix(path)
-    title = title if view.title is None else view.title
-    figure = stark_figure(field_map, title, unit, view)
-    save_described(figure, path, title, joined(provenance, field_map.provenance))
+def picture(
+    thing: FieldMap | StarkAnswer | FieldLines, *, title: str | None = None, view: View = WHOLE, **options: Any
+) -> Picture:
+    """The picture of a map, of the answer that has it, or of lines in a field; options: of `stark_figure`."""
+    if isinstance(thing, StarkAnswer):
+        title, thing = title or name_of_top(thing.request.top), thing.states
+    title = (title or "") if view.title is None else view.title
+    if isinstance(thing, FieldLines):
+        return Picture(lobes_figure(thing, title), title, thing.provenance)
+    return Picture(stark_figure(thing, title, view=view, **options), title, thing.provenance)
 
 
 def _energies(axes: Any, field_map: FieldMap, view: View) -> None:
@@ -228,33 +202,3 @@ def lobes_figure(lines: FieldLines, title: str = "") -> Any:
         axes.set_title(f"{title}, light {lines.light}: full ΔM = 0, dashed ΔM = ±1".strip(", "), loc="left", fontsize=9)
         axes.legend(frameon=False, fontsize=8)
     return figure
-
-
-def plot_lobes(
-    lines: FieldLines,
-    path: str | os.PathLike[str],
-    *,
-    title: str = "",
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw `lobes_figure` into a .png, .pdf or .svg file.
-
-    Parameters
-    ----------
-    lines : FieldLines
-        Lines at two fields or more.
-    path : path
-        Its suffix chooses the format.
-    title : str
-        Title of the picture.
-    provenance : mapping, optional
-        Further entries of the metadata.
-
-    Raises
-    ------
-    ValueError
-        For lines at one field, and for a suffix other than .png, .pdf, .svg.
-    """
-    checked_suffix(path)
-    figure = lobes_figure(lines, title)
-    save_described(figure, path, title, joined(provenance, lines.provenance))

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.formats.structure_request import StructureAnswer
 from rotor.molecules.molecule import Molecule
-from rotor.plots.picture import GREY, checked_suffix, formula_text, new_figure, save, styled
+from rotor.plots.picture import GREY, Picture, formula_text, name_text, new_figure, styled
 from rotor.structures.coordinates import bonded
 from rotor.structures.substitution import Value
 
@@ -57,39 +57,13 @@ def structure_figure(molecule: Molecule, *, values: Sequence[Value] = (), title:
     return figure
 
 
-def plot_structure(
-    molecule: Molecule,
-    path: str | os.PathLike[str],
-    *,
-    values: Sequence[Value] = (),
-    title: str = "",
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw `structure_figure` into a picture, with the provenance in its metadata.
-
-    Parameters
-    ----------
-    molecule : Molecule
-        Positions in Å.
-    path : path
-        A .png, .pdf or .svg file.
-    values : sequence of Value, optional
-        Distances and angles with their errors.
-    title : str, optional
-        Title of the picture.
-    provenance : mapping, optional
-        Entries of the metadata besides the atoms.
-
-    Raises
-    ------
-    ValueError
-        For a suffix other than .png, .pdf, .svg.
-    """
-    checked_suffix(path)
+def picture(answer: StructureAnswer, *, title: str | None = None) -> Picture:
+    """The picture of the geometry that the last method gave, with its bonds."""
+    molecule, values, method = answer.geometry
+    title = title or f"{name_text(answer.request.file.family.name)}, {method}"
     places = np.round(molecule.positions_angstrom, 6).tolist()
     atoms = [[symbol, *place] for symbol, place in zip(molecule.symbols, places, strict=True)]
-    figure = structure_figure(molecule, values=values, title=title)
-    save(figure, path, title, {**(provenance or {}), "atoms": atoms})
+    return Picture(structure_figure(molecule, values=values, title=title), title, {"atoms": atoms})
 
 
 def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: int, up: int) -> None:

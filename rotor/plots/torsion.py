@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from rotor import units
-from rotor.plots.picture import GREY, PALETTE, SIZE_INCHES, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.picture import GREY, PALETTE, SIZE_INCHES, Picture, name_of_top, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.thermodynamics.torsion_request import TorsionAnswer
 from rotor.version import version
@@ -19,17 +17,10 @@ AMPLITUDE = 0.55  # greatest amplitude of a wave function, relative to the small
 MOST_DRAWN = 12
 
 
-def plot_torsion(
-    answer: TorsionAnswer,
-    path: str | os.PathLike[str],
-    *,
-    view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw `torsion_figure` into a .png, .pdf or .svg file; ValueError for another suffix."""
-    checked_suffix(path)
+def picture(answer: TorsionAnswer, *, view: View = WHOLE) -> Picture:
+    """The picture of a torsion."""
     facts = {"program": "rotor", "version": version(), "bond": answer.request.bond, "potential": answer.source}
-    save(torsion_figure(answer, view), path, view.title or _title(answer), {**facts, **(provenance or {})})
+    return Picture(torsion_figure(answer, view), view.title or _title(answer), facts)
 
 
 def torsion_figure(answer: TorsionAnswer, view: View = WHOLE) -> Any:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from rotor.plots.picture import checked_suffix, joined, new_figure, save_described, styled
+from rotor.plots.picture import Picture, name_of_top, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.field_map import FieldMap
+from rotor.quantum.fields.zeeman_request import ZeemanAnswer
 
 PANELS = 9  # at most; further levels are left out
 PANEL_INCHES = (2.6, 2.3)
@@ -59,41 +58,11 @@ def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0, view: Vi
     return figure
 
 
-def plot_zeeman(
-    field_map: FieldMap,
-    path: str | os.PathLike[str],
-    *,
-    title: str = "",
-    spins: int = 0,
-    view: View = WHOLE,
-    provenance: Mapping[str, Any] | None = None,
-) -> None:
-    """Draw `zeeman_figure` into a .png, .pdf or .svg file.
-
-    Parameters
-    ----------
-    field_map : FieldMap
-        A map of at least two fields.
-    path : path
-        Its suffix chooses the format.
-    title : str
-        Title of the picture.
-    spins : int
-        Number of spins, whose quantum numbers end each label.
-    view : View
-        Fields (T) and shifts (MHz) shown, and another title.
-    provenance : mapping, optional
-        Further entries of the metadata.
-
-    Raises
-    ------
-    ValueError
-        For a map of one field, and for a suffix other than .png, .pdf, .svg.
-    """
-    checked_suffix(path)
-    title = title if view.title is None else view.title
-    figure = zeeman_figure(field_map, title, spins, view)
-    save_described(figure, path, title, joined(provenance, field_map.provenance))
+def picture(answer: ZeemanAnswer, *, title: str | None = None, view: View = WHOLE) -> Picture:
+    """The picture of an answer."""
+    title = (title or name_of_top(answer.request.top)) if view.title is None else view.title
+    states = answer.states
+    return Picture(zeeman_figure(states, title, len(answer.request.spin_g), view), title, states.provenance)
 
 
 def _levels(field_map: FieldMap, spins: int) -> dict[str, list[slice]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.alignment.pulse import SHAPES, Axis, Pulse, read_axis
@@ -15,7 +14,7 @@ from rotor.requests.fill import Entries, read_fields
 from rotor.table import counted
 from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Extra, Output, Report, Subject, Verb, tables
+from rotor.verbs.verb import Extra, Report, Subject, Verb, picture, tables
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
@@ -145,24 +144,6 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:
     return AlignRequest(**subject.values, **values)
 
 
-def draw(answer: AlignAnswer, path: Path, report: Report) -> None:
-    """Draw the cosines against time."""
-    from rotor.plots.alignment import plot_alignment
-    from rotor.plots.picture import name_of_top
-
-    trace, view = answer.trace, report.view
-    title = ", ".join(filter(None, (name_of_top(trace.top), _ensemble_text(trace))))
-    plot_alignment(trace, path, classical=answer.classical, title=title, view=view, provenance=report.command)
-
-
-def _ensemble_text(trace: AlignmentTrace) -> str:
-    ensemble = trace.ensemble
-    if ensemble.chosen is None:
-        return f"{ensemble.temperature_k:g} K, {trace.states} states up to J = {ensemble.jmax}"
-    level = ", ".join(f"{name} = {value}" for name, value in ensemble.chosen.items())
-    return f"level {level}, " + ("all M" if ensemble.m is None else f"|M| = {ensemble.m}")
-
-
 def show(answer: AlignAnswer, report: Report) -> Iterable[Part | None]:
     """Conditions, extremes of the cosines, sources and errors."""
     trace, content = answer.trace, report.content
@@ -194,7 +175,7 @@ def _facts(trace: AlignmentTrace, content: Mapping[str, Any]) -> list[tuple[str,
     return [
         *facts,
         ("pulses", "; ".join(_pulse_text(pulse) for pulse in trace.pulses)),
-        ("gas", _ensemble_text(trace)),
+        ("gas", trace.gas_text),
         ("J max", str(trace.jmax)),
         ("method", f"{trace.method}, {counted(sum(trace.steps), 'step')}"),
         ("numerical error", accuracy),
@@ -224,7 +205,7 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the cosines", "out"),
-        Output("plot", PICTURES, "Draw the cosines (.png, .pdf, .svg)", draw, "out.png"),
+        picture("Draw the cosines", "out.png"),
     ),
     subject=OneMolecule(("dipole", "calculator", "hessian", "spin_constants", "spins", *STATES), prepare),
     drawn="ps",

@@ -17,7 +17,7 @@ from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom, Range, Text
 from rotor.verbs.subjects import saved_inputs
-from rotor.verbs.verb import PICTURES, Output, Place, Report, Subject, SubjectKind, Verb
+from rotor.verbs.verb import Output, Place, Report, Subject, SubjectKind, Verb, picture
 
 EXAMPLES = """\b
 Examples:
@@ -92,13 +92,6 @@ class SpectrumFile(SubjectKind):
         if not isinstance(subject.molecules[0].source, str):
             raise ValueError("a scene cannot hold the numbers of a spectrum; give a file")
         return saved_inputs(subject.molecules[0], folder)
-
-
-def draw(answer: AssignAnswer, path: Path, report: Report) -> None:
-    """Draw peaks, predictions and residual peaks."""
-    from rotor.plots.assign import plot_assignment
-
-    plot_assignment(answer, path, view=report.view, provenance=report.command)
 
 
 def write_lines(answer: AssignAnswer, path: Path, report: Report) -> None:
@@ -195,7 +188,7 @@ VERB = Verb(
             write_lines,
             "found.lin",
         ),
-        Output("plot", PICTURES, "Draw peaks, predictions and what is left (.png, .pdf, .svg)", draw, "found.png"),
+        picture("Draw peaks, predictions and what is left", "found.png"),
     ),
     subject=SpectrumFile(),
     drawn="MHz",

@@ -21,7 +21,7 @@ from rotor.verbs.comparing import (
     temperature_note,
 )
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Work, tables
+from rotor.verbs.verb import ErrorsShown, Output, Report, Work, draw_answer, picture, tables
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.text.catalogue import Catalogue
@@ -91,16 +91,12 @@ def write_lines(answer: CatAnswer, path: Path, report: Report) -> None:
 
 def draw(answer: CatAnswer, path: Path, report: Report) -> None:
     """Draw the lines with measured ones in another colour; for a comparison, both lists and the differences."""
-    name, command = Path(answer.request.file).name, str(report.content["command"])
-    if answer.compared is not None:
-        from rotor.plots.comparison import plot_comparison
-
+    name = Path(answer.request.file).name
+    if answer.compared is None:
+        draw_answer(answer.lines, path, report, title=name)
+    else:
         names = name, Path(report.content["compared"]["other"]).name
-        plot_comparison(answer.compared.comparison, path, names=names, view=report.view, command=command)
-        return
-    from rotor.plots.catalogue import plot_catalogue
-
-    plot_catalogue(answer.lines, path, title=name, view=report.view, command=command)
+        draw_answer(answer.compared.comparison, path, report, names=names)
 
 
 def json_of(answer: CatAnswer, content: Mapping[str, Any]) -> str:
@@ -170,7 +166,7 @@ VERB = Tool(
     outputs=(
         Output("out", (".cat", ".cat.gz"), "Write the lines that are left (.cat, .cat.gz)", write_lines),
         *tables("the lines that are left", "lines"),
-        Output("plot", PICTURES, "Draw the lines (.png, .pdf, .svg)", draw),
+        picture("Draw the lines", draw=draw),
     ),
     notes=lambda answer: temperature_note(answer.compared),
     nothing=lambda answer: "" if len(answer.lines) else "no lines are left to draw",

@@ -35,7 +35,7 @@ from rotor.verbs.molecule import (
 from rotor.verbs.observed_file import SeveralInput, is_catalogue
 from rotor.verbs.subjects import beside, saved_molecule
 from rotor.verbs.tables import defined, described, entries_of
-from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb, tables
+from rotor.verbs.verb import Output, Place, Report, Shown, Subject, SubjectKind, Verb, picture, tables
 
 if TYPE_CHECKING:
     from rotor.spectra.emitters import CatalogueLines
@@ -206,13 +206,6 @@ class EmissionShown(Shown):
     top_lines: int = declared(20, Whole(0), "Number of brightest lines shown", option="--top", panel=OUTPUT)
 
 
-def draw(answer: EmissionAnswer, path: Path, report: Report) -> None:
-    """Draw the brightness temperature of all molecules."""
-    from rotor.plots.emission import plot_emission
-
-    plot_emission(answer, path, provenance=dict(report.provenance), **report.view)
-
-
 def show(answer: EmissionAnswer, report: Report) -> Iterable[Part | None]:
     """The source, the molecules and the brightest lines."""
     request, lines = answer.request, answer.lines
@@ -322,7 +315,7 @@ VERB = Verb(
             example="profile.csv",
             of=lambda answer: answer.spectrum,
         ),
-        Output("plot", PICTURES, "Draw T_B of all molecules (.png, .pdf, .svg)", draw, "emission.png"),
+        picture("Draw T_B of all molecules", "emission.png"),
     ),
     subject=SeveralMolecules(),
     shown=EmissionShown,

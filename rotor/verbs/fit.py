@@ -27,7 +27,7 @@ from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Flag, NameList, Text, Whole
 from rotor.table import Table as Columns
 from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
-from rotor.verbs.verb import PICTURES, ErrorsShown, Extra, Output, Report, Verb, Work, tables
+from rotor.verbs.verb import ErrorsShown, Extra, Output, Report, Verb, Work, picture, tables
 
 if TYPE_CHECKING:
     from rotor.fitting.choose import Suggestion, Trial
@@ -184,13 +184,6 @@ def write_lines(answer: FitAnswer, path: Path, report: Report) -> None:
     write_assigned_lines(answer.fit.marked_lines, path)
 
 
-def draw(answer: FitAnswer, path: Path, report: Report) -> None:
-    """Draw the residuals."""
-    from rotor.plots.fit import plot_fit
-
-    plot_fit(answer.fit, path, title=answer.request.title, provenance=report.command)
-
-
 def content(answer: FitAnswer, shown: FitShown) -> dict[str, Any]:
     """Constants, correlations, lines and analyses, by the keys of docs/verbs."""
     from rotor.formats.fit_further import trial_record
@@ -337,7 +330,7 @@ VERB = Verb(
                lambda answer, path, _: write_fitted_par(answer, path, variances=True), "out.var"),
         Output("table", (".txt", ".md", ".tex"), "Write a table for a publication", write_table, "table.tex"),
         Output("save_lines", (".lin", ".csv"), "Write the assigned lines, merged", write_lines, "all.lin"),
-        Output("plot", PICTURES, "Draw the residuals against frequency, J and K (.png, .pdf, .svg)", draw, "rest.png"),
+        picture("Draw the residuals against frequency, J and K", "rest.png"),
     ),
     subject=MeasuredLines(),
     shown=FitShown,

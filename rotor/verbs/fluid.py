@@ -22,7 +22,7 @@ from rotor.requests.fill import Entries, read_fields, read_instance, written_fie
 from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
 from rotor.verbs.subjects import beside
-from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, SubjectKind, Verb, Work
+from rotor.verbs.verb import Output, Place, Report, Shown, Subject, SubjectKind, Verb, Work, draw_answer, picture
 
 if TYPE_CHECKING:
     from ase import Atoms
@@ -282,19 +282,8 @@ def _centres(answer: FluidAnswer, frames: str | None) -> Floats:
 
 def draw(answer: FluidAnswer, path: Path, report: Report) -> None:
     """Draw temperatures, energy and the pair distribution."""
-    from rotor.fluids.analysis import pair_distribution
-    from rotor.plots.fluid import plot_fluid
-
     assert isinstance(answer, DrawnFluid)
-    centres, atoms, settings = answer.centres, answer.atoms, answer.request.settings
-    edges = atoms.cell.lengths()
-    shells = None
-    if atoms.pbc.all() and atoms.cell.orthorhombic and centres.shape[1] > 1:
-        shells = pair_distribution(centres, edges, float(edges.min()) / 2, 120)
-    title = f"{centres.shape[1]} molecules, {settings.model}, {settings.ensemble}, by {answer.request.engine}"
-    if shells is not None:
-        title += f"; g(r) of {len(centres)} frame{'s' if len(centres) > 1 else ''}"
-    plot_fluid(answer.record, shells, centres.shape[1], path, title=title, view=report.view, provenance=report.command)
+    draw_answer(answer, path, report, centres=answer.centres)
 
 
 def _thermometer_error(content: Mapping[str, Any], settings: Settings) -> str:
@@ -381,7 +370,7 @@ VERB = Verb(
             example="run.npz",
             grows=True,
         ),
-        Output("plot", PICTURES, "Draw temperatures, energy and g(r) (.png, .pdf, .svg)", draw, "run.png"),
+        picture("Draw temperatures, energy and g(r)", "run.png", draw),
     ),
     subject=Box(),
     shown=FluidShown,

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
@@ -17,7 +16,7 @@ from rotor.requests.fill import Entries
 from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
 from rotor.verbs.molecule import STATES
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Verb, Work, tables
+from rotor.verbs.verb import Report, Verb, Work, picture, tables
 
 if TYPE_CHECKING:
     from rotor.classical.gas.ensembles import Correlations
@@ -44,17 +43,6 @@ def answer(request: GasRequest, work: Work) -> GasAnswer:
     bar = counting(request.molecules, "molecules") if work.progress else nullcontext()
     with ThreadPoolExecutor(os.cpu_count()) as pool, bar as advance:
         return answer_gas(request, pool, advance)
-
-
-def draw(answer: GasAnswer, path: Path, report: Report) -> None:
-    """Draw the test and the correlation functions."""
-    from rotor.plots.gas import plot_gas
-    from rotor.plots.picture import name_of_top
-
-    content, view = report.content, report.view
-    title = f"{name_of_top(answer.request.top)}, {content['temperature_k']:g} K, {content['molecules']:,} molecules"
-    plateau, record = content["c1_plateau"], dict(report.provenance)
-    plot_gas(answer.test, answer.correlations, path, title=title, plateau=plateau, view=view, provenance=record)
 
 
 def show(answer: GasAnswer, report: Report) -> Iterable[Part | None]:
@@ -122,7 +110,7 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the correlation functions", "out"),
-        Output("plot", PICTURES, "Draw the test and the functions (.png, .pdf, .svg)", draw, "out.png"),
+        picture("Draw the test and the functions", "out.png"),
     ),
     subject=OneMolecule(
         (

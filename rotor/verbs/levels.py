@@ -15,7 +15,7 @@ from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Text, Whole, whole_range
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Extra, Output, Report, Shown, Verb, tables
+from rotor.verbs.verb import Extra, Output, Report, Shown, Verb, draw_answer, picture, tables
 
 COLUMNS = {
     "MHz": ("energy_mhz", "{energy:.4f}"),
@@ -54,10 +54,7 @@ def _span(name: str) -> Any:
 
 def draw(answer: LevelsAnswer, path: Path, report: Report) -> None:
     """Draw the term diagram."""
-    from rotor.plots.levels import plot_levels
-
-    unit = report.shown.unit
-    plot_levels(answer.table, answer.request.top, path, unit=unit, view=report.view, provenance=dict(report.provenance))
+    draw_answer(answer, path, report, unit=report.shown.unit)
 
 
 def show(answer: LevelsAnswer, report: Report) -> Iterable[Part | None]:
@@ -140,7 +137,7 @@ VERB = Verb(
     outputs=(
         *tables("all levels", "levels"),
         Output("egy", (".egy",), "Write all levels as SPCAT's list (.egy)", example="levels.egy"),
-        Output("plot", PICTURES, "Draw the term diagram (.png, .pdf, .svg)", draw, "levels.png"),
+        picture("Draw the term diagram", "levels.png", draw),
     ),
     subject=OneMolecule(("dipole", "dipole_abc", "polarizability", "anisotropy", "state_dipoles")),
     shown=LevelsShown,

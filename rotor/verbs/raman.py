@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
@@ -16,7 +15,7 @@ from rotor.requests.readers import Whole
 from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
 from rotor.verbs.molecule import with_known_polarizability
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, tables
+from rotor.verbs.verb import Report, Shown, Verb, picture, tables
 
 if TYPE_CHECKING:
     from rotor.spectra.raman import RamanLines
@@ -34,13 +33,6 @@ class RamanShown(Shown):
     """Display options of `raman`."""
 
     top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
-
-
-def draw(answer: RamanAnswer, path: Path, report: Report) -> None:
-    """Draw the lines."""
-    from rotor.plots.raman import plot_raman
-
-    plot_raman(answer.lines, path, view=report.view, provenance=report.command)
 
 
 def content(answer: RamanAnswer, shown: RamanShown) -> Mapping[str, Any]:
@@ -120,7 +112,7 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("all lines", "lines"),
-        Output("plot", PICTURES, "Draw the lines (.png, .pdf, .svg)", draw, "lines.png"),
+        picture("Draw the lines", "lines.png"),
     ),
     subject=OneMolecule(
         ("dipole", "dipole_abc", "anisotropy", "state_dipoles", "calculator", "hessian"),

@@ -21,7 +21,7 @@ from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long
 from rotor.verbs.molecule import range_without_unit, with_some_dipole
 from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work
+from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work, draw_answer, picture
 
 MOST_FACTS_OF_STATES = 10  # in the head of a line list; rotor info shows all
 HITRAN_K = 296.0
@@ -184,11 +184,8 @@ def draw(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """Draw the lines or their profile."""
     if report.shown.over is not None:
         draw_over(answer, path, report)
-        return
-    from rotor.plots.spectrum import plot_spectrum
-
-    drawn = answer.lines if answer.request.shape == "sticks" else answer.spectrum
-    plot_spectrum(drawn, path, provenance=report.command, **report.view)
+    else:
+        draw_answer(answer, path, report)
 
 
 def show(answer: SpectrumAnswer, report: Report) -> Iterable[Part | None]:
@@ -324,7 +321,7 @@ VERB = Verb(
             example="profile.csv",
             of=lambda answer: answer.spectrum,
         ),
-        Output("plot", PICTURES, "Draw the spectrum (.png, .pdf, .svg)", draw, "lines.png"),
+        picture("Draw the spectrum", "lines.png", draw),
         Output(
             "loomis_wood",
             PICTURES,

@@ -18,7 +18,7 @@ from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.table import counted
 from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, tables
+from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, picture, tables
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
@@ -88,25 +88,11 @@ def _derived_table(name: str, answer: StarkAnswer, report: Report) -> Any:
     return report.cache[name]
 
 
-def draw(answer: StarkAnswer, path: Path, report: Report) -> None:
-    """Draw the map."""
-    from rotor.plots.picture import name_of_top
-    from rotor.plots.stark import plot_stark
-
-    title = name_of_top(answer.request.top)
-    plot_stark(answer.states, path, title=title, view=report.view, provenance=report.command)
-
-
 def draw_lines(answer: StarkAnswer, path: Path, report: Report) -> None:
     """Draw the lines against the field."""
-    from rotor.plots.stark import plot_lobes
+    from rotor.plots.show import write_picture
 
-    plot_lobes(
-        _derived_table("lines", answer, report),
-        path,
-        title=report.content["name"] or "",
-        provenance=dict(report.provenance),
-    )
+    write_picture(_derived_table("lines", answer, report), path, report.command, title=report.content["name"])
 
 
 def show(answer: StarkAnswer, report: Report) -> Iterable[Part | None]:
@@ -155,7 +141,7 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the map", "out"),
-        Output("plot", PICTURES, "Draw the map (.png, .pdf, .svg)", draw, "out.png"),
+        picture("Draw the map", "out.png"),
         _further("lines", "the lines in every field, resolved in M,"),
         Output("lobes", PICTURES, "Draw the lines against the field (.png, .pdf, .svg)", draw_lines, scene=False),
         _further("spectrum", "the cross section at the highest field"),

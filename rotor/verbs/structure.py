@@ -21,7 +21,6 @@ from rotor.structures.family import Family
 from rotor.table import counted
 from rotor.verbs.subjects import saved_inputs
 from rotor.verbs.verb import (
-    PICTURES,
     ErrorsShown,
     Output,
     Place,
@@ -29,6 +28,8 @@ from rotor.verbs.verb import (
     Subject,
     SubjectKind,
     Verb,
+    draw_answer,
+    picture,
     tables,
 )
 
@@ -105,12 +106,8 @@ def write_geometry(answer: StructureAnswer, path: Path, report: Report) -> None:
 
 def draw(answer: StructureAnswer, path: Path, report: Report) -> None:
     """Draw the molecule with its bonds."""
-    from rotor.plots.picture import name_text
-    from rotor.plots.structure import plot_structure
-
-    molecule, values, method = _geometry(answer)
-    title = f"{name_text(answer.request.file.family.name)}, {method}"
-    plot_structure(molecule, path, values=values, title=title, provenance=report.command)
+    _geometry(answer)
+    draw_answer(answer, path, report)
 
 
 def failure(answer: StructureAnswer) -> str:
@@ -218,7 +215,7 @@ VERB = Verb(
             write_geometry,
             "structure.xyz",
         ),
-        Output("plot", PICTURES, "Draw the molecule with its bonds (.png, .pdf, .svg)", draw, "structure.png"),
+        picture("Draw the molecule with its bonds", "structure.png", draw),
     ),
     subject=Isotopologues(),
     shown=ErrorsShown,

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
@@ -14,7 +12,7 @@ from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import CONDITIONS
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Extra, Output, Report, Verb, Work, tables
+from rotor.verbs.verb import Extra, Report, Verb, Work, picture, tables
 
 if TYPE_CHECKING:
     from rotor.thermodynamics import ThermoFunctions
@@ -33,19 +31,6 @@ Examples:
 def answer(request: ThermoRequest, work: Work) -> ThermoAnswer:
     """The functions, with a progress line on a terminal while levels are summed."""
     return answer_thermo(request, sum_progress() if work.progress else None)
-
-
-def draw(answer: ThermoAnswer, path: Path, report: Report) -> None:
-    """Draw the heat capacity."""
-    from rotor.plots.heat_capacity import Panel, curve_temperatures, plot_heat_capacity
-    from rotor.plots.picture import name_of_top
-
-    request = answer.request
-    grid = tuple(curve_temperatures(answer.functions.temperature_k).tolist())
-    smooth = answer_thermo(replace(request, temperatures_k=grid, pressure_bar=None)).functions
-    label = "quantum" if request.species == "equilibrium" else f"quantum, {request.species}"
-    title = name_of_top(request.top) if report.view.title is None else report.view.title
-    plot_heat_capacity([Panel(title, {label: smooth})], path, view=report.view, provenance=dict(report.provenance))
 
 
 def show(answer: ThermoAnswer, report: Report) -> Iterable[Part | None]:
@@ -165,7 +150,7 @@ VERB = Verb(
     notes=lambda answer: answer.notes,
     outputs=(
         *tables("the table", "out"),
-        Output("plot", PICTURES, "Draw the heat capacity (.png, .pdf, .svg)", draw, "out.png"),
+        picture("Draw the heat capacity", "out.png"),
     ),
     subject=OneMolecule(
         ("dipole", "dipole_abc", "polarizability", "anisotropy", "state_dipoles", "calculator", "hessian")

@@ -14,7 +14,7 @@ from rotor.reports.progress import progress_bar
 from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, Work
+from rotor.verbs.verb import Output, Report, Shown, Verb, Work, picture
 
 if TYPE_CHECKING:
     from rotor.thermodynamics.classical_torsion import ClassicalTorsion
@@ -36,13 +36,6 @@ def answer(request: TorsionRequest, work: Work) -> TorsionAnswer:
         return answer_torsion(request)
     with progress_bar("angles of the scan") as show:
         return answer_torsion(request, show)
-
-
-def draw(answer: TorsionAnswer, path: Path, report: Report) -> None:
-    """Draw potential, levels and wave functions."""
-    from rotor.plots.torsion import plot_torsion
-
-    plot_torsion(answer, path, view=report.view, provenance=report.command)
 
 
 def content(answer: TorsionAnswer, shown: Shown) -> Mapping[str, Any]:
@@ -177,7 +170,7 @@ VERB = Verb(
         Output("thermo_csv", (".csv",), "Write the thermodynamic functions of all methods as CSV", example="thermo.csv",
                of=lambda answer: answer.functions),
         Output("classical_csv", (".csv",), "Write the classical gas against time as CSV", write_motion, "gas.csv"),
-        Output("plot", PICTURES, "Draw potential, levels and wave functions (.png, .pdf, .svg)", draw, "torsion.png"),
+        picture("Draw potential, levels and wave functions", "torsion.png"),
     ),
     subject=OneMolecule(
         ("constants", "dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "spin_constants", "spins",

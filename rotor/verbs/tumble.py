@@ -13,7 +13,7 @@ from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import STATES
 from rotor.verbs.turning_body import TurningBody, build
-from rotor.verbs.verb import PICTURES, Output, Report, Verb, tables
+from rotor.verbs.verb import Output, Report, Verb, draw_answer, picture, tables
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
@@ -64,16 +64,9 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
 
 def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
     """Draw the polhodes."""
-    from rotor.plots.polhodes import plot_polhodes
-
     if not isinstance(answer, TumbleAnswer):
         raise ValueError("outputs.plot: needs a free motion; leave it out")
-    request, units = answer.request, answer.request.units
-    label = f"Time ({units.time})" if units.time else "Time"
-    plot_polhodes(
-        answer.motion, answer.table.times / units.time_factor, path, axis_names=request.axes, time_label=label,
-        time_factor=units.time_factor, title=_picture_title(request), provenance=dict(report.provenance),
-    )  # fmt: skip
+    draw_answer(answer, path, report, title=_picture_title(answer.request))
 
 
 def film(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
@@ -275,7 +268,7 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the motion", "tumble"),
-        Output("plot", PICTURES, "Draw the polhodes (.png, .pdf, .svg)", draw, "tumble.png"),
+        picture("Draw the polhodes", "tumble.png", draw),
         Output("gif", (".gif", ".mp4"), "Animate the motion (.gif; .mp4 with ffmpeg)", film, "tumble.gif"),
     ),
     subject=TurningBody(

@@ -105,6 +105,15 @@ class Report:
         """The provenance of pictures: the command or the scene alone."""
         return {name: self.provenance[name] for name in ("command", "scene") if name in self.provenance}
 
+    @property
+    def picture_options(self) -> Mapping[str, Any]:
+        """The options of a picture that follow from its view."""
+        from rotor.plots.view import WHOLE
+
+        if isinstance(self.view, Mapping):
+            return self.view
+        return {} if self.view in (None, WHOLE) else {"view": self.view}
+
 
 Writer = Callable[[Any, Path, Report], None]
 
@@ -405,6 +414,18 @@ def tables(what: str, stem: str) -> tuple[Output, Output]:
         Output("csv", (".csv",), f"Write {what} as CSV", example=f"{stem}.csv"),
         Output("parquet", (".parquet",), f"Write {what} as Parquet", example=f"{stem}.parquet"),
     )
+
+
+def draw_answer(answer: Any, path: Path, report: Report, **options: Any) -> None:
+    """Draw an answer, or an object of it. options: of the picture."""
+    from rotor.plots.show import write_picture
+
+    write_picture(answer, path, report.command, **report.picture_options, **options)
+
+
+def picture(help: str, example: str = "", draw: Writer = draw_answer) -> Output:
+    """Output for the picture of an answer."""
+    return Output("plot", PICTURES, f"{help} (.png, .pdf, .svg)", draw, example)
 
 
 def check_early(structure: type, entries: Entries) -> None:

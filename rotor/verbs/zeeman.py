@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.fields.zeeman_request import ZeemanAnswer, ZeemanRequest, answer_zeeman
@@ -17,7 +16,7 @@ from rotor.requests.readers import Numbers
 from rotor.table import counted
 from rotor.verbs.molecule import STATES, Reading
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Verb, tables
+from rotor.verbs.verb import Report, Verb, picture, tables
 
 if TYPE_CHECKING:
     from rotor.tops.magnetic import Tensor
@@ -71,15 +70,6 @@ def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
     return top if chi is None else replace(top, magnetic=replace(top.magnetic, magnetisability=chi))
 
 
-def draw(answer: ZeemanAnswer, path: Path, report: Report) -> None:
-    """Draw the map."""
-    from rotor.plots.picture import name_of_top
-    from rotor.plots.zeeman import plot_zeeman
-
-    title, spins = name_of_top(answer.request.top), len(answer.request.spin_g)
-    plot_zeeman(answer.states, path, title=title, spins=spins, view=report.view, provenance=report.command)
-
-
 def show(answer: ZeemanAnswer, report: Report) -> Iterable[Part | None]:
     """The conditions and the first states."""
     states = answer.states
@@ -119,7 +109,7 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the map", "out"),
-        Output("plot", PICTURES, "Draw the map (.png, .pdf, .svg)", draw, "out.png"),
+        picture("Draw the map", "out.png"),
     ),
     subject=OneMolecule(
         ("dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "calculator", "hessian", *STATES),

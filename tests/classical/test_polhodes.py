@@ -20,7 +20,8 @@ from rotor.classical.integrators.splitting import RotationSplitting
 from rotor.classical.motion import MotionTable, invariant_drift, sampled
 from rotor.geometry.rotations import IDENTITY
 from rotor.plots.animation import Atoms, animate, box_edges
-from rotor.plots.polhodes import plot_polhodes, polhode_figure
+from rotor.plots.polhodes import polhode_figure
+from rotor.plots.show import write_picture
 from rotor.plots.sphere import view_of
 
 moments_of_a_body = st.permutations((0, 1, 2)).flatmap(
@@ -193,11 +194,11 @@ def test_the_same_picture_is_the_same_file_and_has_provenance(tmp_path):
     motion = free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9])
     for suffix in ("png", "svg", "pdf"):
         for name in "ab":
-            plot_polhodes(motion, [0, 10], tmp_path / f"{name}.{suffix}", provenance={"made": "here"})
+            write_picture(motion, tmp_path / f"{name}.{suffix}", {"made": "here"}, times=[0, 10])
         assert (tmp_path / f"a.{suffix}").read_bytes() == (tmp_path / f"b.{suffix}").read_bytes()
     assert '"made"' in (tmp_path / "a.svg").read_text(encoding="utf-8").replace("&quot;", '"')
     with pytest.raises(ValueError, match=r"\.png"):
-        plot_polhodes(motion, [0, 10], tmp_path / "a.jpg")
+        write_picture(motion, tmp_path / "a.jpg")
     with pytest.raises(ValueError, match="one body"):
         polhode_figure(free_motion([0.6, 0.8, 1.0], [0.0, 0.0, 0.0]), [0, 10])
 

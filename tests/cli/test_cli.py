@@ -311,7 +311,7 @@ def test_files_appear_all_or_none(call, folder, monkeypatch):
     def fails(*args, **options):
         raise OSError(28, "No space left on device", "a.png")
 
-    monkeypatch.setattr(plots, "plot_spectrum", fails)
+    monkeypatch.setattr(plots, "picture", fails)
     code, out, err = call("spectrum", "CO", "--csv", "a.csv", "--cat", "a.cat", "--plot", "a.png")
     assert (code, out, err) == (1, "", "error: a.png: No space left on device\n")
     assert [p.name for p in folder.iterdir()] == ["a.csv"]

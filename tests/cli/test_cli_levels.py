@@ -16,7 +16,8 @@ from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.level_list import level_list
 from rotor.formats.spcat.text.par import read_par
-from rotor.plots.levels import ladders, levels_figure, plot_levels
+from rotor.plots.levels import ladders, levels_figure
+from rotor.plots.show import write_picture
 from rotor.plots.view import View
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.request import LevelsRequest, answer_levels
@@ -168,7 +169,7 @@ def test_labels_of_the_diagram_do_not_overlap(tmp_path, monkeypatch):
     save = Figure.savefig
     monkeypatch.setattr(Figure, "savefig", lambda self, *a, **k: (drawn.append(self), save(self, *a, **k))[1])
     top = rotor.read("H2CO")
-    plot_levels(answer_levels(LevelsRequest(top, jmax=10)).table, top, tmp_path / "a.png", unit="K")
+    write_picture(answer_levels(LevelsRequest(top, jmax=10)), tmp_path / "a.png", unit="K")
     figure = drawn[0]
     figure.canvas.draw()
     axes = figure.axes[0]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.plots.raman import plot_raman
+from rotor.plots.show import write_picture
 from rotor.spectra.raman import raman_lines
 
 KEYS = {
@@ -83,7 +83,7 @@ def test_no_lines_is_an_answer_and_a_picture_of_none_is_not(call):
     assert code == 1
     assert err == "error: --plot: no lines: the polarizability of a rigid spherical top is isotropic\n"
     with pytest.raises(ValueError, match="no Raman line to draw"):
-        plot_raman(raman_lines(rotor.read("CH4"), jmax=3), "a.png")
+        write_picture(raman_lines(rotor.read("CH4"), jmax=3), "a.png")
 
 
 @pytest.mark.parametrize(

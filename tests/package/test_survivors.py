@@ -14,7 +14,7 @@ from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.classical.lyapunov import Flow, lyapunov_exponents
 from rotor.fitting.publication import unit_of, value_text
 from rotor.formats.spcat.hamiltonian.labels import Functions, _by_k2
-from rotor.plots.raman import plot_raman
+from rotor.plots.show import write_picture
 from rotor.plots.view import View
 from rotor.quantum.wang import wang_matrix
 from rotor.quantum.wang.wang_matrix import lowest_energies
@@ -206,18 +206,18 @@ def test_the_provenance_of_raman_lines():
 
 def test_a_raman_picture_has_the_title_and_the_facts_that_are_given(folder):
     lines = raman_lines(rotor.read("N2"), temperature_k=77.0)
-    plot_raman(lines, "a.svg", title="own title", provenance={"command": "rotor raman N2"})
+    write_picture(lines, "a.svg", title="own title", provenance={"command": "rotor raman N2"})
     text = (folder / "a.svg").read_text()
     assert "own title" in text
     assert "rotor raman N2" in text
     assert "temperature_k" in text
-    plot_raman(lines, "b.svg", title="own title", view=View(title="of the view"))
+    write_picture(lines, "b.svg", title="own title", view=View(title="of the view"))
     assert "of the view" in (folder / "b.svg").read_text()
     assert "own title" not in (folder / "b.svg").read_text()
     with pytest.raises(ValueError, match="no line between"):
-        plot_raman(lines, "c.svg", view=View(horizontal=(1e5, 2e5)))
+        write_picture(lines, "c.svg", view=View(horizontal=(1e5, 2e5)))
     with pytest.raises(ValueError, match=r"c\.txt"):
-        plot_raman(lines, "c.txt")
+        write_picture(lines, "c.txt")
 
 
 def test_the_picture_of_a_command_and_of_a_scene_are_of_its_lines(call, folder):

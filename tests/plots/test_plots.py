@@ -10,7 +10,7 @@ import pytest
 import rotor
 from rotor.plots import spectrum as plots
 from rotor.plots.picture import formula_text
-from rotor.plots.spectrum import plot_spectrum
+from rotor.plots.show import write_picture
 from rotor.spectra.spectrum import Spectrum, resolving_grid
 
 START = {".png": b"\x89PNG", ".pdf": b"%PDF", ".svg": b"<?xml"}
@@ -35,7 +35,7 @@ def figure(monkeypatch):
 @pytest.mark.parametrize("suffix", START)
 def test_the_suffix_names_the_format_and_the_same_picture_is_the_same_file(water, tmp_path, suffix):
     for name in ("a", "b"):
-        plot_spectrum(water, tmp_path / f"{name}{suffix}", provenance={"command": "by hand"})
+        write_picture(water, tmp_path / f"{name}{suffix}", provenance={"command": "by hand"})
     content = (tmp_path / f"a{suffix}").read_bytes()
     assert content.startswith(START[suffix])
     assert content == (tmp_path / f"b{suffix}").read_bytes()
@@ -50,7 +50,7 @@ def test_names_lie_on_nothing(figure, tmp_path, source, fwhm):
     drawn = rotor.api.line_list(rotor.read(source), temperature_k=100.0, jmax=25)
     if fwhm:
         drawn = Spectrum.from_lines(drawn, resolving_grid(drawn, fwhm_mhz=fwhm), fwhm_mhz=fwhm)
-    plot_spectrum(drawn, tmp_path / "a.png")
+    write_picture(drawn, tmp_path / "a.png")
     figure[0].canvas.draw()
     axes = figure[0].axes[0]
     boxes = [text.get_window_extent() for text in axes.texts]
@@ -60,7 +60,7 @@ def test_names_lie_on_nothing(figure, tmp_path, source, fwhm):
 
 
 def test_the_strongest_line_of_water_is_named(water, figure, tmp_path):
-    plot_spectrum(water, tmp_path / "a.png")
+    write_picture(water, tmp_path / "a.png")
     axes = figure[0].axes[0]
     strongest = water.strongest(1)
     upper, lower = water.quanta(strongest.upper)[0], water.quanta(strongest.lower)[0]
@@ -75,7 +75,7 @@ def test_the_strongest_line_of_water_is_named(water, figure, tmp_path):
 
 def test_an_axis_over_decades_is_logarithmic(figure, tmp_path):
     lines = rotor.api.line_list(rotor.read("water"), range_mhz=(0.0, 5e5))
-    plot_spectrum(lines, tmp_path / "a.png")
+    write_picture(lines, tmp_path / "a.png")
     axes = figure[0].axes[0]
     assert axes.get_yscale() == "log"
     assert axes.get_xlabel() == "Frequency (GHz)"
@@ -84,14 +84,14 @@ def test_an_axis_over_decades_is_logarithmic(figure, tmp_path):
 
 def test_a_profile_says_its_shape(water, figure, tmp_path):
     doppler = Spectrum.from_lines(water, resolving_grid(water))
-    plot_spectrum(doppler, tmp_path / "a.png")
+    write_picture(doppler, tmp_path / "a.png")
     assert figure[0].axes[0].get_title(loc="right") == "Gaussian profile, Doppler width"
     assert figure[0].axes[0].get_ylabel() == "Absorption cross section (nm²)"
 
 
 def test_a_spectrum_without_lines_is_drawn_without_names(figure, tmp_path):
     x = np.linspace(10.0, 1000.0, 50_001)
-    plot_spectrum(Spectrum(x, np.exp(-(((x - 400) / 10) ** 2)), unit="D^2 ps"), tmp_path / "a.png", title="tumbling")
+    write_picture(Spectrum(x, np.exp(-(((x - 400) / 10) ** 2)), unit="D^2 ps"), tmp_path / "a.png", title="tumbling")
     axes = figure[0].axes[0]
     assert axes.get_ylabel() == "Intensity (D^2 ps)"
     assert axes.get_title(loc="left") == "tumbling"
@@ -118,11 +118,11 @@ def test_formulas_are_set_as_chemists_do(formula, text):
 
 def test_nothing_to_draw_is_an_error(water, tmp_path):
     with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
-        plot_spectrum(water, tmp_path / "a.gif")
+        write_picture(water, tmp_path / "a.gif")
     with pytest.raises(ValueError, match="no line to draw"):
-        plot_spectrum(water.where([]), tmp_path / "a.png")
+        write_picture(water.where([]), tmp_path / "a.png")
     with pytest.raises(ValueError, match="nothing between"):
-        plot_spectrum(water, tmp_path / "a.png", range_mhz=(1.0, 2.0))
+        write_picture(water, tmp_path / "a.png", range_mhz=(1.0, 2.0))
     assert not list(tmp_path.iterdir())
     assert math.isinf(water.range_mhz[1])
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from places import ORACLES, PROJECT
 
-from rotor.plots.heat_capacity import heat_capacity_figure, plot_heat_capacity
+from rotor.plots.heat_capacity import heat_capacity_figure, picture
 from rotor.thermodynamics import GAS_CONSTANT, thermodynamic_functions
 
 KNOWN = tomllib.loads((ORACLES / "heat_capacity.toml").read_text(encoding="utf-8"))
@@ -139,6 +139,6 @@ def test_the_picture_has_every_curve_and_point():
     with pytest.raises(ValueError, match="needs a panel"):
         heat_capacity_figure([])
     with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
-        plot_heat_capacity(MAKE.panels()[:1], "heat.gif")
+        picture(MAKE.panels()[:1]).save("heat.gif")
     points = [sum(line.get_marker() == "o" for line in axes.get_lines()) for axes in figure.axes]
     assert points == [4, 1, 1, 1]
