@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from rotor.quantum.internal_rotation.levels import (
 )
 from rotor.quantum.internal_rotation.nuclei import Nuclei
 from rotor.quantum.levels import Levels, MomentBlock, SpeciesMoments
-from rotor.quantum.tensors import Tensors, cartesian_of
+from rotor.quantum.tensors import BodyTensor, Tensors, cartesian_of
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 if TYPE_CHECKING:
@@ -57,14 +58,8 @@ class HyperfineMoments(SpeciesMoments):
 
     def _pieces(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> Iterator[tuple[float, NDArray[Any]]]:
         """Components of a dipole along the axes of the rho-axis frame, each with the elements of its unit vector."""
-        body = tensors[0, 0]
-        if body.rank != 1:
-            raise ValueError("spins beside internal rotation: only dipole moments are computed, no tensors of rank 2")
-        vector = turned_by(cartesian_of(body.components, REPRESENTATION), self.model.angle)
-        if self.model.has_plane and abs(vector[2]) > 0:
-            raise ValueError("a dipole along c beside internal rotation: the molecule has the plane ab as a mirror")
-        for axis, value in zip("abc", vector.tolist(), strict=True):
-            block = self.levels.space.tensors[f"mu {axis}"].blocks.get((up.number, low.number)) if value else None
+        for axis, value in _along_axes(tensors[0, 0], self.model.angle, self.model.has_plane):
+            block = self.levels.space.tensors[f"mu {axis}"].blocks.get((up.number, low.number))
             if block is not None:
                 yield value, block
 
@@ -75,6 +70,17 @@ class HyperfineMoments(SpeciesMoments):
         slopes = np.hstack([rotation @ self.model.jacobian, spins])
         none = np.zeros(len(slopes))
         return np.column_stack([slopes[:, constants.index(name)] if name in constants else none for name in names])
+
+
+@lru_cache(maxsize=16)
+def _along_axes(body: BodyTensor, angle: float, has_plane: bool) -> tuple[tuple[str, float], ...]:
+    """The components of a vector that are not zero, by axis of the rho-axis frame at this angle; ValueError for what is not computed."""
+    if body.rank != 1:
+        raise ValueError("spins beside internal rotation: only dipole moments are computed, no tensors of rank 2")
+    vector = turned_by(cartesian_of(body.components, REPRESENTATION), angle)
+    if has_plane and abs(vector[2]) > 0:
+        raise ValueError("a dipole along c beside internal rotation: the molecule has the plane ab as a mirror")
+    return tuple((axis, value) for axis, value in zip("abc", vector.tolist(), strict=True) if value)
 
 
 def hyperfine_levels(
