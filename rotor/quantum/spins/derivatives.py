@@ -47,6 +47,7 @@ class UnitTables(NamedTuple):
 
 
 Kinds = tuple[int, int, int]  # kinds of both blocks and N' - N
+Rows = slice | list[int]
 
 
 def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
@@ -67,8 +68,10 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
             alike = blocks[run]
             states = states_of_group(group, alike, len(levels))
             total = np.zeros((len(alike), len(names), states.rows.shape[1]))
+            twice_f = list(states.places)
+            rows_of_f, rows_of_n = frame.rows_of_f(twice_f), [frame.rows_of_n(twice_f, r) for r in group.rotations]
             for coefficients, elements in tables:
-                _add(total, states, elements, coefficients, frame)
+                _add(total, states, elements, coefficients[rows_of_f], rows_of_n)
             out[states.rows] = total.transpose(0, 2, 1)
     return np.asarray(out[:-1][rows])
 
@@ -187,15 +190,18 @@ def _power_tables(state_terms: StateTerms, shared: Shared, frame: Frame) -> dict
     return {key: UnitTables(elements, np.array(columns), mix) for key, elements in tables.items()}
 
 
-def _add(total: Floats, states: States, tables: dict[Kinds, UnitTables], coefficients: Floats, frame: Frame) -> None:
-    """Add the derivatives (blocks, parameters, states) from one channel for blocks of a group."""
-    group, twice_f = states.group, list(states.places)
-    coefficients_of_f = coefficients[frame.rows_of_f(twice_f)]
-    for left in group.rotations:
-        for right in group.rotations:
+def _add(
+    total: Floats, states: States, tables: dict[Kinds, UnitTables], coefficients: Floats, rows_of_n: Sequence[Rows]
+) -> None:
+    """Add the derivatives (blocks, parameters, states) from one channel for blocks of a group.
+
+    coefficients: of the F of these blocks. rows_of_n: for each kind of rotational block the places of its N in the tables.
+    """
+    for left in states.group.rotations:
+        for right, rows in zip(states.group.rotations, rows_of_n, strict=True):
             key = (left.kind, right.kind, (left.rise - right.rise) // 2)
             if key in tables:
-                slopes = _between(states, left, right, tables[key], coefficients_of_f, frame.rows_of_n(twice_f, right))
+                slopes = _between(states, left, right, tables[key], coefficients, rows)
                 twice = (
                     1.0 if left.kind == right.kind and left.rise == right.rise else 2.0
                 )  # the other order has no table
@@ -204,7 +210,7 @@ def _add(total: Floats, states: States, tables: dict[Kinds, UnitTables], coeffic
 
 def _between(
     states: States, left: RotationColumns, right: RotationColumns, table: UnitTables, coefficients: Floats,
-    places: slice | list[int],
+    places: Rows,
 ) -> Floats:  # fmt: skip
     """Σ_p'r' V_p'r' Σ_pr c(p', p) X_c(r', r) V_pr between two kinds of rotational blocks: (blocks, parameters, states)."""
     elements = table.elements[places]  # (blocks, units, r', r)

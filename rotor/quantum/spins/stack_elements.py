@@ -127,16 +127,14 @@ def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, 
     rank, rise = tensor.rank, pairs.rise
     if rank > MOST_RANK:
         raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
-    if abs(rise) > rank or not (steps := tensor.signed_parts(up._replace(j=rise), low._replace(j=0))[0]):
+    steps, parts_of_n = _signed_parts(tensor, up, low, rise)
+    if abs(rise) > rank or not steps:
         return None
     closes = (pairs.m + pairs.n >= rank)[:, 0]
     if not closes.any():
         return None
     m, n = (pairs.m, pairs.n) if closes.all() else (pairs.m[closes], pairs.n[closes])
-    by_n = [
-        tensor.signed_parts(up._replace(j=j + rise), low._replace(j=j)) for j in range(4)
-    ]  # phases depend on N modulo 4
-    parts = np.array([signed for _, signed in by_n])[n[:, 0] % 4]
+    parts = parts_of_n[n[:, 0] % 4]
     elements, every_n = np.zeros((len(m), up.size, low.size)), tuple(n[:, 0].tolist())
     for step in steps:
         source, target = overlap(up, low, step)
@@ -153,6 +151,13 @@ def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, 
     out = np.zeros((len(closes), up.size, low.size))
     out[closes] = elements
     return out
+
+
+@lru_cache(maxsize=1024)
+def _signed_parts(tensor: BodyTensor, up: WangBlock, low: WangBlock, rise: int) -> tuple[tuple[int, ...], Floats]:
+    """The steps of K of a tensor between two kinds of Wang blocks, and its components with their signs by N modulo 4, (4, 2K + 1)."""
+    by_n = [tensor.signed_parts(up._replace(j=n + rise), low._replace(j=n)) for n in range(4)]
+    return tuple(by_n[0][0]), np.array([signed for _, signed in by_n])
 
 
 @lru_cache(maxsize=512)  # about 20 MB for N up to 100

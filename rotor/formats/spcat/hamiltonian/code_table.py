@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from math import sqrt
 from typing import NamedTuple
 
@@ -220,6 +221,7 @@ class Digits(NamedTuple):
             return frozenset()
         return frozenset("S") if self.ladder > 1 else frozenset("A" if self.ksq else "")
 
+    @lru_cache(maxsize=4096)  # noqa: B019  of tuples, which hold nothing else
     def symmetry(self, oblate: bool) -> Symmetry:
         """The symmetry of the operator with its series; a sine is along z and odd under time reversal.
 
@@ -300,6 +302,7 @@ def every_state(states: int) -> int:
     return int(10 ** state_digits(states)) - 1
 
 
+@lru_cache(maxsize=4096)  # a file is looked through for states, phases, series and operators
 def split_code(code: int, states: int = 1) -> Digits:
     """The fields of a code in a file with this number of vibrational states.
 
