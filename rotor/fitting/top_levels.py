@@ -7,47 +7,18 @@ the exact sum E = Σ c ∂E/∂c.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Ints
 from rotor.fitting.top_constants import ConstantSet, TopConstants
+from rotor.quantum.block_levels import AssignedLevels, BlockLevels, without_level
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.label_tracking import LabelledBlocks, joined
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError, level_model
 from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels
 from rotor.quantum.quanta import value_text
 from rotor.quantum.solve import solve_levels
-
-if TYPE_CHECKING:
-    from rotor.quantum.estimates.contracted import ContractedLevels
-
-
-@dataclass(frozen=True)
-class TopLevels(LevelModel):
-    """Levels in blocks that can be solved for any constants.
-
-    parts : indices of labels among all labels, and the blocks that contain their levels
-    """
-
-    names: tuple[str, ...]
-    count: int
-    parts: tuple[tuple[Ints, LabelledBlocks | ContractedLevels], ...]
-
-    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
-        """See `LevelModel`."""
-        energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
-        for rows, blocks in self.parts:
-            energies[rows], slopes[rows] = blocks.levels(values_mhz)
-        return energies, slopes
-
-    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """Always 1: levels are labelled by their dominant basis state at any constants."""
-        return np.ones(self.count)
 
 
 def top_levels(constants: TopConstants, labels: Ints) -> LevelModel:
@@ -106,10 +77,9 @@ def _levels_of_states(
     )
     values = np.array(list(begin.values.values()))
     blocks = labelled_states(begin.top, begin.effects, names, labels_by_row, values)
-    missing = np.ones(len(labels), dtype=bool)
-    missing[blocks.found] = False
-    _refuse(begin, labels, missing)
-    return TopLevels(names, len(labels), ((np.arange(len(labels)), blocks),))
+    parts = [AssignedLevels(np.arange(len(labels)), np.arange(len(names)), blocks)]
+    _refuse(begin, labels, without_level(parts, len(labels)))
+    return BlockLevels.of(names, parts, len(labels))
 
 
 def _levels_with_spins(
@@ -124,23 +94,10 @@ def _levels_with_spins(
     def rows_of(levels: Levels, chosen: Ints) -> Ints:
         return levels.rows_of(**{name: column[chosen] for name, column in quanta.items()})
 
-    values, all_parameters = np.array(list(begin.values.values())), np.arange(len(names))
-    groups = assigned_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
-    missing = np.ones(len(labels), dtype=bool)
-    for group in groups:
-        missing[group.rows] = False
-    _refuse(begin, labels, missing)
-    whole = [(group.blocks, group.rows, all_parameters) for group in groups if isinstance(group.blocks, LabelledBlocks)]
-    parts: list[tuple[Ints, LabelledBlocks | ContractedLevels]] = []
-    if whole:
-        rows = np.concatenate([group_rows for _, group_rows, _ in whole])
-        starts = np.cumsum([0, *(len(group_rows) for _, group_rows, _ in whole)])
-        moved = [
-            (group[0], np.arange(a, b), all_parameters) for group, a, b in zip(whole, starts, starts[1:], strict=False)
-        ]
-        parts.append((rows, joined(moved, len(rows))))
-    parts += [(group.rows, group.blocks) for group in groups if not isinstance(group.blocks, LabelledBlocks)]
-    return TopLevels(names, len(labels), tuple(parts))
+    values = np.array(list(begin.values.values()))
+    parts = assigned_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
+    _refuse(begin, labels, without_level(parts, len(labels)))
+    return BlockLevels.of(names, parts, len(labels))
 
 
 def _in_closed_form(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:

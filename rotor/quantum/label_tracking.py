@@ -7,7 +7,7 @@ anew; see `Follows` for what is looked at.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
@@ -275,6 +275,12 @@ class LabelledBlocks:
         """Places of the labels that were found."""
         return np.concatenate([block.rows for block in self.tracked]) if self.tracked else np.zeros(0, dtype=np.int64)
 
+    def moved(self, rows: Ints, columns: Ints) -> Iterator[Tracked]:
+        """The blocks with other places of labels and of parameters."""
+        for tracked in self.tracked:
+            block = tracked.block._replace(parameters=columns[tracked.block.parameters])
+            yield tracked._replace(block=block, rows=rows[tracked.rows])
+
     @cached_property
     def _space(self) -> Workspace:
         return Workspace()
@@ -302,13 +308,3 @@ class LabelledBlocks:
             energies[block.rows] = block.start.energies
             slopes[block.rows[:, None], block.block.parameters] = block.start.slopes
         return energies, slopes
-
-
-def joined(parts: Sequence[tuple[LabelledBlocks, Ints, Ints]], count: int) -> LabelledBlocks:
-    """Several sets of blocks as one of so many labels: each with the places of its labels and of its parameters among all."""
-    tracked = list[Tracked]()
-    for blocks, rows, columns in parts:
-        for block_tracked in blocks.tracked:
-            block = block_tracked.block._replace(parameters=columns[block_tracked.block.parameters])
-            tracked.append(block_tracked._replace(block=block, rows=rows[block_tracked.rows]))
-    return LabelledBlocks(count, tuple(tracked))

@@ -6,31 +6,23 @@ Small blocks are solved whole (`effect_units`); in large ones each label is solv
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
+from rotor.quantum.block_levels import AssignedLevels
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
-from rotor.quantum.label_tracking import LabelledBlocks
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.spins.scheme import scheme_of
 
 if TYPE_CHECKING:
-    from rotor.quantum.estimates.contracted import ContractedLevels
     from rotor.tops.top import Top
 
 _MOST_ELEMENTS = 1e7  # most elements of vectors of the F that are solved together
 _LARGE = 400  # blocks of an F with more functions may be contracted
-
-
-class AssignedLevels(NamedTuple):
-    """Labels, by their places among all, and the blocks that contain their levels."""
-
-    rows: Ints
-    blocks: LabelledBlocks | ContractedLevels
 
 
 def assigned_with_spins(
@@ -66,7 +58,7 @@ def assigned_with_spins(
     list of AssignedLevels
         Blocks with their labels; labels without a level are missing.
     """
-    scheme, all_f = scheme_of(top, effects), distinct(twice_f)
+    scheme, all_f, columns = scheme_of(top, effects), distinct(twice_f), np.arange(len(names))
     size = (1 + sum(len(effect.states(top)) for effect in effects)) * int(np.prod([two + 1 for two in scheme.twice]))
     products = scheme.equivalent < 3 and functions is None  # functions of three equivalent nuclei are not products
     if products and size * int(all_f.max() + 1) > _LARGE:
@@ -79,7 +71,7 @@ def assigned_with_spins(
             return []
         contracted = contracted_levels(top, effects, plan, levels, rows[here], names, values_mhz)
         if contracted is not None:
-            return [AssignedLevels(here, contracted)]
+            return [AssignedLevels(here, columns, contracted)]
     out = list[AssignedLevels]()
     for chunk in np.split(all_f, np.flatnonzero(np.diff(np.cumsum((size * (all_f + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1):
         places, angular = np.flatnonzero(np.isin(twice_f, chunk)), chunk.tolist()
@@ -88,7 +80,6 @@ def assigned_with_spins(
         has_level = rows >= 0
         if has_level.any():
             namer = functions(levels) if functions else None
-            out.append(
-                AssignedLevels(places[has_level], unit_levels(top, levels, rows[has_level], names, values_mhz, namer))
-            )
+            blocks = unit_levels(top, levels, rows[has_level], names, values_mhz, namer)
+            out.append(AssignedLevels(places[has_level], columns, blocks))
     return out

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -23,17 +22,14 @@ from rotor.formats.spcat.hamiltonian.l_spins import functions_by_l, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import named_by, naming_by
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
+from rotor.quantum.block_levels import AssignedLevels, BlockLevels, without_level
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import assigned_with_spins
-from rotor.quantum.label_tracking import LabelledBlocks, joined
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
 from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.wang.rotation import solve_rotation
-
-if TYPE_CHECKING:
-    from rotor.quantum.estimates.contracted import ContractedLevels
 
 _NO_REQUEST = IntensityFile("", Request(), ())
 
@@ -63,14 +59,6 @@ def names_of_quanta(form: Format) -> tuple[str, ...]:
     return names if spins else ("j", *names[1:])
 
 
-class _Solved(NamedTuple):
-    """A group with its labels (places among all), its parameters (columns) and its blocks."""
-
-    rows: Ints
-    columns: Ints
-    blocks: LabelledBlocks | ContractedLevels
-
-
 @dataclass(frozen=True)
 class FileLevels(LevelModel):
     """Energies of the labelled levels of a file; names: parameter lines as code#place.
@@ -79,8 +67,7 @@ class FileLevels(LevelModel):
     """
 
     names: tuple[str, ...]
-    count: int
-    solved: tuple[_Solved, ...]
+    whole: BlockLevels
     reduced: Ints
     excluded: Ints
 
@@ -95,16 +82,12 @@ class FileLevels(LevelModel):
         reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else np.zeros(0, dtype=np.int64)
         if len(reduced):
             refuse_far_f(labels, reduced, form, names_of_quanta(form), max(sum(group.spins) for group in groups))
-        parts = _together(_searched(file, groups, form, labels, reduced), len(file.parameters))
-        return cls(line_names(file), len(labels), tuple(parts), reduced, excluded_parameters(file))
+        names, parts = line_names(file), _searched(file, groups, form, labels, reduced)
+        return cls(names, BlockLevels.of(names, parts, len(labels)), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies and derivatives, see `LevelModel`."""
-        energies, slopes = np.empty(self.count), np.zeros((self.count, len(self.names)))
-        for part in self.solved:
-            part_energies, derived = part.blocks.levels(values_mhz[part.columns])
-            energies[part.rows] = part_energies
-            slopes[part.rows[:, None], part.columns] = derived
+        energies, slopes = self.whole.levels(values_mhz)
         if len(self.reduced):
             rows, columns = self.reduced[:, None], self.excluded
             energies[self.reduced] -= slopes[rows, columns] @ values_mhz[columns]
@@ -112,21 +95,20 @@ class FileLevels(LevelModel):
         return energies, slopes
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """1 for all levels: labels follow the dominant function at any constants."""
-        return np.ones(self.count)
+        """See `BlockLevels`."""
+        return self.whole.overlaps(before_mhz, after_mhz)
 
 
-def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels: Ints, reduced: Ints) -> list[_Solved]:
+def _searched(
+    file: ParameterFile, groups: Sequence[Group], form: Format, labels: Ints, reduced: Ints
+) -> list[AssignedLevels]:
     """Assign the labels to the levels of the groups; `reduced` labels have F below 0."""
     positive = labels.copy()
     positive[reduced, -1] = -spelled_out(labels[reduced], form) if len(reduced) else 0
     names, values = line_names(file), np.array([p.value for p in file.parameters])
     while True:
         parts = [part for group in groups for part in _with_labels(group, form, positive, names, values)]
-        assigned = np.zeros(len(labels), dtype=bool)
-        for part in parts:
-            assigned[part.rows] = True
-        lost = np.flatnonzero(~assigned)
+        lost = np.flatnonzero(without_level(parts, len(labels)))
         if not len(lost):
             return parts
         none = lost[~np.isin(lost, reduced) | (positive[lost, -1] >= HIGHEST_SEARCHED)]
@@ -136,21 +118,6 @@ def _searched(file: ParameterFile, groups: Sequence[Group], form: Format, labels
                 f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model", none
             )
         positive[lost, -1] += 1
-
-
-def _together(parts: Sequence[_Solved], count: int) -> list[_Solved]:
-    """Join the parts of all groups that are solved block by block, so that blocks of equal size are solved together."""
-    joinable = [(part.blocks, part.rows, part.columns) for part in parts if isinstance(part.blocks, LabelledBlocks)]
-    others = [part for part in parts if not isinstance(part.blocks, LabelledBlocks)]
-    if not joinable:
-        return others
-    rows = np.concatenate([rows for _, rows, _ in joinable])
-    starts = np.cumsum([0, *(len(rows) for _, rows, _ in joinable)])
-    moved = [
-        (blocks, np.arange(start, stop), columns)
-        for (blocks, _, columns), start, stop in zip(joinable, starts, starts[1:], strict=False)
-    ]
-    return [_Solved(rows, np.arange(count), joined(moved, len(rows))), *others]
 
 
 def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
@@ -165,7 +132,9 @@ def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
     return named_by(levels, group.diag, group.oblate, group.diagonal(max(j)))
 
 
-def _with_labels(group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats) -> list[_Solved]:
+def _with_labels(
+    group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats
+) -> list[AssignedLevels]:
     """Assign labels to the levels of a group by their quantum numbers, a few F at a time."""
     here = _places_of_group(group, form, labels)
     if not len(here):
@@ -189,7 +158,7 @@ def _direct(group: Group, form: Format) -> bool:
 
 def _assign_without_spins(
     group: Group, form: Format, labels: Ints, here: Ints, names: Sequence[str], values: Floats
-) -> list[_Solved]:
+) -> list[AssignedLevels]:
     """Blocks of the labels at the places `here`, for states without spins."""
     place = {state.number: v for v, state in enumerate(group.states)}
     v = [place[number] for number in labels[here, 3].tolist()] if form.states else np.zeros(len(here), dtype=np.int64)
@@ -198,18 +167,12 @@ def _assign_without_spins(
     requested = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
     naming = naming_by(group.diag, group.oblate, group.diagonal(int(labels[here, 0].max())))
     blocks = labelled_states(group.top, (group.effect,), parameters, requested, start, naming)
-    present = np.sort(blocks.found)
-    if not len(present):
-        return []
-    order = np.full(len(here), -1)
-    order[present] = np.arange(len(present))
-    all_columns = np.arange(len(columns))
-    return [_Solved(here[present], columns, joined([(blocks, order, all_columns)], len(present)))]
+    return [AssignedLevels(here, columns, blocks)]
 
 
 def _assign_with_spins(
     group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
-) -> list[_Solved]:
+) -> list[AssignedLevels]:
     """Blocks of the labels at the places `here` with these doubled F, for states with spins."""
     columns, start = _columns_of(group, names, values)
     parameters = tuple(group.effect.parameters(group.top))
@@ -221,7 +184,7 @@ def _assign_with_spins(
 
     functions = partial(_functions_of, group) if group.effect.pairs else None
     assigned = assigned_with_spins(group.top, (group.effect,), parameters, start, twice, rows_of, functions)
-    return [_Solved(here[part.rows], columns, part.blocks) for part in assigned]
+    return [AssignedLevels(here[part.rows], columns, part.blocks) for part in assigned]
 
 
 def _rows_of(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
@@ -241,7 +204,7 @@ def _columns_of(group: Group, names: Sequence[str], values: Floats) -> tuple[Int
 
 def _assign_in_blocks(
     group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
-) -> list[_Solved]:
+) -> list[AssignedLevels]:
     """Blocks of the labels at the places `here` with these doubled J, for states without spins."""
     levels = levels_in_blocks(group, distinct(twice).tolist())
     rows = _rows_of(group, levels, form, labels[here])
@@ -254,7 +217,7 @@ def _assign_in_blocks(
     named = functions is None and "kc" in levels.quanta
     naming = naming_by(group.diag, group.oblate, group.diagonal(levels.jmax)) if named else None
     blocks = unit_levels(group.top, levels, rows[has_level], parameters, start, functions, naming)
-    return [_Solved(here[has_level], columns, blocks)]
+    return [AssignedLevels(here[has_level], columns, blocks)]
 
 
 def _functions_of(group: Group, levels: Levels) -> Functions:
