@@ -10,7 +10,7 @@ too, with one parameter: H itself.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,9 +19,9 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.state_elements import StateElements, StateTerms
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
-from rotor.quantum.levels import Levels, SolvedBlock, placed, weights_by_state
+from rotor.quantum.levels import Levels, SolvedBlock, levels_of_blocks, placed
 from rotor.quantum.one_to_one import one_to_one
-from rotor.quantum.states import Coupling, OperatorOfJ, State
+from rotor.quantum.states import Coupling, OperatorOfJ
 from rotor.quantum.wang.basis import Part, WangBlock, limited, names_of, parts_of, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator
 from rotor.tops.operators import Operators
@@ -52,7 +52,7 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
         values = effect.parameters(top)
         couplings += [(values[coupling.name], coupling) for coupling in couplings_of(top, [effect], representation)]
         states |= {state.v: state.operators(values) for state in effect.states(top)}
-    extra_states(top, effects)
+    _refuse_equal_numbers([0, *(state.v for effect in effects for state in effect.states(top))])
     for _, coupling in couplings:
         for v in (coupling.bra, coupling.ket):
             if v not in states:
@@ -60,13 +60,10 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
     return Model(states, tuple(couplings), representation, k_limits_of(top, effects))
 
 
-def extra_states(top: Top, effects: tuple[QuantumEffect, ...]) -> list[State]:
-    """The states that effects bring; ValueError where two have one number."""
-    states = [state for effect in effects for state in effect.states(top)]
-    numbers = [0, *(state.v for state in states)]
+def _refuse_equal_numbers(numbers: list[int]) -> None:
+    """ValueError where two states have one number."""
     if len(set(numbers)) < len(numbers):
         raise ValueError(f"states {numbers}: every state has a number v of its own, and 0 is the top's")
-    return states
 
 
 def coupled_levels(
@@ -87,22 +84,10 @@ def coupled_levels(
     labels = np.concatenate([block.labels for block in blocks])
     quanta = {"v": labels[:, 0]} if len(model.states) > 1 else {}
     j = np.repeat([block.j for block in blocks], [len(block.energies_mhz) for block in blocks])
-    levels = Levels(
-        kind=top.kind,
-        representation=model.representation,
-        jmax=jmax,
-        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
-        quanta=quanta | {"j": j, "ka": labels[:, 1], "kc": labels[:, 2]},
-        multiplicity=2 * j + 1,
-        components=np.ones_like(j),
-        weight=np.ones_like(j),
-        effects=effects,
-        blocks=blocks,
-        mixing=np.concatenate([block.mixing for block in blocks]),
-    )
-    weighted = replace(levels, weight=weights_by_state(top, extra_states(top, effects), levels))
-    _refuse_mixed_weights(weighted)
-    return weighted
+    quanta |= {"j": j, "ka": labels[:, 1], "kc": labels[:, 2]}
+    levels = levels_of_blocks(top, effects, blocks, quanta, jmax, model.representation, multiplicity=2 * j + 1)
+    _refuse_mixed_weights(levels)
+    return levels
 
 
 def _refuse_mixed_weights(levels: Levels) -> None:

@@ -23,7 +23,6 @@ from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
-    from rotor.quantum.states import State
     from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
 
@@ -351,6 +350,10 @@ class Levels(Table):
         """The levels `rows` as text, one row of quantum numbers each."""
         return names_of.labels(self.quanta, rows, self.halves)
 
+    def quantum(self, name: str) -> Ints:
+        """A quantum number of all levels (n,), 0 where they do not have it."""
+        return self.quanta.get(name, np.zeros(len(self), dtype=np.int64))
+
     def quanta_of(self, rows: NDArray[Any]) -> Ints:
         """Quantum numbers (n, names) of the levels `rows`, in the order of `quanta_names`."""
         return names_of.matrix(self.quanta, rows)
@@ -393,13 +396,34 @@ def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
     return _of_rotation(levels, weights)
 
 
-def weights_by_state(top: Top, states: Sequence[State], levels: Levels) -> Ints:
-    """Spin weights of levels by those of the top, and in states that have their own by these."""
+def levels_of_blocks(
+    top: Top,
+    effects: tuple[QuantumEffect, ...],
+    blocks: tuple[Any, ...],
+    quanta: dict[str, NDArray[Any]],
+    jmax: int,
+    representation: str,
+    **others: Any,
+) -> Levels:
+    """The levels of blocks of several states or with spins, with the spin weights of the top or of the state; others: see `Levels`."""
+    ones = np.ones(sum(len(block.energies_mhz) for block in blocks), dtype=np.int64)
+    levels = Levels(
+        kind=top.kind,
+        representation=representation,
+        jmax=jmax,
+        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
+        quanta=quanta,
+        weight=ones,
+        effects=effects,
+        blocks=blocks,
+        mixing=np.concatenate([block.mixing for block in blocks]),
+        **{"components": ones, **others},
+    )
     weight = weights_of_levels(levels, top.spin_weights)
-    for state in states:
+    for state in (state for effect in effects for state in effect.states(top)):
         if state.spin_weights is not None:
-            weight = np.where(levels.quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
-    return weight
+            weight = np.where(quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
+    return replace(levels, weight=weight)
 
 
 def _of_rotation(levels: Levels, weights: SpinWeights) -> Ints:

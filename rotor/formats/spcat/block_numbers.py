@@ -25,12 +25,10 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.hamiltonian.code_table import TURNS, Digits, Kind, split_code
-from rotor.formats.spcat.hamiltonian.states import StateOptions
+from rotor.formats.spcat.hamiltonian.states import SPECIES, StateOptions, species_numbers
 from rotor.formats.spcat.pattern_numbers import pattern_numbers, pattern_steps
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.levels import Levels
-
-_SPECIES = np.array([[0, 3], [1, 2]])  # by Ka odd, Kc odd; Bx and Bz change places in an oblate basis
 
 
 class SubBlock(NamedTuple):
@@ -155,9 +153,8 @@ def _exists(state: StateOptions, species: int, oblate: bool) -> bool:
 
 def _weight(state: StateOptions, species: int, oblate: bool) -> tuple[int, ...]:
     """The weights that must agree between connected sub-blocks; the first is above 0 if the sub-block exists."""
-    rotated_species = species if not oblate else (0, 3, 2, 1)[species]
-    ka, kc = (np.array([parity]) for parity in np.argwhere(rotated_species == _SPECIES)[0])
-    along = kc if oblate else ka
+    along, other = (np.array([parity]) for parity in SPECIES[species])
+    ka, kc = (other, along) if oblate else (along, other)
     if state.fold < 3:
         return (int(state.weights(ka, kc, along)[0]),)
     if state.fold == 3:
@@ -176,9 +173,7 @@ class _Reach(NamedTuple):
 
 def _reach(d: Digits, states: int, oblate: bool) -> _Reach:
     """The sub-blocks that a code connects."""
-    species = int(_SPECIES[TURNS[d.symmetry(oblate).axis]])
-    if oblate:
-        species = (0, 3, 2, 1)[species]
+    species = int(species_numbers(*TURNS[d.symmetry(oblate).axis], oblate))
     spins = (1,) if d.projects_spin else tuple(sorted(d.spins))
     return _Reach(d.states(states), species, _ranks(spins, d))
 
@@ -231,13 +226,11 @@ def _connects(reach: _Reach, a: SubBlock, b: SubBlock, change: Ints) -> bool:
 def sub_blocks(group: Group, levels: Levels, negative: bool) -> tuple[list[SubBlock], Ints]:
     """Sub-block and |K| of each level of a group; negative: for a symmetric top, of the component -K."""
     quanta, n = levels.quanta, levels.rotational
-    v = np.array([state.number for state in group.states])[quanta.get("v", np.zeros(len(n), dtype=np.int64))]
+    v = np.array([state.number for state in group.states])[levels.quantum("v")]
+    k = group.k_of(levels)
     if "kc" in quanta:
-        species = _SPECIES[quanta["ka"] % 2, quanta["kc"] % 2]
-        k = quanta["kc"] if group.oblate else quanta["ka"]
-        species = np.array([0, 3, 2, 1])[species] if group.oblate else species
+        species = species_numbers(quanta["ka"], quanta["kc"], group.oblate)
     else:
-        k = quanta.get("k", np.zeros(len(n), dtype=np.int64))
         species = np.where(k % 2, 1 if negative else 2, 3 if negative else 0)
         species = np.where(k == 0, 3 * (n % 2), species)
     names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []

@@ -14,6 +14,7 @@ from rotor.arrays import Floats, Indices, Ints, end_to_end, rising_order, rows_o
 from rotor.formats.spcat.block_numbers import Blocks, sub_blocks
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format, quanta_of
+from rotor.formats.spcat.hamiltonian.states import species_numbers
 from rotor.formats.spcat.solved_groups import SolvedGroup
 from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
 from rotor.formats.spcat.text.egy import LevelList
@@ -125,8 +126,7 @@ def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices)
     """
     if levels.kind in ("prolate", "oblate"):  # both weights are equal
         return np.ones(len(upper), dtype=bool)
-    quanta = levels.quanta
-    along, v = quanta["kc"] if group.oblate else quanta["ka"], quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+    quanta, along, v = levels.quanta, group.k_of(levels), levels.quantum("v")
     weights = np.zeros((len(levels), 2), dtype=np.int64)
     for place, state in enumerate(group.states):
         weights[v == place] = state.block_weights(quanta["ka"], quanta["kc"], along)[v == place]
@@ -143,10 +143,8 @@ def weights_of_lines(group: Group, levels: Levels, transitions: Transitions) -> 
         return np.full(1, weight[0])
     if (weight[transitions.upper] == weight[transitions.lower]).all() or "kc" not in levels.quanta:
         return np.asarray(weight[transitions.lower])
-    ka, kc = levels.quanta["ka"] % 2, levels.quanta["kc"] % 2
-    species = np.array([[0, 3], [1, 2]])[(kc, ka) if group.oblate else (ka, kc)]
-    v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
-    order = (levels.multiplicity * (len(group.states) + 1) + v) * 4 + species
+    species = species_numbers(levels.quanta["ka"], levels.quanta["kc"], group.oblate)
+    order = (levels.multiplicity * (len(group.states) + 1) + levels.quantum("v")) * 4 + species
     for block in levels.blocks:  # blocks are ordered by their first state and species
         rows = slice(block.start, block.start + len(block.energies_mhz))
         order[rows] = order[rows].min()

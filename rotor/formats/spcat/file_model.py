@@ -74,6 +74,10 @@ class Group:
         """Doubled spins."""
         return self.states[0].spins
 
+    def k_of(self, levels: Levels) -> Ints:
+        """|K| of levels along the axis of the basis."""
+        return levels.quantum("k" if "kc" not in levels.quanta else "kc" if self.oblate else "ka")
+
     def levels(self, twice_f: tuple[int, int], executor: Executor | None = None) -> Levels:
         """The levels with doubled F from the first to the last of `twice_f`, with the weights of the file.
 
@@ -129,22 +133,21 @@ class Group:
 
     def _weights(self, levels: Levels) -> Ints:
         """Weights of levels, summed over components."""
-        n, quanta = levels.rotational, levels.quanta
-        v = quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+        quanta, v = levels.quanta, levels.quantum("v")
         total = np.zeros(len(levels), dtype=np.int64)
         for place, state in enumerate(self.states):
-            for ka, kc, k, alike in _components(levels, n, self.oblate):
+            for ka, kc, k, alike in _components(levels, self.oblate):
                 component_weight = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, state.odd_spins(quanta)), 0)
                 total += np.where((v == place) & alike, np.maximum(component_weight, 0), 0)
         return total
 
 
-def _components(levels: Levels, n: Ints, oblate: bool) -> list[tuple[Ints, Ints, Ints, Ints]]:
+def _components(levels: Levels, oblate: bool) -> list[tuple[Ints, Ints, Ints, Ints]]:
     """Ka, Kc, K of each component and the rows that have it; a symmetric top has two components ±K."""
     quanta, all_rows = levels.quanta, np.ones(len(levels), dtype=bool)
     if "kc" in quanta:
         return [(quanta["ka"], quanta["kc"], quanta["kc"] if oblate else quanta["ka"], all_rows)]
-    k = quanta.get("k", np.zeros_like(n))
+    n, k = levels.rotational, levels.quantum("k")
     upper, lower = n - k, n - k + 1  # the other K of both components; K = 0 has only the first
     pairs = [(upper, all_rows), (lower, k > 0)]
     return [(other, k, k, alike) if oblate else (k, other, k, alike) for other, alike in pairs]

@@ -106,7 +106,7 @@ def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False
         Half-integers rounded up.
     """
     quanta, n = levels.quanta, levels.rotational
-    v = quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+    v = levels.quantum("v")
     columns = [n, *_rotation(group, levels, v, form, negative)]
     if form.states:
         columns.append(np.array([state.number for state in group.states])[v])
@@ -129,12 +129,8 @@ def _rotation(group: Group, levels: Levels, v: Ints, form: Format, negative: boo
             return _ka_kc(group, levels, v)
         n = levels.rotational  # linear, in a file with the quanta of asymmetric tops
         return [np.zeros_like(n), n]
-    if "kc" in quanta:
-        k = quanta["kc"] if group.oblate else quanta["ka"]
-        odd = is_odd(quanta["ka"], quanta["kc"])
-    else:
-        k = quanta.get("k", np.zeros(len(levels), dtype=np.int64))
-        odd = np.full(len(levels), negative)
+    k = group.k_of(levels)
+    odd = is_odd(quanta["ka"], quanta["kc"]) if "kc" in quanta else np.full(len(levels), negative)
     return [np.where(odd & ~_unsigned(group, v, k), -k, k)]
 
 
@@ -149,7 +145,7 @@ def _unsigned(group: Group, v: Ints, k: Ints) -> NDArray[np.bool_]:
 def _ka_kc(group: Group, levels: Levels, v: Ints) -> list[Ints]:
     """Ka and Kc; for E species the K across the axis is N - K, or N - K + 1 in the first state of an l-doubled pair."""
     n, ka, kc = levels.rotational, levels.quanta["ka"], levels.quanta["kc"]
-    along = kc if group.oblate else ka
+    along = group.k_of(levels)
     firsts = [pair.first for pair in group.effect.pairs]
     other = np.where(_unsigned(group, v, along), n - along + np.isin(v, firsts), ka if group.oblate else kc)
     return [other, along] if group.oblate else [along, other]

@@ -54,7 +54,7 @@ class SolvedGroup(NamedTuple):
     def numbers(self) -> Ints:
         """The state in the file of each level."""
         numbers = np.array([state.number for state in self.group.states])
-        return np.asarray(numbers[self.levels.quanta.get("v", np.zeros(len(self.levels), dtype=np.int64))])
+        return np.asarray(numbers[self.levels.quantum("v")])
 
 
 def solved_groups(parameters: ParameterFile, groups: list[Group], request: Request, form: Format) -> list[SolvedGroup]:
@@ -156,9 +156,9 @@ def _column(levels: Levels, name: str, most: Levels) -> Ints:
     if name in ("n", "j"):
         return levels.rotational
     if name in ("k", "ka"):
-        return np.asarray(levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64)))
+        return levels.quantum("k")
     if name == "kc":
-        return np.asarray(levels.rotational - levels.quanta.get("k", np.zeros(len(levels), dtype=np.int64)))
+        return np.asarray(levels.rotational - levels.quantum("k"))
     total = (levels.multiplicity - 1).astype(np.int64)
     return np.asarray(total if name in most.halves else total // 2)
 

@@ -103,7 +103,7 @@ def _derivatives_of_uncoupled(top: Top, levels: Levels, names: Sequence[str], ro
     """Derivatives of levels of one state or of uncoupled ones, in closed form: each parameter acts in its state only."""
     terms = {0: parameter_operators(top, levels.effects)}
     terms |= {state.v: state.terms for effect in levels.effects for state in effect.states(top)}
-    out, v = np.zeros((len(rows), len(names))), levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
+    out, v = np.zeros((len(rows), len(names))), levels.quantum("v")
     for number, by_name in terms.items():
         here = v[rows] == number
         out[here] = _sums_of_terms(levels, [by_name.get(name, {}) for name in names], rows[here])

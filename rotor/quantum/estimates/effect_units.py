@@ -103,8 +103,7 @@ def unit_levels(
 
 def _quanta(levels: Levels) -> Ints:
     """v, Ka, Kc of all levels."""
-    v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
-    return np.stack([v, levels.quanta["ka"], levels.quanta["kc"]], axis=1)
+    return np.stack([levels.quantum("v"), levels.quanta["ka"], levels.quanta["kc"]], axis=1)
 
 
 def _names(block: Any) -> Ints:

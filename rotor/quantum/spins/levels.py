@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.arrays import hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import Levels, placed, weights_by_state
+from rotor.quantum.levels import Levels, levels_of_blocks, placed
 from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, contracted_plan, functions_of_blocks
 from rotor.quantum.spins.operators import AxialState
@@ -105,21 +105,14 @@ def _table(
     scheme = shared.scheme
     for column, (name, half) in enumerate(zip(scheme.names, scheme.half, strict=True), 4):
         quanta[name] = labels[:, column] if half else labels[:, column] // 2
-    ones = np.ones(len(labels), dtype=np.int64)
-    levels = Levels(
-        kind=top.kind,
-        representation=shared.representation,
-        jmax=jmax,
-        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
-        quanta=quanta,
+    return levels_of_blocks(
+        top,
+        effects,
+        blocks,
+        quanta,
+        jmax,
+        shared.representation,
         multiplicity=labels[:, -1] + 1,
-        components=np.where(labels[:, 1] > 0, 2, 1) if axial else ones,
-        weight=ones,
+        components=np.where(labels[:, 1] > 0, 2, 1) if axial else np.ones(len(labels), dtype=np.int64),
         halves=frozenset(name for name, half in zip(scheme.names, scheme.half, strict=True) if half),
-        effects=effects,
-        blocks=blocks,
-        mixing=np.concatenate([block.mixing for block in blocks]),
-    )
-    return replace(
-        levels, weight=weights_by_state(top, [state for effect in effects for state in effect.states(top)], levels)
     )

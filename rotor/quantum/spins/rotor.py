@@ -70,8 +70,7 @@ def solved_rotor(
     """
     if top.kind in ("prolate", "oblate") and _all_axial(top, effects, terms):
         levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, False, executor))
-        v = levels.quanta.get("v", np.zeros(len(levels), dtype=np.int64))
-        blocks = _axial_blocks(v, levels.rotational, levels.quanta["k"], levels.energy_mhz)
+        blocks = _axial_blocks(levels.quantum("v"), levels.rotational, levels.quanta["k"], levels.energy_mhz)
         return blocks, "Ir" if top.kind == "prolate" else "IIIr"
     levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True))
     representation = str(levels.representation)

@@ -19,7 +19,8 @@ from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 
-SPECIES = {"ee": "A", "eo": "a", "oo": "b", "oe": "c"}  # species of rotational functions by parities of Ka and Kc
+SPECIES = ((0, 0), (1, 0), (1, 1), (0, 1))  # A, Bx, By, Bz by the parities of K along the axis of the basis and across
+_NUMBER = np.array([[0, 3], [1, 2]])
 
 
 class Fold(NamedTuple):
@@ -233,6 +234,11 @@ def _check_total(v: int, line: Options, spins: tuple[int, ...], e_species: tuple
         raise ValueError(
             f"EWT = {line.ewt} of state {v}: with a total spin of three nuclei levels of E species do not exist; their weight is 0"
         )
+
+
+def species_numbers(ka: Ints | int, kc: Ints | int, oblate: bool) -> Ints:
+    """Places in `SPECIES` of levels with these labels, where c instead of a is the axis of an oblate basis."""
+    return np.asarray(_NUMBER[(kc % 2, ka % 2) if oblate else (ka % 2, kc % 2)])
 
 
 def is_odd(ka: Ints, kc: Ints) -> NDArray[np.bool_]:

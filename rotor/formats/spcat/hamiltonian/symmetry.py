@@ -15,10 +15,8 @@ import numpy as np
 from rotor.formats.spcat.hamiltonian.code_table import TURNS, Symmetry
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator
-from rotor.formats.spcat.hamiltonian.states import StateOptions
+from rotor.formats.spcat.hamiltonian.states import SPECIES, StateOptions
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix
-
-_SPECIES = ((0, 0), (0, 1), (1, 1), (1, 0))  # A, Ba, Bb, Bc by parities of Ka and Kc
 
 
 def l_values(states: Sequence[StateOptions], pairs: Sequence[Pair]) -> dict[int, int]:
@@ -93,7 +91,7 @@ def some_weights_agree(axis: str, low: StateOptions, high: StateOptions, odd_spi
         Whether such levels exist.
     """
     turn = TURNS[axis]
-    for species in _SPECIES:
+    for species in SPECIES:
         other = (species[0] ^ turn[0], species[1] ^ turn[1])
         ours, theirs = _weights(low, *species), _weights(high, *other, odd_spins)
         agree = bool(set(ours) & set(theirs) - {0}) if low.fold > 2 else ours[0] == theirs[0]
@@ -130,7 +128,7 @@ def species_pairs(up: StateOptions, low: StateOptions, turned: tuple[bool, bool]
 def _by_species(state: StateOptions, turned: bool) -> dict[str, tuple[int, ...]]:
     """Weights of a state by species."""
     swapped = replace(state, plus=state.minus, minus=state.plus) if turned else state
-    return {"eo"[ka] + "eo"[kc]: _weights(swapped, ka, kc) for ka, kc in _SPECIES}
+    return {"eo"[ka] + "eo"[kc]: _weights(swapped, ka, kc) for ka, kc in SPECIES}
 
 
 def symmetric_part(operator: CodedOperator, axes: str) -> CodedOperator:

@@ -15,11 +15,11 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Ints
 from rotor.formats.provenance import record_of, write_beside
+from rotor.formats.spcat.hamiltonian.states import species_numbers
 from rotor.formats.spcat.text.egy import LevelList, write_egy
 from rotor.quantum.levels import Levels
 from rotor.quantum.request import SelectedLevels
 
-_SPECIES = np.array([[1, 4], [2, 3]])  # by the parities of Ka and Kc
 _FIRST = ("n", "j", "k", "ka", "kc", "v")  # the order of SPCAT: rotation, state, then whatever spins add
 
 
@@ -67,7 +67,7 @@ def _blocks(levels: Levels) -> Ints:
     """The number of the block that each level belongs to."""
     quanta = levels.quanta
     if tuple(quanta) == ("j", "ka", "kc"):
-        return np.asarray(4 * quanta["j"] + _SPECIES[quanta["ka"] % 2, quanta["kc"] % 2])
+        return np.asarray(4 * quanta["j"] + 1 + species_numbers(quanta["ka"], quanta["kc"], False))
     last = "f" if "f" in quanta else "n" if "n" in quanta else "j"
     keys = np.stack([quanta[last], *(quanta[name] % 2 for name in ("ka", "kc") if name in quanta)], axis=1)
     _, first, number = np.unique(keys, axis=0, return_index=True, return_inverse=True)
