@@ -59,7 +59,7 @@ def _sweeps_of_thermo(request: Any) -> Sweeps:
 
 def _sweeps_of_torsion(request: Any) -> Sweeps:
     """The sweep over scan points; without a scan nothing can be chosen, since the basis follows from the energies."""
-    from rotor.thermodynamics.torsion_request import is_scan
+    from rotor.thermodynamics.torsion_potential import is_scan
 
     why = "basis: its size follows from the highest energy; the error is stated with each run"
     return Sweeps((), () if is_scan(request.potential) else (why,))
