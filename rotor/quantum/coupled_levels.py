@@ -74,12 +74,12 @@ def coupled_levels(
     Raises ValueError for a Hamiltonian that overflows, a coupling that is not invariant under time reversal, and states that mix levels of
     different spin weight.
     """
-    every_j = range(jmin, jmax + 1)
-    pieces = [(model, [j]) for j in every_j] if executor else [(model, every_j)]
+    all_j = range(jmin, jmax + 1)
+    pieces = [(model, [j]) for j in all_j] if executor else [(model, all_j)]
     solved = (
         executor.map(solve_coupled, *zip(*pieces, strict=True)) if executor else (solve_coupled(*p) for p in pieces)
     )
-    blocks = tuple(placed(block for of_some_j in solved for block in of_some_j))
+    blocks = tuple(placed(block for blocks_of_piece in solved for block in blocks_of_piece))
 
     labels = np.concatenate([block.labels for block in blocks])
     quanta = {"v": labels[:, 0]} if len(model.states) > 1 else {}
@@ -108,14 +108,14 @@ def _refuse_mixed_weights(levels: Levels) -> None:
             )
 
 
-def solve_coupled(model: Model, every_j: Sequence[int]) -> list[SolvedBlock]:
+def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
     """The coupled blocks of some J, in the order of J."""
-    vertices = {j: [(v, b) for v in sorted(model.states) for b in blocks_of_state(model, v, j)] for j in every_j}
+    vertices = {j: [(v, b) for v in sorted(model.states) for b in blocks_of_state(model, v, j)] for j in all_j}
     terms = StateTerms.of_values(model.states, _links(model), model.representation)
     elements = StateElements(terms, 1, model.representation, vertices)
     by_j: dict[int, list[SolvedBlock]] = {}
-    for j in sorted(every_j, reverse=True):
-        here = elements.of_j(j)
+    for j in sorted(all_j, reverse=True):
+        here = elements.at(j)
         zero = float(
             here.mix[terms.first[0], 0]
         )  # the part that is one number for J: taken out of the matrices for the sake of digits
@@ -131,7 +131,7 @@ def solve_coupled(model: Model, every_j: Sequence[int]) -> list[SolvedBlock]:
             parts = parts_of([vertices[j][i] for i in members])
             labels, mixing = names_of_states(parts, matrix, vectors, model.representation)
             by_j[j].append(SolvedBlock(parts, energies + zero, vectors, labels=labels, mixing=mixing))
-    return [block for j in every_j for block in by_j[j]]
+    return [block for j in all_j for block in by_j[j]]
 
 
 def _links(model: Model) -> list[tuple[int, int, OperatorOfJ, list[tuple[str, OperatorOfJ]]]]:
@@ -174,8 +174,10 @@ def names_of_states(
     """
     functions = [np.linalg.eigh(matrix[part.place, part.place]).eigenvectors.T @ vectors[part.place] for part in parts]
     overlaps = np.concatenate(functions) ** 2
-    of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(vectors.shape[1])
-    return names_of_functions(parts, representation)[of_state], overlaps[of_state, np.arange(vectors.shape[1])]
+    function_of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(vectors.shape[1])
+    return names_of_functions(parts, representation)[function_of_state], overlaps[
+        function_of_state, np.arange(vectors.shape[1])
+    ]
 
 
 def names_of_functions(parts: tuple[Part, ...], representation: str) -> Ints:

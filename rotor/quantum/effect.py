@@ -189,11 +189,11 @@ def couplings_of(top: Top, effects: Iterable[QuantumEffect], representation: str
         couplings += effect.couplings(top)
         for name in effect.parameters(top):
             if effect.j_operator(top, name, 1, representation) is not None:
-                couplings.append(Coupling(name, 0, 0, _own_operator(effect, top, name)))
+                couplings.append(Coupling(name, 0, 0, _operator_of_parameter(effect, top, name)))
     return couplings
 
 
-def _own_operator(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
+def _operator_of_parameter(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
     def operator(j: int, representation: str) -> JOperator:
         matrix = effect.j_operator(top, name, j, representation)
         assert matrix is not None

@@ -128,7 +128,7 @@ def effects_of_each_field() -> Any:
 
 
 def saved_of_top(effects: Iterable[QuantumEffect], top: Top) -> HamiltonianInput:
-    """The same of a top."""
+    """The input that makes these effects of a top; ValueError for effects that a scene cannot name."""
     by_name = {effect.name: effect for effect in effects}
     if unknown := by_name.keys() - _SPINS - _KNOWN:
         raise ValueError(f"a scene has no name for {', '.join(sorted(unknown))}")

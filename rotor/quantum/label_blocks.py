@@ -99,7 +99,7 @@ def _chunk(blocks: Sequence[Occurring], units: Sequence[tuple[int, int]], powers
         units=diagonals,
         sizes=sizes.tolist(),
         runs=tuple((first, stop, int(sizes[first])) for first, stop in pairwise(bounds)),
-        bands=tuple(_of_band(d, sizes, offsets) for d in range(min(len(diagonals), size))),
+        bands=tuple(_places_of_band(d, sizes, offsets) for d in range(min(len(diagonals), size))),
         offsets=offsets,
         x=x,
         rows=np.array([row for occurring in blocks for row in occurring.rows]),
@@ -111,7 +111,7 @@ def _chunk(blocks: Sequence[Occurring], units: Sequence[tuple[int, int]], powers
     )
 
 
-def _of_band(d: int, sizes: Ints, offsets: Ints) -> tuple[Ints, Ints]:
+def _places_of_band(d: int, sizes: Ints, offsets: Ints) -> tuple[Ints, Ints]:
     """Which elements (blocks, size) of diagonal d are in a block, and their places in the lower triangles of all matrices."""
     index, size = np.arange(sizes[-1]), int(sizes[-1])
     block, place = np.nonzero(index + d < sizes[:, None])

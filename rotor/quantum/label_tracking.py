@@ -91,17 +91,19 @@ def tracked_blocks(
         stack = LinearStack.of([blocks[i][0] for i in numbers.tolist()])
         members = _members([blocks[i][1].sub_blocks for i in numbers.tolist()], stack.size)
         solved = stack.solved(values_mhz, space)
-        made = [blocks[i][1].namer(*stack.states(solved, place)) for place, i in enumerate(numbers.tolist())]
-        tracked_rows = [find(i, names) for i, names in zip(numbers.tolist(), made, strict=True)]
+        state_names = [blocks[i][1].namer(*stack.states(solved, place)) for place, i in enumerate(numbers.tolist())]
+        tracked_rows = [find(i, names) for i, names in zip(numbers.tolist(), state_names, strict=True)]
         slopes = stack.slopes(solved.vectors, _padded([states for _, states in tracked_rows], 0), space)
         leading, shares = _leading(members, solved)
         for place, (rows, states) in enumerate(tracked_rows):
             if len(rows):
                 block, named = blocks[numbers[place]]
                 block_rows = slopes[place, : len(rows), : len(block.parameters)]
-                of_states = leading[place, : block.size], shares[place, : block.size]
-                start = AtStart(values_mhz[block.parameters], solved.energies[place, states], block_rows, *of_states)
-                tracked.append(Tracked(block, named, rows, made[place][states], states, start))
+                leading_of_states = leading[place, : block.size], shares[place, : block.size]
+                start = AtStart(
+                    values_mhz[block.parameters], solved.energies[place, states], block_rows, *leading_of_states
+                )
+                tracked.append(Tracked(block, named, rows, state_names[place][states], states, start))
     return LabelledBlocks(count, tuple(tracked))
 
 
@@ -185,8 +187,8 @@ class _Labelled:
         states = self.states.copy()
         for b in np.flatnonzero(moved).tolist():
             block = self.tracked[b]
-            made = block.named.namer(*self.stack.states(solved, b))
-            states[b, : len(block.rows)] = _states_of(made, block.names)
+            state_names = block.named.namer(*self.stack.states(solved, b))
+            states[b, : len(block.rows)] = _states_of(state_names, block.names)
         return states
 
     @cached_property
@@ -254,10 +256,10 @@ def _counts(leading: Ints, chosen: NDArray[np.bool_], parts: int) -> Ints:
     return np.bincount(numbers, minlength=blocks * parts).reshape(blocks, parts)
 
 
-def _states_of(made: Ints, names: Ints) -> Ints:
+def _states_of(state_names: Ints, names: Ints) -> Ints:
     """Which states have the names, of the names of all."""
-    of_name = {tuple(name): state for state, name in enumerate(made.tolist())}
-    states = [of_name.get(tuple(name), -1) for name in names.tolist()]
+    state_by_name = {tuple(name): state for state, name in enumerate(state_names.tolist())}
+    states = [state_by_name.get(tuple(name), -1) for name in names.tolist()]
     if min(states) < 0:
         raise ValueError("a labelled level has no state of its name with these constants")
     return np.array(states)

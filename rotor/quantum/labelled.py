@@ -215,14 +215,14 @@ class WangBlocks(LevelModel):
 
     def _bands(self, chunk: Chunk, coefficients: Floats) -> list[Floats]:
         """Diagonals (blocks, size) of the Hamiltonian."""
-        weights = (chunk.x * coefficients) @ self._of_unit
+        weights = (chunk.x * coefficients) @ self._unit_of_term
         bands = [(unit @ weights[:, :, None])[:, :, 0] for unit in chunk.units]
         if not all(np.isfinite(band.sum()) for band in bands):
             raise ValueError("a block of the Hamiltonian is not finite with these constants")
         return bands
 
     @cached_property
-    def _of_unit(self) -> Floats:
+    def _unit_of_term(self) -> Floats:
         """1 where a term of the Hamiltonian has a unit matrix, (terms, units)."""
         places = np.array([place for _, place in self.powers])
         return np.asarray(places[:, None] == np.arange(1 + max(places.max(initial=-1), -1)), dtype=float)

@@ -38,17 +38,17 @@ def labelled_states(
     Hamiltonian that is not finite, or not invariant under time reversal.
     """
     representation, limits, named = representation_of(top), k_limits_of(top, effects), naming or by_overlaps
-    of_j = {j: np.flatnonzero(labels[:, 0] == j) for j in distinct(labels[:, 0][labels[:, 0] >= 0]).tolist()}
+    rows_of_j = {j: np.flatnonzero(labels[:, 0] == j) for j in distinct(labels[:, 0][labels[:, 0] >= 0]).tolist()}
     states = sorted({0, *(state.v for effect in effects for state in effect.states(top))})
-    whole = {j: wang_blocks(j, representation) for j in of_j}
+    whole = {j: wang_blocks(j, representation) for j in rows_of_j}
     vertices = {
-        j: [(v, cut) for v in states for block in whole[j] if (cut := _within(block, limits.get(v)))] for j in of_j
+        j: [(v, cut) for v in states for block in whole[j] if (cut := _within(block, limits.get(v)))] for j in rows_of_j
     }
     terms = StateTerms.of(top, effects, names, representation)
     elements = StateElements(terms, len(names), representation, vertices)
     blocks, inside = list[NamedBlock](), list[Ints]()
-    for j, rows in sorted(of_j.items(), reverse=True):
-        here = elements.of_j(j)
+    for j, rows in sorted(rows_of_j.items(), reverse=True):
+        here = elements.at(j)
         classes = {(int(v), "eo"[ka % 2] + "eo"[kc % 2]) for _, v, ka, kc in labels[rows].tolist()}
         for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in here.links]):
             members_here = [vertices[j][i] for i in members]
@@ -56,8 +56,8 @@ def labelled_states(
                 blocks.append((here.block(members), named(members_here, representation)))
                 inside.append(rows)
 
-    def find(number: int, made: Ints) -> tuple[Ints, Ints]:
-        state_of = {tuple(name): state for state, name in enumerate(made.tolist())}
+    def find(number: int, state_names: Ints) -> tuple[Ints, Ints]:
+        state_of = {tuple(name): state for state, name in enumerate(state_names.tolist())}
         rows = inside[number]
         states = np.array([state_of.get(tuple(name), -1) for name in labels[rows, 1:].tolist()], dtype=np.int64)
         return rows[states >= 0], states[states >= 0]

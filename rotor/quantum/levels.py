@@ -359,7 +359,7 @@ class Levels(Table):
         return names_of.matrix(self.quanta, rows)
 
     def quanta_columns(self, rows: NDArray[Any], suffix: str) -> dict[str, NDArray[Any]]:
-        """The same as columns by name: j_upper, ka_upper, kc_upper for the suffix upper."""
+        """Quantum numbers of the levels `rows` as columns by name: j_upper, ka_upper, kc_upper for the suffix upper."""
         return names_of.columns(self.quanta, rows, suffix)
 
     @property
@@ -391,9 +391,9 @@ def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
     """
     quanta = levels.quanta
     if "i_tot" in quanta and "i_sym" not in quanta and weights.rule != "none":
-        of_even, of_odd = (_of_rotation(levels, kind) for kind in (weights, weights.exchanged()))
-        return np.where(quanta["i_tot"] % 2 == 0, of_even, of_odd)
-    return _of_rotation(levels, weights)
+        even, odd = (_rotational_weights(levels, kind) for kind in (weights, weights.exchanged()))
+        return np.where(quanta["i_tot"] % 2 == 0, even, odd)
+    return _rotational_weights(levels, weights)
 
 
 def levels_of_blocks(
@@ -426,7 +426,7 @@ def levels_of_blocks(
     return replace(levels, weight=weight)
 
 
-def _of_rotation(levels: Levels, weights: SpinWeights) -> Ints:
+def _rotational_weights(levels: Levels, weights: SpinWeights) -> Ints:
     quanta = levels.quanta
     if "species" in quanta and weights.rule == "none":
         return levels.weight
@@ -434,13 +434,13 @@ def _of_rotation(levels: Levels, weights: SpinWeights) -> Ints:
         weight_of = {name: weights.of_irrep(name) for name in np.unique(quanta["irrep"]).tolist()}
         return np.array([weight_of[name] for name in quanta["irrep"].tolist()], dtype=np.int64)
     if "kc" in quanta:
-        return _of_asymmetric(levels, weights)
+        return _asymmetric_weights(levels, weights)
     if "k" in quanta:
         return weights.of_symmetric(levels.rotational, np.abs(quanta["k"]), oblate=levels.kind == "oblate")
     return weights.of_spherical(levels.rotational) if levels.kind == "spherical" else weights.of_j(levels.rotational)
 
 
-def _of_asymmetric(levels: Levels, weights: SpinWeights) -> Ints:
+def _asymmetric_weights(levels: Levels, weights: SpinWeights) -> Ints:
     """By parities of (Ka, Kc); a symmetric top whose ±K are split has weights by K, one component each.
 
     Of a pair with K a multiple of n, 0even and 0odd go by the parity of the other label, which is J where K = 0: a half turn about
@@ -449,8 +449,8 @@ def _of_asymmetric(levels: Levels, weights: SpinWeights) -> Ints:
     ka, kc = levels.quanta["ka"], levels.quanta["kc"]
     if levels.kind in ("prolate", "oblate") and weights.rule == "K":
         k, other = (kc, ka) if levels.kind == "oblate" else (ka, kc)
-        of_even_and_odd = np.array([weights.of_symmetric(j, 0) for j in (0, 1)])  # of K = 0, whose other label is J
+        at_zero = np.array([weights.of_symmetric(j, 0) for j in (0, 1)])  # of K = 0, whose other label is J
         both = weights.of_symmetric(levels.rotational, k, oblate=levels.kind == "oblate") // np.where(k == 0, 1, 2)
-        return np.where(k % weights.modulus == 0, of_even_and_odd[other % 2], both)
-    of_parity = np.array([[weights.of_ka_kc(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)
-    return np.asarray(of_parity[ka % 2, kc % 2])
+        return np.where(k % weights.modulus == 0, at_zero[other % 2], both)
+    by_parity = np.array([[weights.of_ka_kc(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)
+    return np.asarray(by_parity[ka % 2, kc % 2])

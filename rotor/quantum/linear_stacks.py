@@ -191,12 +191,12 @@ def linear_block(size: int, elements: Sequence[WeightedElements]) -> LinearBlock
     ([0, 1, 1], [0, 0, 1], [1.0, 0.5, 0.0], [3])
     """
     diagonal = np.arange(size) * (size + 1)
-    places, of_place = numbered(np.concatenate([diagonal, *(element.places for element in elements)]), size * size)
+    places, position = numbered(np.concatenate([diagonal, *(element.places for element in elements)]), size * size)
     parameters = np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(element.parameters for element in elements)]))
     factors, start = np.zeros((len(places), len(parameters))), size
     for element in elements:
         stop = start + len(element.places)
-        factors[of_place[start:stop, None], np.searchsorted(parameters, element.parameters)] += element.factors
+        factors[position[start:stop, None], np.searchsorted(parameters, element.parameters)] += element.factors
         start = stop
     acting = np.flatnonzero(factors.any(axis=0))
     return LinearBlock(

@@ -24,19 +24,21 @@ def one_to_one(overlaps: Floats) -> Ints:
         return np.asarray(clear)
     loss = overlaps.max(axis=0)[None, :] - overlaps  # never below 0
     potential = np.zeros(count)  # of the functions; of the states the largest overlap is taken off above
-    of_function, of_state = np.full(count, -1), np.full(count, -1)
+    state_of_function, function_of_state = np.full(count, -1), np.full(count, -1)
     for state, function in enumerate(clear.tolist()):
-        if of_function[function] < 0:
-            of_function[function], of_state[state] = state, function
+        if state_of_function[function] < 0:
+            state_of_function[function], function_of_state[state] = state, function
     lifted = np.zeros(count)  # potentials of the states
-    for state in np.flatnonzero(of_state < 0).tolist():
-        _augmented(state, loss, potential, lifted, of_function, of_state)
-    return of_state
+    for state in np.flatnonzero(function_of_state < 0).tolist():
+        _augmented(state, loss, potential, lifted, state_of_function, function_of_state)
+    return function_of_state
 
 
-def _augmented(state: int, loss: Floats, potential: Floats, lifted: Floats, of_function: Ints, of_state: Ints) -> None:
+def _augmented(
+    state: int, loss: Floats, potential: Floats, lifted: Floats, state_of_function: Ints, function_of_state: Ints
+) -> None:
     """One more state has a name, by the way of least loss; the arrays are changed."""
-    count = len(of_state)
+    count = len(function_of_state)
     distance, before = np.full(count, np.inf), np.full(count, -1)
     done = np.zeros(count, dtype=bool)
     here, least, seen = state, 0.0, [state]
@@ -47,16 +49,16 @@ def _augmented(state: int, loss: Floats, potential: Floats, lifted: Floats, of_f
         function = int(np.where(done, np.inf, distance).argmin())
         least = float(distance[function])
         done[function] = True
-        if of_function[function] < 0:
+        if state_of_function[function] < 0:
             break
-        here = int(of_function[function])
+        here = int(state_of_function[function])
         seen.append(here)
-    reached = [int(of_state[function_seen]) for function_seen in seen[1:]]
+    reached = [int(function_of_state[function_seen]) for function_seen in seen[1:]]
     potential[reached] += distance[reached] - least
     lifted[seen] += least - np.array([0.0, *distance[reached]])
     while True:
         previous = int(before[function])
-        of_function[function] = previous
-        function, of_state[previous] = int(of_state[previous]), function
+        state_of_function[function] = previous
+        function, function_of_state[previous] = int(function_of_state[previous]), function
         if previous == state:
             return

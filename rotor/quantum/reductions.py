@@ -69,7 +69,7 @@ class Conversion:
 
 
 def to_reduction(constants: Constants, reduction: str, covariance: Covariance | None = None) -> Conversion:
-    """The same top in Watson's A- or S-reduction, axes unchanged.
+    """Convert a top to Watson's A- or S-reduction, axes unchanged.
 
     covariance : of the constants; by default their uncertainties, uncorrelated. It is carried over to first order.
 
@@ -84,7 +84,7 @@ def to_reduction(constants: Constants, reduction: str, covariance: Covariance | 
 
 
 def to_representation(constants: Constants, representation: str, covariance: Covariance | None = None) -> Conversion:
-    """The same top in the axes of another representation, reduction unchanged.
+    """Convert a top to the axes of another representation, reduction unchanged.
 
     Exact for a rigid top, whose A, B, C stay; else, and for errors, see `to_reduction`.
 
@@ -168,7 +168,7 @@ def _order(term: Operators) -> int:
 
 
 def _exchange_axes(operators: Operators, old: str, new: str) -> Operators:
-    """The same operator in terms of the new x, y, z; exact."""
+    """Express an operator in terms of the new x, y, z; exact."""
     cartesian = _CARTESIAN @ np.array([operators.get(powers, 0.0) for powers in _TERMS])
     place = [old.index(axis) for axis in new]  # where the new x, y, z stood
     pairs = [{0, 1}, {1, 2}, {2, 0}]

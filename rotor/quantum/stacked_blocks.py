@@ -56,14 +56,14 @@ def are_whole(blocks: Iterable[SolvedBlock]) -> bool:
 
 def stacks_by_j(blocks: Iterable[SolvedBlock]) -> Iterator[tuple[int, dict[int, ParityStates]]]:
     """Each J, rising, with its stacks by their parity. The blocks must be whole and in the order of J."""
-    of_j: list[SolvedBlock] = []
+    blocks_of_j: list[SolvedBlock] = []
     for block in blocks:
-        if of_j and of_j[0].basis.j != block.basis.j:
-            yield of_j[0].basis.j, _stacked(of_j)
-            of_j = []
-        of_j.append(block)
-    if of_j:
-        yield of_j[0].basis.j, _stacked(of_j)
+        if blocks_of_j and blocks_of_j[0].basis.j != block.basis.j:
+            yield blocks_of_j[0].basis.j, _stacked(blocks_of_j)
+            blocks_of_j = []
+        blocks_of_j.append(block)
+    if blocks_of_j:
+        yield blocks_of_j[0].basis.j, _stacked(blocks_of_j)
 
 
 def _stacked(blocks: list[SolvedBlock]) -> dict[int, ParityStates]:
@@ -73,14 +73,14 @@ def _stacked(blocks: list[SolvedBlock]) -> dict[int, ParityStates]:
 
 def _stack(blocks: list[SolvedBlock], j: int, parity: int) -> ParityStates:
     columns = np.empty(((j - parity) // 2 + 1, sum(block.basis.size for block in blocks)))
-    of_sign, at = {}, 0
+    by_sign, at = {}, 0
     for block in blocks:
         here = slice(at, at + block.basis.size)
         columns[block.basis.first_k // 2 :, here] = block.vectors
         columns[: block.basis.first_k // 2, here] = 0.0
-        of_sign[block.basis.sign] = block, here
+        by_sign[block.basis.sign] = block, here
         at = here.stop
-    return ParityStates(j, parity, columns, of_sign)
+    return ParityStates(j, parity, columns, by_sign)
 
 
 @dataclass(frozen=True)
@@ -134,17 +134,17 @@ class Vector:
         yield from _pairs(up, low, moved, partner, signs)
 
     def _across(self, up: ParityStates, low: ParityStates) -> Iterator[tuple[SolvedBlock, Product]]:
-        of_real, of_imaginary = self.partners[up.j - low.j, up.parity, False]
+        real_partner, imaginary_partner = self.partners[up.j - low.j, up.parity, False]
         raised, lowered = _shifted(up, low, 1), _shifted(up, low, -1)
         _, real, imaginary = self.sizes
         if real:
             moved = raised - lowered
             moved *= real
-            yield from _pairs(up, low, moved, of_real, (1, -1))
+            yield from _pairs(up, low, moved, real_partner, (1, -1))
         if imaginary:
             raised += lowered
             raised *= imaginary
-            yield from _pairs(up, low, raised, of_imaginary, (1, -1))
+            yield from _pairs(up, low, raised, imaginary_partner, (1, -1))
 
 
 def _pairs(

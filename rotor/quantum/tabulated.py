@@ -73,7 +73,7 @@ def _labels_of_table(levels: Levels) -> dict[str, Ints]:
 
 
 def with_tabulated_energies(levels: Levels, table: LevelTable) -> Levels:
-    """The same levels, and the same states, with the energies of a table where it has the level."""
+    """The levels and their states with the energies of a table where it has the level."""
     energy, _ = tabulated_energies(table, _labels_of_table(levels), levels.energy_mhz)
     blocks = tuple(
         replace(block, energies_mhz=energy[block.start : block.start + len(block.energies_mhz)])

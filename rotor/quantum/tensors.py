@@ -258,7 +258,7 @@ def _folded(up: WangBlock, low: WangBlock, rank: int, step: int, parts: list[flo
 
 
 def block_elements(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> Floats:
-    """The same as a matrix (up.size, low.size)."""
+    """The real elements of a tensor between two Wang blocks, (up.size, low.size)."""
     return acting_on(np.eye(low.size), up, low, tensor)
 
 
@@ -270,7 +270,7 @@ def acting_on(vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor
 
 
 def add_acting_on(zeros: Floats, vectors: Floats, up: WangBlock, low: WangBlock, tensor: BodyTensor) -> None:
-    """The same, transposed, into an array of zeros (n, up.size)."""
+    """Write a tensor times columns (low.size, n), transposed, into an array of zeros (n, up.size)."""
     states = vectors.T
     for number, (source, target, elements) in enumerate(bands_between(up, low, tensor)):
         if number == 0:

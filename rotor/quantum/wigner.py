@@ -244,7 +244,7 @@ def _sum_of_ratios(
 
 
 def _exact_sum_of_ratios(falling: list[int], rising: list[int], growing: bool, t: int, last: int) -> tuple[float, int]:
-    """The same for one symbol in integers, by Horner's rule from the last ratio, as mantissa and exponent."""
+    """The sum of ratios of a single symbol in integers, by Horner's rule from the last ratio, as mantissa and exponent."""
     n, d = 1, 1
     for at in range(last - 1, t - 1, -1):
         up = -prod(x - at for x in falling) * (at + 2 if growing else 1)

@@ -65,10 +65,10 @@ class Blocks:
         """
         starts = {f: self._starts(f) for f in sorted(set(twice_f.tolist()))}
         block, rank = list[int](), list[int]()
-        for sub, own_n, own_k, f in zip(levels, n.tolist(), k.tolist(), twice_f.tolist(), strict=True):
+        for sub, n_of_level, k_of_level, f in zip(levels, n.tolist(), k.tolist(), twice_f.tolist(), strict=True):
             place, before = starts[f][sub]
             block.append(len(self.members) * ((f + 1) // 2) + place + 1)
-            rank.append(before + (own_k - self._least_k(sub, own_n)) // 2 + 1)
+            rank.append(before + (k_of_level - self._least_k(sub, n_of_level)) // 2 + 1)
         return np.array(block, dtype=np.int64), np.array(rank, dtype=np.int64)
 
     def _starts(self, twice_f: int) -> dict[SubBlock, tuple[int, int]]:

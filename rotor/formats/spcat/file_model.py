@@ -35,9 +35,9 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
     SpeciesPairs,
     forbidden,
     l_values,
-    some_weights_agree,
     species_pairs,
     symmetric_part,
+    weights_agree,
 )
 from rotor.formats.spcat.hamiltonian.undiagonalized import is_undiagonalized, without_diagonalization
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
@@ -181,13 +181,13 @@ def groups_of(
     members, oblate = members_of_pairs(doubled), first.nvib < 0
     dipoles, others = dipoles_of(intensities.dipoles, len(states))
     phases = phases_of(file, len(states), members)
-    own_axes = moments_within_states(dipoles, others, states, members)
-    phases = with_dipoles(phases, own_axes, oblate, as_spcat and bool(phases.odd))
+    axes_within_states = moments_within_states(dipoles, others, states, members)
+    phases = with_dipoles(phases, axes_within_states, oblate, as_spcat and bool(phases.odd))
     lines = _acting(file, states, doubled, phases.odd)[0]
     dipoles, others = _dipoles_of_both_components(dipoles, doubled), _others_of_both(others, doubled)
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     lines = with_their_spins(lines, states)[0]
-    light = Light(dipoles, others, series_of(file, len(states), doubled), phases, own_axes)
+    light = Light(dipoles, others, series_of(file, len(states), doubled), phases, axes_within_states)
     return [
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
         for numbers in connected_parts(len(states), [*pairs, *doubled])
@@ -205,7 +205,7 @@ class Light(NamedTuple):
     others: list[tuple[Dipole, DipoleCode]]
     series: Series
     phases: Phases
-    own_axes: list[tuple[int, bool]]
+    axes_within_states: list[tuple[int, bool]]
 
 
 def moments_within_states(
@@ -219,9 +219,7 @@ def moments_within_states(
         if code.axis in (1, 2, 3) and len(set(code.states)) == 1
     ]
     return [
-        (axis, odd)
-        for v, axis, odd in plain
-        if v in members or some_weights_agree("abc"[axis - 1], states[v], states[v])
+        (axis, odd) for v, axis, odd in plain if v in members or weights_agree("abc"[axis - 1], states[v], states[v])
     ]
 
 
@@ -358,7 +356,9 @@ def _group(
     turned = _turned(usable, light, doubled)
     if light.phases.odd:
         fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
-        moments, beside = turned_moments(moments, beside, turned, with_dipoles(fixed, light.own_axes, oblate, False))
+        moments, beside = turned_moments(
+            moments, beside, turned, with_dipoles(fixed, light.axes_within_states, oblate, False)
+        )
     elif light.phases.between_i:
         moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
     axes, apart = basis_axes(oblate), _apart(states, pairs)

@@ -75,20 +75,20 @@ def lines_of_coupled_spins(
     first = states[0]
     usable = tuple(line for line in lines if _highest_spin(line) <= len(first.spins))
     if first.equivalent == 2 and by_exchange:
-        of = {state.number: state for state in states}
-        return tuple(part for line in usable for part in _by_exchange(line, of))
+        state_of = {state.number: state for state in states}
+        return tuple(part for line in usable for part in _by_exchange(line, state_of))
     if first.equivalent == 3:
         return tuple(_with_factors_of_three(line, len(first.spins), axes) for line in usable)
     return usable
 
 
-def _by_exchange(line: CodedLine, of: Mapping[int, StateOptions]) -> list[CodedLine]:
+def _by_exchange(line: CodedLine, state_of: Mapping[int, StateOptions]) -> list[CodedLine]:
     """A line restricted to the part that connects levels of equal weight, with one line for each state if this part differs."""
     if not line.operator.spins:
         return [line]
     if line.states:
-        return [line._replace(exchange=exchange_of(line.symmetry.axis, *(of[v] for v in line.states)))]
-    part_by_state = {v: exchange_of(line.symmetry.axis, state, state) for v, state in of.items()}
+        return [line._replace(exchange=exchange_of(line.symmetry.axis, *(state_of[v] for v in line.states)))]
+    part_by_state = {v: exchange_of(line.symmetry.axis, state, state) for v, state in state_of.items()}
     if len(set(part_by_state.values())) == 1:
         return [line._replace(exchange=next(iter(part_by_state.values())))]
     return [line._replace(states=(v, v), exchange=part) for v, part in part_by_state.items()]

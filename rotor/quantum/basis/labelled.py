@@ -82,8 +82,8 @@ class Basis:
 
 def rotation_labels(jmax: int, jmin: int = 0) -> dict[str, Ints]:
     """J and K of all |J K⟩ with J from `jmin` to `jmax`, K rising."""
-    every_j = np.arange(jmin, jmax + 1)
+    all_j = np.arange(jmin, jmax + 1)
     return {
-        "J": np.repeat(every_j, 2 * every_j + 1),
-        "K": np.concatenate([np.arange(-j, j + 1) for j in every_j.tolist()]),
+        "J": np.repeat(all_j, 2 * all_j + 1),
+        "K": np.concatenate([np.arange(-j, j + 1) for j in all_j.tolist()]),
     }

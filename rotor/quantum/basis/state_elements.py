@@ -71,23 +71,24 @@ class StateTerms(NamedTuple):
     @classmethod
     def of(cls, top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], representation: str) -> StateTerms:
         place = {name: i for i, name in enumerate(names)}
-        own = [state for effect in effects for state in (State(0, effect.operators(top)), *effect.states(top))]
-        found = {(q, n) for state in own for operators in state.terms.values() for _, q, n in operators}
-        powers = ((0, 0), *sorted(found - {(0, 0)}))
-        first = {v: i * len(powers) for i, v in enumerate(dict.fromkeys(state.v for state in own))}
+        states = [state for effect in effects for state in (State(0, effect.operators(top)), *effect.states(top))]
+        occurring = {(q, n) for state in states for operators in state.terms.values() for _, q, n in operators}
+        powers = ((0, 0), *sorted(occurring - {(0, 0)}))
+        first = {v: i * len(powers) for i, v in enumerate(dict.fromkeys(state.v for state in states))}
         terms = [
             (first[state.v] + powers.index((q, n)), place[name], p, factor)
-            for state in own
+            for state in states
             for name, operators in state.terms.items()
             if name in place
             for (p, q, n), factor in operators.items()
         ]
         links = list[_Link]()
-        for one in couplings_of(top, effects, representation):
-            if one.name in place:
+        for coupling in couplings_of(top, effects, representation):
+            if coupling.name in place:
                 unit = len(first) * len(powers) + len(links)
-                links.append(_Link(unit, one.bra, one.ket, one.operator, [(one.name, one.operator)]))
-                terms.append((unit, place[one.name], 0, 1.0))
+                named = [(coupling.name, coupling.operator)]
+                links.append(_Link(unit, coupling.bra, coupling.ket, coupling.operator, named))
+                terms.append((unit, place[coupling.name], 0, 1.0))
         rows, columns, p = np.array([term[:3] for term in terms], dtype=np.int64).reshape(-1, 3).T
         factors = np.array([term[3] for term in terms], dtype=float)
         return cls(powers, first, rows, columns, p, factors, tuple(links))
@@ -95,14 +96,18 @@ class StateTerms(NamedTuple):
     @classmethod
     def of_values(cls, states: Mapping[int, Operators], links: Sequence[Summed], representation: str) -> StateTerms:
         """Of one parameter, H itself: operators of every state by v with their values, and sums of couplings."""
-        powers = ((0, 0), *sorted({(q, n) for own in states.values() for _, q, n in own} - {(0, 0)}))
+        powers = ((0, 0), *sorted({(q, n) for operators in states.values() for _, q, n in operators} - {(0, 0)}))
         first = {v: i * len(powers) for i, v in enumerate(states)}
-        found = [(first[v] + powers.index((q, n)), p, c) for v, own in states.items() for (p, q, n), c in own.items()]
+        terms = [
+            (first[v] + powers.index((q, n)), p, c)
+            for v, operators in states.items()
+            for (p, q, n), c in operators.items()
+        ]
         units = range(len(first) * len(powers), len(first) * len(powers) + len(links))
-        found += [(unit, 0, 1.0) for unit in units]
-        rows, p, factors = (np.array(column) for column in zip(*found, strict=True))
-        made = tuple(_Link(unit, *link) for unit, link in zip(units, links, strict=True))
-        return cls(powers, first, rows, np.zeros_like(rows), p, factors, made)
+        terms += [(unit, 0, 1.0) for unit in units]
+        rows, p, factors = (np.array(column) for column in zip(*terms, strict=True))
+        numbered_links = tuple(_Link(unit, *link) for unit, link in zip(units, links, strict=True))
+        return cls(powers, first, rows, np.zeros_like(rows), p, factors, numbered_links)
 
     @property
     def linked(self) -> list[int]:
@@ -129,25 +134,25 @@ def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> 
     """The unit matrices of one state, those of `powers`, over every Wang block: lower triangles."""
     if not blocks:
         return {}
-    every = sorted(blocks)
-    diagonals = unit_diagonals(every, [block.size for block in every], powers[1:])
-    size = max(block.size for block in every)
-    ones = np.arange(size)[None, :] < np.array([block.size for block in every])[:, None]
-    of_block, functions = np.nonzero(ones)
-    found = [(of_block, functions, np.zeros_like(functions), np.zeros_like(functions))]
-    given = [np.ones(len(functions))]
+    rising = sorted(blocks)
+    diagonals = unit_diagonals(rising, [block.size for block in rising], powers[1:])
+    size = max(block.size for block in rising)
+    ones = np.arange(size)[None, :] < np.array([block.size for block in rising])[:, None]
+    numbers, functions = np.nonzero(ones)
+    pieces = [(numbers, functions, np.zeros_like(functions), np.zeros_like(functions))]
+    elements = [np.ones(len(functions))]
     for d, values in enumerate(diagonals):
         places = np.nonzero(values)
-        found.append((places[0], places[1], np.full_like(places[0], d), places[2] + 1))
-        given.append(values[places])
-    b, i, d_of, unit = (np.concatenate(column) for column in zip(*found, strict=True))
-    value = np.concatenate(given)
+        pieces.append((places[0], places[1], np.full_like(places[0], d), places[2] + 1))
+        elements.append(values[places])
+    b, i, distance, unit = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    value = np.concatenate(elements)
     order = np.argsort(b, kind="stable")
-    bounds = np.searchsorted(b[order], np.arange(len(every) + 1))
+    bounds = np.searchsorted(b[order], np.arange(len(rising) + 1))
     out = {}
-    for number, block in enumerate(every):
+    for number, block in enumerate(rising):
         chosen = order[bounds[number] : bounds[number + 1]]
-        out[block] = WangElements(i[chosen] + d_of[chosen], i[chosen], unit[chosen], value[chosen])
+        out[block] = WangElements(i[chosen] + distance[chosen], i[chosen], unit[chosen], value[chosen])
     return out
 
 
@@ -162,25 +167,25 @@ class _Joining:
 
     def elements(self, vertices: Sequence[Vertex], j: int) -> list[tuple[int, int, WangElements]]:
         """Elements between two vertices, those of the bra in rows, or within one, for every link; none for round-off of zero."""
-        found = list[tuple[int, int, WangElements]]()
-        of_state: dict[int, list[tuple[int, WangBlock, int]]] = {}
+        linked = list[tuple[int, int, WangElements]]()
+        blocks_by_state: dict[int, list[tuple[int, WangBlock, int]]] = {}
         for i, (v, block) in enumerate(vertices):
-            of_state.setdefault(v, []).append((i, block, 2 * (block.first_k % 2) + (block.sign > 0)))
+            blocks_by_state.setdefault(v, []).append((i, block, 2 * (block.first_k % 2) + (block.sign > 0)))
         for link in self._links:
             operator = link.operator(j, self._representation)
             least = NOTHING * max(
                 (float(np.abs(band).max(initial=0.0)) for band in operator.bands.values()), default=0.0
             )
-            for i, up, of_up in of_state.get(link.bra, ()):
-                for k, low, of_low in of_state.get(link.ket, ()):
-                    kind = (link.unit, link.bra, of_up, link.ket, of_low)
+            for i, up, kind_up in blocks_by_state.get(link.bra, ()):
+                for k, low, kind_low in blocks_by_state.get(link.ket, ()):
+                    kind = (link.unit, link.bra, kind_up, link.ket, kind_low)
                     self._tried[kind] += 1
                     if (self._tried[kind] <= _TRIED_AT or kind in self._kinds) and (
-                        one := _linked(link, operator, (up, low), least, self._representation)
+                        elements := _linked(link, operator, (up, low), least, self._representation)
                     ):
                         self._kinds.add(kind)
-                        found.append((i, k, one))
-        return found
+                        linked.append((i, k, elements))
+        return linked
 
 
 def _linked(
@@ -233,10 +238,12 @@ class StateElements:
         """count: of the parameters."""
         self.terms, self._count = terms, count
         self._vertices, self._joining = vertices, _Joining(self.terms.links, representation)
-        self._elements = wang_elements({block for some in vertices.values() for _, block in some}, self.terms.powers)
+        self._elements = wang_elements(
+            {block for members in vertices.values() for _, block in members}, self.terms.powers
+        )
 
-    def of_j(self, j: int) -> ElementsOfJ:
-        """Those of one J; the highest J come first."""
+    def at(self, j: int) -> ElementsOfJ:
+        """The elements of one J; the highest J come first."""
         links = self._joining.elements(self._vertices[j], j)
         return ElementsOfJ(self._vertices[j], links, self.terms.mix(j, self._count), self.terms.first, self._elements)
 
@@ -248,20 +255,20 @@ class ElementsOfJ(NamedTuple):
     links: list[tuple[int, int, WangElements]]
     mix: Floats
     first: dict[int, int]
-    of_wang: dict[WangBlock, WangElements]
+    within: dict[WangBlock, WangElements]
 
     def block(self, members: Sequence[int]) -> LinearBlock:
         """The block of some vertices, one behind the other."""
         parts = parts_of([self.vertices[i] for i in members])
         place = dict(zip(members, parts, strict=True))
-        found = [_shifted(self.of_wang[part.basis], part, self.first[part.v]) for part in parts]
-        found += [_between(one, place[i], place[k]) for i, k, one in self.links if i in place and k in place]
-        rows, columns, units, values = (np.concatenate(column) for column in zip(*found, strict=True))
+        pieces = [_shifted(self.within[part.basis], part, self.first[part.v]) for part in parts]
+        pieces += [_between(link, place[i], place[k]) for i, k, link in self.links if i in place and k in place]
+        rows, columns, units, values = (np.concatenate(column) for column in zip(*pieces, strict=True))
         size = parts[-1].place.stop
-        places, of_place = numbered(rows * size + columns, size * size)
-        used, of_unit = numbered(units, len(self.mix))
+        places, position = numbered(rows * size + columns, size * size)
+        used, column = numbered(units, len(self.mix))
         factors = np.zeros((len(places), len(used)))
-        np.add.at(factors, (of_place, of_unit), values)
+        np.add.at(factors, (position, column), values)
         mix = self.mix[used]
         parameters = np.flatnonzero(mix.any(axis=0))
         return LinearBlock(size, *np.divmod(places, size), factors, mix[:, parameters], parameters)
@@ -284,15 +291,15 @@ def blocks_of_terms(
     terms: StateTerms, count: int, representation: str, blocks: Sequence[SolvedBlock]
 ) -> list[LinearBlock]:
     """The linear blocks of so many parameters over the functions of solved blocks."""
-    every, by_j = [vertices_of(block) for block in blocks], dict[int, list[int]]()
-    for number, own in enumerate(every):
-        by_j.setdefault(own[0][1].j, []).append(number)
-    vertices = {j: [vertex for i in numbers for vertex in every[i]] for j, numbers in by_j.items()}
+    members, by_j = [vertices_of(block) for block in blocks], dict[int, list[int]]()
+    for number, vertices_of_block in enumerate(members):
+        by_j.setdefault(vertices_of_block[0][1].j, []).append(number)
+    vertices = {j: [vertex for i in numbers for vertex in members[i]] for j, numbers in by_j.items()}
     elements = StateElements(terms, count, representation, vertices)
     out: dict[int, LinearBlock] = {}
     for j in sorted(by_j, reverse=True):
-        here, start = elements.of_j(j), 0
+        here, start = elements.at(j), 0
         for number in by_j[j]:
-            stop = start + len(every[number])
+            stop = start + len(members[number])
             out[number], start = here.block(range(start, stop)), stop
     return [out[number] for number in range(len(blocks))]

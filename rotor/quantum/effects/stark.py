@@ -234,9 +234,9 @@ def acting(
         if top.polarizability_abc_angstrom3 is None:
             raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")
         light = Contraction(top.polarizability_abc_angstrom3, np.outer(Z, Z))
-    own_dipole = dipole or (0.0, 0.0, 0.0)
-    states = dipoles_by_state(top, own_dipole, effects or effects_of(top, False))
-    return Contraction(own_dipole, direction, states if len(states) > 1 else {}), light
+    dipole_abc = dipole or (0.0, 0.0, 0.0)
+    states = dipoles_by_state(top, dipole_abc, effects or effects_of(top, False))
+    return Contraction(dipole_abc, direction, states if len(states) > 1 else {}), light
 
 
 def dipole_derivative(top: Top, axis: int, effects: Sequence[QuantumEffect]) -> Contraction:

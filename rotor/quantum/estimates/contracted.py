@@ -87,8 +87,8 @@ class ContractedLevels:
             for number in {block.parts[target.part].number for target in block.targets} - set(names):
                 names[number] = _states_by_name(self.rotors[number], solved.vectors[number])
             rows = np.array([target.row for target in block.targets])
-            found_energies, vectors = _levels_of(block, _functions_of(block, names), solved, self.window_mhz)
-            energies[rows] = found_energies
+            level_energies, vectors = _levels_of(block, _functions_of(block, names), solved, self.window_mhz)
+            energies[rows] = level_energies
             slopes[rows] = self._slopes(block, vectors, solved, len(values_mhz))
         return energies, slopes
 

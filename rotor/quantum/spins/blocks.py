@@ -254,10 +254,10 @@ def parts_of_f(plan: Plan, patterns: Ints) -> Iterator[tuple[SpinPart, ...]]:
         yield _parts(plan, [(i, rows_of_n) for _, i, rows_of_n in sorted(members, key=lambda member: member[0])])
 
 
-def functions_of_blocks(plan: Plan, every_f: Iterable[int]) -> list[SpinBlock]:
+def functions_of_blocks(plan: Plan, all_f: Iterable[int]) -> list[SpinBlock]:
     """Basis functions of the blocks of all F, without vectors: labels and energies are those of the rotational states."""
     out = []
-    for twice_f in every_f:
+    for twice_f in all_f:
         patterns = plan.shared.scheme.patterns(twice_f)
         for parts in parts_of_f(plan, patterns):
             energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])

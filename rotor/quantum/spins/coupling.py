@@ -186,25 +186,27 @@ _AT_ONCE = 200_000  # elements computed at a time; intermediate arrays then fit 
 _LARGE = 10_000  # a table with more elements is computed alone
 
 
-def for_every_f(tables: Mapping[int, tuple[Ints, Ints]], of: Callable[[Ints, Ints], Floats]) -> dict[int, Floats]:
+def for_all_f(tables: Mapping[int, tuple[Ints, Ints]], compute: Callable[[Ints, Ints], Floats]) -> dict[int, Floats]:
     """Coefficients `of` (bra, ket) patterns by F; many small tables are computed in one call, pair by pair."""
-    out = {f: of(bra, ket) for f, (bra, ket) in tables.items() if len(bra) * len(ket) > _LARGE}
+    out = {f: compute(bra, ket) for f, (bra, ket) in tables.items() if len(bra) * len(ket) > _LARGE}
     batch: list[int] = []
     count = 0
     for f in (f for f in tables if f not in out):
         batch.append(f)
         count += len(tables[f][0]) * len(tables[f][1])
         if count > _AT_ONCE:
-            out |= _pair_by_pair({f: tables[f] for f in batch}, of)
+            out |= _pair_by_pair({f: tables[f] for f in batch}, compute)
             batch, count = [], 0
-    return out | (_pair_by_pair({f: tables[f] for f in batch}, of) if batch else {})
+    return out | (_pair_by_pair({f: tables[f] for f in batch}, compute) if batch else {})
 
 
-def _pair_by_pair(tables: Mapping[int, tuple[Ints, Ints]], of: Callable[[Ints, Ints], Floats]) -> dict[int, Floats]:
+def _pair_by_pair(
+    tables: Mapping[int, tuple[Ints, Ints]], compute: Callable[[Ints, Ints], Floats]
+) -> dict[int, Floats]:
     """Coefficients of several tables as one list of pairs of patterns."""
     bra = np.concatenate([left.repeat(len(right), axis=0) for left, right in tables.values()])
     ket = np.concatenate([np.tile(right, (len(left), 1)) for left, right in tables.values()])
-    values, start = of(bra[:, None, :], ket[:, None, :]).ravel(), 0
+    values, start = compute(bra[:, None, :], ket[:, None, :]).ravel(), 0
     out: dict[int, Floats] = {}
     for f, (left, right) in tables.items():
         stop = start + len(left) * len(right)

@@ -39,45 +39,45 @@ def spin_levels(
 def levels_of_f(
     top: Top,
     effects: tuple[QuantumEffect, ...],
-    every_f: Sequence[int],
+    all_f: Sequence[int],
     n_range: tuple[int, int] | None = None,
     executor: Executor | None = None,
     exist: Exist | None = None,
 ) -> Levels:
-    """The levels with vectors of all doubled F in `every_f` whose label has N within `n_range`, by default all.
+    """The levels with vectors of all doubled F in `all_f` whose label has N within `n_range`, by default all.
 
     exist: takes labels (n, columns as `SpinBlock.labels`) and returns whether each level exists, (n,) of bool. Blocks without an existing
     level are not solved. In an axial top v and K decide.
     """
     hold_freed_memory()
-    lowest, highest = _range_of_n(top, effects, every_f)
-    plan = simplified(contracted_plan(top, effects, lowest, highest, executor, exist), effects, every_f)
-    solved = solved_blocks(plan, every_f, exist)
+    lowest, highest = _range_of_n(top, effects, all_f)
+    plan = simplified(contracted_plan(top, effects, lowest, highest, executor, exist), effects, all_f)
+    solved = solved_blocks(plan, all_f, exist)
     if n_range:
         solved = [_within(block, n_range) for block in solved]
     blocks = tuple(placed(solved))
     return _table(top, effects, plan.shared, blocks, highest if n_range is None else n_range[1])
 
 
-def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequence[int]) -> tuple[Levels, Plan]:
-    """Basis functions of all F in `every_f`, rotational states times coupling patterns, as levels without spin splitting.
+def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence[int]) -> tuple[Levels, Plan]:
+    """Basis functions of all F in `all_f`, rotational states times coupling patterns, as levels without spin splitting.
 
     They are labelled as solved levels are, without vectors; the plan has the operators and the coupling coefficients of these F.
     """
-    lowest, highest = _range_of_n(top, effects, every_f)
+    lowest, highest = _range_of_n(top, effects, all_f)
     plan = contracted_plan(top, effects, lowest, highest, None)
     if plan.shared.scheme.equivalent == 3:
         raise ValueError(
             "functions of three equivalent nuclei are not products of a rotational state and a coupling pattern"
         )
-    blocks = tuple(placed(functions_of_blocks(plan, every_f)))
+    blocks = tuple(placed(functions_of_blocks(plan, all_f)))
     return _table(top, effects, plan.shared, blocks, highest), plan
 
 
-def _range_of_n(top: Top, effects: tuple[QuantumEffect, ...], every_f: Sequence[int]) -> tuple[int, int]:
+def _range_of_n(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence[int]) -> tuple[int, int]:
     """The lowest and the highest N that couple with the spins to one of these F (doubled)."""
     total = scheme_of(top, effects).total
-    return min(max(0, (f - total) // 2) for f in every_f), max((f + total) // 2 for f in every_f)
+    return min(max(0, (f - total) // 2) for f in all_f), max((f + total) // 2 for f in all_f)
 
 
 def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:

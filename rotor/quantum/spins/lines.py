@@ -114,8 +114,10 @@ def connected_blocks(blocks: Sequence[SpinBlock], tensors: Tensors) -> Iterator[
         for first, low in enumerate(lows):
             reached = elements.reached_from(low)
             for rise in range(rank + 1):
-                ups, of_number = by_f.get(twice_f + 2 * rise, []), holders.get(twice_f + 2 * rise, {})
-                places = {place for number in reached for place in of_number.get(number, ()) if rise or place >= first}
+                ups, places_by_number = by_f.get(twice_f + 2 * rise, []), holders.get(twice_f + 2 * rise, {})
+                places = {
+                    place for number in reached for place in places_by_number.get(number, ()) if rise or place >= first
+                }
                 yield from ((ups[i], low) for i in sorted(places) if _acting(ups[i], low, tensors, rank))
 
 

@@ -160,14 +160,14 @@ def _group(layout: Layout, members: Sequence[tuple[int, Sequence[SpinPart], Layo
         start += count
     counts = [rotation.columns.stop - rotation.columns.start for rotation in rotations]
     columns, orders = np.zeros((len(members), start), dtype=np.int64), list[Any]()
-    for place, (f, parts, own_layout) in enumerate(members):
+    for place, (f, parts, block_layout) in enumerate(members):
         numbers, sizes = frame.patterns[f], [frame.sizes[part.number] for part in parts]
-        if len(numbers) == len(frame.n_patterns) and own_layout == layout:
+        if len(numbers) == len(frame.n_patterns) and block_layout == layout:
             columns[place] = np.repeat(sizes, counts)
             orders.append(slice(None))
             continue
         order = list[int]()
-        for part, size, n_pattern_and_kind in zip(parts, sizes, own_layout, strict=True):
+        for part, size, n_pattern_and_kind in zip(parts, sizes, block_layout, strict=True):
             rotation = rotations[layout.index(n_pattern_and_kind)]
             at = [pattern + rotation.columns.start - rotation.patterns.start for pattern in numbers[part.patterns]]
             columns[place, at] = size

@@ -27,7 +27,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.blocks import Plan
-from rotor.quantum.spins.coupling import coefficients, for_every_f, patterns, powers_between
+from rotor.quantum.spins.coupling import coefficients, for_all_f, patterns, powers_between
 from rotor.quantum.spins.rotor import Channel
 from rotor.quantum.spins.scheme import Scheme
 
@@ -212,12 +212,13 @@ def _alone(twice: tuple[int, ...], channel: Channel, highest_n: int) -> Alone:
     tables = {j: patterns(twice, j) for j in range(sum(twice) % 2, 2 * highest_n + sum(twice) + 1, 2)}
     tables = {j: patterns_of_j[patterns_of_j[:, 0] <= 2 * highest_n] for j, patterns_of_j in tables.items()}
 
-    def of(bra: Ints, ket: Ints) -> Floats:
+    def coefficients_of_tables(bra: Ints, ket: Ints) -> Floats:
         plain = coefficients(twice, channel.acting, channel.rank, bra, ket)
         return plain * powers_between(twice[0], (channel.ns, channel.n2), bra, ket) if channel.ns else plain
 
-    by_j = for_every_f(
-        {j: (patterns_of_j, patterns_of_j) for j, patterns_of_j in tables.items() if len(patterns_of_j)}, of
+    by_j = for_all_f(
+        {j: (patterns_of_j, patterns_of_j) for j, patterns_of_j in tables.items() if len(patterns_of_j)},
+        coefficients_of_tables,
     )
     norm = np.zeros((highest_n + 1, highest_n + 1))
     ends = np.full((2, highest_n + 1), -np.inf)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.coupling import coefficients, for_every_f, moment_coefficients, powers_between
+from rotor.quantum.spins.coupling import coefficients, for_all_f, moment_coefficients, powers_between
 from rotor.quantum.spins.rotor import Channel
 from rotor.quantum.spins.scheme import Scheme
 
@@ -95,7 +95,7 @@ def couplings_of(scheme: Scheme, channel: Channel, tables: Mapping[int, Ints]) -
     if scheme.equivalent:
         return {f: _couplings_of_f(scheme, channel, f) for f in tables}
     both = {f: (patterns, patterns) for f, patterns in tables.items()}
-    return for_every_f(both, lambda bra, ket: coefficients_between(scheme, channel, bra, ket))
+    return for_all_f(both, lambda bra, ket: coefficients_between(scheme, channel, bra, ket))
 
 
 def coefficients_between(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints) -> Floats:
@@ -129,7 +129,7 @@ def coefficients_of_step(scheme: Scheme, patterns: dict[int, Ints], rank: int, s
     tables = {f: (patterns[f + step], patterns_of_f) for f, patterns_of_f in patterns.items() if f + step in patterns}
     if scheme.equivalent:
         return {f: tensor_coefficients(scheme, rank, *bra_and_ket) for f, bra_and_ket in tables.items()}
-    return for_every_f(tables, lambda bra, ket: tensor_coefficients(scheme, rank, bra, ket))
+    return for_all_f(tables, lambda bra, ket: tensor_coefficients(scheme, rank, bra, ket))
 
 
 def tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints, acting: int | None = None) -> Floats:

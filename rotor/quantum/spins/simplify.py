@@ -21,7 +21,7 @@ from rotor.quantum.spins.contraction import Contracted
 from rotor.quantum.spins.neglected import largest_shifts
 
 
-def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[int]) -> Plan:
+def simplified(plan: Plan, effects: Sequence[QuantumEffect], all_f: Sequence[int]) -> Plan:
     """The plan with the elements of the requested treatment; unchanged if none is requested."""
     requested = next((effect for effect in effects if isinstance(effect, HyperfineMethod)), None)
     if requested is None:
@@ -40,7 +40,9 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], every_f: Sequence[i
     used = Used(chosen, estimates[chosen], requested.tolerance_mhz)
     if chosen == EXACT:
         return plan.with_method(used)
-    return plan.with_method(used, [(_without_neglected(contracted, chosen), of) for contracted, of in plan.contracted])
+    return plan.with_method(
+        used, [(_without_neglected(contracted, chosen), channels) for contracted, channels in plan.contracted]
+    )
 
 
 def _without_neglected(contracted: Sequence[Contracted], method: str) -> list[Contracted]:

@@ -33,17 +33,17 @@ from rotor.quantum.spins.rotor import Channel
 FEW = 100  # with more patterns of an F, coefficients are computed one F at a time
 
 
-def solved_blocks(plan: Plan, every_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock]:
+def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock]:
     """Solve the blocks of all doubled F in which a level exists (`levels.levels_of_f`): by F, then by the lowest member of each family."""
     scheme = plan.shared.scheme
     if scheme.equivalent == 3:
         from rotor.quantum.spins.three_equivalent import allowed_states, in_wang_functions
 
-        plan, patterns = in_wang_functions(plan), {f: scheme.patterns(f) for f in every_f}
+        plan, patterns = in_wang_functions(plan), {f: scheme.patterns(f) for f in all_f}
         members, solutions = allowed_states(plan, patterns, exist)
     else:
-        table = pattern_table(scheme, every_f[0], every_f[-1])
-        patterns = {f: table.patterns[f] for f in every_f if f in table.patterns}
+        table = pattern_table(scheme, all_f[0], all_f[-1])
+        patterns = {f: table.patterns[f] for f in all_f if f in table.patterns}
         members = _existing_members(plan, patterns, exist)
         solutions = _states(plan, members, table._replace(patterns=patterns))
     plan.shared.cache["patterns"] = patterns

@@ -135,17 +135,15 @@ def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, 
         return None
     m, n = (pairs.m, pairs.n) if closes.all() else (pairs.m[closes], pairs.n[closes])
     parts = parts_of_n[n[:, 0] % 4]
-    elements, every_n = np.zeros((len(m), up.size, low.size)), tuple(n[:, 0].tolist())
+    elements, all_n = np.zeros((len(m), up.size, low.size)), tuple(n[:, 0].tolist())
     for step in steps:
         source, target = overlap(up, low, step)
         if source.start < source.stop:
             rows, columns = np.arange(target.start, target.stop), np.arange(source.start, source.stop)
             first, count = low.first_k + 2 * source.start, source.stop - source.start
-            elements[:, rows, columns] = (
-                _couplings(every_n, rise, rank, step, first, count) * parts[:, rank + step, None]
-            )
+            elements[:, rows, columns] = _couplings(all_n, rise, rank, step, first, count) * parts[:, rank + step, None]
     if rank > 1:
-        _add_folded(elements, parts, up, low, (every_n, rise))
+        _add_folded(elements, parts, up, low, (all_n, rise))
     if closes.all():
         return elements
     out = np.zeros((len(closes), up.size, low.size))
@@ -161,12 +159,12 @@ def _signed_parts(tensor: BodyTensor, up: WangBlock, low: WangBlock, rise: int) 
 
 
 @lru_cache(maxsize=512)  # about 20 MB for N up to 100
-def _couplings(every_n: tuple[int, ...], rise: int, rank: int, step: int, first_k: int, count: int) -> Floats:
+def _couplings(all_n: tuple[int, ...], rise: int, rank: int, step: int, first_k: int, count: int) -> Floats:
     """`tensors.coupling` from each N to N + rise, over K = first_k, first_k + 2, ..., times √2 where one of K and K + step is 0.
 
     (N, K), zero where K exceeds N; shared and read-only.
     """
-    n, k = np.array(every_n)[:, None], first_k + 2 * np.arange(count)
+    n, k = np.array(all_n)[:, None], first_k + 2 * np.arange(count)
     m = n + rise
     exists = (np.abs(k) <= n) & (np.abs(k + step) <= m)
     inside = np.where(exists, k, np.maximum(-n, -m - step)).astype(float)
@@ -182,9 +180,9 @@ def _add_folded(
     elements: Floats, parts: Floats, up: WangBlock, low: WangBlock, n_and_rise: tuple[tuple[int, ...], int]
 ) -> None:
     """Add the elements that connect K with -K', as in `tensors.bands_between`: s X(K', -K) for 1 ≤ K, K' and K + K' ≤ rank."""
-    rank, (every_n, rise) = parts.shape[1] // 2, n_and_rise
+    rank, (all_n, rise) = parts.shape[1] // 2, n_and_rise
     for column, k in enumerate(low.k[:rank].tolist()):
         for row, k_up in enumerate(up.k[:rank].tolist()):
             if k and k_up and k + k_up <= rank:
-                turned = _couplings(every_n, rise, rank, k + k_up, -k, 1)[:, 0]
+                turned = _couplings(all_n, rise, rank, k + k_up, -k, 1)[:, 0]
                 elements[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]

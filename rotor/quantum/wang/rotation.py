@@ -122,13 +122,15 @@ def _linear(
         components=np.ones_like(j),
         weight=top.spin_weights.of_j(j),
         effects=effects,
-        blocks=tuple(_one_function(int(number), e, row) for row, (number, e) in enumerate(zip(j, energy, strict=True)))
+        blocks=tuple(
+            _single_function(int(number), e, row) for row, (number, e) in enumerate(zip(j, energy, strict=True))
+        )
         if in_blocks
         else (),
     )
 
 
-def _one_function(j: int, energy: float, row: int) -> SolvedBlock:
+def _single_function(j: int, energy: float, row: int) -> SolvedBlock:
     """A block of the single function K = 0."""
     basis = WangBlock(j, "eo" if j % 2 else "ee", 0, 1, 1)
     return single_block(basis, np.array([energy]), np.ones((1, 1)), row)

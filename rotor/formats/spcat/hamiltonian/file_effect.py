@@ -210,15 +210,15 @@ def real_lines(
     return acting, list(dict.fromkeys(reasons))
 
 
-def _stored(of: OperatorOfJ) -> OperatorOfJ:
+def _stored(operator_at: OperatorOfJ) -> OperatorOfJ:
     """The operator, stored for each J up to `_STORED_TO` at its first use."""
     stored: dict[tuple[int, str], JOperator] = {}
 
     def operator(j: int, representation: str) -> JOperator:
         if j > _STORED_TO:
-            return of(j, representation)
+            return operator_at(j, representation)
         if (j, representation) not in stored:
-            stored[j, representation] = of(j, representation)
+            stored[j, representation] = operator_at(j, representation)
         return stored[j, representation]
 
     return operator
@@ -307,10 +307,10 @@ class FileEffect(QuantumEffect):
                 couplings += self._with_pairs(line, states)
             elif operator.by_j is not None:
                 pairs = [states] if states else [(v, v) for v in range(len(self.numbers))]
-                of = operator.by_j
+                operator_at = operator.by_j
                 if self._is_turned(line):
-                    of = half_turned(of, self.turned, operator.odd)
-                couplings += [Coupling(line.name, *pair, of) for pair in pairs]
+                    operator_at = half_turned(operator_at, self.turned, operator.odd)
+                couplings += [Coupling(line.name, *pair, operator_at) for pair in pairs]
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
                 couplings.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
@@ -322,13 +322,14 @@ class FileEffect(QuantumEffect):
         pairs = self.apart.get((coupling.bra, coupling.ket))
         if pairs is None:
             return coupling
-        of = coupling.operator
-        whole = of(_LOOKED_AT, self._representation)
+        operator_at = coupling.operator
+        whole = operator_at(_LOOKED_AT, self._representation)
         part = between_species(whole, self._representation, pairs)
         if np.abs((whole - part).matrix).max() <= NOTHING * np.abs(whole.matrix).max():
             return coupling
         return replace(
-            coupling, operator=lambda j, representation: between_species(of(j, representation), representation, pairs)
+            coupling,
+            operator=lambda j, representation: between_species(operator_at(j, representation), representation, pairs),
         )
 
     @property
@@ -344,11 +345,11 @@ class FileEffect(QuantumEffect):
         operator = line.operator
         if operator.plain is not None and states[0] == states[1]:
             return []  # listed with the operators of both components
-        of = operator.by_j or plain_of_j(operator.plain or {})
+        operator_at = operator.by_j or plain_of_j(operator.plain or {})
         if operator.odd and states[0] == states[1] and self.axes[2] == "c":
-            of = _turned_round(of)  # -i stands between states of an oblate basis, not within a pair
+            operator_at = _turned_round(operator_at)  # -i stands between states of an oblate basis, not within a pair
         try:
-            return couplings_with_pairs(line.name, of, operator.odd, states, line.reversed_, self.pairs)
+            return couplings_with_pairs(line.name, operator_at, operator.odd, states, line.reversed_, self.pairs)
         except ValueError as error:
             raise ValueError(f"parameter {line.code}: {error}") from None
 
@@ -441,5 +442,5 @@ class FileEffect(QuantumEffect):
 _LOOKED_AT = 5  # J at which all elements of a file's operators exist
 
 
-def _turned_round(of: OperatorOfJ) -> OperatorOfJ:
-    return lambda j, representation: -1.0 * of(j, representation)
+def _turned_round(operator_at: OperatorOfJ) -> OperatorOfJ:
+    return lambda j, representation: -1.0 * operator_at(j, representation)

@@ -145,27 +145,27 @@ def _within(odd: bool, pair: Pair | None) -> list[RealPart]:
     return [RealPart(x, x, 1.0), RealPart(y, y, 1.0)]
 
 
-def _scaled(of: OperatorOfJ, factor: complex) -> OperatorOfJ:
+def _scaled(operator_at: OperatorOfJ, factor: complex) -> OperatorOfJ:
     """factor · O."""
-    return lambda j, representation: factor * of(j, representation)
+    return lambda j, representation: factor * operator_at(j, representation)
 
 
-def _turned(of: OperatorOfJ, factor: complex) -> OperatorOfJ:
+def _turned(operator_at: OperatorOfJ, factor: complex) -> OperatorOfJ:
     """factor (O↑ - O↓)."""
 
     def operator(j: int, representation: str) -> JOperator:
-        bands = of(j, representation).bands
+        bands = operator_at(j, representation).bands
         return JOperator(j, {q: factor * np.sign(q) * band for q, band in bands.items() if q})
 
     return operator
 
 
 def couplings_with_pairs(
-    name: str, of: OperatorOfJ, odd: bool, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair]
+    name: str, operator_at: OperatorOfJ, odd: bool, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair]
 ) -> list[Coupling]:
     """The couplings of `over_real_states` for an operator over |J k⟩, with a factor i if it is odd."""
     return [
-        Coupling(name, bra, ket, _turned(of, 1j * factor) if turned else _scaled(of, factor))
+        Coupling(name, bra, ket, _turned(operator_at, 1j * factor) if turned else _scaled(operator_at, factor))
         for bra, ket, factor, turned in over_real_states(states, odd, reversed_, pairs)
     ]
 

@@ -140,7 +140,7 @@ def _tensor_of_j(tensor: Tensor, j: int, representation: str, z: str) -> JOperat
     return _tensor_of_n(tensor, components(j, representation), z)
 
 
-def _tensor_of_n(tensor: Tensor, of: Mapping[str, JOperator], z: str) -> JOperator:
+def _tensor_of_n(tensor: Tensor, n_abc: Mapping[str, JOperator], z: str) -> JOperator:
     """The Hermitian operator of a tensor, from Na, Nb, Nc.
 
     With X, Y, Z = Nc, Nb, Na (prolate) or Na, Nb, Nc (oblate), E = (X + iY)^K and {A, B} = AB + BA,
@@ -154,10 +154,10 @@ def _tensor_of_n(tensor: Tensor, of: Mapping[str, JOperator], z: str) -> JOperat
     x, y = ("c", "b") if z == "a" else ("a", "b")
     k, cosine = tensor.shape(z)
     if k == 0:
-        return of[z]
-    raised, lowered = (of[x] + 1j * of[y]) ** k, (of[x] - 1j * of[y]) ** k
+        return n_abc[z]
+    raised, lowered = (n_abc[x] + 1j * n_abc[y]) ** k, (n_abc[x] - 1j * n_abc[y]) ** k
     pair = raised + lowered if cosine else -1j * (raised - lowered)
-    return 0.5 * pair if k == tensor.rank else tensor.factor_below() * anticommutator(of[z], pair)
+    return 0.5 * pair if k == tensor.rank else tensor.factor_below() * anticommutator(n_abc[z], pair)
 
 
 def _with_spins(d: Digits, axes: str) -> CodedOperator:

@@ -127,13 +127,13 @@ def odd_of_turned(g: str) -> frozenset[str]:
     return frozenset("abc") - {g} if g else frozenset()
 
 
-def half_turned(of: OperatorOfJ, axis: str, odd: bool) -> OperatorOfJ:
+def half_turned(operator_at: OperatorOfJ, axis: str, odd: bool) -> OperatorOfJ:
     """Representation of an operator O that changes sign under C2g, in functions invariant under θ C2g.
 
     For an odd O, passed as i O, it is i C2g O; for an even one, with a factor i between two states, i C2g i O = -C2g O.
     """
 
     def operator(j: int, representation: str) -> JOperator:
-        return (1.0 if odd else -1.0) * (half_turn(j, representation, axis) @ of(j, representation))
+        return (1.0 if odd else -1.0) * (half_turn(j, representation, axis) @ operator_at(j, representation))
 
     return operator

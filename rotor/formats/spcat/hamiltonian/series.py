@@ -266,16 +266,16 @@ def _multiplied(base: CodedOperator, factor: Factor, sine: bool, axes: str) -> C
     if base.rotor is not None:
         alike = multiplied(base.rotor, lambda m, n, above, below: factor(n, above, below), whole, base.odd != sine)
         return replace(base, rotor=alike, odd=base.odd != sine)
-    of = base.by_j or plain_of_j(base.plain or {})
-    return replace(base, plain=None, by_j=_by_elements(of, factor, whole), odd=base.odd != sine)
+    operator_at = base.by_j or plain_of_j(base.plain or {})
+    return replace(base, plain=None, by_j=_by_elements(operator_at, factor, whole), odd=base.odd != sine)
 
 
-def _by_elements(of: OperatorOfJ, factor: Factor, whole: complex) -> OperatorOfJ:
+def _by_elements(operator_at: OperatorOfJ, factor: Factor, whole: complex) -> OperatorOfJ:
     """An operator whose elements are multiplied by a factor."""
 
     def operator(j: int, representation: str) -> JOperator:
         k = np.arange(-j, j + 1.0)
-        bands = of(j, representation).bands
+        bands = operator_at(j, representation).bands
         return JOperator(j, {q: whole * factor(j, k + q, k) * band for q, band in bands.items()})
 
     return operator

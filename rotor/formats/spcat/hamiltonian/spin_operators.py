@@ -109,8 +109,8 @@ def _vector(axis: str, rank: int, where: Where) -> Complexes:
 @lru_cache(maxsize=1024)
 def _n(frame: tuple[str, str, str], sign: int, n: int, representation: str, power: int) -> Complexes:
     """(N_x ± iN_y) to a power."""
-    of = components(n, representation)
-    return ((of[frame[0]] + sign * 1j * of[frame[1]]) ** power).matrix
+    n_abc = components(n, representation)
+    return ((n_abc[frame[0]] + sign * 1j * n_abc[frame[1]]) ** power).matrix
 
 
 def _commutator(frame: tuple[str, str, str], sign: int, operator: Complexes, where: Where) -> Complexes:

@@ -62,18 +62,18 @@ def forbidden(
         return f"its Δk - Δl is no multiple of {low.fold}"
     on_total = low.equivalent == 2 and max(spins, default=0) > len(low.spins) - 2
     turns = (0, 1) if on_total else (0,)  # of the function of two equivalent spins
-    if not doubled and not any(some_weights_agree(symmetry.axis, low, high, odd) for odd in turns):
+    if not doubled and not any(weights_agree(symmetry.axis, low, high, odd) for odd in turns):
         return "it connects levels of unequal nuclear-spin weights"
     return ""
 
 
 def exchange_of(axis: str, low: StateOptions, high: StateOptions) -> int:
     """The part of an operator with one of two equivalent spins that connects levels of equal weight: 1 even, -1 odd, 0 both."""
-    even, odd = (some_weights_agree(axis, low, high, turned) for turned in (0, 1))
+    even, odd = (weights_agree(axis, low, high, turned) for turned in (0, 1))
     return int(even) - int(odd)
 
 
-def some_weights_agree(axis: str, low: StateOptions, high: StateOptions, odd_spins: int = 0) -> bool:
+def weights_agree(axis: str, low: StateOptions, high: StateOptions, odd_spins: int = 0) -> bool:
     """Whether an operator along an axis connects levels of equal weight.
 
     Parameters

@@ -75,7 +75,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
     rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
 
-    letter, parameters_of_states = _letter(file, rows), _own_parameters(rows, len(states))
+    letter, parameters_of_states = _letter(file, rows), _parameters_by_state(rows, len(states))
     constants, energies = [], []
     for v, parameters in enumerate(parameters_of_states):
         option = replace(options_of_state(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
@@ -143,7 +143,7 @@ def _letter(file: ParameterFile, rows: list[tuple[CodedLine, Parameter]]) -> str
     return "s" if "S" in letters else "a" if letters else file.options[0].chr
 
 
-def _own_parameters(rows: list[tuple[CodedLine, Parameter]], count: int) -> list[list[Parameter]]:
+def _parameters_by_state(rows: list[tuple[CodedLine, Parameter]], count: int) -> list[list[Parameter]]:
     """The parameters of each state without spins, with the codes of one state; parameters of all states occur in each."""
     by_state: list[list[Parameter]] = [[] for _ in range(count)]
     for line, parameter in rows:
