@@ -26,7 +26,7 @@ from rotor.alignment.carry import EDGE, Outcome, Plan, Problem, Task, run, tasks
 from rotor.alignment.ensemble import Ensemble, ground_level, single_level, thermal
 from rotor.alignment.observables import Harmonics
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
-from rotor.alignment.steps import Pilot, pilot_of
+from rotor.alignment.steps import Pilot, lowest_jmax, pilot_of
 from rotor.alignment.timeline import timeline
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import FieldSpace, FreeLevels
@@ -217,6 +217,8 @@ def align(
             f"the pulses need J up to about {jmax}; states up to J = {HIGHEST_J} are propagated: lower the intensity, the duration or the "
             "temperature"
         )
+    if jmax_option is None:
+        jmax = lowest_jmax(problem, jmax)
     while True:
         pilot = pilot_of(problem, jmax)
         if pilot.edge <= 0.3 * tolerance:

@@ -22,6 +22,10 @@ PILOT_TIMES = 256
 USUAL_STEPS = 15  # of the coarser of two runs; the finer one is used
 USUAL_TOLERANCE = 1e-9  # that twice as many steps of a short pulse give
 ASYMPTOTIC = 1e-4  # error of a cosine below which it falls as the order of the method says
+SEARCH_WORK = 1e9  # complex products of a run, one to three seconds, above which a lower J max is looked for
+SEARCH_TOLERANCE = 1e-3  # of a cosine, in runs that look for J max
+SEARCH_EDGE = 0.03  # of the tolerance: population at the edge of such a run
+SMALLEST_EDGE = 1e-30  # a population that is 0 for its logarithm
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ def pilot_of(problem: Problem, jmax: int) -> Pilot:
         outcome = None if task is None else run(replace(task, plan=plan))
         edge = relative_edge(outcome, task) if outcome and task else 0.0
         return Pilot(plan, (0,) * len(problem.windows), 0.0, edge, space, task, outcome, whole)
-    if len(task.rows) > LARGEST_SPLIT or all(len(window.channels) > 1 for window in problem.windows):
+    if _needs_magnus(problem, task):
         return replace(_refined(problem, space, task, None), whole=whole)
     if whole:
         rule = "nystrom 4" if problem.tolerance >= 1e-10 else "nystrom 6"
@@ -82,6 +86,58 @@ def pilot_of(problem: Problem, jmax: int) -> Pilot:
     for rule in rules[1:]:
         best = _refined(problem, space, task, rule, below=best)
     return best
+
+
+def _needs_magnus(problem: Problem, task: Task) -> bool:
+    """Whether the block is too large for eigenvectors of its operator, or several operators act in all windows."""
+    return len(task.rows) > LARGEST_SPLIT or all(len(window.channels) > 1 for window in problem.windows)
+
+
+def lowest_jmax(problem: Problem, guess: int) -> int:
+    """A lower J max than the guess if a run with that takes long and the edge of a smaller basis stays empty in runs with coarse steps.
+
+    The work of a run grows with the fourth power of J max or faster, and the guess has a margin of up to fifteen J.
+    """
+    if expected_work(problem, guess) < SEARCH_WORK:
+        return guess
+    coarse = replace(problem, tolerance=max(problem.tolerance, SEARCH_TOLERANCE), cached={})
+    goal, seen, jmax = math.log(SEARCH_EDGE * problem.tolerance), list[tuple[int, float]](), problem.ensemble.jmax + 4
+    while jmax < guess:
+        seen.append((jmax, math.log(max(_coarse_edge(coarse, jmax), SMALLEST_EDGE))))
+        if seen[-1][1] <= goal:
+            return jmax
+        jmax += _further(seen, goal)
+    return guess
+
+
+def _coarse_edge(problem: Problem, jmax: int) -> float:
+    """Relative population of the two highest J of the pilot's block, with one method."""
+    space = problem.space(jmax)
+    task, _ = pilot_task(problem, space)
+    if task is None:
+        return 0.0
+    return _refined(problem, space, task, None if _needs_magnus(problem, task) else "nystrom 4").edge
+
+
+def _further(seen: Sequence[tuple[int, float]], goal: float) -> int:
+    """How many J to add: the logarithm of the population at the edge falls at least linearly; two before two J maxima are known."""
+    if len(seen) < 2:
+        return 2
+    (low, before), (high, now) = seen[-2:]
+    slope = (before - now) / (high - low)
+    return max(2, min(math.ceil((now - goal) / slope), high // 2)) if slope > 0 else 2
+
+
+def expected_work(problem: Problem, jmax: int) -> float:
+    """Complex products of a run of the pilot's block: drifts of `nystrom 4`, a step for each radian between the levels of J max and two below."""
+    space = problem.space(jmax)
+    task, _ = pilot_task(problem, space)
+    if task is None:
+        return 0.0
+    centres = [float(np.mean(space.levels.energy_mhz[space.levels.j == j])) for j in (jmax - 2, jmax)]
+    duration = sum(window.stop_ps - window.start_ps for window in problem.windows)
+    steps = RAD_PER_PS_MHZ * abs(centres[1] - centres[0]) * duration
+    return 6.0 * steps * len(task.rows) ** 2 * len(task.columns)
 
 
 def _refined(

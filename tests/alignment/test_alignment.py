@@ -386,6 +386,41 @@ def test_a_j_max_too_small_is_refused_and_the_one_chosen_is_enough():
     assert guessed_jmax(OCS, [GaussianPulse(1e13, 1.0)], 0, 1e-6) <= chosen.jmax
 
 
+WATER = Top.from_constants("A=835840 B=435350 C=278140 MHz").with_polarizability(np.diag([1.49, 1.42, 1.37]), "test")
+
+
+@pytest.mark.parametrize(
+    ("top", "pulse", "kelvin"),
+    [
+        (OCS, GaussianPulse(1e12, 1.0), 0.0),
+        (OCS, GaussianPulse(1e12, 20.0, axis=elliptical(0.3)), 1.0),
+        (OCS, Kick(1e-2), 1.0),
+        (IODOBENZENE, GaussianPulse(3e11, 2.0), 0.0),
+        (WATER, GaussianPulse(1e13, 0.5, axis=elliptical(0.3)), 0.0),
+    ],
+)
+def test_a_lower_j_max_has_the_same_cosines(monkeypatch, top, pulse, kelvin):
+    """What a long pulse takes, looked for beneath the guess: both within what they state, and the edge is empty."""
+    times = np.linspace(pulse.window_ps[0], pulse.window_ps[1] + 20, 41)
+    guess = align(top, pulse, times, temperature_k=kelvin)
+    monkeypatch.setattr("rotor.alignment.steps.SEARCH_WORK", 0.0)
+    lower = align(top, pulse, times, temperature_k=kelvin)
+    assert lower.jmax < guess.jmax
+    assert lower.edge_population < 1e-6
+    apart = np.abs(lower.cosines["cos2theta"] - guess.cosines["cos2theta"]).max()
+    assert apart <= lower.error_estimate + guess.error_estimate + 1e-13  # round-off
+
+
+def test_a_long_elliptical_pulse_takes_the_j_that_it_needs():
+    """Water under 951 ps: 2 s of processor time; blocks of 344 states for the guessed J max took more than 100 s."""
+    pulse = GaussianPulse(1e12, 951.0, axis=elliptical(0.3))
+    start = time.process_time()
+    trace = align(WATER, pulse, [-10.0, 0.0, 3400.0])
+    assert trace.jmax <= 6 < guessed_jmax(WATER, [pulse], 0, 1e-6)
+    assert time.process_time() - start < 20  # s
+    assert trace.error_estimate < 1e-6
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
