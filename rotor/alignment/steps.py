@@ -129,7 +129,7 @@ def _further(seen: Sequence[tuple[int, float]], goal: float) -> int:
 
 
 def expected_work(problem: Problem, jmax: int) -> float:
-    """Complex products of a run of the pilot's block: drifts of `nystrom 4`, a step for each radian between the levels of J max and two below."""
+    """Complex products of a run of the pilot's block: drifts of `nystrom 4`, a step for each radian between J max and two below."""
     space = problem.space(jmax)
     task, _ = pilot_task(problem, space)
     if task is None:
