@@ -61,18 +61,19 @@ def with_bars(axes: Any, places: Any, shares: list[dict[str, Any]], colour: str)
 def success(rows: list[Row]) -> Any:
     """Share of lists whose strongest species is found, by what the list is like."""
     with styled():
-        figure = new_figure((9.0, 2.8))
-        for axes, (title, groups) in zip(figure.subplots(1, len(PANELS), sharey=True), PANELS.items(), strict=True):
+        figure = new_figure((6.0, 4.8))
+        panels = figure.subplots(2, 2, sharey=True)
+        for axes, (title, groups) in zip(panels.flat, PANELS.items(), strict=True):
             chosen = [[row for row in rows if inside(row)] for _, inside in groups]
             with_bars(
                 axes, range(len(groups)), [share(sum(has(row, 0) for row in part), len(part)) for part in chosen], BLUE
             )
             names = [f"{name}\n({len(part)})" for (name, _), part in zip(groups, chosen, strict=True)]
-            axes.set_xticks(range(len(groups)), names, fontsize=7)
+            axes.set_xticks(range(len(groups)), names)
             axes.set_xlabel(title)
             axes.set_xlim(-0.5, len(groups) - 0.5)
             axes.axhline(90, color=GREY, lw=0.6, ls=":")
-        figure.axes[0].set_ylabel("Strongest species found (%)")
+        figure.supylabel("Strongest species found (%)")
         figure.axes[0].set_ylim(60, 101)
         return figure
 
@@ -97,7 +98,7 @@ def isotopologues(result: dict[str, Any]) -> Any:
     """Found 13C species of each molecule."""
     with styled():
         rows = result["rows"]
-        figure = new_figure((7.0, 3.2))
+        figure = new_figure((6.0, 3.6))
         axes = figure.add_subplot()
         x = np.arange(len(rows))
         axes.bar(x, [len(row["species"]) for row in rows], color=GREY, alpha=0.35, label="13C species")
@@ -119,11 +120,11 @@ def isotopologues(result: dict[str, Any]) -> Any:
             label="found, right",
         )
         axes.bar(x, [-row["wrong"] for row in rows], width=0.5, color=ORANGE, label="wrong")
-        axes.set_xticks(x, [row["smiles"] for row in rows], rotation=30, ha="right", fontsize=7)
+        axes.set_xticks(x, [row["smiles"] for row in rows], rotation=30, ha="right")
         axes.axhline(0, color="black", lw=0.5)
         axes.set_ylabel("Species")
-        axes.set_ylim(top=1.45 * max(len(row["species"]) for row in rows))
-        axes.legend(fontsize=7, ncols=2, loc="upper left")
+        axes.set_ylim(top=1.75 * max(len(row["species"]) for row in rows))
+        axes.legend(loc="upper left")
         return figure
 
 

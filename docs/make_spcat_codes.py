@@ -52,12 +52,15 @@ OPTIONS = """
 CHECKED = """
 ## Beside the compiled program
 
-538 inputs of the kinds that published fits have, 16 of them published files, and 656 made afterwards with other random numbers, were
-computed here and by the program itself (its public C source, gcc -O2; it repeats 22 reference catalogues of 2008 line by line), and
-compared by quantum numbers, frequencies, intensities, degeneracies and energies of levels: 1 to 18 states in either basis, up to five
-spins with and without a total spin of two or three, more than six quanta, weights by IAX 1 to 11, E species, l-doubled states with and
-without spins, energies of one K, KNMIN, KNMAX, DIAG, IXX, VSYM, MAXV, FQLIM, STR1, FLAGS 0 to 1111, 300 tied parameters, option lines of
-each state, commas, moments of other kinds, series. With `--as-spcat`:
+538 inputs of the kinds that published fits have, 16 of them published files, were computed here and by the program itself. 656 more
+were made afterwards with other random numbers. The program is its public C source (gcc -O2), which repeats 22 reference catalogues of 2008
+line by line. Quantum numbers, frequencies, intensities, degeneracies and energies of levels were compared. The inputs have
+
+- 1 to 18 states in either basis, l-doubled states with and without spins, energies of one K, E species, 300 tied parameters, series;
+- up to five spins with and without a total spin of two or three, more than six quanta, weights by IAX 1 to 11;
+- KNMIN, KNMAX, DIAG, IXX, VSYM, MAXV, FQLIM, STR1, FLAGS 0 to 1111, option lines of each state, commas, moments of other kinds.
+
+With `--as-spcat`:
 
 | inputs | first 538 | later 656 | last 641 | cause |
 |---|---|---|---|---|
@@ -76,60 +79,75 @@ each state, commas, moments of other kinds, series. With `--as-spcat`:
 | a prolate symmetric top with a spin in the oblate basis: names by K here | 0 | 0 | 1 | inferred |
 | rotational constants that are all 0 | 0 | 0 | 1 | not looked into |
 
-Proved means that the program was compiled again with that one place of its source set right (the search for a free place, the sort by
-⟨K²⟩) or without its list of first-order energies: the 9, 8 and 1 inputs are then equal in every line, each by the one
-change; of the last 641 five by the first and one by the third. Inferred means concluded from the parameters that these inputs have and
+Proved means that the program was compiled again with one change: with that place of its source set right (the search for a free place, the
+sort by ⟨K²⟩), or without its list of first-order energies. The 9, 8 and 1 inputs are then equal in every line, each by the one change. Of
+the last 641 five are equal by the first change and one by the third. Inferred means concluded from the parameters that these inputs
+have and
 the equal ones do not.
 
 Of the 656 at first 590 were equal and 41 differed. One of the 41 has spins and DIAG 3, where levels of both Wang blocks of one state are
-named together, in another 148 of 2187 names by DIAG 5 depended on the order of equal diagonal elements: both are as in the program now, but
+named together. In another 148 of 2187 names by DIAG 5 depended on the order of equal diagonal elements. Both are as in the program now, but
 for four names of the second, which the program in long double gives as here. The 218 inputs with DIAG 2 to 5 were computed again then.
 
 Energies of all inputs with other names by the first three causes are equal as sorted lists, to every digit printed. Of the 12 inputs
-of the first cause the program compiled in long double or with fused multiply-add differs from itself in nine, in names too in the two;
-in the other three it does not: the pairs of levels looked at there are 3e-10 to 6e-9 MHz apart (up to 12 units in the last place), one
+of the first cause the program compiled in long double or with fused multiply-add differs from itself in nine, in names too in the two.
+In the other three it does not: the pairs of levels looked at there are 3e-10 to 6e-9 MHz apart (up to 12 units in the last place), one
 1.3e-7 MHz, and round-off mixes them here. The place that counts as free depends on the order in which the program's diagonalization
 leaves the states, so that those names follow no rule that could be repeated here.
 
 A code with I1 = 0 and I2 > 0, "commutator with i N²", is refused within one state. With TYP 41 and 61 the program's elements of ΔN = 1
-have the magnitudes of ½i [N², S_k], but the product of ⟨2₀₂|H|1₁₁⟩, ⟨2₂₀|H|1₁₁⟩ and ⟨2₀₂|H|2₂₀⟩, which no choice of phases changes, has the
-other sign in both bases (its listing of the matrix, EGYFLG 5); TYP 20, 40 and 60 do nothing, TYP 21 has the parity of an operator
+have the magnitudes of ½i [N², S_k]. No choice of phases changes the product of ⟨2₀₂|H|1₁₁⟩, ⟨2₂₀|H|1₁₁⟩ and ⟨2₀₂|H|2₂₀⟩, and it has the
+other sign in both bases (its listing of the matrix, EGYFLG 5). TYP 20, 40 and 60 do nothing, TYP 21 has the parity of an operator
 between states. What the two orders of a spin-rotation constant differ by has the name C_ab-ba here, and no code.
 
-The last 641 are 6 public files, 9 variations of each of the 22 reference cases (constants, temperature, ranges, cuts, FLAGS, MAXV, dipoles,
-KNMIN, KNMAX, sign and digits of SPIND, sign of NVIB, signs of couplings, weights, VSYM, EWT, DIAG, spins added), 3 of each sample of
-tests/oracles/kinds, and 14 of each of 19 kinds of published files with other random constants, with 48 more of the terms of l-doubled
-states and of linear and spherical tops. Before repairs 29 more differed or were refused: quantum numbers of a spinless file whose SPIND has
-the other sign, a linear molecule in the oblate basis, a dipole of a spherical top, constants that do not follow A ≥ B ≥ C, parameters of
-spins that SPIND does not name (left out, with a note), DIAG below 0 (refused with `--as-spcat` then), .egy lists of 10,000
-levels or of more than six quanta, line 2 whose full columns abut, CHR in apostrophes. Of the four variations of ch2cl2_2quad that have 1 to
+The last 641 are
+
+- 6 public files;
+- 9 variations of each of the 22 reference cases (constants, temperature, ranges, cuts, FLAGS, MAXV, dipoles, KNMIN, KNMAX, sign and
+  digits of
+  SPIND, sign of NVIB, signs of couplings, weights, VSYM, EWT, DIAG, spins added);
+- 3 of each sample of tests/oracles/kinds;
+- 14 of each of 19 kinds of published files with other random constants;
+- 48 more of the terms of l-doubled states and of linear and spherical tops.
+
+Before repairs 29 more differed or were refused:
+
+- quantum numbers of a spinless file whose SPIND has the other sign, parameters of spins that SPIND does not name (left out, with a note);
+- a linear molecule in the oblate basis, a dipole of a spherical top, constants that do not follow A ≥ B ≥ C;
+- DIAG below 0 (refused with `--as-spcat` then), .egy lists of 10,000 levels or of more than six quanta;
+- line 2 whose full columns abut, CHR in apostrophes.
+
+Of the four variations of ch2cl2_2quad that have 1 to
 5 intensities off by 2e-4 to 1.3e-3 of LGINT each is equal in every line to the program in long double. A public file of ClONO2 (one spin
-3/2, chi_ab, N to 101; 79,032 lines) has 2,200 lines off between levels that coincide, the program in long double 1,516 and with fused
-multiply-add 1,602; all 34,480 levels are equal.
+3/2, chi_ab, N to 101) has 79,032 lines. 2,200 of them, between levels that coincide, are off; of the program in long double 1,516, and with
+fused multiply-add 1,602. All 34,480 levels are equal.
 
 Fits: 56 made inputs with spins and states, lines made by the program, were given to SPFIT and to `rotor fit`. With about 80 % of the
 parameters free 26 were equal, 19 differed and 11 were refused or did not converge; many of these had parameters that the lines do not
-determine. With what is called undetermined here held in both, and up to 100 iterations here (30 in SPFIT), 46 are equal (constants within
-0.02 standard errors, most within 1e-5, errors within 2 %), eight do not converge here (seven of them end SPFIT at its 30 iterations as
-well), one has a parameter twice, which is refused, and the rest differ: one did not converge in SPFIT, one has an imaginary q.
+determine. What is called undetermined here was held in both,
+with up to 100 iterations here and 30 in SPFIT. 46 are equal: constants within 0.02 standard errors, most within 1e-5, errors within 2
+%. Eight do
+not converge here; seven of them end SPFIT at its 30 iterations as well. One has a parameter twice, which is refused. The rest differ:
+one did
+not converge in SPFIT, one has an imaginary q.
 
 By name: of 50 inputs 18 are refused, with the reason, by `rotor convert` to TOML (weights that have no name, dipoles and terms that
 the declared symmetry forbids). For most of the others the lines predicted from the TOML are those of the .int file, and about 20 written
-back as .var and .int give SPCAT the same lines; the rest differ in a few lines near the cut or of one frequency, one has a spin without
+back as .var and .int give SPCAT the same lines. The rest differ in a few lines near the cut or of one frequency, one has a spin without
 constants, one another Q.
 
 The partition function that the program writes at the end of its .out file was compared for the 22 reference cases and 44 of these
 inputs, at its seven temperatures: it sums the levels from FBGN to FEND that have a weight and no v above MAXV, with hc/k = 1.43878 cm K,
 from the lowest of them, or from 0 if that is lower. So summed, the levels here give the same to the four decimals printed, but for one
 input, where an operator joins states of unlike weights (see above). `rotor` sums to convergence instead where it is asked for Q, with hc/k
-of CODATA. Block and place in the first two columns of its .egy files are the program's in the 22 cases and in 36 of the 44 inputs; the
+of CODATA. Block and place in the first two columns of its .egy files are the program's in the 22 cases and in 36 of the 44 inputs. The
 other eight have l-doubled states or a total spin of equivalent nuclei, whose levels count by F and energy here, from block 1 on.
 
 Its .str file is not written, and a note says so where FLAGS ask for it: it lists transition dipoles with their signs, which follow from the
 phases that its diagonalization leaves, component by component of one line. Strengths of lines are in the .csv and the JSON.
 
 16 of the later inputs were then spelled in 144 other ways (tabs, carriage returns, D exponents, missing errors and labels, long
-titles, blank lines, other counts, commas, comments, text at the end): 129 were read as the program reads them; the others had an empty
+titles, blank lines, other counts, commas, comments, text at the end): 129 were read as the program reads them. The others had an empty
 title or a QROT below 1 (read here), a parameter without a value (where the program ends its list without a word; refused here) or of a
 state that does not exist (left out, with a note).
 
@@ -149,19 +167,20 @@ of one g makes lines then, as J cannot.
 Where levels coincide round-off decides: the program in long double differs from itself in 9,700 of the 67,000 lines of the reference case
 three_states_fermi_coriolis, and here other LAPACK drivers give other shares.
 
-I_tot of three nuclei (IAX -6): a parameter names the first of them, or the first and the second for the pair across from it; with
+I_tot of three nuclei (IAX -6): a parameter names the first of them, or the first and the second for the pair across from it. With
 ΔK = 1 or 2 its value is twice that of a nucleus coupled by itself, with ΔK = 0 the same. Levels here are those of three nuclei coupled
 one by one with tensors turned by 120°, of the species that exchange allows (tests write out every spin function). For spins of 3/2
 and more elements between unequal totals are wrong in the program: a loop of its source (setzitot, spinit.c) steps by the size of the
-other total. With that step set right the energies of CHCl3-like levels with F = 1 agree to 1e-6 cm⁻¹; beyond, some of its names go to
+other total. With that step set right the energies of CHCl3-like levels with F = 1 agree to 1e-6 cm⁻¹. Beyond, some of its names go to
 levels of forbidden species, since it names by the order of energy in blocks that hold those too.
 
 With I_tot of two nuclei and two connected states of which some weights agree and others do not (WTPL, WTMN 3, 5 and 3, 7), SPCAT leaves
 out the elements between levels of unequal weights. Here they are there. Weights by exchange of one set of nuclei are equal or exchanged
 in two states; with those both agree.
 
-Spin terms of more than second order (TYP 5 to 79, one spin, one twice, two; in two states where they are odd), of one K, with powers of
-N·S, and times Fourier and Euler terms, were compared on some 150 inputs in both bases. All are equal but for shares of levels that
+Some 150 inputs in both bases compare spin terms of more than second order (TYP 5 to 79, one spin, one twice, two; in two states where
+they are odd). Terms of one K, with powers of N·S, and times Fourier and Euler terms are among them. All are equal but for shares of
+levels that
 nearly coincide. TYP 20, 40, 60 with two spins are I1·I2 times Na, Nb, Nc, as the program has them.
 
 Series (FF, EX, TYP 90 to 99) were compared on 40 more inputs: one and two states, l-doubled pairs, ρ of unlike signs, NOFC, G12, NEWLZ,
@@ -169,13 +188,13 @@ five kinds of Euler terms. All are equal but for shares of strength of levels th
 which the program computes as if TYP were 0: here n = 10 FC + I1, as documented. Without NEWLZ it passes over TYP 80 to 89 of the state
 with K l ≤ 0. Of 330 further inputs of one or two states, many with one term alone, 256 are equal, 48 were refused then (an odd
 operator within one state, see below), and 26 differ. With the first-order energies of the roll-over left out of the program and its
-search for a free place set right (one input) all names and energies of the 26 are equal, four inputs in every line; the other 22
+search for a free place set right (one input) all names and energies of the 26 are equal, four inputs in every line. The other 22
 differ in strengths alone, of levels that nearly coincide (inferred).
 
 ### Phases: odd operators within one state, PHASE
 
 The program decides for each of a, b, c whether the operators along it within one state are odd under time reversal (Na) or even ({Nb, Nc}):
-by the greater number of parameters, or by PHASE; the others it leaves out, here with a note. Between two states those of the other kind
+by the greater number of parameters, or by PHASE. The others it leaves out, here with a note. Between two states those of the other kind
 have the factor i. The Hamiltonian is real where none is odd, or those along two axes: functions are then left as they are by time
 reversal with half a turn about the third axis (a, b odd: c). Here it is computed in such functions, and refused where none fit.
 
@@ -197,7 +216,7 @@ concerns they are as here; so they are in the program as it is with PHASE 3, 5 o
 wrong sign in elements between K and -K'. Complex matrices over signed K give the energies and strengths found here
 (tests/formats/spcat/test_odd_operators.py).
 
-Where components of the dipole of both kinds act on a line, its amplitude has a real and an imaginary part, which do not interfere; the
+Where components of the dipole of both kinds act on a line, its amplitude has a real and an imaginary part, which do not interfere. The
 program adds them, or leaves out one ("has bad phase"). Of eight inputs with other names of K doublets the program in long double or
 with fused multiply-add differs from itself in seven. PHASE 1, 2, 4 and 7 belong to no functions; here they compute where the operators
 of a file fit some. SPCAT settles the phases along axes that no parameter concerns by the dipoles, and so does `--as-spcat`; without it, as

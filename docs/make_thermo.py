@@ -207,13 +207,13 @@ def panels() -> list[Panel]:
     for entry in known["einstein"]:
         values = published_cp(entry, "einstein", cold) / GAS_CONSTANT - 2.5
         points.append(Points(entry["species"], cold[np.isfinite(values)], values[np.isfinite(values)]))
-    out.append(Panel("H$_2$: Leachman et al. 2009, Valenti et al. 2012", hydrogen, points))
+    out.append(Panel("H$_2$: Leachman 2009, Valenti 2012", hydrogen, points))
     for entry in sorted(known["table"], key=lambda entry: MOLECULES.index(entry["molecule"])):
         if entry["molecule"] == "H2":
             continue
         seen = Points("published", np.array(entry["temperature_k"]), np.array(entry["cp"]) / GAS_CONSTANT - 2.5)
         formula = entry["molecule"].replace("2", "$_2$").replace("4", "$_4$")
-        out.append(Panel(f"{formula}: JANAF (Chase 1998)", {"quantum": computed(entry["molecule"], t)}, [seen]))
+        out.append(Panel(f"{formula}: JANAF", {"quantum": computed(entry["molecule"], t)}, [seen]))
     return out
 
 

@@ -12,10 +12,10 @@ from rotor.alignment.align import AlignmentTrace
 from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, RAD_PER_PS_MHZ, DipolePulse, Kick
 from rotor.alignment.request import AlignAnswer
 from rotor.arrays import Floats
-from rotor.plots.picture import GREY, PALETTE, Picture, name_of_top, new_figure, styled
+from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, name_of_top, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 
-SIZE_INCHES = (7.2, 4.6)
+SIZE_INCHES = (WIDTH_INCHES, 4.2)
 NAMES = {"cos2theta": "⟨cos²θ⟩", "costheta": "⟨cosθ⟩", "cos2theta_2d": "⟨cos²θ$_{2D}$⟩"}
 NARROW = 1 / 100  # of the time range: shorter pulses are drawn as a line
 PER_TW = 1e12  # W/cm² in 1 TW/cm²
@@ -103,4 +103,4 @@ def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) 
         trace.t_ps[0] - 0.01 * (trace.t_ps[-1] - trace.t_ps[0]), trace.t_ps[-1]
     )  # a margin shows a pulse at the first time
     if len(trace.cosines) > 1 or classical:
-        axes.legend(frameon=False, fontsize=8)
+        axes.legend(frameon=False, fontsize=9)

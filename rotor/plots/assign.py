@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
-from rotor.plots.picture import GREY, PALETTE, Picture, new_figure, styled
+from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 
 
@@ -20,7 +20,7 @@ def picture(answer: AssignAnswer, *, title: str | None = None, view: View = WHOL
 def assignment_figure(answer: AssignAnswer, title: str = "", view: View = WHOLE) -> Any:
     """A matplotlib figure of peaks and mirrored predictions, with unexplained peaks below."""
     with styled():
-        figure = new_figure((9.0, 5.5))
+        figure = new_figure((WIDTH_INCHES, 5.0))
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
         peaks = answer.request.peaks
         upper.vlines(peaks.frequency_mhz, 0, peaks.intensity, color=GREY, lw=0.7, label="peaks")
@@ -38,7 +38,7 @@ def assignment_figure(answer: AssignAnswer, title: str = "", view: View = WHOLE)
         lower.set_xlabel("Frequency (MHz)")
         count = f"{answer.request.peaks.source or 'spectrum'}: {len(answer.species)} species"
         upper.set_title(title or count, loc="left")
-        figure.legend(*upper.get_legend_handles_labels(), fontsize=7, loc="outside lower right", ncols=2)
+        figure.legend(*upper.get_legend_handles_labels(), fontsize=9, loc="outside lower right", ncols=2)
         show_part(upper, view)
         if view.horizontal is not None:
             lower.set_xlim(*view.horizontal)

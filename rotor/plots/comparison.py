@@ -9,7 +9,17 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.compare import Comparison
 from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, ORANGE, Picture, name_text, new_figure, styled
+from rotor.plots.picture import (
+    BLUE,
+    GREY,
+    MOST_VECTOR_STICKS,
+    ORANGE,
+    WIDTH_INCHES,
+    Picture,
+    name_text,
+    new_figure,
+    styled,
+)
 from rotor.plots.view import WHOLE, View, show_part
 
 UNPAIRED = ORANGE
@@ -44,7 +54,7 @@ def comparison_figure(comparison: Comparison, *, names: tuple[str, str] = ("", "
     if not len(comparison.reference) and not len(comparison.ours):
         raise ValueError("neither list has a line to draw; widen the range or lower the cut")
     with styled():
-        figure = new_figure((7.2, 5.0))
+        figure = new_figure((WIDTH_INCHES, 4.8))
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
         _draw_mirror(above, comparison, names)
         _draw_differences(below, comparison)
@@ -73,7 +83,7 @@ def _draw_mirror(axes: Any, comparison: Comparison, names: tuple[str, str]) -> N
     axes.set_ylabel("log₁₀ intensity (nm² MHz)")
     for name, place, va in ((names[0], 0.98, "top"), (names[1], 0.02, "bottom")):
         axes.text(0.005, place, name_text(name), transform=axes.transAxes, va=va, ha="left", color=GREY)
-    axes.figure.legend(loc="outside upper right", ncols=2, frameon=False, fontsize=7)
+    axes.figure.legend(loc="outside upper right", ncols=2, frameon=False, fontsize=9)
 
 
 def _sticks(axes: Any, lines: Catalogue, rows: Ints, drawn: tuple[float, float, str], label: str) -> None:
@@ -105,7 +115,7 @@ def _draw_differences(axes: Any, comparison: Comparison) -> None:
             ghz[seen], factor * off[seen], factor * errors[seen], fmt=".", color=ORANGE, markersize=3, lw=0.7,
             label=f"measured ({np.count_nonzero(seen)})",
         )  # fmt: skip
-        axes.legend(frameon=False, fontsize=7)
+        axes.legend(frameon=False, fontsize=9)
     axes.set_ylabel(f"Difference ({unit})")
     if not len(off):
         axes.text(0.5, 0.5, "no line in common", transform=axes.transAxes, ha="center", va="center", color=GREY)

@@ -87,7 +87,7 @@ def emission_figure(
         axes.set_xlabel("Wavenumber (cm⁻¹)" if unit == "cm-1" else f"Frequency ({unit or 'GHz'})")
         axes.set_ylabel("Brightness temperature (K)")
         axes.set_title(_title(answer) if title is None else title, loc="left")
-        legend_below(figure, axes, ncols=4, fontsize=7)
+        legend_below(figure, axes, ncols=3, fontsize=9)
         _name(axes, answer, mhz)
     return figure
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotor.fitting.fit import Fit
 from rotor.formats.fit_request import FitAnswer
-from rotor.plots.picture import BLUE, GREY, ORANGE, Picture, new_figure, styled
+from rotor.plots.picture import BLUE, GREY, ORANGE, WIDTH_INCHES, Picture, new_figure, styled
 from rotor.table import counted
 
 _HEADINGS = {
@@ -31,7 +31,7 @@ def fit_figure(fit: Fit, title: str = "") -> Any:
         if name in _HEADINGS
     ]
     with styled():
-        figure = new_figure((7.2, 1.6 * len(panels) + 0.6))
+        figure = new_figure((WIDTH_INCHES, 1.6 * len(panels) + 0.6))
         for place, (heading, x) in enumerate(panels, 1):
             axes = figure.add_subplot(len(panels), 1, place)
             _draw(axes, fit, x)

@@ -9,7 +9,7 @@ import numpy as np
 from rotor.fluids.analysis import PairDistribution, pair_distribution
 from rotor.fluids.record import FluidRecord
 from rotor.fluids.request import FluidAnswer
-from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, Picture, new_figure, styled
+from rotor.plots.picture import BLUE, GREEN, GREY, ORANGE, WIDTH_INCHES, Picture, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.units import KJ_PER_MOL_EV
 
@@ -60,7 +60,7 @@ def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules
         Temperatures and energy over time, g(r) beside them.
     """
     with styled():
-        figure = new_figure((7.2, 4.2))
+        figure = new_figure((WIDTH_INCHES, 4.2))
         if shells is None:
             temperature_axes, energy_axes = figure.subplots(2, 1, sharex=True)
         else:
@@ -88,7 +88,9 @@ def _draw_temperatures(axes: Any, record: FluidRecord) -> None:
         if np.isfinite(kelvin).all():
             axes.plot(record.time_ps, kelvin, color=colour, linewidth=0.8, label=name)
     axes.set(xlabel=TIME, ylabel="Temperature (K)")
-    axes.legend(frameon=False, ncols=3, fontsize=7, loc="best")
+    axes.legend(
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.0, ncols=3, handlelength=1.0, columnspacing=1.0
+    )
 
 
 def _draw_shells(axes: Any, shells: PairDistribution) -> None:

@@ -14,6 +14,7 @@ from rotor.plots.picture import (
     GREY,
     ORANGE,
     SIZE_INCHES,
+    WIDTH_INCHES,
     Picture,
     name_of_top,
     name_text,
@@ -27,7 +28,7 @@ from rotor.thermodynamics.classical_gas import GasAnswer
 from rotor.units import MHZ_PER_CM
 
 
-def equipartition_figure(tests: Mapping[str, Equipartition], columns: int = 3) -> Any:
+def equipartition_figure(tests: Mapping[str, Equipartition], columns: int = 2) -> Any:
     """A matplotlib figure of the mean of 2E/kT by degree for each gas, with bands of 1 and 3 expected standard deviations."""
     figure, axes = _panels(len(tests), columns, 2.6)
     for panel, (name, test) in zip(axes, tests.items(), strict=False):
@@ -95,7 +96,7 @@ def _panels(count: int, columns: int, height: float) -> tuple[Any, list[Any]]:
     across = min(columns, count)
     rows = -(-count // across)
     with styled():
-        figure = new_figure((max(SIZE_INCHES[0], 3.3 * across), height * rows))
+        figure = new_figure((max(WIDTH_INCHES, 3.0 * across), height * rows))
         axes = list(figure.subplots(rows, across, squeeze=False).flat)
     for empty in axes[count:]:
         empty.set_visible(False)

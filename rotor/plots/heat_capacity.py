@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.plots.picture import PALETTE, SIZE_INCHES, Picture, name_of_top, new_figure, styled
+from rotor.plots.picture import PALETTE, SIZE_INCHES, WIDTH_INCHES, Picture, name_of_top, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.thermodynamics import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer, answer_thermo
@@ -48,7 +48,7 @@ def heat_capacity_figure(panels: Sequence[Panel], columns: int = 2, view: View =
         raise ValueError("a picture of heat capacities needs a panel, and a curve in each")
     rows = -(-len(panels) // columns)
     across = min(columns, len(panels))
-    size = SIZE_INCHES if len(panels) == 1 else (4.6 * across, 3.4 * rows)
+    size = SIZE_INCHES if len(panels) == 1 else (max(WIDTH_INCHES, 3.0 * across), 3.4 * rows)
     with styled():
         figure = new_figure(size)
         for panel, axes in zip(panels, figure.subplots(rows, across, squeeze=False).flat, strict=False):
@@ -107,11 +107,14 @@ def _draw(axes: Any, panel: Panel) -> None:
         )  # fmt: skip
     if t[-1] > LOG_FROM * t[0]:
         _make_logarithmic(axes)
-    axes.set_ylim(bottom=0.0, top=_highest(panel, classical))
+    rows = -(-len(axes.get_legend_handles_labels()[0]) // 2)
+    axes.set_ylim(
+        bottom=0.0, top=_highest(panel, classical) * (1.0 + 0.12 * rows)
+    )  # the legend stands above all curves
     axes.set_xlabel("Temperature (K)")
     axes.set_ylabel("Heat capacity $C_v/R$, no translation")
     axes.set_title(panel.title, loc="left")
-    axes.legend(frameon=False, fontsize=7.5, loc="best")
+    axes.legend(loc="upper left", ncols=2, handlelength=1.2, columnspacing=0.8, handletextpad=0.5, borderaxespad=0.0)
 
 
 def _frame(axes: Any, view: View) -> None:

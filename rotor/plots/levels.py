@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +18,7 @@ from rotor.plots.picture import (
     MOST_VECTOR_STICKS,
     ORANGE,
     PALETTE,
+    WIDTH_INCHES,
     Picture,
     legend_below,
     name_of_top,
@@ -31,10 +33,11 @@ from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
 UNITS = {"MHz": "energy_mhz", "cm-1": "energy_cm", "K": "energy_k"}
-SIZE_INCHES = (7.2, 5.4)
+SIZE_INCHES = (WIDTH_INCHES, 5.4)
 HALF_WIDTH = 0.36  # of a step, in columns
-NARROW = 0.25  # the same if labels also have the number of the vibrational state
+NARROW = 0.18  # the same if labels also have the number of the vibrational state
 MOST_LABELS = 160
+MOST_OF_WIDTH = 0.5  # wider names do not move the end of the axis
 MOST_WEIGHTS = 4
 
 
@@ -117,7 +120,7 @@ def levels_figure(
         heading_text = f"{table.levels.kind} top" if top is None else name_of_top(top)
         axes.set_title(title if title is not None else heading_text, loc="left")
         if axes.get_legend_handles_labels()[0]:
-            legend_below(figure, axes, ncols=4, fontsize=7)
+            legend_below(figure, axes, ncols=3, fontsize=9)
         _label(figure, axes, table, column, energy, half_width)
     return figure
 
@@ -215,19 +218,32 @@ def _label(figure: Any, axes: Any, table: SelectedLevels, column: Ints, energy: 
     figure.canvas.draw()  # computes the layout, so that pixel sizes are valid
     last: dict[int, float] = {}
     pixels = axes.transData.transform(np.stack([column, energy], axis=1))[:, 1]
-    height = 5.8 * figure.dpi / 72.0  # of a label with letters of 6 points
-    labelled, level_of_row = 0, _rotational_levels(table)
+    height = 8.7 * figure.dpi / 72.0  # of a label with letters of 9 points
+    names: list[Any] = []
+    level_of_row = _rotational_levels(table)
     unnamed = np.ones(len(table), dtype=bool)
     for row in np.argsort(energy, kind="stable").tolist():
         ladder = int(column[row])
-        if labelled == MOST_LABELS or pixels[row] - last.get(ladder, -np.inf) < height:
+        if len(names) == MOST_LABELS or pixels[row] - last.get(ladder, -np.inf) < height:
             continue
         last[ladder] = float(pixels[row])
-        labelled += 1
         merged = np.flatnonzero(unnamed & (level_of_row == level_of_row[row]) & (np.abs(pixels - pixels[row]) < height))
         unnamed[merged] = False
         text = merged_text(table.levels.quanta, table.rows[merged], table.levels.halves)
-        axes.text(ladder + half_width + 0.03, energy[row], text, fontsize=6, color=GREY, va="center", clip_on=True)
+        names.append(
+            axes.text(ladder + half_width + 0.03, energy[row], text, fontsize=9, color=GREY, va="center", clip_on=True)
+        )
+    _widen(axes, names)
+
+
+def _widen(axes: Any, names: Sequence[Any]) -> None:
+    """Move the right end of the axis until all names stand inside."""
+    first, last = axes.get_xlim()
+    for name in names:  # a name keeps its width in pixels: place + width (last - first) / pixels = last
+        share = name.get_window_extent().width / axes.bbox.width
+        if share < MOST_OF_WIDTH:
+            last = max(last, (name.get_position()[0] - first * share) / (1.0 - share))
+    axes.set_xlim(first, last)
 
 
 def _rotational_levels(table: SelectedLevels) -> Ints:

@@ -9,7 +9,7 @@ from typing import Any
 from rotor.arrays import Floats
 from rotor.plots.picture import GREY
 
-SPACE = 1.3  # height of the vertical axis relative to the tallest named peak
+SPACE = 1.45  # height of the vertical axis relative to the tallest named peak
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def leave_or_remove(text: Any, axes: Any, boxes: list[Any], drawn: Floats) -> No
 def _written(axes: Any, peak: Peak) -> Any:
     text = axes.annotate(
         peak.name, (peak.x, peak.y), xytext=(0, 3), textcoords="offset points", rotation=90, ha="center", va="bottom",
-        fontsize=7, color=peak.colour,
+        fontsize=9, color=peak.colour,
     )  # fmt: skip
     text.set_in_layout(False)  # names use free space and do not change the layout
     return text

@@ -11,7 +11,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.assignment.peaks import PeakList
 from rotor.plots.names import SPACE, Peak, name_peaks
-from rotor.plots.picture import BLUE, GREY, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.picture import BLUE, GREY, WIDTH_INCHES, checked_suffix, name_of_top, new_figure, save, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import line_text
 from rotor.spectra.lines import Lines
@@ -42,7 +42,7 @@ def plot_over(
 def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view: View = WHOLE) -> Any:
     """A matplotlib figure of peaks above the axis and lines below."""
     with styled():
-        figure = new_figure((9.0, 4.5))
+        figure = new_figure((WIDTH_INCHES, 4.2))
         axes = figure.add_subplot()
         shown = heights > LEAST_SHOWN * heights.max(initial=0.0)
         axes.vlines(peaks.frequency_mhz, 0, peaks.intensity, color=GREY, lw=0.7, label="peaks")
@@ -58,7 +58,7 @@ def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view
         axes.set_xlabel("Frequency (MHz)")
         axes.set_ylabel("Intensity")
         axes.set_title(title, loc="left")
-        axes.legend(frameon=False, fontsize=7, loc="upper left")
+        axes.legend(frameon=False, fontsize=9, loc="upper left")
         axes.set_xlim(*peaks.band_mhz)
         axes.set_ylim(-1.05 * float(heights.max(initial=0.0)), SPACE * float(peaks.intensity.max()))
         show_part(axes, view)

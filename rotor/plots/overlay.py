@@ -19,6 +19,7 @@ PANELS = 6  # on a page
 CHANNELS = 1500  # default number in a panel
 _MOST_NAMES = 14
 _GAP = 20.0  # channels
+POINTS_PER_LETTER = 5.5  # mean width of a letter of 9 points
 PAGE_INCHES = (8.3, 11.7)
 
 
@@ -104,6 +105,10 @@ def overlay_figure(
             figure.canvas.draw()
             _name(axes, lines, names, spectrum, brightness)
         axes.set_xlabel("Frequency (GHz)")
+        handles = {
+            name: handle for each in figure.axes for handle, name in zip(*each.get_legend_handles_labels(), strict=True)
+        }
+        figure.legend(handles.values(), handles, loc="outside lower right", ncols=len(handles))
         titles = {KELVIN: "Brightness temperature (K)", ABSORBANCE: "Absorbance"}
         figure.supylabel(titles.get(spectrum.unit, f"Intensity ({spectrum.unit})"), fontsize=9)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
@@ -131,6 +136,8 @@ def _panel(
     top = float(max(y.max(initial=0.0), m.max(initial=0.0), 5 * np.median(spectrum.noise)))
     bottom = float(min(y.min(initial=0.0), m.min(initial=0.0)))
     axes.set_xlim(edges[0] / 1e3, edges[1] / 1e3)
+    axes.locator_params(axis="x", nbins=6)  # frequencies in full, such as 233.8255, without an offset
+    axes.ticklabel_format(axis="x", useOffset=False)
     axes.set_ylim(1.05 * bottom, SPACE * top + 0.15 * top)
     marked = [at / 1e3 for at in unidentified if edges[0] <= at <= edges[1]]
     if marked:
@@ -163,6 +170,17 @@ def _name(
         )
         for i in rows
     ]
+    _leave_space(axes, peaks)
     inside = (spectrum.frequency_mhz >= first) & (spectrum.frequency_mhz <= last)
     drawn = np.stack([spectrum.frequency_mhz[inside] / 1e3, np.maximum(spectrum.intensity, brightness)[inside]], axis=1)
     name_peaks(axes, peaks, drawn, _MOST_NAMES)
+
+
+def _leave_space(axes: Any, peaks: Sequence[Peak]) -> None:
+    """Raise the upper limit until an upright name stands inside above the tallest peak."""
+    if not peaks:
+        return
+    low, high = axes.get_ylim()
+    letters = max(len(peak.name) for peak in peaks)
+    share = min((POINTS_PER_LETTER * letters + 8.0) / 72.0 * axes.figure.dpi / axes.bbox.height, 0.6)
+    axes.set_ylim(low, max(high, low + (max(peak.y for peak in peaks) - low) / (1.0 - share)))

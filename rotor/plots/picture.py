@@ -40,13 +40,14 @@ STYLE: dict[Any, Any] = {
     "ytick.major.width": 0.7,
     "axes.formatter.use_mathtext": True,
     "legend.frameon": False,
-    "legend.fontsize": 8.0,
+    "legend.fontsize": 9.0,
     "svg.fonttype": "none",
     "svg.hashsalt": "rotor",  # equal pictures give equal files
     "pdf.fonttype": 42,
 }
 _USERS: ContextVar[dict[Any, Any] | None] = ContextVar("settings of the user's style", default=None)
-SIZE_INCHES = (7.2, 3.8)
+WIDTH_INCHES = 6.0  # letters of 9 points have 5 points where the picture is as wide as a column of 8.5 cm
+SIZE_INCHES = (WIDTH_INCHES, 3.6)
 DPI = 200
 SUFFIXES = (".png", ".pdf", ".svg")
 MOST_VECTOR_STICKS = 5_000  # more sticks are drawn as pixels inside a PDF or SVG

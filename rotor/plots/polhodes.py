@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.free.free_motion import FreeMotion
 from rotor.classical.tumble import PERIODS, TumbleAnswer
-from rotor.plots.picture import Picture, new_figure, styled
+from rotor.plots.picture import WIDTH_INCHES, Picture, new_figure, styled
 from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL, draw_axes, draw_curve, draw_family, draw_sphere, view_of
 from rotor.version import version
 
-SIZE_INCHES = (7.2, 3.6)
+SIZE_INCHES = (WIDTH_INCHES, 3.4)
 POINTS = 1500  # per curve
 MOST_PERIODS = 12  # in the diagram over time; more would be a solid band
 
@@ -137,7 +137,7 @@ def _draw_direction(axes: Any, view: Any, path: Floats) -> None:
 def _mark_period(axes: Any, first: float, last: float, period: float) -> None:
     if last - first > period:
         axes.axvline(first + period, color="0.6", linewidth=0.8, linestyle="--", zorder=0)
-        axes.text(first + period, -1.0, " period", fontsize=8, color="0.4", ha="left", va="center")
+        axes.text(first + period, -1.0, " period", fontsize=9, color="0.4", ha="left", va="center")
 
 
 def _draw_right(axes: Any, moments: Floats, times: Floats, path: Floats, names: tuple[str, str, str]) -> None:

@@ -22,6 +22,7 @@ from rotor.units import MHZ_PER_CM
 
 UNITS = {"MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM}  # units of the frequency axis, in MHz
 VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
+LEAST_NAMED = 0.005  # of a linear axis: lower lines cannot be seen
 LEAST_HEIGHT = 0.55  # part of a linear axis for the strongest line; long names have the rest
 TALL = 1e-2  # below this part of the strongest, lines cannot be seen on a linear axis
 NARROW = 1e-3  # a range narrower than this part of its frequency is shown in MHz, with all digits
@@ -231,7 +232,7 @@ def _inscribe(
     axes.set_ylabel("Integrated absorption (nm² MHz)" if isinstance(thing, Lines) else _ordinate(thing))
     axes.set_title(title if title is not None else _title(thing, lines), loc="left")
     shape = _shape_text(thing) if isinstance(thing, Spectrum) and thing.profile else ""
-    axes.set_title("; ".join(filter(None, (transition, shape))), loc="right", fontsize=8, color=GREY)
+    axes.set_title("; ".join(filter(None, (transition, shape))), loc="right", fontsize=9, color=GREY)
 
 
 def _shape_text(spectrum: Spectrum) -> str:
@@ -257,6 +258,8 @@ def _name_lines(
     """Name the strongest lines from the strongest down, upright above them, wherever there is space."""
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
     low, high = axes.get_ylim()
+    if axes.get_yscale() == "linear":
+        low = max(low, LEAST_NAMED * high)
     rows = _strongest_first(thing, lines, heights, x)
     rows = rows[(heights[rows] > low) & (heights[rows] <= high)][: 15 * most]
     drawn = _drawn_points(axes, thing, x)
@@ -323,7 +326,7 @@ def _label(axes: Any, lines: Lines, row: int, height: float, x: _Axis, transitio
         rotation=90,
         ha="center",
         va="bottom",
-        fontsize=7,
+        fontsize=9,
         color=GREY,
     )
     name.set_in_layout(False)  # names go where the axes leave space; they do not move the axes

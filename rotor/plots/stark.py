@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.plots.picture import GREY, PALETTE, Picture, name_of_top, new_figure, styled
+from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, name_of_top, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.stark_request import StarkAnswer
@@ -16,7 +16,7 @@ from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 
 NARROW_INCHES = 5.0
-SIZE_INCHES = (7.2, 6.4)
+SIZE_INCHES = (WIDTH_INCHES, 6.0)
 LEAST_DRAWN = 1e-4  # relative to the strongest line
 MOST_LABELS = 40  # on the axis of energies; a name takes 1/40 of its height
 LETTER = 0.0105  # width of a letter, relative to the range of fields
@@ -86,9 +86,9 @@ def _energies(axes: Any, field_map: FieldMap, view: View) -> None:
     axes.set_ylabel("Energy (cm⁻¹)")
     if seen != {-1}:
         if axes.figure.get_figwidth() < NARROW_INCHES:  # the title needs the width beside it
-            axes.figure.legend(fontsize=8, loc="outside upper right", ncols=len(seen))
+            axes.figure.legend(fontsize=9, loc="outside upper right", ncols=len(seen))
         else:
-            axes.legend(frameon=False, fontsize=8, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
+            axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1, 1), ncols=len(seen))
 
 
 def _curves(field_map: FieldMap, view: View) -> list[Ints]:
@@ -117,7 +117,7 @@ def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]
     axes.set_xlim(first - (0.045 + LETTER * longest) * (end - first), end + 0.02 * (end - first))
     for (energy, label), place in zip(named, places.tolist(), strict=True):
         axes.annotate(
-            label, (first, energy), (first - 0.035 * (end - first), place), ha="right", va="center", fontsize=7,
+            label, (first, energy), (first - 0.035 * (end - first), place), ha="right", va="center", fontsize=9,
             arrowprops={"arrowstyle": "-", "linewidth": 0.4, "color": GREY, "shrinkA": 0.0, "shrinkB": 2.0},
         )  # fmt: skip
 
@@ -200,5 +200,5 @@ def lobes_figure(lines: FieldLines, title: str = "") -> Any:
         axes.set_xlabel("Field (kV/cm)")
         axes.set_ylabel("Frequency (MHz)")
         axes.set_title(f"{title}, light {lines.light}: full ΔM = 0, dashed ΔM = ±1".strip(", "), loc="left", fontsize=9)
-        axes.legend(frameon=False, fontsize=8)
+        axes.legend(frameon=False, fontsize=9)
     return figure

@@ -10,7 +10,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.formats.structure_request import StructureAnswer
 from rotor.molecules.molecule import Molecule
-from rotor.plots.picture import GREY, Picture, formula_text, name_text, new_figure, styled
+from rotor.plots.picture import GREY, WIDTH_INCHES, Picture, formula_text, name_text, new_figure, styled
 from rotor.structures.coordinates import bonded
 from rotor.structures.substitution import Value
 
@@ -41,7 +41,7 @@ def structure_figure(molecule: Molecule, *, values: Sequence[Value] = (), title:
     spread = np.ptp(x, axis=0)
     across, up, depth = np.argsort(-spread, kind="stable").tolist()
     width, height = max(spread[across] + 2 * _MARGIN, 2.5), max(spread[up] + 2 * _MARGIN, 2.0)
-    scale = min(7.2 / width, 6.0 / height, 1.5)
+    scale = min(WIDTH_INCHES / width, 6.0 / height, 1.5)
     with styled():
         figure = new_figure((width * scale, height * scale + 0.5))
         axes = figure.add_subplot()
@@ -100,7 +100,7 @@ def _write_at_bond(axes: Any, ends: Floats, radii: Sequence[float], centre: Floa
     side = "left" if normal[0] > 0 else "right"
     stands = abs(normal[0]) > _STANDS
     place = middle + normal * (_BESIDE if stands else max(radii) + _BESIDE)
-    axes.text(*place, text, ha=side if stands else "center", va="center", fontsize=7.0, zorder=4)
+    axes.text(*place, text, ha=side if stands else "center", va="center", fontsize=9, zorder=4)
 
 
 def _radius(symbol: str) -> float:
@@ -123,4 +123,4 @@ def _draw_atoms(axes: Any, molecule: Molecule, across: int, up: int, depth: int)
         axes.add_patch(
             Circle(place, _radius(molecule.symbols[atom]), facecolor=colour, edgecolor=GREY, linewidth=0.8, zorder=2)
         )
-        axes.text(*place, f"{molecule.symbols[atom]}{atom + 1}", ha="center", va="center", fontsize=7.0, zorder=3)
+        axes.text(*place, f"{molecule.symbols[atom]}{atom + 1}", ha="center", va="center", fontsize=9, zorder=3)

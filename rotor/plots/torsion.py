@@ -61,7 +61,7 @@ def torsion_figure(answer: TorsionAnswer, view: View = WHOLE) -> Any:
         axes.set_xlabel("Torsional angle, 0 in the geometry (degrees)")
         axes.set_ylabel("Energy above the minimum (cm⁻¹)")
         axes.set_title(_title(answer) if view.title is None else view.title, loc="left")
-        axes.legend(frameon=False, fontsize=7.5, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        axes.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         show_part(axes, view)
     return figure
 

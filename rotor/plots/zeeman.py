@@ -42,7 +42,7 @@ def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0, view: Vi
     if len(field_map.fields) < 2:
         raise ValueError("a picture of a map needs two fields or more")
     levels = _levels(field_map, spins)
-    columns = min(3, len(levels))
+    columns = min(2, len(levels))  # two panels and their titles fill a column of 8.5 cm
     rows = -(-len(levels) // columns)
     with styled():
         figure = new_figure((0.8 + PANEL_INCHES[0] * columns, 0.8 + PANEL_INCHES[1] * rows))
@@ -50,11 +50,12 @@ def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0, view: Vi
         for axes, (label, curves) in zip(panels.ravel(), levels.items(), strict=False):
             _panel(axes, field_map, label, curves)
             show_part(axes, view)
-        for axes in panels.ravel()[len(levels) :]:
-            axes.set_visible(False)
-        figure.supxlabel("Magnetic field (T); blue: M < 0, red: M > 0", fontsize=10)
-        figure.supylabel("Shift from the level (MHz)", fontsize=10)
-        figure.suptitle(title, x=0.02, ha="left", fontsize=11)
+        for place, axes in enumerate(panels.ravel()):
+            axes.set_visible(place < len(levels))
+            axes.tick_params(labelbottom=place + columns >= len(levels))  # the lowest panel of each column
+        figure.supxlabel("Magnetic field (T); blue: M < 0, red: M > 0", fontsize=9)
+        figure.supylabel("Shift from the level (MHz)", fontsize=9)
+        figure.suptitle(title, x=0.02, ha="left", fontsize=10)
     return figure
 
 
@@ -88,7 +89,8 @@ def _panel(axes: Any, field_map: FieldMap, label: str, curves: list[slice]) -> N
         shade = colormaps["coolwarm"](0.5 + 0.5 * m / largest) if m else (0.2, 0.2, 0.2, 1.0)
         axes.plot(field_map.field[rows], field_map.energy_mhz[rows] - centre, color=shade, linewidth=0.9)
     name = f"{largest:.0f}" if float(largest).is_integer() else f"{largest:g}"
+    level = f"J = {label}" if label.isdecimal() else label
     axes.set_title(
-        f"{label}   M = -{name} ... {name}" if largest >= 0.5 else f"{label}   M = 0", fontsize=8, loc="left"
+        f"{level},  M = -{name} ... {name}" if largest >= 0.5 else f"{level},  M = 0", fontsize=9, loc="left"
     )
     axes.ticklabel_format(useOffset=False)

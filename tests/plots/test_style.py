@@ -22,7 +22,7 @@ def test_all_letters_and_the_resolution_follow(folder):
     figure = rotor.spectrum("OCS", jmax=5).plot("small.png", style="small.mplstyle")
     axes = figure.axes[0]
     assert (axes.xaxis.label.get_size(), axes.xaxis.get_ticklabels()[0].get_size()) == (4.5, 4.5)
-    assert imread("small.png").shape[1] == 360  # 7.2 inches
+    assert imread("small.png").shape[1] == 300  # 6 inches
 
 
 def test_every_picture_takes_it(call, folder):
@@ -86,3 +86,26 @@ def test_titles_fit_a_column_of_a_page(folder, title, options):
 def test_a_short_title_stays_as_it_is(folder):
     figure = rotor.spectrum("OCS", jmax=5).plot("a.png", title="OCS")
     assert (figure.axes[0].get_title(loc="left"), figure.axes[0]._left_title.get_size()) == ("OCS", 10.0)
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        lambda: rotor.spectrum("water", jmax=5),
+        lambda: rotor.levels("NH3", jmax=3),
+        lambda: rotor.stark("OCS", fields_kv_per_cm="0:100kV/cm:5"),
+        lambda: rotor.thermo("H2", temperatures_k="10:300:5"),
+        lambda: rotor.gas("water", molecules=200, seed=1),
+    ],
+    ids=["spectrum", "levels", "stark", "thermo", "gas"],
+)
+def test_letters_have_five_points_in_a_column(answer):
+    """Scaled to a column of 8.5 cm every letter is legible: 5 points or more."""
+    from matplotlib.text import Text
+
+    figure = answer().plot()
+    figure.canvas.draw()
+    texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
+    assert len(texts) > 5
+    smallest = min(texts, key=Text.get_fontsize)
+    assert smallest.get_fontsize() * (8.5 / 2.54) / figure.get_figwidth() >= 5.0, smallest.get_text()
