@@ -369,7 +369,7 @@ SUBJECTS: Sequence[Subject] = (
     Subject(
         "driven",
         "Driven motion",
-        "Attitude of driven bodies, looked at at five times, beside steps to a hundred times finer than the finest.",
+        "Attitude of driven bodies, compared at five times with steps to a hundred times finer than the finest.",
         "Give a tolerance rather than a step: three digits more cost about a factor of two. A splitting of order 6 or 8 "
         "needs less time still, where its compiled steps are loaded (they are from 4,000 substeps on).",
         driven,
