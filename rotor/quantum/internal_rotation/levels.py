@@ -251,9 +251,8 @@ def species_blocks(
     model: TurningTops, name: str, jmin: int, jmax: int, count: int, needed: Ints | None = None
 ) -> SpeciesBlocks:
     """Blocks of a species, for J from jmin to jmax or for those in `needed`."""
-    if isinstance(model, SeveralTops):
-        return model.blocks(model.species[name], jmax, jmin=jmin, count=count, needed=needed)
-    return model.blocks(model.species[name], jmax, jmin=jmin, count=count, needed=needed)
+    sigma: Any = model.species[name]
+    return model.blocks(sigma, jmax, jmin=jmin, count=count, needed=needed)
 
 
 @dataclass(frozen=True)
@@ -318,9 +317,7 @@ def _blocks(species: SpeciesLevels, model: TurningTops, start: int, components: 
 def species_splitting(top: Top, constants: InternalRotationConstants, j: int) -> float:
     """The largest |E_s(K) - E_A(K) - E_s(0) + E_A(0)| over |K| ≤ J and species s of the torsional ground state, MHz."""
     model = turning_tops(top, constants)
-    if isinstance(model, SeveralTops):
-        ground = [model.ground_energies(species, j) for species in model.species.values()]
-    else:
-        ground = [model.ground_energies(sigma, j) for sigma in model.species.values()]
+    species: Mapping[str, Any] = model.species
+    ground = [model.ground_energies(sigma, j) for sigma in species.values()]
     differences = np.array(ground[1:]) - ground[0]
     return float(np.abs(differences - differences[:, [j]]).max())
