@@ -25,16 +25,16 @@ class AssignedLevels(NamedTuple):
     blocks: LabelledBlocks | ContractedLevels
 
     @property
-    def found(self) -> Ints:
+    def with_level(self) -> Ints:
         """Places of the labels that have a level."""
-        return self.rows[self.blocks.found] if isinstance(self.blocks, LabelledBlocks) else self.rows
+        return self.rows[self.blocks.with_level] if isinstance(self.blocks, LabelledBlocks) else self.rows
 
 
 def without_level(parts: Sequence[AssignedLevels], count: int) -> NDArray[np.bool_]:
     """Which of `count` labels have no level in any of these blocks."""
     missing = np.ones(count, dtype=bool)
     for part in parts:
-        missing[part.found] = False
+        missing[part.with_level] = False
     return missing
 
 

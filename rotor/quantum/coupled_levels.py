@@ -111,7 +111,7 @@ def _refuse_mixed_weights(levels: Levels) -> None:
 def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
     """The coupled blocks of some J, in the order of J."""
     vertices = {j: [(v, b) for v in sorted(model.states) for b in blocks_of_state(model, v, j)] for j in all_j}
-    terms = StateTerms.of_values(model.states, _links(model), model.representation)
+    terms = StateTerms.with_values(model.states, _links(model), model.representation)
     elements = StateElements(terms, 1, model.representation, vertices)
     by_j: dict[int, list[SolvedBlock]] = {}
     for j in sorted(all_j, reverse=True):

@@ -273,7 +273,7 @@ class LabelledBlocks:
     tracked: tuple[Tracked, ...]
 
     @property
-    def found(self) -> Ints:
+    def with_level(self) -> Ints:
         """Places of the labels that were found."""
         return np.concatenate([block.rows for block in self.tracked]) if self.tracked else np.zeros(0, dtype=np.int64)
 

@@ -38,14 +38,14 @@ class Word(NamedTuple):
 class Written(NamedTuple):
     """A moment as a sum of words, from the second of its states to the first.
 
-    electric: whether it is a part of the electric dipole. commutator: ½[N², ] of the whole. of_k: what an element from K'' to K' is
+    electric: whether it is a part of the electric dipole. commutator: ½[N², ] of the whole. factor_of_k: what an element from K'' to K' is
     multiplied with, signs of K counted. A moment of the spin `Moment.spin` has words without a cosine.
     """
 
     words: tuple[Word, ...]
     electric: bool
     commutator: bool = False
-    of_k: FactorOfK | None = None
+    factor_of_k: FactorOfK | None = None
 
 
 class Moment(NamedTuple):

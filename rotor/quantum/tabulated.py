@@ -24,12 +24,12 @@ def as_tabulated(top: Top, effects: Sequence[QuantumEffect], rotation: Levels) -
 
     The table stands for the semi-rigid Hamiltonian of the top in all its states; spins do not change that.
     """
-    if top.level_table is None or not _is_own(top, effects):
+    if top.level_table is None or not _are_of_constants(top, effects):
         return rotation
     return with_tabulated_energies(rotation, top.level_table)
 
 
-def _is_own(top: Top, effects: Sequence[QuantumEffect]) -> bool:
+def _are_of_constants(top: Top, effects: Sequence[QuantumEffect]) -> bool:
     """Whether the effects without spins are those of the constants of a top and of its further states, no more and no other values."""
     plain = [effect for effect in effects if not effect.spins(top)]
     others = [effect for effect in plain if effect not in SEMI_RIGID]
@@ -47,7 +47,7 @@ def tabulated_line_errors(
     nan where a level is not in the table; None where no table holds for these levels, or where it does not know what errors have in common.
     """
     table = top.level_table
-    if table is None or table.own_error_mhz is None or not _is_own(top, levels.effects):
+    if table is None or table.own_error_mhz is None or not _are_of_constants(top, levels.effects):
         return None
     quanta = _labels_of_table(levels)
     rows = table.rows_of({name: quanta[name] for name in table.quanta})
@@ -57,7 +57,7 @@ def tabulated_line_errors(
 def tabulated_level_errors(top: Top, levels: Levels) -> Floats | None:
     """One standard deviation (levels,) in MHz of energies from the top's table, nan for levels that it has not; None without a table."""
     table = top.level_table
-    if table is None or not _is_own(top, levels.effects):
+    if table is None or not _are_of_constants(top, levels.effects):
         return None
     quanta = _labels_of_table(levels)
     rows = table.rows_of({name: quanta[name] for name in table.quanta})

@@ -79,7 +79,7 @@ def spherical_components(cartesian: ArrayLike, rank: int, representation: str) -
         x, y, z = turn @ array
         return np.array([(x - 1j * y) / np.sqrt(2), z, -(x + 1j * y) / np.sqrt(2)])
     if array.shape == (3, 3) and rank in (0, 1, 2):
-        return _of_matrix(turn @ array @ turn.T, rank)
+        return _components_of_matrix(turn @ array @ turn.T, rank)
     raise ValueError(
         f"rank {rank} of an array {array.shape}: a vector (3,) has rank 1, a matrix (3, 3) ranks 0, 1 and 2"
     )
@@ -102,7 +102,7 @@ def cartesian_of(components: ArrayLike, representation: str) -> Floats:
     return np.asarray(turn.T @ matrix @ turn)
 
 
-def _of_matrix(t: Floats, rank: int) -> Complexes:
+def _components_of_matrix(t: Floats, rank: int) -> Complexes:
     if rank == 0:
         return np.array([-np.trace(t) / np.sqrt(3)], dtype=complex)
     if rank == 1:

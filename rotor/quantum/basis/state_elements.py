@@ -94,7 +94,7 @@ class StateTerms(NamedTuple):
         return cls(powers, first, rows, columns, p, factors, tuple(links))
 
     @classmethod
-    def of_values(cls, states: Mapping[int, Operators], links: Sequence[Summed], representation: str) -> StateTerms:
+    def with_values(cls, states: Mapping[int, Operators], links: Sequence[Summed], representation: str) -> StateTerms:
         """Of one parameter, H itself: operators of every state by v with their values, and sums of couplings."""
         powers = ((0, 0), *sorted({(q, n) for operators in states.values() for _, q, n in operators} - {(0, 0)}))
         first = {v: i * len(powers) for i, v in enumerate(states)}

@@ -344,11 +344,11 @@ def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockState
         "free_mhz": levels.energy_mhz[states.rows],
         "weight": levels.weight[states.rows],
     }
-    of_block = {"m": block.m, "block": block.label, "copies": block.copies, "round_off_mhz": _round_off(terms, fields)}
+    by_block = {"m": block.m, "block": block.label, "copies": block.copies, "round_off_mhz": _round_off(terms, fields)}
     count = int(listed.sum())
     return {
         "field": np.tile(fields, count),
-        **{name: np.full(count * len(fields), value) for name, value in of_block.items()},
+        **{name: np.full(count * len(fields), value) for name, value in by_block.items()},
         **{name: np.repeat(values[listed], len(fields)) for name, values in by_state.items()},
         **{name: values[:, listed].T.ravel() for name, values in by_field.items()},
     }

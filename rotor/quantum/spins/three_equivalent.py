@@ -114,11 +114,11 @@ def allowed_states(
                 sub_block = np.unique(functions.sub_block[chosen], return_inverse=True)[1]
                 members.append(Member(f, used, names, sizes, Allowed(products, sub_block, names, sizes)))
                 matrices.append(matrix[np.ix_(chosen, chosen)])
-    every_states = (
+    solutions = (
         diagonalised([number], (matrix - matrix[0, 0] * np.eye(len(matrix)))[None], matrix[:1, 0])
         for number, matrix in enumerate(matrices)
     )
-    return members, every_states
+    return members, solutions
 
 
 def _parts(plan: Plan, patterns: Ints) -> list[SpinPart]:

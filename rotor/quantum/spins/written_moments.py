@@ -55,9 +55,9 @@ def _matrix(moment: Written, up: int, low: int, representation: str) -> Complexe
         total += word.factor * _word_elements(word, up, low, representation)
     if moment.commutator:
         total *= (up * (up + 1.0) - low * (low + 1.0)) / 2
-    if moment.of_k is not None:
+    if moment.factor_of_k is not None:
         k, above = np.arange(-low, low + 1.0), np.arange(-up, up + 1.0)
-        total *= moment.of_k(low, above[:, None], k[None, :])
+        total *= moment.factor_of_k(low, above[:, None], k[None, :])
     return total
 
 

@@ -208,7 +208,7 @@ def _fourier_of(
     if sine:
         words = tuple(word._replace(factor=imaginary(oblate) * word.factor) for word in words)
     function_of_k = factor_of_k(n, sine, series, code.states)
-    return Moment(value, states[::-1], written=Written(words, bool(code.axis), of_k=function_of_k))
+    return Moment(value, states[::-1], written=Written(words, bool(code.axis), factor_of_k=function_of_k))
 
 
 def _meaning(code: DipoleCode) -> str:
