@@ -25,6 +25,7 @@ from rotor.assignment.growth import (
     Grown,
     grown_from,
     merged_lines,
+    predict,
     prior_weight,
     quartic_prior,
     slopes_of,
@@ -132,7 +133,8 @@ def _places(seen: Field, species: Grown, taken: Mask, column: int, least: int, s
     """Likelihood of the group at all its places; None where the other lines place it, or do not predict it."""
     constants, covariance = _others(seen, species, taken)
     scales = np.where(species.ratios > LEAST_RATIO, species.scales, -np.inf)
-    lines = merged_lines(seen, species.constants, species.temperature_k, scales)
+    predicted = predict(seen, species.constants, species.temperature_k)
+    lines = merged_lines(seen, species.constants, predicted, scales)
     inside = np.flatnonzero(_largest(seen, lines.main)[:, column] >= least)
     inside = inside[np.argsort(-lines.height[inside], kind="stable")][:MOST_LINES]
     if not len(inside):
@@ -150,16 +152,12 @@ def _places(seen: Field, species: Grown, taken: Mask, column: int, least: int, s
     present = float(move @ slopes @ (species.constants - constants) / (move @ move))
     rest = np.sqrt(np.maximum(np.diag(variances) - move**2, 0.0) + sigma0**2)
     free = np.setdiff1d(np.arange(len(seen.peaks)), species.peak[~taken])
-    peaks, used = seen.peaks, np.zeros(len(free), np.int64)
-    frequency, height, density = peaks.frequency_mhz[free], peaks.log_intensity[free], peaks.log_density[free]
-    ratios = [
-        _kernels.joint_ratio(
-            lines.centre[inside] + move * (x - present), lines.height[inside], rest, frequency, height, density,
-            peaks.log_threshold, SPREAD, DETECTED, used, n,
-        )
-        for n, x in enumerate(t.tolist(), 1)
-    ]  # fmt: skip
-    return Places(constants, covariance, movement, t, np.array(ratios) - 0.5 * t**2, present, largest, second)
+    peaks = seen.peaks
+    ratios = _kernels.joint_ratios_along(
+        lines.centre[inside] - present * move, move, t, lines.height[inside], rest, peaks.frequency_mhz[free],
+        peaks.log_intensity[free], peaks.log_density[free], peaks.log_threshold, SPREAD, DETECTED,
+    )  # fmt: skip
+    return Places(constants, covariance, movement, t, ratios - 0.5 * t**2, present, largest, second)
 
 
 def _moved(seen: Field, species: Grown, places: Places, sigma0: float) -> Grown | None:

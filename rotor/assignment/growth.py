@@ -20,6 +20,7 @@ from rotor.units import MHZ_PER_K
 SOFTEST_MHZ = 3e6  # 100 cm⁻¹: vibrational wavenumber for the a-priori sizes of quartic constants
 ROUNDS = 24
 WINDOW = 3.5  # standard errors
+MOST_IN_WINDOW = 12  # peaks; a line with more is not matched
 LEAST_RATIO = 3.0  # ln of the likelihood ratio above which a type counts as present
 FEW, CHANCE_OF_FEW = 12, 0.25  # largest number of chance peaks in a window while few lines are assigned
 FIRST_CHANCE, LAST_CHANCE, RISE = 0.003, 0.05, 1.6  # this limit with more lines, increasing by round: safe lines first
@@ -30,6 +31,7 @@ LEAST_SHARE = (
     0.1  # smallest share of a peak for an assigned line; the peak does not measure the frequency of a weaker one
 )
 MOST_LINES = 400
+MOST_OF_TYPE = 60  # strongest lines of a type that tell its intensity while lines are added
 OPEN = 1e-3  # relative standard error above which a constant is not determined
 FEWEST_MOVED = 4  # lines with ΔJ ≠ 0: wrong twins of Q branches had two by chance, right constants five or more
 FIRST_MHZ = 0.05  # standard error of the family's lines, for distortion
@@ -113,10 +115,10 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
     table = field.table
     size = len(table.upper)
     energy, row, f, s_nu = np.empty(len(field.jj)), np.empty(size, np.int64), np.empty(size), np.empty(size)
+    _kernels.level_energies(table.levels, table.theta, field.jj, constants, energy)
     count = _kernels.lines_in_band(
-        table.levels, table.theta, field.jj, table.upper, table.lower, table.strength, constants, field.peaks.windows,
-        energy, row, f, s_nu,
-    )  # fmt: skip
+        table.theta, table.upper, table.lower, table.strength, constants, field.peaks.windows, energy, row, f, s_nu
+    )
     row, f = row[:count], f[:count]
     below = energy[table.lower[row]]
     expected = np.log(s_nu[:count]) - below / (MHZ_PER_K * temperature_k)
@@ -124,7 +126,9 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
     selected = np.zeros(count, dtype=bool)
     for q in range(3):
         rows = np.flatnonzero(kind == q)
-        selected[rows[np.argsort(-expected[rows], kind="stable")[:most]]] = True
+        if len(rows) > most:
+            rows = rows[np.argsort(-expected[rows], kind="stable")[:most]]
+        selected[rows] = True
     return Predicted(row[selected], f[selected], expected[selected], kind[selected], below[selected])
 
 
@@ -234,19 +238,14 @@ def _errors(slopes: Floats, covariance: Floats, sigma0: float) -> Floats:
     return np.asarray(np.sqrt(_variances(slopes, covariance) + sigma0**2))
 
 
-def _ratios(
-    field: Field, constants: Floats, covariance: Floats, temperature_k: float, sigma0: float, most: int = 60
-) -> tuple[Predicted, Floats, Floats, Floats, Floats]:
-    """Predicted lines, ratios and scales by type, errors of lines (lines,), and their derivatives."""
-    lines = predict(field, constants, temperature_k, most)
-    slopes = slopes_of(field, lines.row, constants)
-    errors = np.minimum(_errors(slopes, covariance, sigma0), 2.0)
+def _ratios(field: Field, lines: Predicted, errors: Floats, most: int) -> tuple[Floats, Floats]:
+    """Likelihood ratios and scales by type, from the strongest lines of each; errors of lines (lines,)."""
     peaks = field.peaks
-    ratios, scales = _kernels.best_scales(
+    ratios: tuple[Floats, Floats] = _kernels.best_scales(
         lines.frequency, lines.expected, lines.kind, errors, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
         peaks.log_threshold, SPREAD, DETECTED, most, 16,
     )  # fmt: skip
-    return lines, ratios, scales, errors, slopes
+    return ratios
 
 
 def _matched(
@@ -259,10 +258,12 @@ def _matched(
     before: Grown | None,
 ) -> _Matched | None:
     """The lines matched to peaks."""
-    _, ratios, scales, _, _ = _ratios(field, constants, covariance, temperature_k, sigma0)
+    lines = predict(field, constants, temperature_k)
+    errors = np.minimum(_errors(slopes_of(field, lines.row, constants), covariance, sigma0), 2.0)
+    ratios, scales = _ratios(field, lines, errors, MOST_OF_TYPE)
     if not (ratios > LEAST_RATIO).any():
         return None
-    merged = merged_lines(field, constants, temperature_k, np.where(ratios > LEAST_RATIO, scales, -np.inf))
+    merged = merged_lines(field, constants, lines, np.where(ratios > LEAST_RATIO, scales, -np.inf))
     if not len(merged.centre):
         return None
     variance = _variances(merged.slope, covariance)
@@ -290,11 +291,8 @@ class Merged:
     slope: Floats
 
 
-def merged_lines(
-    field: Field, constants: Floats, temperature_k: float, scales: Floats, most: int = MOST_LINES
-) -> Merged:
-    """Lines above the threshold; those closer than the width of a peak are merged."""
-    lines = predict(field, constants, temperature_k, most)
+def merged_lines(field: Field, constants: Floats, lines: Predicted, scales: Floats) -> Merged:
+    """Predicted lines above the threshold; those closer than the width of a peak are merged."""
     level = lines.expected + scales[lines.kind]
     selected = np.flatnonzero(level > field.peaks.log_threshold - 1.0)
     selected = selected[np.argsort(lines.frequency[selected], kind="stable")]
@@ -333,20 +331,11 @@ def _predicted_by_others(
 def _nearest(field: Field, centre: Floats, height: Floats, errors: Floats, most_chance: float) -> Ints:
     """The peak matched to each line (lines,), or -1."""
     peaks = field.peaks
-    f = peaks.frequency_mhz
-    window = WINDOW * errors
-    first, last = np.searchsorted(f, centre - window), np.searchsorted(f, centre + window)
-    out = np.full(len(centre), -1)
-    for n in np.flatnonzero((last > first) & (last - first < 12)).tolist():
-        near = np.arange(first[n], last[n])
-        apart = (f[near] - centre[n]) / errors[n]
-        higher = (peaks.log_intensity[near] - height[n]) / SPREAD
-        cost = apart**2 + higher**2
-        best = int(np.argmin(cost))
-        chance = 2 * window[n] * np.exp(peaks.log_density[near[best]]) * 4 * SPREAD
-        if abs(higher[best]) < 3.0 and chance < most_chance:
-            out[n] = near[best]
-    return out
+    chosen: Ints = _kernels.nearest_peaks(
+        centre, height, errors, WINDOW, most_chance, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density, SPREAD,
+        MOST_IN_WINDOW,
+    )  # fmt: skip
+    return chosen
 
 
 def _without_doubles(chosen: Ints, height: Floats) -> Ints:
@@ -409,18 +398,15 @@ def with_evidence(field: Field, grown: Grown) -> Grown:
     Learning Algorithms (2003), eq. 28.10).
     """
     sigma0 = 1.3 * max(1.4826 * float(np.median(np.abs(grown.residual))), SMALLEST_MHZ)
-    lines = predict(field, grown.constants, grown.temperature_k, 120)
-    peaks = field.peaks
-    ratios, scales = _kernels.best_scales(
-        lines.frequency, lines.expected, lines.kind, np.full(len(lines.row), sigma0), peaks.frequency_mhz,
-        peaks.log_intensity, peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, 120, 16,
-    )  # fmt: skip
+    lines = predict(field, grown.constants, grown.temperature_k)
+    ratios, scales = _ratios(field, lines, np.full(len(lines.row), sigma0), 2 * MOST_OF_TYPE)
     active = ratios > LEAST_RATIO
-    best = _joint_ratio(field, grown, np.where(active, scales, -np.inf), sigma0)
+    best = _joint_ratio(field, grown.constants, lines, np.where(active, scales, -np.inf), sigma0)
     for q in np.flatnonzero(active).tolist():
         fewer = active.copy()
         fewer[q] = False
-        without = _joint_ratio(field, grown, np.where(fewer, scales, -np.inf), sigma0) if fewer.any() else 0.0
+        rest = np.where(fewer, scales, -np.inf)
+        without = _joint_ratio(field, grown.constants, lines, rest, sigma0) if fewer.any() else 0.0
         if without > best:
             best, active = without, fewer
     centre, sizes = quartic_prior(field, grown.constants)
@@ -440,13 +426,13 @@ def with_evidence(field: Field, grown: Grown) -> Grown:
     )
 
 
-def _joint_ratio(field: Field, grown: Grown, scales: Floats, sigma0: float) -> float:
+def _joint_ratio(field: Field, constants: Floats, lines: Predicted, scales: Floats, sigma0: float) -> float:
     """ln of the likelihood ratio of the lines of all types; lines of a peak are merged, and each peak is matched once."""
-    merged = merged_lines(field, grown.constants, grown.temperature_k, scales)
+    merged = merged_lines(field, constants, lines, scales)
     order = np.argsort(-merged.height, kind="stable")
     peaks = field.peaks
     value = _kernels.joint_ratio(
         merged.centre[order], merged.height[order], np.full(len(order), sigma0), peaks.frequency_mhz, peaks.log_intensity,
-        peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, np.zeros(len(peaks), np.int64), 1,
+        peaks.log_density, peaks.log_threshold, SPREAD, DETECTED,
     )  # fmt: skip
     return float(value)

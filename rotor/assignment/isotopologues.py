@@ -16,7 +16,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.assignment import _kernels
 from rotor.assignment.families import Bounds, Family
-from rotor.assignment.growth import Grown, Merged, grow, merged_lines
+from rotor.assignment.growth import Grown, Merged, grow, merged_lines, predict
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import RigidTable
 from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field, alike
@@ -118,7 +118,7 @@ def candidates(peaks: PeakList, parent: Grown, expected: Expected, table: RigidT
     seen = Field(peaks, table, bounds, np.array([parent.temperature_k]), parent.constants, expected.errors)
     scales = parent.scales + np.log(expected.abundance)
     start = np.concatenate([expected.constants, parent.constants[3:]])
-    lines = merged_lines(seen, start, parent.temperature_k, scales)
+    lines = merged_lines(seen, start, predict(seen, start, parent.temperature_k), scales)
     visible = np.argsort(-lines.height, kind="stable")[:MOST_LINES]
     visible = visible[lines.height[visible] > peaks.log_threshold - 0.5]
     if len(visible) < 4:
@@ -178,7 +178,7 @@ def _ratio(peaks: PeakList, lines: Merged, visible: Ints, shift: Floats) -> floa
     centre = lines.centre[visible] + lines.slope[visible, :3] @ shift
     value = _kernels.joint_ratio(
         centre, lines.height[visible], np.full(len(visible), ROUGH_MHZ), peaks.frequency_mhz, peaks.log_intensity,
-        peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, np.zeros(len(peaks), np.int64), 1,
+        peaks.log_density, peaks.log_threshold, SPREAD, DETECTED,
     )  # fmt: skip
     return float(value)
 

@@ -11,7 +11,7 @@ the full Hamiltonian.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -59,6 +59,20 @@ class RigidTable:
     def kappa(self) -> Floats:
         """Ray's κ of the grid (POINTS,)."""
         return np.asarray(-np.cos(self.theta))
+
+    @cached_property
+    def _of_types(self) -> list[RigidTable]:
+        return [self._selected(np.flatnonzero(self.kind == q)) for q in range(len(TYPES))]
+
+    def of_type(self, kind: int) -> RigidTable:
+        """The table with the lines of a type alone, or of all for a kind beyond those."""
+        return self._of_types[kind] if kind < len(TYPES) else self
+
+    def _selected(self, lines: Ints) -> RigidTable:
+        return replace(
+            self, upper=self.upper[lines], lower=self.lower[lines], kind=self.kind[lines],
+            strength=np.ascontiguousarray(self.strength[:, lines]),
+        )  # fmt: skip
 
     def label(self, line: int) -> str:
         """A line as text, `3 1 2 - 2 1 1`."""

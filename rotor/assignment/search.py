@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment import _kernels
+from rotor.assignment import _kernels, _sweep
 from rotor.assignment.families import SAME_PEAK_MHZ, Bounds, Family
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import RigidTable
@@ -72,6 +72,11 @@ class Field:
         return self.bounds.points(self.table.kappa)
 
     @cached_property
+    def energies(self) -> Floats:
+        """E_κ of the levels at the points of κ (levels, points)."""
+        return np.ascontiguousarray(self.table.reduced[self.points].T)
+
+    @cached_property
     def order(self) -> Ints:
         """Peaks by decreasing intensity."""
         return np.argsort(-self.peaks.intensity, kind="stable")
@@ -100,15 +105,14 @@ def roots_of(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
     lines = family.lines[np.argsort(-np.abs(_change_of_jj(field, family.lines)), kind="stable")]
     upper, lower = table.upper[lines], table.lower[lines]
     further, below = table.upper[family.companions], table.lower[family.companions]
-    points = field.points
-    energies = table.reduced[points]
+    energies, kappa = field.energies, table.kappa[field.points]
     out = np.empty((4000, 5))
     low, high = field.peaks.band_mhz
-    count = _kernels.sweep(
-        np.ascontiguousarray((energies[:, upper] - energies[:, lower]).T), field.jj[upper] - field.jj[lower], table.kappa[points],
-        energies[:, further] - energies[:, below], field.jj[further] - field.jj[below],
+    count = _sweep.sweep(
+        energies[upper] - energies[lower], field.jj[upper] - field.jj[lower], kappa,
+        np.ascontiguousarray((energies[further] - energies[below]).T), field.jj[further] - field.jj[below],
         field.peaks.frequency_mhz[seeds], field.peaks.log_intensity[seeds], field.near, low, high, BIN_MHZ, NEAR_MHZ, 2 * SOFTNESS, RATIO,
-        field.bounds.array, need, min(STRIDE, max(1, len(energies) // FEWEST_POINTS)), out,
+        field.bounds.array, need, min(STRIDE, max(1, len(kappa) // FEWEST_POINTS)), out,
     )  # fmt: skip
     return out[:count]
 
@@ -128,22 +132,26 @@ def ranked(field: Field, family: Family, roots: Floats, least: float) -> list[Ca
         return []
     order = np.argsort(roots[:, 1] - 2 * roots[:, 0], kind="stable")[:300]
     tops = np.ascontiguousarray(roots[order, 2:])
-    ratios, temperatures = quick_ratios(field, tops, np.full(len(tops), family.kind))
-    out = list[Candidate]()
-    for i in np.argsort(-ratios).tolist():
-        if ratios[i] < least:
-            break
-        if not any(alike(tops[i], other.constants, SAME) for other in out):
-            out.append(Candidate(tops[i], family, float(ratios[i]), float(temperatures[i])))
+    ratios, temperatures = quick_ratios(field, tops, family.kind, least)
+    out, left = list[Candidate](), np.argsort(-ratios)
+    left = left[ratios[left] >= least]
+    while len(left):
+        best = left[0]
+        out.append(Candidate(tops[best], family, float(ratios[best]), float(temperatures[best])))
+        left = left[(np.abs(tops[left] - tops[best]) >= SAME * tops[best]).any(axis=1)]
     return out
 
 
-def quick_ratios(field: Field, tops: Floats, kinds: Ints) -> tuple[Floats, Floats]:
-    """ln of the likelihood ratios of rigid tops (n, 3) from lines of one type each, and the best temperatures."""
+def quick_ratios(field: Field, tops: Floats, kind: int, least: float = 0.0) -> tuple[Floats, Floats]:
+    """ln of the likelihood ratios of rigid tops (n, 3) from lines of a type or of all, and the best temperatures.
+
+    least : of a ratio of one type that matters; lower ones count as 0.
+    """
     table, peaks = field.table, field.peaks
+    lines = table.of_type(kind)
     ratios: tuple[Floats, Floats] = _kernels.quick_ratios(
-        table.levels, table.theta, field.jj, table.upper, table.lower, table.kind, table.strength, tops, kinds,
+        table.reduced, table.theta, field.jj, lines.upper, lines.lower, lines.kind, lines.strength, kind == _kernels.MIXED, tops,
         field.temperatures, peaks.windows, ROUGH_MHZ, SOFTNESS, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
-        peaks.log_threshold, SPREAD, DETECTED, 40, SAME_PEAK_MHZ,
+        peaks.log_threshold, SPREAD, DETECTED, 40, SAME_PEAK_MHZ, least,
     )  # fmt: skip
     return ratios

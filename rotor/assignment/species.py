@@ -29,6 +29,7 @@ NEAR, GROWN_NEAR = (
 )  # relative difference of constants of roots of which one is grown; of those near a species
 AROUND = 0.01  # relative difference below which roots may belong to one species
 MOST_ALIASES = 4
+SURELY_MOVED = 12  # peaks of lines with ΔJ ≠ 0: a wrong twin of Q branches has fewer, those that A + C, DJ, DJK and chance can match
 LOW_J, LOW_KA, SHIFT_PEAKS = 8, 3, 25  # lines and peaks that tell shifts of A, B and C together
 PEAK_MHZ = 0.1  # half the width of a peak
 MULTIPLES = (2.0, 0.5, 3.0, 1.5, 2 / 3, 1 / 3)
@@ -134,7 +135,7 @@ def compiled(table: RigidTable) -> bool:
     family = Family(0, low[table.quanta[table.upper[low], 0] == 5], low[:0], 0.0)
     roots_of(seen, family, seen.seeds(5), 1)
     candidate = Candidate(np.array([3000.0, 1050.0, 950.0]), family, 0.0, 2.0)
-    quick_ratios(seen, candidate.constants[None, :], np.zeros(1, dtype=np.int64))
+    quick_ratios(seen, candidate.constants[None, :], 0)
     grow(seen, candidate)
     return True
 
@@ -167,7 +168,7 @@ def _best(grown: Sequence[Grown]) -> list[Grown]:
 
 def aliases(seen: Field, grown: Grown) -> list[Candidate]:
     """Candidates with other constants whose lines include those of a species, which may then be wrong."""
-    return [*multiples(seen, grown), *shifts(seen, grown)]
+    return [*multiples(seen, grown), *(shifts(seen, grown) if grown.moved < SURELY_MOVED else [])]
 
 
 def multiples(seen: Field, grown: Grown) -> list[Candidate]:
@@ -196,7 +197,7 @@ def multiples(seen: Field, grown: Grown) -> list[Candidate]:
             families.append(Family(0, lines, lines[:0], 0.0))
     if not tops:
         return []
-    ratios, temperatures = quick_ratios(seen, np.array(tops), np.zeros(len(tops), dtype=np.int64))
+    ratios, temperatures = quick_ratios(seen, np.array(tops), 0)
     each = zip(tops, families, ratios.tolist(), temperatures.tolist(), strict=True)
     return [Candidate(*values) for values in each if values[2] > FAINT]
 
@@ -267,7 +268,7 @@ def _shifted(seen: Field, start: Floats, present: NDArray[np.bool_], slow: Ints)
     tops, which = np.ascontiguousarray(tops[sound]), np.repeat(rows, len(peaks))[sound]
     if not len(tops):
         return []
-    each = [quick_ratios(seen, tops, np.full(len(tops), q)) for q in np.flatnonzero(present)]
+    each = [quick_ratios(seen, tops, q) for q in np.flatnonzero(present).tolist()]
     ratios = np.sum([ratio for ratio, _ in each], axis=0)
     temperatures = np.array([temperature for _, temperature in each])[
         np.argmax([ratio for ratio, _ in each], axis=0), np.arange(len(tops))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rotor.arrays import Floats
-from rotor.assignment import _kernels
+from rotor.assignment import _kernels, _sweep
 from rotor.assignment.families import Bounds, families
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.assignment.rigid_table import JMAX, rigid_table
@@ -146,7 +146,6 @@ def compiled_joint(f: Floats, height: Floats, sigma: Floats, peaks: PeakList) ->
     return float(
         _kernels.joint_ratio(
             f, height, sigma, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density, peaks.log_threshold, SPREAD, DETECTED,
-            np.zeros(len(peaks), np.int64), 1,
         )
     )  # fmt: skip
 
@@ -161,6 +160,97 @@ def test_the_likelihood_ratio_is_the_product_of_lines(seed: int) -> None:
     value = compiled_joint(f, height, sigma, peaks)
     assert value == pytest.approx(plain_joint(f, height, sigma, peaks), rel=1e-12)
     assert value != pytest.approx(plain_joint(f + 0.05, height, sigma, peaks), rel=1e-3)
+
+
+def test_likelihood_ratios_along_a_line_are_those_of_each_place() -> None:
+    rng, peaks = np.random.default_rng(15), field_of(5).peaks
+    f, move = rng.choice(peaks.frequency_mhz, 20) + rng.normal(size=20), rng.normal(size=20)
+    height, sigma, t = rng.uniform(1.0, 4.0, 20), rng.uniform(0.2, 2.0, 20), np.linspace(-4, 4, 17)
+    values = _kernels.joint_ratios_along(
+        f,
+        move,
+        t,
+        height,
+        sigma,
+        peaks.frequency_mhz,
+        peaks.log_intensity,
+        peaks.log_density,
+        peaks.log_threshold,
+        SPREAD,
+        DETECTED,
+    )
+    plain = [plain_joint(f + x * move, height, sigma, peaks) for x in t]
+    assert len(set(np.round(plain, 6))) == len(t)  # the places differ
+    np.testing.assert_allclose(values, plain, rtol=1e-12)
+
+
+def test_the_best_scale_is_that_of_all_trials() -> None:
+    """Trials that cannot win end early; the best remains, and nothing below the least."""
+    rng, peaks = np.random.default_rng(16), field_of(6).peaks
+    f = np.concatenate(
+        [peaks.frequency_mhz[::3] + 0.1 * rng.normal(size=len(peaks.frequency_mhz[::3])), rng.uniform(8000, 18000, 9)]
+    )
+    expected, sigma = np.sort(rng.uniform(-3.0, 0.0, len(f)))[::-1], np.full(len(f), 0.2)
+    trials = {
+        float(scale): plain_joint(f, expected + scale, sigma, peaks)
+        for n in range(8)
+        for scale in peaks.log_intensity[np.abs(peaks.frequency_mhz - f[n]) <= 3 * sigma[n]] - expected[n]
+    }
+    high = max(trials, key=lambda scale: trials[scale])
+    arguments = (
+        f, expected, sigma, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, 8,
+    )  # fmt: skip
+    value, scale = _kernels.best_scale(*arguments, 0.0)
+    assert len(trials) > 3
+    assert trials[high] > 10
+    assert scale == pytest.approx(high, abs=0.25 * SPREAD)  # nearer trials count as one
+    assert value == pytest.approx(trials[high], abs=0.5)
+    assert _kernels.best_scale(*arguments, value - 1e-6) == (value, scale)
+    assert _kernels.best_scale(*arguments, value + 1e-6) == (0.0, -np.inf)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_second_lines_within_the_bounds(seed: int) -> None:
+    """The ranges of seeds at each κ are those whose A, B, C are within 3 % of the bounds and not beyond a planar top."""
+    rng, kappa = np.random.default_rng(seed), np.linspace(-0.99, 0.99, 25)
+    difference, jj = rng.normal(size=(3, 25)) + np.array([[6.0], [-3.0], [1.0]]), np.array([6.0, 4.0, 0.0])
+    seeds, bounds = np.sort(rng.uniform(2000, 30000, 200)), BOUNDS.array
+    linear = _sweep._linear(difference, jj, kappa)
+    begin, end = np.empty(25, np.int64), np.empty(25, np.int64)
+    largest = np.array([_sweep._most_asymmetric(x, 0.95) for x in kappa])
+    inside = 0
+    for first in seeds[::10]:
+        _sweep._seconds_within(first, jj, linear, largest, seeds, bounds, begin, end)
+        for k in range(25):
+            matrix = np.array([[jj[0], difference[0, k]], [jj[1], difference[1, k]]])
+            mean, half = np.linalg.solve(matrix, np.stack([np.full(len(seeds), first), seeds]))
+            a, b, c = mean + half, mean + kappa[k] * half, mean - half
+            within = (half > 0) & (c * (a + b) > 0.95 * a * b)
+            for values, low, high in zip((a, b, c), bounds[::2], bounds[1::2], strict=True):
+                within &= (values > 0.97 * low) & (values < 1.03 * high)
+            np.testing.assert_array_equal(np.flatnonzero(within), np.arange(begin[k], end[k]))
+            inside += int(within.sum())
+    assert inside > 50
+
+
+def test_the_nearest_peaks_in_frequency_and_height() -> None:
+    rng, peaks = np.random.default_rng(17), field_of(7, 200).peaks
+    centre, height, errors = (
+        rng.choice(peaks.frequency_mhz, 300) + rng.normal(size=300),
+        rng.uniform(1.0, 4.0, 300),
+        rng.uniform(0.5, 8.0, 300),
+    )
+    chosen = _kernels.nearest_peaks(
+        centre, height, errors, 3.5, 1.5, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density, SPREAD, 12
+    )
+    for line, peak in enumerate(chosen.tolist()):
+        near = np.flatnonzero(np.abs(peaks.frequency_mhz - centre[line]) < 3.5 * errors[line])
+        higher = (peaks.log_intensity[near] - height[line]) / SPREAD
+        cost = ((peaks.frequency_mhz[near] - centre[line]) / errors[line]) ** 2 + higher**2
+        best = int(np.argmin(cost)) if 0 < len(near) < 12 else -1
+        likely = best >= 0 and 7 * errors[line] * np.exp(peaks.log_density[near[best]]) * 4 * SPREAD < 1.5
+        assert peak == (near[best] if likely and abs(higher[best]) < 3 else -1)
+    assert 50 < (chosen >= 0).sum() < 250
 
 
 def test_the_best_temperature_and_ratio_of_a_rigid_top() -> None:
@@ -200,7 +290,7 @@ def test_the_best_temperature_and_ratio_of_a_rigid_top() -> None:
                 if all(abs(other - scale) >= 0.25 * SPREAD for other in scales):  # nearer ones count as one
                     scales.append(scale)
                     best = max(best, (plain_joint(g, e + scale, sigma, peaks), float(temperature)))
-    ratios, temperatures = quick_ratios(field, np.array([TOP, 1.01 * TOP]), np.array([1, 1]))
+    ratios, temperatures = quick_ratios(field, np.array([TOP, 1.01 * TOP]), 1)
     assert ratios[0] == pytest.approx(best[0], abs=0.05)  # the interpolation of E_κ here is linear
     assert temperatures[0] == best[1]
     assert ratios[1] < ratios[0] / 2
