@@ -67,6 +67,15 @@ def write_files(name: str, page: Path) -> None:
         Path("components.csv").write_text("".join(",".join(row) + "\n" for row in (head, *lines)))
     elif name == "structure":
         Path("ocs.toml").write_text(re.search(r"```toml\n(.*?)```", text, re.DOTALL)[1])
+    elif name == "assign":
+        top = rotor.Top.from_constants("A=4512.3 B=1890.7 C=1420.2 MHz", dipole_abc_debye=(1.2, 0.8, 0))
+        lines = rotor.api.line_list(top, temperature_k=2.0, jmax=15, range_mhz=(6000, 18000))
+        rng, height = np.random.default_rng(3), 100 * lines.intensity_nm2_mhz / lines.intensity_nm2_mhz.max()
+        strong = height > 1
+        frequency = lines.frequency_mhz[strong] + 0.003 * rng.normal(size=strong.sum())
+        foreign = np.column_stack([rng.uniform(6000, 18000, 25), 2 * rng.random(25) ** -0.8])
+        peaks = np.concatenate([np.column_stack([frequency, height[strong]]), foreign])
+        np.savetxt("unknown.csv", peaks, delimiter=",", header="frequency_mhz,intensity", comments="", fmt="%.4f")
     elif name == "overlay":
         lines = rotor.spectrum("furan", temperature_k=2, range_mhz=(8000, 18000)).table
         height = lines.intensity_nm2_mhz / lines.intensity_nm2_mhz.max()
