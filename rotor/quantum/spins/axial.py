@@ -10,11 +10,10 @@ of `operators`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.state_elements import StateTerms
@@ -26,19 +25,10 @@ from rotor.quantum.spins.stack_elements import MOST_RANK, Pairs
 from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 
-Exist = Callable[[Ints], NDArray[np.bool_]]  # whether levels with these labels exist
-
 
 def are_axial(blocks: Sequence[SolvedBlock]) -> bool:
     """Whether the solved blocks of the rotation are functions |N K⟩."""
     return isinstance(blocks[0].parts[0].basis, AxialState)
-
-
-def existing_functions(blocks: Sequence[SolvedBlock], exist: Exist, spins: int) -> list[SolvedBlock]:
-    """The functions |N K⟩ whose v and K exist; all of them if none does."""
-    names = [(block.parts[0].v, block.parts[0].basis.k[0], 0, *[0] * (1 + spins)) for block in blocks]
-    existing = exist(np.array(names, dtype=np.int64)).tolist()
-    return [block for block, exists in zip(blocks, existing, strict=True) if exists] or list(blocks)
 
 
 def contracted_operators(

@@ -23,7 +23,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import Block, SolvedBlock, Used
-from rotor.quantum.spins.axial import Exist, are_axial, contracted_operators, existing_functions
+from rotor.quantum.spins.axial import are_axial, contracted_operators
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stacks_of
 from rotor.quantum.spins.families import families_of, links_of_stacks
 from rotor.quantum.spins.many_f import Group
@@ -32,6 +32,7 @@ from rotor.quantum.spins.pattern_tables import couplings_of
 from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
+    Exist,
     channels_of,
     solved_rotor,
     valued_terms,
@@ -182,6 +183,11 @@ class Plan:
         return out
 
     @cached_property
+    def sizes(self) -> list[int]:
+        """The number of states of each rotational block."""
+        return [len(block.energies_mhz) for block in self.blocks]
+
+    @cached_property
     def families_at(self) -> dict[tuple[int, int], dict[int, list[tuple[int, int]]]]:
         """By N and class, then by number of the family: (place in the family, block) of its members there."""
         places: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
@@ -213,9 +219,7 @@ def contracted_plan(
     """
     without_internal_rotation(top, "levels with spins in a field")
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
-    blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor)
-    if exist is not None and are_axial(blocks):
-        blocks = existing_functions(blocks, exist, len(scheme.twice))
+    blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor, exist)
     channels = channels_of(terms, scheme)
     firsts = _alike(channels)
     distinct = {first: channels[first] for first in firsts.values()}
@@ -248,10 +252,12 @@ def parts_of_f(plan: Plan, patterns: Ints) -> Iterator[tuple[SpinPart, ...]]:
         return
     n, classes = patterns[:, 0] // 2, plan.shared.scheme.classes(patterns)
     bounds = [0, *(np.flatnonzero((n[1:] != n[:-1]) | (classes[1:] != classes[:-1])) + 1).tolist(), len(patterns)]
-    rows = {(int(n[a]), int(classes[a])): slice(a, b) for a, b in pairwise(bounds)}
-    for number in sorted({number for place in rows for number in plan.families_at.get(place, ())}):
-        members = [(at, i, rows[place]) for place in rows for at, i in plan.families_at.get(place, {}).get(number, ())]
-        yield _parts(plan, [(i, rows_of_n) for _, i, rows_of_n in sorted(members, key=lambda member: member[0])])
+    families: dict[int, list[tuple[int, int, int, int]]] = {}
+    for a, b in pairwise(bounds):
+        for number, members in plan.families_at.get((int(n[a]), int(classes[a])), {}).items():
+            families.setdefault(number, []).extend([(at, i, a, b) for at, i in members])
+    for number in sorted(families):
+        yield _parts(plan, sorted(families[number]))
 
 
 def functions_of_blocks(plan: Plan, all_f: Iterable[int]) -> list[SpinBlock]:
@@ -280,13 +286,12 @@ def coefficients_by_f(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Cha
     return {f: {channel: by_f[f] for channel, by_f in by_channel.items()} for f in tables}
 
 
-def _parts(plan: Plan, members: list[tuple[int, slice]]) -> tuple[SpinPart, ...]:
-    """The parts of one block: rotational blocks with rows of their patterns, one after another."""
-    parts, start = [], 0
-    for i, rows in members:
-        block = plan.blocks[i]
-        stop = start + (rows.stop - rows.start) * len(block.energies_mhz)
-        parts.append(SpinPart(i, block, rows, slice(start, stop)))
+def _parts(plan: Plan, members: list[tuple[int, int, int, int]]) -> tuple[SpinPart, ...]:
+    """The parts of one block, one after another; members: place in the family, rotational block, first and last row of its patterns."""
+    parts, start, blocks, sizes = [], 0, plan.blocks, plan.sizes
+    for _, i, first, last in members:
+        stop = start + (last - first) * sizes[i]
+        parts.append(SpinPart(i, blocks[i], slice(first, last), slice(start, stop)))
         start = stop
     return tuple(parts)
 

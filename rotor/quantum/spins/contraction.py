@@ -159,13 +159,13 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contrac
     return [elements for elements in (*back, *forward) if elements is not None]
 
 
-def acting_numbers(contracted: Sequence[Contracted]) -> list[tuple[int, int]]:
-    """The pairs of block numbers between which an element is not zero."""
-    out: list[tuple[int, int]] = []
+def acting_numbers(contracted: Sequence[Contracted]) -> Ints:
+    """The pairs (pairs, 2) of block numbers between which an element is not zero."""
+    out = [np.zeros((0, 2), dtype=np.int64)]
     for up, low, pairs, matrices in contracted:
         acting = matrices.any(axis=(1, 2))
-        out += zip(up.numbers[pairs.up][acting].tolist(), low.numbers[pairs.low][acting].tolist(), strict=True)
-    return out
+        out.append(np.column_stack([up.numbers[pairs.up][acting], low.numbers[pairs.low][acting]]))
+    return np.concatenate(out)
 
 
 def by_numbers(contracted: Sequence[Contracted]) -> dict[tuple[int, int], Floats]:

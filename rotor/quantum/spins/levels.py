@@ -11,9 +11,9 @@ import numpy as np
 from rotor.arrays import hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, levels_of_blocks, placed
-from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, contracted_plan, functions_of_blocks
 from rotor.quantum.spins.operators import AxialState
+from rotor.quantum.spins.rotor import Exist
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.quantum.spins.simplify import simplified
 from rotor.quantum.spins.solve import solved_blocks

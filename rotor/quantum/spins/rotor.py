@@ -6,11 +6,12 @@ Terms with the same spins, rank and power of N·S share all coupling coefficient
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled_levels import names_of_functions
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
+
+Exist = Callable[[Ints], NDArray[np.bool_]]  # whether levels with these labels exist
 
 
 class Channel(NamedTuple):
@@ -62,15 +65,24 @@ Terms = list[tuple[float, SpinTerm]]
 
 
 def solved_rotor(
-    top: Top, effects: tuple[QuantumEffect, ...], terms: Terms, nmin: int, nmax: int, executor: Executor | None
+    top: Top,
+    effects: tuple[QuantumEffect, ...],
+    terms: Terms,
+    nmin: int,
+    nmax: int,
+    executor: Executor | None,
+    exist: Exist | None = None,
 ) -> tuple[list[SolvedBlock], str]:
     """The solved blocks of the rotation from N = `nmin` to `nmax`, and the representation of their functions.
 
-    A symmetric top whose terms are all axial has functions |N K⟩, one in each block.
+    A symmetric top whose terms are all axial has functions |N K⟩, one in each block; those for which `exist` is false are left out,
+    unless it is false for all.
     """
     if top.kind in ("prolate", "oblate") and _all_axial(top, effects, terms):
         levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, False, executor))
-        blocks = _axial_blocks(levels.quantum("v"), levels.rotational, levels.quanta["k"], levels.energy_mhz)
+        v, k = levels.quantum("v"), levels.quanta["k"]
+        chosen = np.ones(len(levels), dtype=bool) if exist is None else _existing(v, k, exist, scheme_of(top, effects))
+        blocks = _axial_blocks(v[chosen], levels.rotational[chosen], k[chosen], levels.energy_mhz[chosen])
         return blocks, "Ir" if top.kind == "prolate" else "IIIr"
     levels = as_tabulated(top, effects, solve_rotation(top, effects, nmin, nmax, True, executor, in_blocks=True))
     representation = str(levels.representation)
@@ -95,6 +107,14 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
     operators = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
     coupled = any(effect.couplings(top) or (top.states is None and effect.states(top)) for effect in effects)
     return not coupled and all(operator is None for operator in operators)
+
+
+def _existing(v: Ints, k: Ints, exist: Exist, scheme: Scheme) -> NDArray[np.bool_]:
+    """Which functions |N K⟩ exist by their v and K; all of them if none does."""
+    labels = np.zeros((len(v), 4 + len(scheme.twice)), dtype=np.int64)
+    labels[:, 0], labels[:, 1] = v, k
+    existing = exist(labels)
+    return existing if existing.any() else np.ones(len(v), dtype=bool)
 
 
 def _axial_blocks(v: Ints, n: Ints, k: Ints, energies_mhz: Floats) -> list[SolvedBlock]:

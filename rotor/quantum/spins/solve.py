@@ -13,7 +13,6 @@ from itertools import accumulate
 import numpy as np
 
 from rotor.arrays import Floats, Ints, Workspace
-from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.axial_levels import axial_states
 from rotor.quantum.spins.blocks import (
     Member,
@@ -28,7 +27,7 @@ from rotor.quantum.spins.blocks import (
 from rotor.quantum.spins.many_f import MOST, Frame, Group, Tables, between, frame_of, functions_of, groups_of, tables_of
 from rotor.quantum.spins.parts import SpinPart, labels_by_shares, names_of_tables, over_functions
 from rotor.quantum.spins.pattern_tables import PatternTable, couplings_by_f, pattern_table
-from rotor.quantum.spins.rotor import Channel
+from rotor.quantum.spins.rotor import Channel, Exist
 
 FEW = 100  # with more patterns of an F, coefficients are computed one F at a time
 

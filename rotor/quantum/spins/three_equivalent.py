@@ -23,12 +23,11 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.connected import part_numbers
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.spins.axial import Exist
 from rotor.quantum.spins.blocks import Member, Plan, States, diagonalised
 from rotor.quantum.spins.contraction import stacks_of
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.pattern_tables import ROUND_OFF, coefficients_between
-from rotor.quantum.spins.rotor import ALONE, Channel
+from rotor.quantum.spins.rotor import ALONE, Channel, Exist
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.quantum.wang.j_operators import phase
