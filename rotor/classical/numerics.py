@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 ORDER = 8  # of the adaptive method: steps go with the tolerance to the power -1/8
 NAME = "error of the steps"
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
-FINEST_TOLERANCE = 1e-13
+FINEST_TOLERANCE = 1e-13  # of references: a hundred times finer than the finest that is tried
 DIVISIONS = (8, 16, 32, 64, 128)  # of the duration: steps of a splitting, times 16
 ORDERS = (2, 4, 6, 8)
 

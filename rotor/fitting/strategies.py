@@ -19,7 +19,7 @@ from rotor.fitting.search import FitOptions, Grouping, Search, round_off, too_fe
 from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, STALLED, Iteration, Minimum, Progress, minimise
 from rotor.statistics.regression import regression
 
-_REJECTIONS = 20
+_REJECTIONS = 20  # a bound: two sets of rejected lines may alternate
 _STAGES = (0.1, 0.2, 0.35, 0.5, 0.7, 0.85)  # stages of a search by rising J: shares of the lines in order of J
 _STAGE_ITERATIONS = 4  # per stage
 _FAR = 15.0  # times the median residual, about ten standard deviations: lines beyond it may belong to other levels

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from rotor.fluids.motion.dynamics import RigidDynamics
 
 SHORTEST_PS, GROWTH, LONGEST_PS = 10.0, 1.5, 100.0
-FRICTION_PER_PS = 5.0
+FRICTION_PER_PS = 5.0  # momenta are forgotten in 0.2 ps, well inside the shortest equilibration
 ROW_FS = 20.0
 LIMIT = 2.5  # standard errors
 LEAST_SAMPLES = 5.0  # smallest number of independent values in a quarter

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 TOO_NEAR_ANGSTROM = 0.5  # atoms of different molecules are never this close
 RELAXING_STEPS = 300
-RELAXING_FS = 1.0
+RELAXING_FS = 1.0  # half of the usual step: forces of random orientations are larger than those of a liquid
 RELAXING_K = 300.0  # temperature of the largest speeds during relaxation
 
 
@@ -133,6 +133,7 @@ def relax(atoms: Atoms, steps: int = RELAXING_STEPS, **how: Any) -> None:
         dynamics.step()
         dynamics.nsteps += 1
         force, torque = dynamics.wrench()
+        # a motion against its force climbs out of a minimum: it is stopped there, so that the energy falls in all further steps
         against = np.sum(force * state.momentum, axis=1) < 0.0
         state.momentum[against] = 0.0
         back = np.sum(torque * state.angular * bodies.inverse_moments, axis=1) < 0.0

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from rotor.fluids.forces.models import RigidModel
     from rotor.fluids.motion.bodies import Bodies
 
-BLOCKS = 5
+BLOCKS = 5  # few, so that each is long; the standard error of their mean is itself uncertain by a third, 1/√8
 WINDOW = 0.5  # fraction of a block up to which correlations are integrated
 LEAST_BLOCK_PS = 4.0
 FELL_TO = math.exp(-1)  # largest correlation at the end of the window for which the integral is given
-MOST_FRAMES = 4096
-DIFFUSION_FROM_PS = 1.0
+MOST_FRAMES = 4096  # of 56 bytes a molecule: 0.2 GB for 1000 molecules
+DIFFUSION_FROM_PS = 1.0  # earlier displacements are ballistic or inside the cage of the neighbours, not linear in t
 CM2_PER_S = 1e4  # 1 m²/s
 SMALL_DIPOLE = 1e-6  # e Å
 

@@ -104,7 +104,7 @@ class BondRotation:
         kinds = [(self.molecule.symbols[i], self.molecule.mass_numbers[i] if isotopes else 0) for i in atoms.tolist()]
         alike = np.array([[kind == other for other in kinds] for kind in kinds])
         along = np.outer(arms @ axis, axis)
-        for n in range(MOST_FOLD, 1, -1):
+        for n in range(MOST_FOLD, 1, -1):  # from the highest: a sixfold group is threefold and twofold too
             angle = 2 * math.pi / n
             moved = along + (arms - along) * math.cos(angle) + np.cross(axis, arms) * math.sin(angle)
             apart = np.where(alike, np.linalg.norm(moved[:, None] - arms[None], axis=-1), np.inf)

@@ -18,8 +18,8 @@ from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 NARROW_INCHES = 5.0
 SIZE_INCHES = (WIDTH_INCHES, 6.0)
 LEAST_DRAWN = 1e-4  # relative to the strongest line
-MOST_LABELS = 40  # on the axis of energies; a name takes 1/40 of its height
-LETTER = 0.0105  # width of a letter, relative to the range of fields
+MOST_LABELS = 27  # on the axis of energies; a name takes 1/27 of its height
+LETTER = 0.016  # width of a letter, relative to the range of fields
 SAME_HEIGHT = 0.1  # part of the height of a name; nearer levels share one
 
 

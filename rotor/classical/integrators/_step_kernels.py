@@ -19,7 +19,7 @@ from rotor.arrays import Floats
 from rotor.classical._kernels import halves, remainders, symmetric_steps, two_product, two_square, two_sum
 from rotor.geometry._kernels import cross, exponential, product
 
-NEWTON_SWEEPS = 40
+NEWTON_SWEEPS = 40  # a bound: convergence is quadratic where the step has a root near the guess
 
 
 @njit(cache=True, inline="always")
@@ -188,9 +188,9 @@ def _near_root(m: Any, j: Any, d: Any, guess: Any) -> Any:
         f3 = (n * m[2] + d[2] * x[0] * x[1]) - j[2] * x[2]
         e = _correction(_slopes(m, j, d, x), (f1, f2, f3))
         x, change = (x[0] + e[0], x[1] + e[1], x[2] + e[2]), abs(e[0]) + abs(e[1]) + abs(e[2])
-        if change < 1e-5 * (abs(x[0]) + abs(x[1]) + abs(x[2])) + 1e-300:
+        if change < 1e-5 * (abs(x[0]) + abs(x[1]) + abs(x[2])) + 1e-300:  # quadratic: x is now off by about its square
             return x, True
-        if not change < 1e6:
+        if not change < 1e6:  # also nan
             break
     return x, False
 
