@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from rotor.alignment.align import BasisTooSmallError, truncation_apart
@@ -13,7 +12,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.plans import plan_fields
 from rotor.quantum.fields.inputs import largest_difference
 from rotor.requests.field import declared_fields
-from rotor.requests.knob import Choice, Measure, Setting, Sweep, Sweeps, ladder
+from rotor.requests.knob import Choice, Knob, Measure, with_whole
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Plan, peak_mb, timed
 
@@ -24,38 +23,55 @@ MOST_CONFIRMED = 6  # J max that are confirmed by whole runs, before the one of 
 LOOSER = (1e3, 1e2, 1e1, 1.0, 0.3, 0.1)  # tolerances of cosines that are tried, times the accuracy
 
 
-def sweeps_of_align(request: Any) -> Sweeps:
-    """J max of the basis, and the number of classical molecules."""
+def _in_basis(request: Any) -> tuple[Any, int]:
+    """The quantum gas of a request, and J max of its basis."""
     trace = answer_align(replace(request, classical_molecules=0)).trace
-    shares = {round(share * trace.jmax) for share in SHARES_OF_J} | {trace.jmax - 1}
-    values = sorted(j for j in shares if j >= trace.ensemble.jmax)
-    basis = tuple(Setting(str(j), j, j == trace.jmax) for j in values)
-    beyond, measure = trace.jmax + MORE_J, Measure("cosine", "", cosine_error)
-    knobs = [Sweep("numerics.jmax", (measure,), basis, beyond, f"J max {beyond}", partial(trace_with, trace))]
-    if request.classical_molecules:
-        knobs.append(_classical(request))
-    return Sweeps(tuple(knobs))
+    return trace, trace.jmax
 
 
-def _classical(request: Any) -> Sweep:
-    """The number of classical molecules, whose error is that of a mean."""
+def _smaller(setting: tuple[Any, int]) -> set[int]:
+    """Values of J max up to that of the request, at least the highest populated J."""
+    trace, jmax = setting
+    values = {round(share * jmax) for share in SHARES_OF_J} | {jmax - 1}
+    return {j for j in values if j >= trace.ensemble.jmax}
 
-    def error(answer: Any, reference: Any) -> float:
-        return max(largest_difference(answer.classical[name], true) for name, true in reference.classical.items())
 
-    coarse = replace(request, tolerance=max(request.tolerance, 1e-2))  # the quantum gas beside it does not matter here
-    molecules = request.classical_molecules
-    counts = ladder(
-        (molecules / 64, molecules / 16, molecules / 4),
-        molecules,
-        lambda n: replace(coarse, classical_molecules=max(int(n), 2)),
-        "{:.0f}".format,
-    )
-    most = replace(coarse, classical_molecules=16 * molecules, seed=request.seed + 1)
-    measure = Measure("cosine of the classical gas", "", error)
-    return Sweep(
-        "observables.classical_molecules", (measure,), counts, most, f"{16 * molecules} other molecules", answer_align
-    )
+BASIS = Knob(
+    _smaller,
+    lambda setting: setting[1] + MORE_J,
+    (Measure("cosine", "", cosine_error),),
+    "J max {}",
+    change=lambda setting, _, jmax: (setting[0], jmax),
+    prepare=_in_basis,
+    key="numerics.jmax",
+    title="highest J of the basis",
+    value=lambda setting: setting[1],
+    answer=lambda setting: trace_with(*setting),
+)
+
+
+def _classical_error(answer: Any, reference: Any) -> float:
+    """The error of the classical gas, which is that of a mean."""
+    return max(largest_difference(answer.classical[name], true) for name, true in reference.classical.items())
+
+
+CLASSICAL = Knob(
+    lambda request: [request.classical_molecules / part for part in (64, 16, 4)],
+    lambda request: 16 * request.classical_molecules,
+    (Measure("cosine of the classical gas", "", _classical_error),),
+    "{} other molecules",
+    change=lambda request, name, count: with_whole(request, name, max(count, 2)),
+    # the quantum gas beside it does not matter here
+    prepare=lambda request: replace(request, tolerance=max(request.tolerance, 1e-2)),
+    used=lambda request: request.classical_molecules > 0,
+    key="observables.classical_molecules",
+    title="molecules of the classical gas",
+    attribute="classical_molecules",
+    reference=lambda request: replace(
+        request, classical_molecules=16 * request.classical_molecules, seed=request.seed + 1
+    ),
+    label="{:.0f}".format,
+)
 
 
 def choose_basis(scene: Any, request: Any, allowed: float) -> Choice:
@@ -112,4 +128,4 @@ def plan_of_align(request: Any) -> Plan:
     )
 
 
-ALIGN = Numerics({"": Goal("cosines", choose_basis)}, sweeps=sweeps_of_align, plan=plan_of_align)
+ALIGN = Numerics({"": Goal("cosines", choose_basis)}, knobs=(BASIS, CLASSICAL), plan=plan_of_align)

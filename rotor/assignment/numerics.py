@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotor.requests.knob import Sweeps
 from rotor.requests.numerics import Numerics
 from rotor.requests.plan import Plan
 
@@ -33,6 +32,6 @@ def plan_of_assign(request: Any) -> Plan:
 
 
 ASSIGN = Numerics(
-    sweeps=lambda request: Sweeps((), ("search: seeded; how sure the answer is stands with it as a probability",)),
+    remarks=lambda request: ("search: seeded; how sure the answer is stands with it as a probability",),
     plan=plan_of_assign,
 )

@@ -11,7 +11,7 @@ from rotor.classical.step_errors import MOST_CALLED, MOST_STEPS, apart
 from rotor.classical.tolerance_search import FINER, Planned, choose_tolerance, planned_tolerance
 from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.requests.budget import ROUNDING
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Measure, Sweep, Sweeps, ladder
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import LONG_SEARCH, LeftOut, Plan, peak_mb, timed
 
@@ -52,22 +52,6 @@ def error_of_growth(answer: Any) -> float:
     return 100 * ROUNDING
 
 
-def sweeps_of_tumble(request: Any) -> Sweeps:
-    """Tolerance and step of a driven motion."""
-    if isinstance(request, TumbleRequest):
-        return Sweeps((), (f"the free motion: {NOTHING_CHEAPER}; theta functions, round-off alone",))
-    measure = Measure("attitude", "rad", lambda answer, reference: apart(answer.motion, reference.motion))
-    finest = replace(request, step=None, tolerance=min(FINEST_TOLERANCE, 1e-2 * request.tolerance))
-    against = f"steps to {finest.tolerance:g}"
-    tolerance = request.tolerance if request.step is None else None
-    settings = ladder(TOLERANCES, tolerance, lambda each: replace(request, step=None, tolerance=each))
-    knobs = [Sweep("numerics.tolerance", (measure,), settings, finest, against, answer_driven)]
-    remark = _refusal(request)
-    if remark is None:
-        knobs += [_splitting(request, order, finest, measure, against) for order in ORDERS]
-    return Sweeps(tuple(knobs), () if remark is None else (f"numerics.step: {remark}",))
-
-
 def _refusal(request: Any) -> str | None:
     """Why no splitting applies to these effects; None if one does."""
     first, second = request.times[:2]
@@ -78,12 +62,54 @@ def _refusal(request: Any) -> str | None:
     return None
 
 
-def _splitting(request: Any, order: int, finest: Any, measure: Measure, against: str) -> Sweep:
-    span = abs(request.times[-1] - request.times[0])
-    length = request.step if request.step is not None and request.order == order else None
-    steps = [span / (16 * number) for number in DIVISIONS]
-    settings = ladder(steps, length, lambda each: replace(request, step=each, order=order), "{:.3g}".format)
-    return Sweep(f"numerics.step, order {order}", (measure,), settings, finest, against, answer_driven)
+ATTITUDE = Measure("attitude", "rad", lambda answer, reference: apart(answer.motion, reference.motion))
+
+
+def _finest(request: Any) -> float:
+    return float(min(FINEST_TOLERANCE, 1e-2 * request.tolerance))
+
+
+def _with_tolerance(request: Any, _: str, tolerance: float) -> Any:
+    return replace(request, step=None, tolerance=tolerance)
+
+
+TOLERANCE = Knob(
+    TOLERANCES,
+    _finest,
+    (ATTITUDE,),
+    "steps to {:g}",
+    change=_with_tolerance,
+    used=lambda request: not isinstance(request, TumbleRequest),
+    key="numerics.tolerance",
+    value=lambda request: request.tolerance if request.step is None else None,
+    answer=answer_driven,
+)
+
+
+def _splitting(order: int) -> Knob:
+    """The step of a splitting of an order."""
+    return Knob(
+        lambda request: [abs(request.times[-1] - request.times[0]) / (16 * number) for number in DIVISIONS],
+        _finest,
+        (ATTITUDE,),
+        "steps to {:g}",
+        change=lambda request, _, step: replace(request, step=step, order=order),
+        used=lambda request: not isinstance(request, TumbleRequest) and _refusal(request) is None,
+        key=f"numerics.step, order {order}",
+        title="length of a step",
+        value=lambda request: request.step if request.order == order else None,
+        reference=lambda request: _with_tolerance(request, "", _finest(request)),
+        answer=answer_driven,
+        label="{:.3g}".format,
+    )
+
+
+def _remarks(request: Any) -> tuple[str, ...]:
+    """Why a free motion has no knob, or why the steps of a driven motion are not swept."""
+    if isinstance(request, TumbleRequest):
+        return (f"the free motion: {NOTHING_CHEAPER}; theta functions, round-off alone",)
+    refusal = _refusal(request)
+    return () if refusal is None else (f"numerics.step: {refusal}",)
 
 
 def step_error(request: Any, steps: int) -> LeftOut:
@@ -179,7 +205,8 @@ def _memory_mb(request: DrivenRequest) -> float:
 
 TUMBLE = Numerics(
     {"rad": Goal("attitude", choose, error_of_motion), "%": Goal("growth rate", choose_growth, error_of_growth)},
-    sweeps=sweeps_of_tumble,
+    knobs=(TOLERANCE, *map(_splitting, ORDERS)),
+    remarks=_remarks,
     plan=plan_of_motion,
     planned=planned,
 )

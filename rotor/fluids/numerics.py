@@ -29,14 +29,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor import units
 from rotor.fluids.request import NewBox, answer_fluid, box_of
-from rotor.requests.knob import Choice, Measure, Sweep, Sweeps, ladder, refuse_set
+from rotor.fluids.settings import ELECTROSTATICS
+from rotor.requests.knob import Choice, Knob, Measure, refuse_set
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, LeftOut, Plan, largest_first, peak_mb
 
@@ -143,14 +143,11 @@ def force_error(request: FluidRequest) -> float:
     return force_difference(forces, reference)
 
 
-def sweeps_of_fluid(request: FluidRequest) -> Sweeps:
-    """Sweeps of the step (energy and positions over a short time), of the cutoff and of Ewald's tolerance (forces)."""
+def _swept_box(request: FluidRequest) -> FluidRequest:
+    """The request with its box; ValueError for an engine whose settings are not swept."""
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: only the settings of the engine rotor are swept")
-    ready = with_box(request)
-    return Sweeps(
-        (_step(ready), _cutoff(ready), *_ewald(ready)), ("conditions.steps: the error of a mean is in its report",)
-    )
+    return with_box(request)
 
 
 def followed(request: FluidRequest, step_fs: float) -> FluidRequest:
@@ -186,16 +183,6 @@ def _moved(answer: Any, reference: Any) -> float:
     return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
 
 
-def _step(request: FluidRequest) -> Sweep:
-    measures = (
-        Measure("conserved energy per degree", "K", lambda answer, _: conserved_k(answer)),
-        Measure(f"positions after {FOLLOWED_FS:g} fs", "Å", _moved),
-    )
-    settings = ladder(STEPS_FS, request.settings.step_fs, partial(followed, request))
-    reference = followed(request, FINEST_STEP_FS)
-    return Sweep("numerics.step", measures, settings, reference, f"a step of {FINEST_STEP_FS:g} fs", answer_followed)
-
-
 def forces_of(request: FluidRequest, electrostatics: str, cutoff: float, tolerance: float) -> Callable[[], Any]:
     """A function that computes the forces (n, 3) in eV/Å on the nuclei of a request whose box is made."""
     from rotor.fluids.forces.potential import RigidPotential
@@ -222,29 +209,52 @@ def _most(request: FluidRequest) -> float:
     return 0.5 * float(min(request.box.cell.lengths()))  # type: ignore[union-attr]
 
 
-def _cutoff(request: FluidRequest) -> Sweep:
-    most, run_settings = _most(request), request.settings
-    make = partial(forces_of, request, run_settings.electrostatics)
-    cutoffs = [cutoff for cutoff in CUTOFFS if cutoff < 0.95 * most]
-    settings = ladder(cutoffs, run_settings.cutoff_angstrom, lambda cutoff: make(cutoff, run_settings.ewald_tolerance))
-    reference = forces_of(request, "ewald", 0.99 * most, FINEST_EWALD)
-    against = f"Ewald's sum to {FINEST_EWALD:g}, Lennard-Jones to {0.99 * most:.3g} Å"
-    measure = Measure("force", "%", force_difference)
-    return Sweep(
-        f"numerics.cutoff, {run_settings.electrostatics}", (measure,), settings, reference, against, lambda call: call()
+STEP = Knob(
+    STEPS_FS,
+    FINEST_STEP_FS,
+    (
+        Measure("conserved energy per degree", "K", lambda answer, _: conserved_k(answer)),
+        Measure(f"positions after {FOLLOWED_FS:g} fs", "Å", _moved),
+    ),
+    "a step of {:g} fs",
+    change=lambda request, _, step: followed(request, step),
+    key="numerics.step",
+    title="length of a step",
+    value=lambda request: request.settings.step_fs,
+    answer=answer_followed,
+)
+FORCE = Measure("force", "%", force_difference)
+
+
+def _cutoff(electrostatics: str) -> Knob:
+    """The cutoff of the forces, with a treatment of the charges."""
+    return Knob(
+        lambda request: [cutoff for cutoff in CUTOFFS if cutoff < 0.95 * _most(request)],
+        lambda request: 0.99 * _most(request),
+        (FORCE,),
+        f"Ewald's sum to {FINEST_EWALD:g}, Lennard-Jones to {{:.3g}} Å",
+        change=lambda request, _, cutoff: forces_of(request, electrostatics, cutoff, request.settings.ewald_tolerance),
+        used=lambda request: request.settings.electrostatics == electrostatics,
+        key=f"numerics.cutoff, {electrostatics}",
+        title="cutoff of the forces (Å)",
+        value=lambda request: request.settings.cutoff_angstrom,
+        reference=lambda request: forces_of(request, "ewald", 0.99 * _most(request), FINEST_EWALD),
+        answer=lambda forces: forces(),
     )
 
 
-def _ewald(request: FluidRequest) -> list[Sweep]:
-    """Sweep of the tolerance of the Ewald sum, if the scene uses one."""
-    run_settings = request.settings
-    if run_settings.electrostatics != "ewald":
-        return []
-    make = partial(forces_of, request, "ewald", run_settings.cutoff_angstrom)
-    settings = ladder(EWALD, run_settings.ewald_tolerance, make)
-    measure = Measure("force", "%", force_difference)
-    against = f"a tolerance of {FINEST_EWALD:g}"
-    return [Sweep("numerics.ewald_tolerance", (measure,), settings, make(FINEST_EWALD), against, lambda call: call())]
+SUM = Knob(
+    EWALD,
+    FINEST_EWALD,
+    (FORCE,),
+    "a tolerance of {:g}",
+    change=lambda request, _, tolerance: forces_of(request, "ewald", request.settings.cutoff_angstrom, tolerance),
+    used=lambda request: request.settings.electrostatics == "ewald",
+    key="numerics.ewald_tolerance",
+    title="tolerance of Ewald's sum",
+    value=lambda request: request.settings.ewald_tolerance,
+    answer=lambda forces: forces(),
+)
 
 
 def left_out_of_fluid(
@@ -323,6 +333,8 @@ FLUID = Numerics(
         "%": Goal("forces", choose_ewald, lambda answer: force_error(replace(answer.request, box=answer.atoms))),
     },
     bare=False,
-    sweeps=sweeps_of_fluid,
+    knobs=(STEP, *map(_cutoff, ELECTROSTATICS), SUM),
+    prepare=_swept_box,
+    remarks=lambda request: ("conditions.steps: the error of a mean is in its report",),
     plan=plan_of_fluid,
 )

@@ -11,13 +11,11 @@ from rotor.formats.fit_request import answer_fit
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.left_out import left_out_of_levels
 from rotor.quantum.estimates.plans import effect_texts
-from rotor.requests.knob import DECADES, Choice, Measure, Sweep, Sweeps, ladder, loosest, stated
+from rotor.requests.knob import DECADES, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import LeftOut, Plan, peak_mb, timed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from rotor.formats.fit_request import FitRequest
     from rotor.tops.top import Top
 
@@ -40,42 +38,40 @@ def error_of_constants(answer: Any) -> float:
     return 100.0 * float(answer.constants_errors.numerical or 0.0)
 
 
-def _goal(of: str, error: Callable[[Any], float]) -> Goal:
-    """Goal that chooses the loosest sufficient tolerance of the search, in decades."""
-
-    def choose(scene: Any, request: Any, accuracy: float) -> Choice:
-        """The choice, by complete fits."""
-        return loosest(
-            DECADES, lambda value: with_options(request, tolerance=value), answer_fit, accuracy, "tolerance", error
-        )
-
-    return Goal(of, choose) if error is stated else Goal(of, choose, error)
-
-
-def sweeps_of_fit(request: Any) -> Sweeps:
-    """Sweep of the search; weights and rejected lines do not concern its accuracy."""
-    measure = Measure("a constant", "σ", _in_errors)
-    finest = with_options(request, tolerance=FINEST_TOLERANCE)
-    against = f"a search to {FINEST_TOLERANCE:g}"
-    options = request.options
-    counts = [n for n in ITERATIONS if n < options.most_iterations]
-    iterations = ladder(
-        counts, options.most_iterations, lambda n: with_options(request, most_iterations=int(n)), "{:.0f}".format
-    )
-    tolerances = ladder(TOLERANCES, options.tolerance, lambda value: with_options(request, tolerance=value))
-    return Sweeps(
-        (
-            Sweep("numerics.iterations", (measure,), iterations, finest, against, answer_fit),
-            Sweep("tolerance of the search", (measure,), tolerances, finest, against, answer_fit),
-        ),
-        ("numerics.loss, numerics.reject_above: an accuracy does not decide which lines count",),
-    )
-
-
 def _in_errors(answer: Any, reference: Any) -> float:
     """The largest difference of a free constant in its standard errors."""
     fitted, true = answer.parameters, reference.parameters
     return float(np.max(np.abs(fitted.value_mhz - true.value_mhz) / true.error_mhz))
+
+
+def _with_tolerance(request: Any, _: str, tolerance: float) -> Any:
+    return with_options(request, tolerance=tolerance)
+
+
+ERROR = Measure("a constant", "σ", _in_errors)
+AGAINST = f"a search to {FINEST_TOLERANCE:g}"
+STEPS = Knob(
+    lambda request: [count for count in ITERATIONS if count < request.options.most_iterations],
+    FINEST_TOLERANCE,
+    (ERROR,),
+    AGAINST,
+    change=lambda request, _, count: with_options(request, most_iterations=int(count)),
+    key="numerics.iterations",
+    title="iterations of the search",
+    value=lambda request: request.options.most_iterations,
+    reference=lambda request: with_options(request, tolerance=FINEST_TOLERANCE),
+    label="{:.0f}".format,
+)
+TOLERANCE = Knob(
+    TOLERANCES,
+    FINEST_TOLERANCE,
+    (ERROR,),
+    AGAINST,
+    change=_with_tolerance,
+    tried=DECADES,
+    key="tolerance of the search",
+    value=lambda request: request.options.tolerance,
+)
 
 
 def plan_of_fit(request: Any) -> Plan:
@@ -126,7 +122,11 @@ def _levels_text(request: FitRequest) -> str:
 
 
 FIT = Numerics(
-    {"MHz": _goal("frequencies of the lines", stated), "%": _goal("constants", error_of_constants)},
-    sweeps=sweeps_of_fit,
+    {
+        "MHz": Goal("frequencies of the lines", knob=TOLERANCE),
+        "%": Goal("constants", error=error_of_constants, knob=TOLERANCE),
+    },
+    knobs=(STEPS, TOLERANCE),
+    remarks=lambda request: ("numerics.loss, numerics.reject_above: an accuracy does not decide which lines count",),
     plan=plan_of_fit,
 )

@@ -4,8 +4,8 @@
         (1e-1, 1e-2, 1e-3), 1e-13, (Measure("Q", "%", error_of_q),), "sums to {:g}", least=1e-13))
 
 A sweep computes answers at each step and compares them with the finest value. An accuracy goal either sets a field whose value bounds
-the error, or is reached by trying values, coarsest first. `Numerics`, beside the request, holds what a verb has beyond the knobs of
-its fields, and its plan.
+the error, or is reached by trying values, coarsest first. `Numerics`, beside the request, holds the knobs of a verb that are no fields,
+and its plan.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ class Measure:
 class Sweep:
     """The settings of a knob for one request.
 
-    name: the key of the scene. measures: errors of each answer. settings: coarsest first. reference: the request that errors are
-    measured against; None if the true value is known. against: the reference in words. answer: computes a request; its processor time
-    is the cost of a setting. repeats: number of calculations in one answer; reported times are for one of them.
+    name: the key of the scene. title: in words. measures: errors of each answer. settings: coarsest first. reference: the request that
+    errors are measured against; None if the true value is known. against: the reference in words. answer: computes a request; its
+    processor time is the cost of a setting. repeats: number of calculations in one answer; reported times are for one of them.
     """
 
     name: str
@@ -57,6 +57,7 @@ class Sweep:
     against: str
     answer: Callable[[Any], Any]
     repeats: int = 1
+    title: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,21 +78,36 @@ class Choice:
     error: float = 0.0
 
 
+def stated(answer: Any) -> float:
+    """The numerical error of an answer; infinite if it is not estimated."""
+    error = answer.errors.numerical
+    return float("inf") if error is None else float(error)
+
+
 def with_field(request: Any, name: str, value: Any) -> Any:
     """The request with another value of a field."""
     return replace(request, **{name: value})
 
 
+def with_whole(request: Any, name: str, value: float) -> Any:
+    """The request with another whole number."""
+    return replace(request, **{name: int(value)})
+
+
 @dataclass(frozen=True, eq=False)
 class Knob:
-    """How fine the approximation of a field is.
+    """How fine an approximation is: of the field where the knob stands, or of `key`.
 
     steps: values of a sweep, coarsest first. finest: value of the reference. Both may be functions of the request.
     measures: errors of an answer beside the reference.
     against: the reference in words, with {:g} for its value, or a function of the value.
     least: finest possible value of a field that bounds the error in the unit of the accuracy; None for other fields.
-    tried: for those other fields, values tried for an accuracy, coarsest first.
-    change: returns the request with a value. prepare: returns the request of a sweep. used: whether the field affects a request.
+    change: returns the request with a value. prepare: returns the request of a sweep. used: whether the knob affects a request.
+    tried: values tried for an accuracy, coarsest first, where no value bounds the error.
+    title: in words, for pictures. key: of a knob that is declared beside the fields. attribute: of the request, which it changes, or
+    value: of a request.
+    reference: returns the request of the reference if `change` to the finest value does not; it returns None if the true value is known.
+    answer: computes a request, by default as the verb does. repeats: number of calculations in one answer. label: formats a value.
     """
 
     steps: Iterable[Any] | Callable[[Any], Iterable[Any]]
@@ -103,23 +119,43 @@ class Knob:
     prepare: Callable[[Any], Any] = lambda request: request
     used: Callable[[Any], bool] = lambda request: True
     tried: tuple[Any, ...] = ()
+    title: str = ""
+    key: str = ""
+    attribute: str = ""
+    value: Callable[[Any], Any] | None = None
+    reference: Callable[[Any], Any] | None = None
+    answer: Answering | None = None
+    repeats: int = 1
+    label: Callable[[Any], str] = "{:g}".format
 
-    def sweep(self, field: Field, request: Any, answer: Callable[[Any], Any]) -> Sweep:
-        """The settings of this knob for a request, including the request's value."""
-        value_of_scene, plain = getattr(request, field.name), self.prepare(request)
-        steps = self.steps(request) if callable(self.steps) else self.steps
-        finest = self.finest(request) if callable(self.finest) else self.finest
+    def sweep(self, field: Field | None, request: Any, answer: Answering) -> Sweep:
+        """The settings of this knob for a request, including the request's value. field: None for a knob that is no field."""
+        name = self.attribute if field is None else field.name
+        plain = self.prepare(request)
+        value_of_scene = getattr(request, name) if self.value is None else self.value(plain)
+        steps = self.steps(plain) if callable(self.steps) else self.steps
+        finest = self.finest(plain) if callable(self.finest) else self.finest
 
         def make(value: Any) -> Any:
-            """The request with this value of the field."""
-            return plain if value == value_of_scene else self.change(plain, field.name, value)
+            """The request with this value; a field that has it is not changed."""
+            return plain if field is not None and value == value_of_scene else self.change(plain, name, value)
 
-        settings = ladder(steps, value_of_scene, make)
-        if value_of_scene is None:
+        settings = ladder(steps, value_of_scene, make, self.label)
+        if value_of_scene is None and field is not None:
             settings += (Setting(field.none or "none", plain, True),)
         against = self.against(finest) if callable(self.against) else self.against.format(finest)
-        reference = self.change(plain, field.name, finest)
-        return Sweep(field.key or field.name, self.measures, settings, reference, against, answer)
+        reference = self.change(plain, name, finest) if self.reference is None else self.reference(plain)
+        key = self.key if field is None else field.key or field.name
+        return Sweep(
+            key,
+            self.measures,
+            settings,
+            reference,
+            against,
+            self.answer or answer,
+            self.repeats,
+            self.title or in_words(key),
+        )
 
     def choose(self, field: Field, request: Any, accuracy: float, answer: Answering) -> Choice:
         """Set the field to the accuracy, or to the first tried value that reaches it.
@@ -127,13 +163,36 @@ class Knob:
         Raises ValueError if the accuracy is finer than possible, or if the field was set as well.
         """
         refuse_set(request, field.name)
-        name = field.last.replace("_", " ")
         if self.tried:
-            return loosest(self.tried, lambda value: self.change(request, field.name, value), answer, accuracy, name)
+            return self.search(field.name, field.last, request, accuracy, answer)
         assert self.least is not None
         if accuracy < self.least:
             raise ValueError(f"accuracy: {accuracy:g}: the finest that is possible here is {self.least:g}")
         return Choice(self.change(request, field.name, accuracy), f"{field.last} {accuracy:g}")
+
+    def search(
+        self,
+        name: str,
+        key: str,
+        request: Any,
+        accuracy: float,
+        answer: Answering,
+        error: Callable[[Any], float] = stated,
+    ) -> Choice:
+        """The request with the first tried value whose answer reaches the accuracy; else with the last, which a run then refuses.
+
+        name: of the field that `change` sets. error: of an answer.
+        """
+        for value in self.tried:
+            changed = self.change(request, name, value)
+            if error(answer(changed)) <= accuracy:
+                break
+        return Choice(changed, f"{in_words(key)} {value:g}" + (LOOSEST if value == self.tried[0] else ""))
+
+
+def in_words(key: str) -> str:
+    """The last part of a key in words."""
+    return key.partition(",")[0].rpartition(".")[2].replace("_", " ")
 
 
 def refuse_set(request: Any, *names: str) -> None:
@@ -143,25 +202,6 @@ def refuse_set(request: Any, *names: str) -> None:
     for name in names:
         if getattr(request, name) != fields[name].default:
             raise ValueError(f"accuracy and {fields[name].key}: give one of them")
-
-
-def stated(answer: Any) -> float:
-    """The numerical error of an answer; infinite if it is not estimated."""
-    error = answer.errors.numerical
-    return float("inf") if error is None else float(error)
-
-
-def loosest(
-    values: Iterable[float], change: Callable[[float], Any], answer: Answering, accuracy: float, name: str,
-    error: Callable[[Any], float] = stated,
-) -> Choice:  # fmt: skip
-    """The request with the first value whose answer reaches the accuracy; else with the last value, which a run then refuses."""
-    values = list(values)
-    for value in values:
-        request = change(value)
-        if error(answer(request)) <= accuracy:
-            break
-    return Choice(request, f"{name} {value:g}" + (LOOSEST if value == values[0] else ""))
 
 
 def knobs_of_fields(request: Any) -> Iterator[tuple[Field, Knob]]:

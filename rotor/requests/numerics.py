@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from rotor.requests.knob import Choice, Sweeps
+from rotor.requests.knob import Choice, Knob, stated
 from rotor.requests.plan import Plan
 
 
@@ -24,13 +24,28 @@ def numerical_error(answer: Any) -> float:
 class Goal:
     """An accuracy goal in one unit.
 
-    of: the observable in words. choose: returns the settings from (scene, request, accuracy); None: the knob of a field chooses.
-    error: the error of an answer.
+    of: the observable in words. error: the error of an answer. knob: whose values are tried; without it, the knob of a field chooses.
+    choose: returns the settings from (scene, request, accuracy), where the accuracy determines them without a search.
     """
 
     of: str = ""
     choose: Callable[[Any, Any, float], Choice] | None = None
     error: Callable[[Any], float] = numerical_error
+    knob: Knob | None = None
+
+    @property
+    def by_field(self) -> bool:
+        """Whether the knob of a field chooses."""
+        return self.choose is None and self.knob is None
+
+    def chosen(self, scene: Any, request: Any, accuracy: float, answer: Callable[[Any], Any]) -> Choice | None:
+        """The settings for an accuracy; None if the knob of a field chooses. answer: computes a request."""
+        if self.choose is not None:
+            return self.choose(scene, request, accuracy)
+        if self.knob is None:
+            return None
+        error = stated if self.error is numerical_error else self.error
+        return self.knob.search("", self.knob.key, request, accuracy, answer, error)
 
 
 @dataclass(frozen=True)
@@ -39,7 +54,7 @@ class Numerics:
 
     goals: by unit. bare: whether an accuracy may have no unit; it then belongs to the goal "" or, without one, to the first goal.
     percent: the unit that a percentage means in a scene.
-    sweeps: beyond those of knobs, from a request.
+    knobs: that are no fields. prepare: returns the request for their sweeps. remarks: approximations without a sweep, with the reason.
     plan: from a request; the default is the plan of a run.
     planned: plan and settings from (scene, request, accuracy in the first unit), where a search would take as long as a run.
     rounding: error of the highest level from rounding, in MHz.
@@ -48,7 +63,9 @@ class Numerics:
     goals: Mapping[str, Goal] = field(default_factory=lambda: {"MHz": Goal()})
     bare: bool = True
     percent: Callable[[Any], str] = lambda scene: "%"
-    sweeps: Callable[[Any], Sweeps] = lambda request: Sweeps(())
+    knobs: tuple[Knob, ...] = ()
+    prepare: Callable[[Any], Any] = lambda request: request
+    remarks: Callable[[Any], Iterable[str]] = lambda request: ()
     plan: Callable[[Any], Plan] | None = None
     planned: Callable[[Any, Any, float], tuple[Plan, Choice | None]] | None = None
     rounding: Callable[[Any], float] | None = None

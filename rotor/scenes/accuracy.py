@@ -87,11 +87,12 @@ def chosen(scene: Scene, request: Any) -> Choice:
     """
     goal, unit = accuracy_of(scene), unit_of(scene)
     assert goal is not None
-    if by_kind := verb_of(scene.kind).load_numerics().goals[unit].choose:
-        return by_kind(scene, request, goal)
+    verb = verb_of(scene.kind)
+    if choice := verb.load_numerics().goals[unit].chosen(scene, request, goal, verb.compute):
+        return choice
     for field, knob in knobs_of_fields(request) if unit != "%" else ():
         if knob.least is not None or knob.tried:
-            return knob.choose(field, request, goal, verb_of(scene.kind).compute)
+            return knob.choose(field, request, goal, verb.compute)
     return Choice(request, NOTHING_CHEAPER)
 
 

@@ -5,16 +5,6 @@ from __future__ import annotations
 from rotor.plots.work_precision import Panel, Point
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision
 
-TITLES = {
-    "effects.distortion": "order of centrifugal distortion", "effects.hyperfine_method": "method of hyperfine structure",
-    "numerics.jmax": "highest J of the basis", "numerics.relative_error": "relative error of the sums",
-    "numerics.step": "length of a step", "numerics.molecules": "number of molecules", "numerics.iterations": "iterations of the search",
-    "numerics.ewald_tolerance": "tolerance of Ewald's sum", "numerics.cutoff": "cutoff of the forces (Å)",
-    "observables.min_lgint": "least intensity in the list, log10(nm² MHz)",
-    "observables.min_relative": "weakest line in the list, relative to the strongest",
-    "observables.least_depth": "least optical depth of a line", "observables.classical_molecules": "molecules of the classical gas",
-}  # fmt: skip
-
 
 def panels_of(table: WorkPrecision) -> list[Panel]:
     """One panel for each knob and error, titled in words; orders of one splitting share a panel.
@@ -30,18 +20,9 @@ def panels_of(table: WorkPrecision) -> list[Panel]:
         label = f"{error_of} ({unit})" if unit else error_of
         grouped.setdefault((name, label), {})[variant or name] = points_of(rows)
     return [
-        Panel(title_of(name), label, curves, joined=name != "effects.hyperfine_method")
+        Panel(table.titles.get(name, name), label, curves, joined=name != "effects.hyperfine_method")
         for (name, label), curves in grouped.items()
     ]
-
-
-def title_of(knob: str) -> str:
-    """A knob in words; for unlisted knobs, the last part of the key.
-
-    >>> title_of("numerics.jmax"), title_of("numerics.grid_points")
-    ('highest J of the basis', 'grid points')
-    """
-    return TITLES.get(knob, knob.rpartition(".")[2].replace("_", " "))
 
 
 def points_of(rows: list[Row]) -> list[Point]:

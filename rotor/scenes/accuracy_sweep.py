@@ -14,7 +14,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
@@ -54,13 +54,14 @@ class WorkPrecision(Table):
     """Errors and times of all settings of all knobs.
 
     kind: of the scene. rows: coarse settings first. references: what errors are measured against, by knob. remarks: approximations
-    without a knob, and sweeps left out, with the reason.
+    without a knob, and sweeps left out, with the reason. titles: knobs in words, by the key of each.
     """
 
     kind: str
     rows: tuple[Row, ...]
     references: Mapping[str, str]
     remarks: tuple[str, ...] = ()
+    titles: Mapping[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -100,9 +101,11 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
     request = calculation.request()
     choice = calculation.choice(request)
     request, verb = request if choice is None else choice.request, calculation.verb
-    declared = [knob.sweep(field, request, verb.compute) for field, knob in knobs_of_fields(request)]
-    further = verb.load_numerics().sweeps(request)
-    return Sweeps((*declared, *further.knobs), further.remarks)
+    sweeps = [knob.sweep(field, request, verb.compute) for field, knob in knobs_of_fields(request)]
+    numerics = verb.load_numerics()
+    prepared = numerics.prepare(request)
+    sweeps += [knob.sweep(None, prepared, verb.compute) for knob in numerics.knobs if knob.used(prepared)]
+    return Sweeps(tuple(sweeps), tuple(numerics.remarks(request)))
 
 
 def work_precision(
@@ -146,12 +149,13 @@ def work_precision(
     (['order J^2', 'order J^4', 'order J^6', 'order J^8'], True)
     """
     knobs, left = knobs_of(scene, folder), limit_seconds
-    table = WorkPrecision(scene.kind, (), {}, knobs.remarks)
+    titles = {knob.name.partition(",")[0]: knob.title for knob in knobs.knobs}
+    table = WorkPrecision(scene.kind, (), {}, knobs.remarks, titles)
     for number, knob in enumerate(knobs.knobs):
         rows, against, remarks, spent = sweep(knob, left / (len(knobs.knobs) - number), progress)
         left = max(left - spent, 0.0)
         references = {**table.references, f"{knob.name}: {knob.measures[0].of}": against}
-        table = WorkPrecision(scene.kind, (*table.rows, *rows), references, (*table.remarks, *remarks))
+        table = WorkPrecision(scene.kind, (*table.rows, *rows), references, (*table.remarks, *remarks), titles)
         on_knob(table)
     return table
 

@@ -80,7 +80,7 @@ def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> 
     from rotor.scenes.accuracy import chosen
 
     goals = verb_of(scene.kind).load_numerics().goals
-    if errors is None or errors.numerical is None or errors.unit not in goals or goals[errors.unit].choose is not None:
+    if errors is None or errors.numerical is None or errors.unit not in goals or not goals[errors.unit].by_field:
         return ""
     uncertain = max((errors.model, errors.data), key=lambda term: term.value or 0.0)
     goal = float(f"{SHARE * (uncertain.value or 0.0):.2g}")

@@ -19,10 +19,12 @@ from rotor.quantum.estimates.accuracy import (
 )
 from rotor.quantum.estimates.left_out import left_out_of_levels
 from rotor.quantum.estimates.plans import SHORT_J, effect_texts, level_parts, plan_fields
-from rotor.requests.knob import Choice, Measure, Setting, Sweep, Sweeps
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, LeftOut, Plan, largest_first, plan_of_whole
 from rotor.spectra.intensity_accuracy import Cut, error_of_intensities
+from rotor.spectra.raman_request import SECTION, answer_raman, section_left_out
+from rotor.spectra.request import INTENSITY, answer_spectrum, intensity_left_out
 from rotor.spectra.widths import doppler, pressure_width
 
 if TYPE_CHECKING:
@@ -49,33 +51,29 @@ def error_of_list(answer: Any) -> float:
     return levels_error(answer, answer.lines.top, answer.lines.levels)
 
 
-def sweeps_of_lines(
-    request: Any, answer: Callable[[Any], Any], measure: Measure, error: Callable[[Any, Any], float], of: str
-) -> Sweeps:
-    """Sweeps of J max (by `measure`), orders of distortion and hyperfine methods (by the error of frequencies)."""
-    jmax = answer(request).lines.jmax
-    fixed, beyond = replace(request, jmax=jmax), math.ceil(BEYOND * jmax) + 1
-    values = sorted({max(1, round(share * jmax)) for share in SHARES_OF_J})
-    settings = tuple(Setting(str(j), replace(request, jmax=j), j == jmax) for j in values)
-    reach = Sweep("numerics.jmax", (measure,), settings, replace(request, jmax=beyond), f"J max {beyond}", answer)
-
-    def line_measure(answer: Any, reference: Any) -> float:
-        return error(answer.lines, reference.lines)
-
-    further = (*distortion(fixed, line_measure, of, answer), *hyperfine(fixed, line_measure, of, answer))
-    return Sweeps((reach, *further), reason_of_no_distortion_sweep(request.top))
+def highest_j(measure: Measure) -> Knob:
+    """The highest J of the levels that lines connect."""
+    return Knob(
+        lambda request: {max(1, round(share * request.jmax)) for share in SHARES_OF_J},
+        lambda request: math.ceil(BEYOND * request.jmax) + 1,
+        (measure,),
+        "J max {}",
+        key="numerics.jmax",
+        title="highest J of the basis",
+        attribute="jmax",
+        label=str,
+    )
 
 
-def _sweeps_of_spectrum(request: Any) -> Sweeps:
-    from rotor.spectra.request import INTENSITY, answer_spectrum
+def _knobs(of: str, lost: Measure, error: Callable[[Any, Any], float]) -> tuple[Knob, ...]:
+    """Highest J (by the intensity lost), order of distortion and treatment of spins (by the error of frequencies)."""
+    frequency = Measure(of, "MHz", lambda answer, reference: error(answer.lines, reference.lines))
+    return highest_j(lost), distortion(frequency), hyperfine(frequency)
 
-    return sweeps_of_lines(request, answer_spectrum, INTENSITY, line_error, "frequency of a line")
 
-
-def _sweeps_of_raman(request: Any) -> Sweeps:
-    from rotor.spectra.raman_request import SECTION, answer_raman
-
-    return sweeps_of_lines(request, answer_raman, SECTION, shift_error, "shift of a line")
+def _with_jmax(request: Any, answer: Callable[[Any], Any]) -> Any:
+    """The request with the highest J of its answer."""
+    return replace(request, jmax=answer(request).lines.jmax)
 
 
 def _jmax_of_spectrum(request: Any) -> tuple[int, str]:
@@ -135,7 +133,6 @@ def _flipped(species: str, flip: tuple[bool, bool]) -> str:
 def plan_of_spectrum(request: Any) -> Plan:
     """The plan of a line list."""
     from rotor.quantum.estimates.limits import populated_j
-    from rotor.spectra.request import answer_spectrum
 
     top, kelvin = request.top, request.temperature_k
     jmax, why = _jmax_of_spectrum(request)
@@ -173,7 +170,6 @@ def plan_of_spectrum(request: Any) -> Plan:
 def plan_of_raman(request: Any) -> Plan:
     """The plan of Raman lines, from a complete run."""
     from rotor.quantum.estimates.limits import populated_j
-    from rotor.spectra.raman_request import answer_raman
 
     def describe(answer: Any) -> dict[str, Any]:
         """Fields of the plan; J max is that of the answer."""
@@ -186,40 +182,44 @@ def plan_of_raman(request: Any) -> Plan:
 
 
 def _rounding_of_raman(request: Any) -> float:
-    from rotor.spectra.raman_request import answer_raman
-
     return rounding_of(request.top, int(answer_raman(request).lines.jmax))
 
 
-def _choose_cut_of_lines(scene: Any, request: Any, accuracy: float) -> Choice:
-    from rotor.spectra.request import answer_spectrum, intensity_left_out
-
-    cut = Cut("min_lgint", lambda cut, decades: cut - decades, intensity_left_out, answer_spectrum)
-    return cut.choose(scene, request, accuracy)
+def _lower_decades(cut: float, decades: int) -> float:
+    return cut - decades
 
 
-def _choose_cut_of_raman(scene: Any, request: Any, accuracy: float) -> Choice:
-    from rotor.spectra.raman_request import answer_raman, section_left_out
-
-    cut = Cut("min_relative", lambda cut, decades: cut * 10.0**-decades, section_left_out, answer_raman)
-    return cut.choose(scene, request, accuracy)
+def _lower_factor(cut: float, decades: int) -> float:
+    return float(cut * 10.0**-decades)
 
 
 SPECTRUM = Numerics(
     {
         "MHz": Goal("frequencies", choose_spins, error_of_list),
-        "%": Goal("intensities", _choose_cut_of_lines, error_of_intensities),
+        "%": Goal(
+            "intensities",
+            Cut("min_lgint", _lower_decades, intensity_left_out, answer_spectrum).choose,
+            error_of_intensities,
+        ),
     },
-    sweeps=_sweeps_of_spectrum,
+    knobs=_knobs("frequency of a line", INTENSITY, line_error),
+    prepare=lambda request: _with_jmax(request, answer_spectrum),
+    remarks=lambda request: reason_of_no_distortion_sweep(request.top),
     plan=plan_of_spectrum,
     rounding=lambda request: rounding_of(request.top, _jmax_of_spectrum(request)[0]),
 )
 RAMAN = Numerics(
     {
         "MHz": Goal("shifts", choose_spins, error_of_list),
-        "%": Goal("cross sections", _choose_cut_of_raman, error_of_intensities),
+        "%": Goal(
+            "cross sections",
+            Cut("min_relative", _lower_factor, section_left_out, answer_raman).choose,
+            error_of_intensities,
+        ),
     },
-    sweeps=_sweeps_of_raman,
+    knobs=_knobs("shift of a line", SECTION, shift_error),
+    prepare=lambda request: _with_jmax(request, answer_raman),
+    remarks=lambda request: reason_of_no_distortion_sweep(request.top),
     plan=plan_of_raman,
     rounding=_rounding_of_raman,
 )

@@ -53,6 +53,7 @@ RELATIVE_CUT = Knob(
     lambda request: [cut for cut in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8) if request.min_relative is None or cut > request.min_relative],
     lambda request: None if request.min_relative is None else 1e-2 * request.min_relative, (SECTION,),
     lambda finest: "no cut" if finest is None else f"a cut at {finest:g}",
+    title="weakest line in the list, relative to the strongest",
 )  # fmt: skip
 
 

@@ -84,6 +84,7 @@ CUT = Knob(
     lambda request: COARSE_CUTS if request.min_lgint is None else tuple(request.min_lgint + decades for decades in COARSER_CUTS),
     lambda request: None if request.min_lgint is None else request.min_lgint - FINER_CUT, (INTENSITY,),
     lambda finest: "no cut" if finest is None else f"a cut at {finest:g}",
+    title="least intensity in the list, log10(nm² MHz)",
 )  # fmt: skip
 
 

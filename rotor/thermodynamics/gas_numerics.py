@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Measure, Sweep, Sweeps, ladder, refuse_set, with_field
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure, refuse_set, with_whole
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, LeftOut, Plan, largest_first
 
@@ -114,32 +114,6 @@ def error_of_gas(unit: str, answer: GasAnswer) -> float:
     return z * scale * relative_spread(unit, degrees_of(request)) / math.sqrt(request.molecules)
 
 
-def sweeps_of_gas(request: Any) -> Sweeps:
-    """The sweep over the number of molecules, with its statistical error."""
-    from rotor.thermodynamics.classical_gas import answer_gas
-
-    def answers(varied: Any) -> list[Any]:
-        return [answer_gas(replace(varied, seed=varied.seed + 10 * n)) for n in range(SEEDS)]
-
-    still = replace(request, times_ps=None)
-    counts = [n for n in MOLECULES if n < request.molecules]
-    exact = (Measure("temperature", "K", _temperature_error), Measure("heat capacity", "%", _heat_capacity_error))
-    settings = ladder(counts, request.molecules, partial(_with_molecules, still), "{:.0f}".format)
-    knobs = [Sweep("numerics.molecules", exact, settings, None, "kT/2 in every degree of freedom", answers, SEEDS)]
-    if request.times_ps is not None:
-        most = min(100 * request.molecules, MOST_IN_REFERENCE)
-        many = replace(request, molecules=most, seed=request.seed + 1)
-        curves = Measure("C1 and C2", "", _curve_error)
-        counted = ladder(counts, request.molecules, partial(_with_molecules, request), "{:.0f}".format)
-        reference, against = many, f"{most} other molecules"
-        knobs.append(Sweep("numerics.molecules", (curves,), counted, reference, against, answer_gas))
-    return Sweeps(tuple(knobs), (f"the motion of each molecule: {NOTHING_CHEAPER}; theta functions, round-off alone",))
-
-
-def _with_molecules(request: Any, count: float) -> Any:
-    return with_field(request, "molecules", int(count))
-
-
 def _mean_square(errors: list[float]) -> float:
     return math.sqrt(sum(error * error for error in errors) / len(errors))
 
@@ -175,6 +149,45 @@ def _degrees(answer: Any) -> int:
 def _curve_error(answer: Any, reference: Any) -> float:
     pairs = [(getattr(answer.correlations, name), getattr(reference.correlations, name)) for name in ("c1", "c2")]
     return max(float(np.max(np.abs(curve - true))) for curve, true in pairs if curve is not None)
+
+
+def _gases(request: Any) -> list[Any]:
+    """Gases that differ in their seeds."""
+    from rotor.thermodynamics.classical_gas import answer_gas
+
+    return [answer_gas(replace(request, seed=request.seed + 10 * number)) for number in range(SEEDS)]
+
+
+def _molecules(**more: Any) -> Knob:
+    """The number of molecules."""
+    return Knob(
+        lambda request: [count for count in MOLECULES if count < request.molecules],
+        lambda request: min(100 * request.molecules, MOST_IN_REFERENCE),
+        change=with_whole,
+        key="numerics.molecules",
+        title="number of molecules",
+        attribute="molecules",
+        label="{:.0f}".format,
+        **more,
+    )
+
+
+KINETIC = _molecules(
+    measures=(Measure("temperature", "K", _temperature_error), Measure("heat capacity", "%", _heat_capacity_error)),
+    against=lambda _: "kT/2 in every degree of freedom",
+    prepare=lambda request: replace(request, times_ps=None),
+    reference=lambda request: None,
+    answer=_gases,
+    repeats=SEEDS,
+)
+CURVES = _molecules(
+    measures=(Measure("C1 and C2", "", _curve_error),),
+    against="{} other molecules",
+    used=lambda request: request.times_ps is not None,
+    reference=lambda request: replace(
+        request, molecules=min(100 * request.molecules, MOST_IN_REFERENCE), seed=request.seed + 1
+    ),
+)
 
 
 def left_out_of_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
@@ -220,6 +233,7 @@ def _goal(quantity: str, unit: str) -> Goal:
 GAS = Numerics(
     {"K": _goal("temperature", "K"), "%": _goal("heat capacity", "%"), "": _goal("C1 and C2", "")},
     percent=lambda scene: "%" if scene.observables.times is None else "",  # C1 and C2 are 1 at first
-    sweeps=sweeps_of_gas,
+    knobs=(KINETIC, CURVES),
+    remarks=lambda request: (f"the motion of each molecule: {NOTHING_CHEAPER}; theta functions, round-off alone",),
     plan=plan_of_gas,
 )

@@ -7,7 +7,6 @@ from typing import Any
 
 from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.estimates.plans import plan_fields
-from rotor.requests.knob import Sweeps
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import LeftOut, Plan, peak_mb, plan_of_whole, timed
 
@@ -53,17 +52,17 @@ def plan_of_torsion(request: Any) -> Plan:
     return plan_of_whole("torsion", lambda: answer_torsion(request), describe)
 
 
-def _sweeps_of_thermo(request: Any) -> Sweeps:
-    return Sweeps((), ("vibration: its states are summed in closed form",) if request.vibrations else ())
-
-
-def _sweeps_of_torsion(request: Any) -> Sweeps:
-    """The sweep over scan points; without a scan nothing can be chosen, since the basis follows from the energies."""
+def _remark_on_basis(request: Any) -> tuple[str, ...]:
+    """Without a scan nothing can be chosen, since the basis follows from the energies."""
     from rotor.thermodynamics.torsion_potential import is_scan
 
     why = "basis: its size follows from the highest energy; the error is stated with each run"
-    return Sweeps((), () if is_scan(request.potential) else (why,))
+    return () if is_scan(request.potential) else (why,)
 
 
-THERMO = Numerics({"": Goal("Q, U and C_v")}, sweeps=_sweeps_of_thermo, plan=plan_of_thermo)
-TORSION = Numerics({"MHz": Goal("levels")}, sweeps=_sweeps_of_torsion, plan=plan_of_torsion)
+THERMO = Numerics(
+    {"": Goal("Q, U and C_v")},
+    remarks=lambda request: ("vibration: its states are summed in closed form",) if request.vibrations else (),
+    plan=plan_of_thermo,
+)
+TORSION = Numerics({"MHz": Goal("levels")}, remarks=_remark_on_basis, plan=plan_of_torsion)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +19,7 @@ from rotor.molecules.bond_scan import MMFF, POINTS, BondScan
 from rotor.quantum.bond_torsion import BondTorsion
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import check_fields, declared
-from rotor.requests.knob import Knob, Measure
+from rotor.requests.knob import Knob, Measure, with_whole
 from rotor.requests.readers import Custom, Grid, Quantity, Text, Whole
 from rotor.table import Table, TextOf
 from rotor.thermodynamics.hindered_rotor import HinderedRotorFunctions, hindered_rotor_functions
@@ -51,7 +51,7 @@ def _level_error(answer: Any, reference: Any) -> float:
 
 ANGLES = Knob(
     (12, 18, 24, 36, 48, 72), 144, (Measure("levels", "cm-1", _level_error),), "{:g} angles",
-    change=lambda request, name, value: replace(request, **{name: int(value)}), used=lambda request: is_scan(request.potential),
+    change=with_whole, used=lambda request: is_scan(request.potential),
 )  # fmt: skip
 
 

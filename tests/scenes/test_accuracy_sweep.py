@@ -248,7 +248,7 @@ def test_what_is_beyond_the_limit_is_left_out_and_said(monkeypatch):
 
 def test_a_panel_a_knob():
     rows = [Row(f"numerics.step, order {n}", "1", False, "attitude", 1e-3 / n, "rad", 0.1) for n in (2, 4)]
-    panels = panels_of(WorkPrecision("tumble", tuple(rows), {}))
+    panels = panels_of(WorkPrecision("tumble", tuple(rows), {}, titles={"numerics.step": "length of a step"}))
     assert [(panel.title, panel.of, list(panel.curves)) for panel in panels] == [
         ("length of a step", "attitude (rad)", ["order 2", "order 4"])
     ]

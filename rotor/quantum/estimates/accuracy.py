@@ -7,7 +7,6 @@ of known spin couplings that are neglected, and the estimated error of an approx
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +15,14 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.quantum.estimates.plans import plan_of_levels
 from rotor.requests.budget import ROUNDING
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Measure, Setting, Sweep, Sweeps
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics, numerical_error
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import Levels
     from rotor.tops.top import Top
 
-METHODS = ("first-order", "N-diagonal", "exact")
+TREATMENTS = ("left out", "first-order", "N-diagonal", "exact")
 EXACT, FOR_METHOD = "exact", 0.9  # default treatment of spins; share of an accuracy for the error of another treatment
 SPINS = frozenset({"nuclear quadrupole", "spin-rotation", "spin-spin", "hyperfine method"})
 
@@ -127,54 +126,70 @@ def to_order(top: Top, order: int) -> Top:
     return top.with_constants(top.constants.replace(**above))
 
 
-def distortion(request: Any, error: Callable[[Any, Any], float], of: str, answer: Callable[[Any], Any]) -> list[Sweep]:
-    """Sweep of the orders of centrifugal distortion up to the highest of the constants; empty without distortion.
-
-    error: error (MHz) of an answer relative to the reference. of: the quantity with this error. answer: computes the answer of a request.
-    """
-    top, names = request.top, [name for name in request.top.constants.values if name not in "ABC"]
-    if (
-        not names
-        or top.states is not None
-        or not any(effect.name == "centrifugal distortion" for effect in request.effects)
-    ):
-        return []
-    orders = [2, *sorted({order_of(name, top) for name in names})]
-    plain = replace(request, top=top.with_constants(top.constants))  # without a table of levels
-    settings = [
-        Setting(f"order J^{order}", replace(request, top=to_order(top, order)), order == orders[-1]) for order in orders
-    ]
-    against = "all constants; the orders that they do not have are in the plan"
-    return [Sweep("effects.distortion", (Measure(of, "MHz", error),), tuple(settings), plain, against, answer)]
+def _has_distortion(request: Any) -> bool:
+    """Whether orders of distortion can be swept."""
+    names = [name for name in request.top.constants.values if name not in "ABC"]
+    present = any(effect.name == "centrifugal distortion" for effect in request.effects)
+    return bool(names) and request.top.states is None and present
 
 
-def hyperfine(request: Any, error: Callable[[Any, Any], float], of: str, answer: Callable[[Any], Any]) -> list[Sweep]:
-    """Sweep of the treatments of hyperfine structure, including none; empty if the calculation has no spins.
+def _orders(request: Any) -> list[int]:
+    """Powers of J in the operators of the constants."""
+    top = request.top
+    return [2, *sorted({order_of(name, top) for name in top.constants.values if name not in "ABC"})]
 
-    error: error (MHz) of an answer relative to the reference. of: the quantity with this error. answer: computes the answer of a request.
-    """
-    from rotor.quantum.effects.of_top import effects_of
+
+def distortion(measure: Measure) -> Knob:
+    """The order of centrifugal distortion, up to the highest of the constants."""
+    return Knob(
+        _orders,
+        None,
+        (measure,),
+        lambda _: "all constants; the orders that they do not have are in the plan",
+        change=lambda request, _, order: replace(request, top=to_order(request.top, order)),
+        prepare=lambda request: replace(
+            request, top=request.top.with_constants(request.top.constants)
+        ),  # no level table
+        used=_has_distortion,
+        key="effects.distortion",
+        title="order of centrifugal distortion",
+        value=lambda request: _orders(request)[-1],
+        reference=lambda request: request,
+        label="order J^{}".format,
+    )
+
+
+def hyperfine(measure: Measure) -> Knob:
+    """The treatment of hyperfine structure, from none to the exact one, by its place in TREATMENTS."""
+    return Knob(
+        range(len(TREATMENTS)),
+        TREATMENTS.index(EXACT),
+        (measure,),
+        lambda _: "the exact method itself",
+        change=lambda request, _, place: _treated(request, TREATMENTS[place]),
+        used=lambda request: any(effect.name in SPINS for effect in request.effects),
+        key="effects.hyperfine_method",
+        title="method of hyperfine structure",
+        value=_treatment,
+        label=lambda place: TREATMENTS[place],
+    )
+
+
+def _treatment(request: Any) -> int | None:
+    """The place of a request's treatment in TREATMENTS; None for another treatment."""
     from rotor.quantum.hyperfine_method import HyperfineMethod
 
-    if not any(effect.name in SPINS for effect in request.effects):
-        return []
-    used = next((effect.method for effect in request.effects if isinstance(effect, HyperfineMethod)), "exact")
-    settings = [Setting("left out", replace(request, effects=effects_of(request.top, False)))]
-    for method in METHODS:
-        settings.append(
-            Setting(method, replace(request, effects=effects_of(request.top, True, method)), method == used)
-        )
-    measure = Measure(of, "MHz", error)
-    return [
-        Sweep(
-            "effects.hyperfine_method",
-            (measure,),
-            tuple(settings),
-            settings[-1].request,
-            "the exact method itself",
-            answer,
-        )
-    ]
+    used = next((effect.method for effect in request.effects if isinstance(effect, HyperfineMethod)), EXACT)
+    return TREATMENTS.index(used) if used in TREATMENTS else None
+
+
+def _treated(request: Any, treatment: str) -> Any:
+    """The request with another treatment of spins."""
+    from rotor.quantum.effects.of_top import effects_of
+
+    if treatment == TREATMENTS[0]:
+        return replace(request, effects=effects_of(request.top, False))
+    return replace(request, effects=effects_of(request.top, True, treatment))
 
 
 def rounding_of(top: Any, j: int) -> float:
@@ -189,26 +204,22 @@ def reason_of_no_distortion_sweep(top: Top) -> tuple[str, ...]:
     return ("effects.distortion: not swept: the top has several states",) if top.states is not None else ()
 
 
-def sweeps_of_levels(request: Any) -> Sweeps:
-    """Sweeps of orders of distortion and of treatments of hyperfine structure."""
-    from rotor.quantum.request import answer_levels
-
-    def error(answer: Any, reference: Any) -> float:
-        return level_error(answer.table.levels, reference.table.levels)
-
-    of = "energy of a level"
-    sweeps = (*distortion(request, error, of, answer_levels), *hyperfine(request, error, of, answer_levels))
-    exact = f"observables.jmax: {NOTHING_CHEAPER}; it says which levels, not how well"
-    return Sweeps(sweeps, (exact, *reason_of_no_distortion_sweep(request.top)))
-
-
+ENERGY = Measure(
+    "energy of a level",
+    "MHz",
+    lambda answer, reference: level_error(answer.table.levels, reference.table.levels),
+)
 LEVELS = Numerics(
     {
         "MHz": Goal(
             "energies", choose_spins, lambda answer: levels_error(answer, answer.request.top, answer.table.levels)
         )
     },
-    sweeps=sweeps_of_levels,
+    knobs=(distortion(ENERGY), hyperfine(ENERGY)),
+    remarks=lambda request: (
+        f"observables.jmax: {NOTHING_CHEAPER}; it says which levels, not how well",
+        *reason_of_no_distortion_sweep(request.top),
+    ),
     plan=plan_of_levels,
     rounding=lambda request: rounding_of(request.top, request.jmax),
 )

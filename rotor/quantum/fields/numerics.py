@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -16,7 +16,7 @@ from rotor.quantum.fields.field_map import each_block
 from rotor.quantum.fields.inputs import ENERGY, largest_difference
 from rotor.quantum.fields.stark_request import answer_stark
 from rotor.quantum.fields.zeeman_request import answer_zeeman
-from rotor.requests.knob import Measure, Setting, Sweep, Sweeps, ladder
+from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, LeftOut, Plan, largest_first
 
@@ -24,30 +24,32 @@ MORE_J = 6  # values of J that the reference has beyond the basis
 SHORT_FIELDS = (2, 20)  # numbers of fields from which the cost is extrapolated
 
 
-def sweeps_of_stark(request: Any) -> Sweeps:
-    """Sweep of J max of the basis of levels in an electric field."""
-    # without other criteria, so that a small basis is not refused
+def _with_basis(request: Any) -> Any:
+    """The request of levels in an electric field with J max of its basis, without criteria that refuse a small basis."""
     plain = replace(request, diabatic_gap_mhz=None, most_at_edge=1.0)
-    jmax = int(answer_stark(plain).states.jmax)
-    basis = ladder(range(request.j_highest + 2, jmax + 1), jmax, lambda number: (plain, int(number)))
-    beyond, energy = jmax + MORE_J, Measure("energy", "MHz", largest_difference)
-    return Sweeps((Sweep("numerics.jmax", (energy,), basis, (plain, beyond), f"J max {beyond}", _energies),))
+    return replace(plain, jmax=int(answer_stark(plain).states.jmax))
 
 
-def sweeps_of_zeeman(request: Any) -> Sweeps:
-    """Sweep of J max of the basis of levels in a magnetic field, if the request has one."""
-    if request.jmax is None:
-        return Sweeps(())
-    beyond = replace(request, jmax=request.jmax + MORE_J)
-    settings = (Setting(str(request.jmax), request, True),)
-    return Sweeps((Sweep("numerics.jmax", (ENERGY,), settings, beyond, f"J max {beyond.jmax}", answer_zeeman),))
+def _energies(request: Any) -> Any:
+    """Energies of all states of a map with J max of the basis, even one that a map would refuse as too small."""
+    fields, jmax = request.map, request.jmax
+    parts = each_block(fields, jmax, partial(solve_block, fields, fields=fields.fields, jmax=jmax))
+    return np.concatenate([part.energies[:, part.j <= fields.j_highest].ravel() for part in parts])
 
 
-def _energies(setting: tuple[Any, int]) -> Any:
-    """Energies of all states of a map with a J max of the basis, even one that a map would refuse as too small."""
-    request, jmax = setting[0].map, setting[1]
-    parts = each_block(request, jmax, partial(solve_block, request, fields=request.fields, jmax=jmax))
-    return np.concatenate([part.energies[:, part.j <= request.j_highest].ravel() for part in parts])
+def _basis(steps: Callable[[Any], Iterable[int]], measure: Measure, answer: Callable[[Any], Any]) -> Knob:
+    """J max of the basis, if the request has it."""
+    return Knob(
+        steps,
+        lambda request: request.jmax + MORE_J,
+        (measure,),
+        "J max {}",
+        key="numerics.jmax",
+        title="highest J of the basis",
+        used=lambda request: request.jmax is not None,
+        attribute="jmax",
+        answer=answer,
+    )
 
 
 def plan_in_field(request: Any, answer: Callable[[Any], Any], words: dict[str, str]) -> Plan:
@@ -107,5 +109,15 @@ def _plan_of_zeeman(request: Any) -> Plan:
     return plan_in_field(request, answer_zeeman, words)
 
 
-STARK = Numerics({"MHz": Goal("energies")}, sweeps=sweeps_of_stark, plan=_plan_of_stark)
-ZEEMAN = Numerics({"MHz": Goal("energies")}, sweeps=sweeps_of_zeeman, plan=_plan_of_zeeman)
+ENERGIES = Measure("energy", "MHz", largest_difference)
+STARK = Numerics(
+    {"MHz": Goal("energies")},
+    knobs=(_basis(lambda request: range(request.j_highest + 2, request.jmax + 1), ENERGIES, _energies),),
+    prepare=_with_basis,
+    plan=_plan_of_stark,
+)
+ZEEMAN = Numerics(
+    {"MHz": Goal("energies")},
+    knobs=(_basis(lambda request: (), ENERGY, answer_zeeman),),
+    plan=_plan_of_zeeman,
+)
