@@ -24,7 +24,7 @@ from rotor.checks import NoAnswerError, RunStopped
 from rotor.cli.shared import process
 from rotor.cli.shared.options import PlainGroup, folded
 from rotor.cli.shared.output import release_files
-from rotor.verbs.names import declared_verbs
+from rotor.verbs.names import declared_verbs, has_small_blocks
 
 if TYPE_CHECKING:
     from rotor.verbs.verb import Verb
@@ -60,9 +60,6 @@ VERBS = {  # with their lines in the list of verbs, short enough for 80 columns
 }
 VERBS |= {name: "" for name in declared_verbs() if name not in VERBS}  # the list shows a new verb's declaration
 FILES = {"run": "run_scene"}  # a verb whose name is that of a function of this module
-ONE_THREAD = frozenset(
-    {"spectrum", "levels", "raman", "thermo", "emission", "fit", "identify"}
-)  # verbs of small matrix blocks, where threads of BLAS cost time; the limit must be set before numpy is loaded
 COMPLETION = "_ROTOR_COMPLETE"  # set by a shell that asks for completions
 NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
@@ -187,7 +184,7 @@ def _run(arguments: list[str]) -> int:
     words = [word for word in arguments[:2] if word != "--debug"]
     is_verb = bool(words) and words[0] in VERBS
     verbs = words[:1] if is_verb else VERBS  # modules of other verbs are not loaded
-    if words[:1] and words[0] in ONE_THREAD:
+    if is_verb and has_small_blocks(words[0]):  # the limit must be set before numpy is loaded
         jmax = re.search(r"--jmax[= ](\d+)(?!\S)", " ".join(arguments))  # before anything is read
         process.one_thread_of_blas(int(jmax[1]) if jmax else None)
     command = typer.main.get_command(_application(verbs, listed=not is_verb))

@@ -12,7 +12,7 @@ from rotor.reports.top_facts import left_out_facts
 from rotor.requests.field import REQUIRED, declared
 from rotor.requests.readers import Text
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Work
+from rotor.verbs.verb import Work, verb_of
 
 if TYPE_CHECKING:
     from rotor.requests.plan import LeftOut, Plan
@@ -60,7 +60,7 @@ def show(answer: PlanAnswer, _: Any) -> Iterable[Part | None]:
     yield answer.scene.heading
     facts: list[tuple[str, str]] = [
         ("effects", "; ".join(plan.effects)),
-        ("conserved" if plan.kind in ("tumble", "gas", "fluid") else "good numbers", ", ".join(plan.good) or "none"),
+        (verb_of(plan.kind).invariants, ", ".join(plan.good) or "none"),
         *plan.parts,
         *((name, f"{count:,}") for name, count in plan.counts.items()),
         ("seconds", f"{plan.seconds:.2g} processor time, without start-up and compilation"),

@@ -22,8 +22,6 @@ KINDS = {
     "asymmetric": "asymmetric top",
 }
 
-WITH_HYPERFINE = ("spectrum", "levels", "emission", "raman", "thermo", "stark", "zeeman")  # verbs with that option
-
 NOTHING_SEEN = "nothing that the molecule shows signs of; further states of vibration are not those of these constants"
 NOTHING_KNOWN = "of constants alone, nuclear spins and motions of large amplitude are not known; a geometry shows them"
 
@@ -38,7 +36,7 @@ def error_facts(errors: Mapping[str, Any] | None) -> list[tuple[str, str]]:
     return [("errors", f"{name.removeprefix('errors ')}: {text}")]
 
 
-def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
+def model_facts(content: Mapping[str, Any], with_spins: str) -> list[tuple[str, str]]:
     """Errors, effects in the model and effects left out (largest first), from `rotor.quantum.estimates.limits.limit_facts`.
 
     Of a motion without a Hamiltonian: errors, and what its content states as left out.
@@ -56,8 +54,7 @@ def model_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
     larger, others = larger_items(content["limits"], lambda limit: limit["size_mhz"], lambda limit: str(limit["name"]))
-    verb = content["command"].split()[1:2]
-    limits = [with_option(Limit(**limit).sentence, *verb) for limit in larger]
+    limits = [with_command(Limit(**limit).sentence, with_spins) for limit in larger]
     limits += [others] if others else []
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
@@ -75,14 +72,14 @@ def top_parts(
     yield title or heading(top)
     yield facts
     yield from parts
-    yield [*source_facts(top, tables, report.sources), *model_facts(report.content)]
+    yield [*source_facts(top, tables, report.sources), *model_facts(report.content, report.with_spins)]
 
 
-def with_option(sentence: str, verb: str = "spectrum") -> str:
-    """Complete a sentence on neglected spins with the option that adds them: of this verb, or of rotor spectrum if it has none."""
+def with_command(sentence: str, with_spins: str) -> str:
+    """Complete a sentence on neglected spins with the command that adds them."""
     from rotor.quantum.estimates.beyond import COMPUTE
 
-    return sentence.replace(COMPUTE, f"rotor {verb if verb in WITH_HYPERFINE else 'spectrum'} --hyperfine")
+    return sentence.replace(COMPUTE, with_spins)
 
 
 def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:

@@ -14,7 +14,7 @@ from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
-from rotor.reports.top_facts import error_facts, left_out_facts, with_option
+from rotor.reports.top_facts import error_facts, left_out_facts, with_command
 from rotor.requests.field import OUTPUT, Field, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT
@@ -221,7 +221,7 @@ def show(answer: EmissionAnswer, report: Report) -> Iterable[Part | None]:
         + ("" if lines.quanta else f", Q {lines.q_source}")
         for name, molecule, lines in zip(request.names, request.molecules, answer.emitted, strict=True)
     )
-    yield [("sources", cited), *error_facts(report.content.get("errors")), *_limits(answer)]
+    yield [("sources", cited), *error_facts(report.content.get("errors")), *_limits(answer, report.with_spins)]
 
 
 def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
@@ -249,7 +249,7 @@ def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
     return facts
 
 
-def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
+def _limits(answer: EmissionAnswer, with_spins: str) -> list[tuple[str, str]]:
     """Neglected effects: of the source, and the largest of each molecule; of many molecules, those of the largest."""
     from rotor.quantum.estimates.limits import model_limits, populated_j
 
@@ -261,7 +261,7 @@ def _limits(answer: EmissionAnswer) -> list[tuple[str, str]]:
         largest.sort(key=lambda pair: -(pair[1].size_mhz or 0.0))
     shown = largest if len(largest) < MOST_LEFT_OUT else largest[: MOST_LEFT_OUT - 2]
     sentences = ["departures from one excitation temperature; structure of the source in the beam"]
-    sentences += [f"{name}: {with_option(limit.sentence, 'emission')}" for name, limit in shown]
+    sentences += [f"{name}: {with_command(limit.sentence, with_spins)}" for name, limit in shown]
     if others := [f"{name}: {limit.name}" for name, limit in largest[len(shown) :]]:
         sentences.append(f"smaller or not estimated: {', '.join(others)}")
     return left_out_facts(sentences)
@@ -300,6 +300,7 @@ VERB = Verb(
     name="emission",
     about="Lines of a source as a radio telescope sees them: brightness temperature in local thermodynamic equilibrium.",
     examples=EXAMPLES,
+    small_blocks=True,
     request=EmissionRequest,
     answer=lambda request, work: answer_emission(request),
     table=lambda answer: answer.lines,

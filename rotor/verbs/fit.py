@@ -312,6 +312,7 @@ VERB = Verb(
     name="fit",
     about="Constants from measured lines, with errors, correlations and undetermined parameters; exit code 1 unless converged.",
     examples=EXAMPLES,
+    small_blocks=True,
     request=FitInput,
     answer=answer,
     table=lambda answer: answer.parameters,

@@ -379,6 +379,7 @@ VERB = Verb(
     drawn="ps",
     scaled=False,
     sound=False,
+    invariants="conserved",
     numerics="rotor.fluids.numerics:FLUID",
     accuracy="of the conserved energy (K) or of Ewald's forces (%)",
     accuracy_example="0.5 K",

@@ -129,6 +129,7 @@ VERB = Verb(
     drawn="ps",
     scaled=False,
     adapt=adapt,
+    invariants="conserved",
     numerics="rotor.thermodynamics.gas_numerics:GAS",
     accuracy="of temperature (K), heat capacity (%), or of C1 and C2 where times are given (%)",
     accuracy_example="1 K",

@@ -190,6 +190,7 @@ VERB = Tool(
     name="identify",
     about="Species that an observed spectrum needs, by evidence; unidentified lines.",
     examples=EXAMPLES,
+    small_blocks=True,
     request=IdentifyRequest,
     of="file",
     answer=answer,

@@ -129,6 +129,7 @@ VERB = Verb(
     name="levels",
     about="Energy levels of a molecule: quantum numbers, energies, degeneracies, term diagram.",
     examples=EXAMPLES,
+    small_blocks=True,
     request=LevelsRequest,
     answer=lambda request, work: answer_levels(request, work.executor),
     results=results,

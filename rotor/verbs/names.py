@@ -18,4 +18,10 @@ def declared_verbs() -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: (_ORDER.index(name) if name in _ORDER else len(_ORDER), name)))
 
 
+def has_small_blocks(name: str) -> bool:
+    """Whether a verb declares small blocks. The text of its file is read, since its module loads numpy."""
+    file = Path(__file__).with_name(f"{name}.py")
+    return file.is_file() and "\n    small_blocks=True," in file.read_text(encoding="utf-8")
+
+
 SCENE_VERBS = tuple(dict.fromkeys((*_ORDER, *declared_verbs())))  # kinds of scene

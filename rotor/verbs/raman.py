@@ -104,6 +104,7 @@ VERB = Verb(
     name="raman",
     about="Rotational Raman lines: Stokes and anti-Stokes shifts and their cross sections.",
     examples=EXAMPLES,
+    small_blocks=True,
     request=RamanRequest,
     answer=lambda request, work: answer_raman(request, work.executor),
     table=lambda answer: answer.lines,

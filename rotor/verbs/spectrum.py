@@ -285,6 +285,7 @@ VERB = Verb(
     name="spectrum",
     about="Rotational lines of a molecule: frequencies, intensities, and the data behind them.",
     examples=EXAMPLES,
+    small_blocks=True,
     request=SpectrumRequest,
     answer=answer_of,
     table=lambda answer: answer.lines,

@@ -141,6 +141,7 @@ VERB = Verb(
     name="thermo",
     about="Rotational partition function, energy, entropy and heat capacity, quantum and classical.",
     examples=EXAMPLES,
+    small_blocks=True,
     request=ThermoRequest,
     answer=answer,
     table=lambda answer: answer.functions,

@@ -280,6 +280,7 @@ VERB = Verb(
     build=build,
     check=check,
     short=is_short,
+    invariants="conserved",
     numerics="rotor.classical.numerics:TUMBLE",
     accuracy="of the attitude",
     accuracy_example="1e-6 rad",

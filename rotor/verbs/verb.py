@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rotor.requests.numerics import Numerics
 
 
+HYPERFINE = "effects.hyperfine"  # identity of the option that adds hyperfine structure
 PICTURES = (".png", ".pdf", ".svg")
 Note = Callable[[str], None]
 
@@ -88,7 +89,8 @@ class Report:
     """Data of a report and its files.
 
     content: of the JSON. shown: display options. entries: as entered. provenance: of files. view: of a picture.
-    sources: whether to print them in full. executor: shares the work of derived tables. cache: derived tables that several files need.
+    sources: whether to print them in full. with_spins: the command that adds hyperfine structure.
+    executor: shares the work of derived tables. cache: derived tables that several files need.
     """
 
     content: Mapping[str, Any]
@@ -97,6 +99,7 @@ class Report:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     view: Any = None
     sources: bool = False
+    with_spins: str = ""
     executor: Executor | None = None
     cache: dict[str, Any] = field(default_factory=dict)
 
@@ -236,6 +239,8 @@ class Verb:
     scaled: whether it has --plot-scale. nothing: reason why there is nothing to draw.
     workers: what --workers shares out. short: whether plain Python answers before the compiler would be loaded.
     numerics: "module:name" of a `rotor.requests.numerics.Numerics`. accuracy: observables of an accuracy goal in a scene.
+    invariants: what a plan calls quantities that do not change.
+    small_blocks: whether its matrices are small blocks, for which threads of BLAS cost time (read by `rotor.verbs.names`).
     sound: whether an accepted request contains no user error.
     other: verb that takes over if one of its options is typed; instead: these options in words.
     """
@@ -264,6 +269,8 @@ class Verb:
     accuracy: str = ""
     accuracy_example: Any = "1 kHz"
     numerics: str = ""
+    invariants: str = "good numbers"
+    small_blocks: bool = False
     sound: bool = True
     short: Callable[[Any], bool] = lambda request: False
     withheld: Callable[[Any, Sequence[str]], Mapping[str, str]] = lambda answer, names: {}
@@ -405,7 +412,9 @@ def report_of(
     shown = verb.read_shown(entries)
     content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
     stated = {name: plain(content[name]) for name in ("errors", *verb.stated) if name in content}
-    return Report(content, shown, entries, {**head, **stated}, view, bool(getattr(shown, "sources", False)), executor)
+    with_spins = f"rotor {verb.name if HYPERFINE in verb.fields else 'spectrum'} --hyperfine"
+    sources = bool(getattr(shown, "sources", False))
+    return Report(content, shown, entries, {**head, **stated}, view, sources, with_spins, executor)
 
 
 def tables(what: str, stem: str) -> tuple[Output, Output]:

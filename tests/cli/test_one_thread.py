@@ -7,7 +7,9 @@ import sys
 
 import pytest
 
+from rotor.cli import VERBS, declaration
 from rotor.cli.shared import process
+from rotor.verbs.names import has_small_blocks
 
 
 @pytest.mark.parametrize(
@@ -27,3 +29,10 @@ def test_one_thread_is_set_before_numpy_is_loaded(monkeypatch, threads, loaded, 
     monkeypatch.setattr(os, "environ", {"OPENBLAS_NUM_THREADS": before} if before else {})
     process.one_thread_of_blas(jmax)
     assert os.environ.get("OPENBLAS_NUM_THREADS") == after
+
+
+def test_small_blocks_are_read_from_the_text_as_declared():
+    declared = {name for name in VERBS if declaration(name).small_blocks}
+    assert declared == {name for name in VERBS if has_small_blocks(name)}
+    assert {"spectrum", "levels", "fit", "identify"} <= declared
+    assert not {"stark", "fluid", "view"} & declared
