@@ -29,11 +29,11 @@ def _in_basis(request: Any) -> tuple[Any, int]:
     return trace, trace.jmax
 
 
-def _smaller(setting: tuple[Any, int]) -> set[int]:
+def _smaller(setting: tuple[Any, int]) -> list[int]:
     """Values of J max up to that of the request, at least the highest populated J."""
     trace, jmax = setting
     values = {round(share * jmax) for share in SHARES_OF_J} | {jmax - 1}
-    return {j for j in values if j >= trace.ensemble.jmax}
+    return sorted(j for j in values if j >= trace.ensemble.jmax)
 
 
 BASIS = Knob(

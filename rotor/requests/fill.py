@@ -72,6 +72,20 @@ def read_instance(structure: Any, entries: Entries, subject: Any = None) -> Any:
         return structure(**read_fields(structure, entries, subject))
 
 
+class NamedError(ValueError):
+    """Error whose text has fields in braces, by name or by identity: `{step}`. `naming` puts in the user's names."""
+
+
+@contextmanager
+def naming(fields: Iterable[Field], style: str) -> Iterator[None]:
+    """Context in which a NamedError names these fields in the user's style."""
+    try:
+        yield
+    except NamedError as error:
+        names = {name: field.called(style) for field in fields for name in (field.name, field.identity)}
+        raise ValueError(re.sub(r"\{([\w.]+)\}", lambda match: names.get(match[1], match[0]), str(error))) from None
+
+
 @contextmanager
 def called(structure: Any, style: str) -> Iterator[None]:
     """Context in which a ValueError names fields of a request in the user's style."""
@@ -87,6 +101,8 @@ def renaming(names: Mapping[str, str]) -> Iterator[None]:
     """
     try:
         yield
+    except NamedError:
+        raise
     except ValueError as error:
         text = renamed(str(error), names)
         if text == str(error):

@@ -54,7 +54,7 @@ def error_of_list(answer: Any) -> float:
 def highest_j(measure: Measure) -> Knob:
     """The highest J of the levels that lines connect."""
     return Knob(
-        lambda request: {max(1, round(share * request.jmax)) for share in SHARES_OF_J},
+        lambda request: [max(1, round(share * request.jmax)) for share in SHARES_OF_J],
         lambda request: math.ceil(BEYOND * request.jmax) + 1,
         (measure,),
         "J max {}",

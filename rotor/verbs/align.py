@@ -10,7 +10,7 @@ from rotor.alignment.request import AlignAnswer, AlignRequest, answer_align
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, record_table
 from rotor.requests.field import CONDITIONS, REQUIRED, all_fields
-from rotor.requests.fill import Entries, read_fields
+from rotor.requests.fill import Entries, NamedError, read_fields
 from rotor.table import counted
 from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
@@ -135,10 +135,9 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:
     if not values.get("pulses"):
         raise ValueError('pulses: expected one or more, such as "gaussian peak=1e13W/cm2 fwhm=1ps"')
     if values.get("state") is not None and "temperature_k" in values and not values.get("classical_molecules"):
-        temperature, state = (
-            verb.fields[f"conditions.{name}"].called(entries.style) for name in ("temperature", "state")
+        raise NamedError(
+            "{temperature_k} and {state}: give one of them; the molecules of one level have no temperature"
         )
-        raise ValueError(f"{temperature} and {state}: give one of them; the molecules of one level have no temperature")
     if values.get("state") is not None and values.get("classical_molecules"):
         subject.note("the classical gas is at the temperature of --temperature, not in the level of --state")
     return AlignRequest(**subject.values, **values)

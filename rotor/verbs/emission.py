@@ -16,7 +16,7 @@ from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
 from rotor.reports.top_facts import error_facts, left_out_facts, with_command
 from rotor.requests.field import OUTPUT, Field, all_fields, declared
-from rotor.requests.fill import Entries, read_instance, written_fields
+from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT
 from rotor.requests.readers import Quantity, Text, Whole
 from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
@@ -120,9 +120,7 @@ class SeveralMolecules(SubjectKind):
             raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
         for field in (FIELDS[name] for name in _SINGLE_ONLY):
             if entries.has(field) and (len(several.names) > 1 or is_catalogue(several.names[0])):
-                raise ValueError(
-                    f"{field.called(entries.style)}: expected with a single molecule, not with a catalogue"
-                )
+                raise NamedError(f"{{{field.name}}}: expected with a single molecule, not with a catalogue")
         if several.partition is not None and not any(map(is_catalogue, several.names)):
             raise ValueError("--partition: needs a .cat file among the molecules; it gives their Q(T)")
         values = {name: value for name, value in entries.values.items() if name.startswith("molecule.")}

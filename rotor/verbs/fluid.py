@@ -18,7 +18,7 @@ from rotor.fluids.settings import Settings
 from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, declared
-from rotor.requests.fill import Entries, read_fields, read_instance, written_fields
+from rotor.requests.fill import Entries, NamedError, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
 from rotor.verbs.subjects import beside
@@ -104,19 +104,17 @@ class Box(SubjectKind):
 
     def _refuse_unused(self, inputs: BoxInput, settings: Settings, entries: Entries) -> None:
         """Refuse inputs without effect: of another ensemble, other electrostatics, or a new box."""
-        known = all_fields(Settings) | self.fields
         uses = {
-            "conditions.friction": ("conditions.ensemble", settings.ensemble, "langevin"),
-            "conditions.relaxation": ("conditions.ensemble", settings.ensemble, "nose-hoover"),
-            "numerics.ewald_tolerance": ("numerics.electrostatics", settings.electrostatics, "ewald"),
+            "conditions.friction": ("ensemble", "langevin"),
+            "conditions.relaxation": ("ensemble", "nose-hoover"),
+            "numerics.ewald_tolerance": ("electrostatics", "ewald"),
         }
-        for name, (choice, chosen, needed) in uses.items():
-            if entries.has(known[name]) and chosen != needed:
-                option, other = known[name].called(entries.style), known[choice].called(entries.style)
-                raise ValueError(f"{option}: expected with {other} {needed}; {chosen} does not use it")
+        for name, (choice, needed) in uses.items():
+            chosen = getattr(settings, choice)
+            if entries.values.get(name) is not None and chosen != needed:
+                raise NamedError(f"{{{name}}}: expected with {{{choice}}} {needed}; {chosen} does not use it")
         if inputs.molecules is None and inputs.density is not None:
-            option, other = (known[f"conditions.{n}"].called(entries.style) for n in ("density", "molecules"))
-            raise ValueError(f"{option}: expected with {other}; the box of a file has the density of its cell")
+            raise NamedError("{density}: expected with {molecules}; the box of a file has the density of its cell")
 
     def _scene_box(self, inputs: BoxInput, place: Place, equilibration: dict[str, Any]) -> Subject:
         if (inputs.molecules is None) == (inputs.box is None):

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.requests.fill import Entries
+from rotor.requests.fill import Entries, NamedError
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
 from rotor.verbs.verb import Note, Report
 
@@ -58,16 +57,14 @@ def is_int_file(source: Any) -> bool:
     return isinstance(source, str) and source.lower().endswith(".int")
 
 
-def predicted(source: str, entries: Entries, called: Callable[[str], str], note: Note, **basis: bool) -> Prediction:
+def predicted(source: str, entries: Entries, note: Note, **basis: bool) -> Prediction:
     """The prediction of an .int file. Inputs that the files determine are refused; notes are passed on.
 
-    called: name of an input, by its identity. basis: as_spcat and full_basis.
+    basis: as_spcat and full_basis.
     """
     for identity, field in ANSWERED.items():
         if entries.values.get(identity) is not None:
-            raise ValueError(
-                f"{called(identity)}: {source} determines it ({field}); change it there{_or_its_var(source)}"
-            )
+            raise NamedError(f"{{{identity}}}: {source} determines it ({field}); change it there{_or_its_var(source)}")
     from rotor.formats.spcat.predict import predict_file
 
     prediction = predict_file(source, **basis)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
-from rotor.requests.fill import Entries, read_instance, renaming, written_fields
+from rotor.requests.fill import Entries, NamedError, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
@@ -147,14 +147,13 @@ class MeasuredLines(SubjectKind):
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The files of the lines, and the starting top."""
         lines: LinesInput = read_instance(LinesInput, entries)
-        called = {name: field.called(entries.style) for name, field in LINES.items()}
         if lines.source is None:
-            raise ValueError(f"{called['source']} is missing; expected measured lines: .lin, .csv, .cat or case.par")
+            raise NamedError("{lines.source} is missing; expected measured lines: .lin, .csv, .cat or case.par")
         is_file = isinstance(lines.source, str)
         is_par = is_file and lines.source.lower().endswith(".par")
         if lines.lin is not None and not is_par:
-            raise ValueError(f"{called['lin']}: expected with a .par file; otherwise give the lines as the source")
-        paths = {name: _path(getattr(lines, name), called[name], place) for name in LINES}
+            raise NamedError("{lin}: expected with a .par file; otherwise give the lines as the source")
+        paths = {name: _path(getattr(lines, name), field.called(entries.style), place) for name, field in LINES.items()}
         values: dict[str, Any] = {
             "paths": paths,
             "inputs": read_instance(FitInput, entries),
@@ -197,8 +196,8 @@ def _refuse_start(entries: Entries, verb: Verb) -> None:
         field for field in verb.fields.values() if field.table in ("molecule", "parameters") and entries.has(field)
     ]
     if others:
-        names = ", ".join(field.called(entries.style) for field in others)
-        raise ValueError(f"{names}: a .par file states the free parameters and the start")
+        names = ", ".join(f"{{{field.identity}}}" for field in others)
+        raise NamedError(f"{names}: a .par file states the free parameters and the start")
 
 
 def _start(entries: Entries) -> MoleculeInput:
@@ -207,12 +206,10 @@ def _start(entries: Entries) -> MoleculeInput:
     if (molecule.source is None) == (molecule.constants is None):
         if entries.style == "key" and molecule.source is None:
             raise ValueError("molecule: expected the starting constants, as source or constants")
-        names = [field.called(entries.style) for field in (START, FIELDS["constants"])]
-        raise ValueError(f"expected the starting constants; give either {names[0]} or {names[1]}")
+        raise NamedError("expected the starting constants; give either {start} or {constants}")
     if molecule.source is not None and str(molecule.source).lower().endswith((".csv", ".lin")):
-        raise ValueError(
-            f"{START.called(entries.style)} {molecule.source}: a list of lines has no constants; give a .toml, .var or the name of a "
-            "molecule"
+        raise NamedError(
+            f"{{start}} {molecule.source}: a list of lines has no constants; give a .toml, .var or the name of a molecule"
         )
     return molecule
 
@@ -240,7 +237,7 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> FitRequest:
         try:
             request = with_more_lines(request, paths["merge"])
         except ValueError as error:
-            raise ValueError(f"{LINES['merge'].called(entries.style)}: {error}") from None
+            raise NamedError(f"{{merge}}: {error}") from None
     settings = {item.name for item in fields(request.options)}
     changes = {name: value for name, value in vars(inputs).items() if name in settings and value is not None}
     return replace(request, options=replace(request.options, **changes))

@@ -85,12 +85,8 @@ class MoleculeOrFile(OneMolecule):
                     f"{_FILE_ALONE[name]}: expected with an .int file, which SPCAT reads with the .var beside it"
                 )
             return super().read(entries, place, verb)
-
-        def called(identity: str) -> str:
-            return verb.fields[identity].called(entries.style)
-
         path = str(Path(place.folder) / str(source)) if entries.style == "key" else str(source)
-        prediction = int_files.predicted(path, entries, called, place.note, **basis)
+        prediction = int_files.predicted(path, entries, place.note, **basis)
         return Subject({"prediction": prediction, "source": path, **basis}, (), str(source), place.note)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:

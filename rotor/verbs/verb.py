@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.reports.screen import Part, json_text, json_with_rows, plain
 from rotor.requests.field import Field, all_fields, declared
-from rotor.requests.fill import Entries, called, read_fields, read_instance, renaming, written_fields
+from rotor.requests.fill import Entries, called, naming, read_fields, read_instance, renaming, written_fields
 from rotor.requests.readers import Flag
 from rotor.table import Table
 from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
@@ -360,12 +360,13 @@ class Verb:
             {name: value for name, value in entries.values.items() if name not in self.subject.fields}, entries.style
         )
         check_early(self.request, early)
-        subject = self.subject.read(entries, place, self)
-        with called(self.request, entries.style):
-            if self.build is not None:
-                return self.build(self, entries, subject), subject
-            values = read_fields(self.request, entries, subject)
-            return self.request(**subject.values, **values), subject
+        with naming(self.fields.values(), entries.style):
+            subject = self.subject.read(entries, place, self)
+            with called(self.request, entries.style):
+                if self.build is not None:
+                    return self.build(self, entries, subject), subject
+                values = read_fields(self.request, entries, subject)
+                return self.request(**subject.values, **values), subject
 
     def naming(self, style: str) -> AbstractContextManager[None]:
         """Context in which a ValueError that names a field of the request names its key or its option."""
