@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Part, record_table, show_parts
-from rotor.requests.field import REQUIRED, check_fields, declared
+from rotor.requests.field import REQUIRED, declared
 from rotor.requests.readers import Quantity, Text
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import PICTURES, Output, Report, Work
@@ -36,9 +36,6 @@ class AccuracyRequest:
         Quantity("s", above=0, metavar="S"),
         "Processor time for all sweeps together; settings beyond it are left out",
     )
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, check_fields, declared
+from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Flag, Names, Quantity, Text, Whole
 from rotor.verbs.observed_file import PANEL
 from rotor.verbs.tool import Tool
@@ -57,9 +57,6 @@ class ViewRequest:
     )
     port: int = declared(0, Whole(0, 65535), "Port on this machine; 0 takes a free port", panel=OUTPUT)
     no_browser: bool = declared(False, Flag(), "Print the address; open no browser", panel=OUTPUT)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)

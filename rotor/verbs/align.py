@@ -12,7 +12,7 @@ from rotor.reports.screen import Part, record_table
 from rotor.requests.field import CONDITIONS, REQUIRED, all_fields
 from rotor.requests.fill import Entries, NamedError, read_fields
 from rotor.table import counted
-from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
+from rotor.verbs.molecule import NUCLEI, REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Report, Subject, Verb, picture, tables
 
@@ -206,7 +206,7 @@ VERB = Verb(
         *tables("the cosines", "out"),
         picture("Draw the cosines", "out.png"),
     ),
-    subject=OneMolecule(("dipole", "calculator", "hessian", "spin_constants", "spins", *STATES), prepare),
+    subject=OneMolecule(("dipole", *REFINEMENT, *NUCLEI, *STATES), prepare),
     drawn="ps",
     scaled=False,
     workers="blocks of initial states",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
+from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import INFINITE, Flag, Names, Quantity, Range, Text, Whole
 
 if TYPE_CHECKING:
@@ -60,7 +60,6 @@ class CatRequest:
 
     def __post_init__(self) -> None:
         """Check that options of a predicted molecule or of an .int file have such a file or molecule."""
-        check_fields(self)
         other = (self.compare or "").lower()
         for name in ("as_spcat", "full_basis"):
             if getattr(self, name) and not other.endswith(".int"):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
+from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
 from rotor.table import Table as Columns
 from rotor.verbs.tool import Tool
@@ -51,7 +51,6 @@ class CatalogueRequest:
     )
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if self.action == ADD and not self.words:
             raise ValueError("add: expected files, folders or 'library', such as 'rotor catalogue add cdms/ library'")
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Part
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import OUTPUT, REQUIRED, check_fields, declared
+from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Text, Whole
 from rotor.tops.facts import top_facts
 from rotor.verbs.molecule import refuse_weights_of_another_kind
@@ -37,9 +37,6 @@ class ConvertRequest:
 
     source: str = declared(REQUIRED, Text(), "File (.par, .var, .int, .toml, ...) or name", option="SOURCE")
     kmax: int = declared(99, Whole(0, 359), "Highest K of a .par or .var (KNMAX), highest F of an .int", panel=OUTPUT)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 @dataclass(frozen=True)

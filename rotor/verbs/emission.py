@@ -52,7 +52,6 @@ Examples:
   rotor emission --fit spectrum.fits CH3OH CH3CN --catalogue lines.rotorcat --shared velocity,width
   rotor emission --fit cube.fits CH3CN --catalogue lines.rotorcat --maps maps.fits --workers 2"""
 _SINGLE_ONLY = ("isotopes", "spin_constants", "spins", *STATES)  # inputs that need a single molecule
-_CONDITIONS = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")  # that may differ between molecules
 
 
 @dataclass(frozen=True)
@@ -89,27 +88,19 @@ class SeveralMolecules(SubjectKind):
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read all molecules and their inputs."""
-        tables = self._tables(entries)
+        inputs, departures = zip(*self._tables(entries), strict=True)
         molecules: list[Top | CatalogueLines] = []
-        inputs, departures = [], []
-        for number, (molecule, emitter) in enumerate(tables):
+        for number, (molecule, stated) in enumerate(zip(inputs, departures, strict=True)):
             try:
-                molecules.append(
-                    _molecule(Reading(molecule, entries.style, place.folder, place.note), emitter.partition)
-                )
+                reading = Reading(molecule, entries.style, place.folder, place.note)
+                molecules.append(_molecule(reading, stated.get("partition")))
             except ValueError as error:
                 raise ValueError(f"molecules[{number}]: {error}" if entries.style == "key" else str(error)) from None
-            inputs.append(molecule)
-            values = {name: getattr(emitter, name) for name in _CONDITIONS}
-            stated = (
-                {name: value for name, value in values.items() if value is not None} if entries.style == "key" else {}
-            )
-            departures.append(stated if emitter.partition is None else {**stated, "partition": emitter.partition})
-        text = " ".join(str(molecule_input.source or molecule_input.constants) for molecule_input in inputs)
-        return Subject({"molecules": tuple(molecules)}, tuple(inputs), text, place.note, tuple(departures))
+        text = " ".join(str(molecule.source or molecule.constants) for molecule in inputs)
+        return Subject({"molecules": tuple(molecules)}, inputs, text, place.note, departures)
 
-    def _tables(self, entries: Entries) -> list[tuple[MoleculeInput, EmitterInput]]:
-        """The inputs of each molecule."""
+    def _tables(self, entries: Entries) -> list[tuple[MoleculeInput, Mapping[str, Any]]]:
+        """The inputs of each molecule, and those in which its gas departs from the conditions."""
         if entries.style == "key":
             tables = entries.values.get("molecules", ())
             if not tables:
@@ -127,7 +118,7 @@ class SeveralMolecules(SubjectKind):
         return [
             (
                 read_molecule(Entries({**values, "molecule.source": source}, entries.style)),
-                EmitterInput(partition=several.partition if is_catalogue(source) else None),
+                {"partition": several.partition} if is_catalogue(source) and several.partition else {},
             )
             for source in several.names
         ]
@@ -170,13 +161,14 @@ def emitting_molecule() -> Any:
     return defined("EmittingMolecule", entries_of(fields), "A molecule of the source.")
 
 
-def _read_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, EmitterInput]:
+def _read_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, Mapping[str, Any]]:
     names = {field.key for field in all_fields(EmitterInput).values()}
     values = {f"molecule.{name}": value for name, value in table.items() if name not in names}
     emitter: EmitterInput = read_instance(
         EmitterInput, Entries({name: table[name] for name in names & table.keys()}, "key")
     )
-    return read_molecule(Entries(values, "key")), emitter
+    departures = {name: value for name, value in vars(emitter).items() if value is not None}
+    return read_molecule(Entries(values, "key")), departures
 
 
 def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:

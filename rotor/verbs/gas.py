@@ -14,7 +14,7 @@ from rotor.reports.progress import counting
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.fill import Entries
 from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
-from rotor.verbs.molecule import STATES
+from rotor.verbs.molecule import NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Report, Verb, Work, picture, tables
 
@@ -112,19 +112,7 @@ VERB = Verb(
         *tables("the correlation functions", "out"),
         picture("Draw the test and the functions", "out.png"),
     ),
-    subject=OneMolecule(
-        (
-            "polarizability",
-            "anisotropy",
-            "spin_weights",
-            "spin_constants",
-            "spins",
-            *STATES,
-            "calculator",
-            "hessian",
-            "symmetry_tolerance",
-        )
-    ),
+    subject=OneMolecule((*POLARIZABILITY, "spin_weights", *NUCLEI, *STATES, *REFINEMENT, "symmetry_tolerance")),
     stated=("source", "temperature_k", "molecules", "seed", "vector_source", "tensor_source"),
     drawn="ps",
     scaled=False,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, identical, part
+from rotor.requests.field import CONDITIONS, REQUIRED, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
 from rotor.table import counted
 from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
@@ -62,7 +62,6 @@ class IdentifyRequest:
     spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if not self.catalogue:
             raise ValueError(
                 "catalogue: expected a local catalogue ('rotor catalogue add'), a folder of .cat files, or a .cat file"

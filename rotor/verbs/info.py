@@ -14,6 +14,7 @@ from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_in
 from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
+from rotor.verbs.molecule import POLARIZABILITY
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Report, Subject, Verb, Work, tables
 
@@ -216,7 +217,7 @@ VERB = Verb(
     records=lambda answer: None,
     show=show,
     outputs=(*tables("the table of Q(T)", "q"),),
-    subject=OneMolecule(("polarizability", "anisotropy", "internal_rotation")),
+    subject=OneMolecule((*POLARIZABILITY, "internal_rotation")),
     build=build,
     drawn=None,
     accuracy="of the rotational constants",

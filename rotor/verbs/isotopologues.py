@@ -10,7 +10,7 @@ from rotor.reports.top_facts import error_facts, is_estimated_dipole, known_digi
 from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.isotopes.isotopologues import Isotopologue
 from rotor.tops.top import Top
-from rotor.verbs.molecule import STATES
+from rotor.verbs.molecule import POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import ErrorsShown, Report, Verb, tables
 
@@ -96,8 +96,7 @@ VERB = Verb(
         *tables("the isotopologues", "family"),
     ),
     subject=OneMolecule(
-        ("constants", "isotopes", "polarizability", "anisotropy", "spin_weights", *STATES, "internal_rotation", "calculator", "hessian",
-         "symmetry_tolerance"),
+        ("constants", "isotopes", *POLARIZABILITY, "spin_weights", *STATES, "internal_rotation", *REFINEMENT, "symmetry_tolerance"),
     ),
     shown=ErrorsShown,
     accuracy="of the rotational constants",

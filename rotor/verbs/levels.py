@@ -14,6 +14,7 @@ from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Text, Whole, whole_range
+from rotor.verbs.molecule import DIPOLE, POLARIZABILITY
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Output, Report, Shown, Verb, draw_answer, picture, tables
 
@@ -140,7 +141,7 @@ VERB = Verb(
         Output("egy", (".egy",), "Write all levels as SPCAT's list (.egy)", example="levels.egy"),
         picture("Draw the term diagram", "levels.png", draw),
     ),
-    subject=OneMolecule(("dipole", "dipole_abc", "polarizability", "anisotropy", "state_dipoles")),
+    subject=OneMolecule((*DIPOLE, *POLARIZABILITY, "state_dipoles")),
     shown=LevelsShown,
     notes=lambda answer: answer.warnings,
     nothing=lambda answer: "" if len(answer.table) else "no level in this range",

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 USUAL_LEAST_MHZ = 100.0  # largest constant below which a missing unit gives a note
 STATES = ("state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names")
+DIPOLE, POLARIZABILITY = ("dipole", "dipole_abc"), ("polarizability", "anisotropy")
+NUCLEI, REFINEMENT = ("spin_constants", "spins"), ("calculator", "hessian")
 _GEOMETRY = {
     "isotopes": "bare constants have no atoms; give the constants of the isotopologue itself",
     "calculator": "bare constants have no geometry to refine; give a molecule",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rotor.requests.field import all_fields, check_fields, declared, declared_fields, identical, part
+from rotor.requests.field import all_fields, declared, declared_fields, identical, part
 from rotor.requests.readers import INFINITE, NameList, Quantity, Text, Whole
 from rotor.spectra.emission_request import LayerInput, WindowInput
 from rotor.verbs.observed_file import PANEL, SeveralInput, SpectrumFile, padded, species_of
@@ -81,7 +81,6 @@ class ObservedRequest:
         return self.sources.names
 
     def __post_init__(self) -> None:
-        check_fields(self)
         if self.over is not None and self.fit is not None:
             raise ValueError("--over, --fit: both name a spectrum; give one of them (a fit also shows the model)")
         declared_here, file = declared_fields(ObservedRequest), all_fields(SpectrumFile).values()

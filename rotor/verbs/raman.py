@@ -13,7 +13,7 @@ from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OUTPUT, declared
 from rotor.requests.readers import Whole
 from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
-from rotor.verbs.molecule import with_known_polarizability
+from rotor.verbs.molecule import DIPOLE, REFINEMENT, with_known_polarizability
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Report, Shown, Verb, picture, tables
 
@@ -116,7 +116,7 @@ VERB = Verb(
         picture("Draw the lines", "lines.png"),
     ),
     subject=OneMolecule(
-        ("dipole", "dipole_abc", "anisotropy", "state_dipoles", "calculator", "hessian"),
+        (*DIPOLE, "anisotropy", "state_dipoles", *REFINEMENT),
         lambda top, reading, entries: with_known_polarizability(top, reading),
     ),
     shown=RamanShown,

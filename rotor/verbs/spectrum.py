@@ -18,7 +18,7 @@ from rotor.requests.readers import Custom, Flag, Quantity, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.verbs import int_files
 from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_json
-from rotor.verbs.molecule import range_without_unit, with_some_dipole
+from rotor.verbs.molecule import POLARIZABILITY, range_without_unit, with_some_dipole
 from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work, draw_answer, picture
@@ -327,9 +327,7 @@ VERB = Verb(
             scene=False,
         ),
     ),
-    subject=MoleculeOrFile(
-        ("polarizability", "anisotropy"), lambda top, reading, entries: with_some_dipole(top, reading)
-    ),
+    subject=MoleculeOrFile(POLARIZABILITY, lambda top, reading, entries: with_some_dipole(top, reading)),
     shown=SpectrumShown,
     content=content,
     notes=lambda answer: answer.notes,

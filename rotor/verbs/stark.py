@@ -16,7 +16,7 @@ from rotor.requests.field import declared_fields
 from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.table import counted
-from rotor.verbs.molecule import STATES, Reading, with_known_polarizability, with_some_dipole
+from rotor.verbs.molecule import REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, picture, tables
 
@@ -149,7 +149,7 @@ VERB = Verb(
         _further("mixture", "means of the thermal mixture against the field"),
         _further("deflection", "effective dipoles, one column for each state,"),
     ),
-    subject=OneMolecule(("anisotropy", "spin_weights", "calculator", "hessian", *STATES), prepare),
+    subject=OneMolecule(("anisotropy", "spin_weights", *REFINEMENT, *STATES), prepare),
     shown=StarkShown,
     stated=("dipole_abc_debye",),
     drawn="kV/cm",

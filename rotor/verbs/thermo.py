@@ -11,6 +11,7 @@ from rotor.reports.progress import sum_progress
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import CONDITIONS
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
+from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Report, Verb, Work, picture, tables
 
@@ -153,9 +154,7 @@ VERB = Verb(
         *tables("the table", "out"),
         picture("Draw the heat capacity", "out.png"),
     ),
-    subject=OneMolecule(
-        ("dipole", "dipole_abc", "polarizability", "anisotropy", "state_dipoles", "calculator", "hessian")
-    ),
+    subject=OneMolecule((*DIPOLE, *POLARIZABILITY, "state_dipoles", *REFINEMENT)),
     drawn="K",
     extras=(
         Extra(

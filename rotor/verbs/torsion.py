@@ -13,6 +13,7 @@ from rotor.reports import top_facts
 from rotor.reports.progress import progress_bar
 from rotor.reports.screen import Part, Table, record_table, rows_of
 from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
+from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Output, Report, Shown, Verb, Work, picture
 
@@ -173,9 +174,7 @@ VERB = Verb(
         picture("Draw potential, levels and wave functions", "torsion.png"),
     ),
     subject=OneMolecule(
-        ("constants", "dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "spin_constants", "spins",
-         "state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names", "hessian", "internal_rotation",
-         "symmetry_tolerance"),
+        ("constants", *DIPOLE, *POLARIZABILITY, "spin_weights", *NUCLEI, *STATES, "hessian", "internal_rotation", "symmetry_tolerance"),
     ),
     content=content,
     notes=lambda answer: answer.warnings,

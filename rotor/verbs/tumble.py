@@ -11,7 +11,7 @@ from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.verbs.body_inputs import MotionInput
-from rotor.verbs.molecule import STATES
+from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.turning_body import TurningBody, build
 from rotor.verbs.verb import Output, Report, Verb, draw_answer, picture, tables
 
@@ -272,8 +272,7 @@ VERB = Verb(
         Output("gif", (".gif", ".mp4"), "Animate the motion (.gif; .mp4 with ffmpeg)", film, "tumble.gif"),
     ),
     subject=TurningBody(
-        ("dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "spin_constants", "spins", *STATES,
-         "internal_rotation", "calculator", "hessian", "symmetry_tolerance"),
+        (*DIPOLE, *POLARIZABILITY, "spin_weights", *NUCLEI, *STATES, "internal_rotation", *REFINEMENT, "symmetry_tolerance"),
     ),
     drawn=None,
     stated=("source", "units", "moments", "angular_momentum", "angular_momentum_source", "effects", "method"),

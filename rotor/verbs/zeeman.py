@@ -14,7 +14,7 @@ from rotor.requests.field import CONDITIONS, declared, names_of
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Numbers
 from rotor.table import counted
-from rotor.verbs.molecule import STATES, Reading
+from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Report, Verb, picture, tables
 
@@ -112,7 +112,7 @@ VERB = Verb(
         picture("Draw the map", "out.png"),
     ),
     subject=OneMolecule(
-        ("dipole", "dipole_abc", "polarizability", "anisotropy", "spin_weights", "calculator", "hessian", *STATES),
+        (*DIPOLE, *POLARIZABILITY, "spin_weights", *REFINEMENT, *STATES),
         with_tensors,
         MagneticInput,
     ),
