@@ -19,7 +19,7 @@ Accuracy = str | float | TotalAccuracy | None
 
 @dataclass(frozen=True)
 class Reached:
-    """The accuracy that was asked for and the error reached, in `unit`. how: the settings chosen for it."""
+    """The requested accuracy and the error that was reached, in `unit`. how: the chosen settings."""
 
     asked: float
     error: float

@@ -1,1 +1,1 @@
-"""What the verbs share: inputs, outputs, reports."""
+"""Parts of all commands: options, files, reports."""

@@ -1,4 +1,4 @@
-"""Commands of typer that pass texts on as they are, and examples folded for a terminal."""
+"""Commands of typer that leave texts unconverted, and examples folded for a terminal."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer.core
 
 
 def folded(examples: str, width: int = 76) -> str:
-    """Examples with commands that are longer than a line continued on the next one, as a shell takes them.
+    """Examples in which long commands continue on the next line, as a shell reads them.
 
     >>> print(folded("  rotor levels water --jmax 4 --plot terms.png", width=30))
       rotor levels water \\
@@ -37,7 +37,7 @@ def _folded_line(line: str, width: int) -> str:
 
 
 class PlainCommand(typer.core.TyperCommand):
-    """A command that passes texts on as they are; the readers of declared fields make numbers of them.
+    """A command that leaves texts unconverted; readers of declared fields make numbers of them.
 
     Typer's own conversion loads pydantic, which takes as long as numpy.
     """
@@ -47,7 +47,7 @@ class PlainCommand(typer.core.TyperCommand):
         return [_unconverted(parameter) for parameter in super().get_params(ctx)]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """The arguments, refused where an option that has one value is given twice: none is dropped silently."""
+        """The arguments; ValueError for an option with a single value that is given twice."""
         single = {
             text
             for parameter in self.params
@@ -62,7 +62,7 @@ class PlainCommand(typer.core.TyperCommand):
 
 
 class PlainGroup(typer.core.TyperGroup):
-    """The same for what stands before a verb."""
+    """A group of commands that leaves texts unconverted."""
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, --help among them."""

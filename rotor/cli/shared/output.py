@@ -1,4 +1,4 @@
-"""Output: tables for people, JSON for programs, notes, and files that are written all or none."""
+"""Output of a command: notes, JSON, and files that are written together or not at all."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ _HELD = ExitStack()  # locks of the files that the command will write
 
 
 def release_files() -> None:
-    """Give up the locks of the files of a command that has ended."""
+    """Release the locks of the files at the end of a command."""
     _HELD.close()
 
 
 def at_end(done: Callable[[], object]) -> None:
-    """What is done when the command has ended."""
+    """Call a function at the end of the command."""
     _HELD.callback(done)
 
 
 @contextmanager
 def answering() -> Iterator[None]:
-    """Inside, a ValueError is no longer the user's mistake: what was given has been checked before."""
+    """Context in which a ValueError is no mistake of the user, whose input has been checked: it becomes a NoAnswerError."""
     try:
         yield
     except ValueError as error:
@@ -40,15 +40,15 @@ def answering() -> Iterator[None]:
 
 
 def note(text: str) -> None:
-    """A line on standard error that the user must not miss."""
+    """Print a remark on standard error."""
     print("note:", text, file=sys.stderr)
 
 
 @dataclass(frozen=True)
 class Files:
-    """Files asked for, by the name of the output: checked before any work is done, written together after all of it.
+    """Requested files by the name of the output: checked before the work, written together after it.
 
-    flags: their options. growing: outputs that are written during the work. on_screen: whether the JSON goes to standard output.
+    flags: their options. growing: outputs that are written during the work. on_screen: outputs that go to standard output.
     """
 
     paths: dict[str, tuple[Path, ...]] = field(default_factory=dict)
@@ -58,7 +58,7 @@ class Files:
 
     @property
     def names(self) -> list[str]:
-        """The paths written, as texts; those written during the work first."""
+        """The paths as texts; those of growing files first."""
         ordered = sorted(self.paths, key=lambda name: name not in self.growing)
         return [str(path) for name in ordered for path in self.paths[name]]
 
@@ -68,14 +68,14 @@ class Files:
         return [name for name in self.paths if name not in self.growing]
 
     def ask_json(self, path: str | None) -> None:
-        """Remember where the JSON goes: to a file, to standard output (`-`), or nowhere."""
+        """Add the JSON: to a file, or to standard output (`-`)."""
         if path == "-":
             self.on_screen.add("json")
         else:
             self.ask("json", "--json", path, (".json",))
 
     def ask(self, name: str, option: str, path: str | None, suffixes: Sequence[str]) -> None:
-        """Remember a file to write; ValueError for a suffix that the option does not write, or no folder to write in."""
+        """Add a file; ValueError for a suffix that the option does not write, and for a folder that is missing or closed."""
         if path is None:
             return
         target = Path(path)
@@ -95,9 +95,9 @@ class Files:
         self.flags[name] = option
 
     def write(self, writers: Mapping[str, Writer]) -> list[str]:
-        """Make every file in a folder beside its place by the writer of its output, then rename: all appear, or none.
+        """Write all files into folders beside their places, then rename them: all appear, or none.
 
-        Returns why files are left out whose format cannot hold the result.
+        Returns the reasons for files that are left out because their format cannot hold the result.
         """
         from rotor.formats.atomic_write import FULL, DoesNotFitError, naming, place, unfinished_folder
 
@@ -118,9 +118,9 @@ class Files:
                 except DoesNotFitError as error:
                     left_out.append(f"{option}: {target} is not written: {error}")
                     continue
-                moves += [(made, target.parent / made.name) for made in sorted(folder.iterdir())]
-            for made, path in moves:
-                place(made, path)
+                moves += [(file, target.parent / file.name) for file in sorted(folder.iterdir())]
+            for file, path in moves:
+                place(file, path)
         return left_out
 
 
@@ -134,7 +134,7 @@ def _resolved(option: str, path: Path) -> Path:
 
 
 def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str], show: Callable[[], None]) -> None:
-    """Write all files, the JSON among them, then print the JSON where it was asked for, else what `show` prints.
+    """Write all files, the JSON among them, then print the JSON if requested, else the report by `show`.
 
     Raises NoAnswerError at the end for files whose format cannot hold the result.
     """
@@ -148,5 +148,5 @@ def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str]
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write text as UTF-8 with plain line ends."""
+    """Write text as UTF-8 with line feeds."""
     path.write_text(text, encoding="utf-8", newline="\n")

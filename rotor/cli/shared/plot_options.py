@@ -18,7 +18,7 @@ UNITS = ("MHz", "GHz", "THz", "cm-1")
 
 
 def picture_fields(unit: str = "") -> dict[str, Field]:
-    """The options of a picture, by name; unit: of its horizontal axis."""
+    """The options of a picture by name. unit: of its horizontal axis."""
     formula = Custom(lambda text: text.replace("$", r"\$"))  # matplotlib takes dollar signs for formulas
     log = Custom(lambda text: Text(("linear", "log")).read(text) == "log", metavar="NAME")
     rows: tuple[tuple[str, Reader, str], ...] = (
@@ -36,7 +36,7 @@ PLOT_NAMES = tuple(picture_fields())
 
 
 def picture_settings(verb: Verb, typed: Mapping[str, Any], drawn: bool) -> Any:
-    """The view of a verb's picture from what was typed; drawn: whether there is a picture. Settings by name of a spectrum."""
+    """The view of a verb's picture from the typed options; for a spectrum, settings by name. drawn: whether there is a picture."""
     across, unit = ("range_mhz", "MHz") if verb.spectral else ("horizontal", verb.drawn or "")
     fields = {name: field for name, field in picture_fields(unit).items() if name in typed}
     if fields and not drawn:
@@ -52,7 +52,7 @@ def picture_settings(verb: Verb, typed: Mapping[str, Any], drawn: bool) -> Any:
 
 @contextmanager
 def picture_style(typed: Mapping[str, Any]) -> Iterator[None]:
-    """Inside, pictures have the style that --style names; ValueError where there is none of that name. Without it, no matplotlib."""
+    """Context in which pictures have the style of --style; ValueError for an unknown one. Without the option, matplotlib is not loaded."""
     with ExitStack() as stack:
         if "style" in typed:
             from rotor.plots.picture import users_style

@@ -1,4 +1,4 @@
-"""What a command may do only where the whole process is its own, not where another program calls `rotor.cli.run`."""
+"""Settings of the process, made only by the console script, not if another program calls `rotor.cli.run`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ALLOCATIONS = 50_000  # objects between two searches for cycles; Python's 700 t
 
 
 def begin() -> None:
-    """The process is that of the command. Until the work begins nothing is looked for that is no longer used: modules stay."""
+    """Mark the process as that of the command. Garbage collection waits until the work begins: modules stay loaded."""
     global _OWN
     _OWN = True
     gc.disable()
@@ -23,9 +23,9 @@ def begin() -> None:
 
 
 def _open_missing_streams() -> None:
-    """A standard stream that was closed before the start is the null device.
+    """Open the null device for standard streams that were closed before the start.
 
-    Otherwise the next file that is opened would take its number, and what is printed would go there or fail.
+    Otherwise the next opened file would take their numbers, and output would go into it or fail.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):  # in the order of their numbers
         if getattr(sys, name) is None:
@@ -33,7 +33,7 @@ def _open_missing_streams() -> None:
 
 
 def begin_work() -> None:
-    """What is loaded stays; from here on memory that is no longer used is found again."""
+    """Exempt loaded modules from garbage collection, and start it."""
     if _OWN:
         gc.freeze()
         gc.set_threshold(_ALLOCATIONS)
@@ -41,10 +41,10 @@ def begin_work() -> None:
 
 
 def end(code: int) -> NoReturn:
-    """The process ends with this exit code, without taking modules and arrays apart one by one, which takes 0.02 to 0.04 s.
+    """End the process with this exit code, without the release of modules and arrays, which takes 0.02 to 0.04 s.
 
-    What was registered for the end runs, and what was printed is written. Where threads still run, or a debugger, a profiler or a
-    measurement of coverage looks on, Python ends as always.
+    Functions registered with atexit run, and output is flushed. With running threads, a debugger, a profiler or a measurement of
+    coverage, Python ends as usual.
     """
     if not _OWN or threading.active_count() > 1 or sys.gettrace() is not None or sys.getprofile() is not None:
         sys.exit(code)
@@ -56,9 +56,9 @@ def end(code: int) -> NoReturn:
 
 
 def leave_compiler_out() -> None:
-    """For short work: kernels run as the plain Python that they are written in; compiling them would take seconds, once.
+    """Run kernels as plain Python: for short work, compiling them would take seconds.
 
-    Numba reads its variable when it is loaded; where it is already there, or the process is another program's, nothing changes.
+    Numba reads its variable when it is loaded. No effect if it is loaded already, or in the process of another program.
     """
     if _OWN and "numba" not in sys.modules:
         os.environ["NUMBA_DISABLE_JIT"] = "1"
@@ -68,10 +68,10 @@ _ONE_THREAD_TO = 100  # the highest J up to which it was measured that one threa
 
 
 def one_thread_of_blas(jmax: int | None = None) -> None:
-    """For small blocks: OpenBLAS takes one thread, as several only wait for each other, on a busy machine for ten times as long.
+    """Limit OpenBLAS to one thread: for small blocks several wait for each other, on a busy machine ten times as long.
 
-    OpenBLAS reads its variable when numpy is loaded; where it is already there, the user has set the variable, J goes beyond 100, or the
-    process is another program's, nothing changes.
+    OpenBLAS reads its variable when numpy is loaded. No effect if numpy is loaded already, if the user has set the variable, for J
+    beyond 100, or in the process of another program.
     """
     if _OWN and "numpy" not in sys.modules and (jmax is None or jmax <= _ONE_THREAD_TO):
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

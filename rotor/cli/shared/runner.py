@@ -1,4 +1,4 @@
-"""The one course of every verb on the command line: read, check, answer, then files, JSON and the report."""
+"""The runner of all verbs on the command line: read, check, answer, then files, JSON and the report."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ if TYPE_CHECKING:
 
 
 def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
-    """Carry out a verb with the texts that were typed, by identity."""
+    """Carry out a verb. typed: texts of the options by identity."""
     verb = verb.verb_for(typed.keys())
-    there = {name: typed[name] for name in typed.keys() & places_of(verb)}
-    inputs = {name: value for name, value in typed.items() if name not in there}
-    entries, there = Entries(with_extras(verb, inputs), "option"), with_files(verb, there)
+    inputs = {name: value for name, value in typed.items() if name not in places_of(verb)}
+    entries = Entries(with_extras(verb, inputs), "option")
+    places = with_files(verb, {name: value for name, value in typed.items() if name not in inputs})
     shown = verb.read_shown(entries)
-    with as_typed(verb, there):
-        files = files_of_options(verb, there)
+    with as_typed(verb, places):
+        files = files_of_options(verb, places)
         if files.paths:
             refuse_overwriting(files, inputs)
-    view = picture_settings(verb, there, "plot" in files.paths)
+    view = picture_settings(verb, places, "plot" in files.paths)
     request, subject = verb.read(entries, Place(".", note))
-    if missing := next((output.flag for output in verb.outputs if output.required and output.name not in there), ""):
+    if missing := next((output.flag for output in verb.outputs if output.required and output.name not in places), ""):
         raise ValueError(f"{missing} is missing; --help shows what the command takes")
     outputs = {**files.paths}
     request = request if verb.adapt is None else verb.adapt(request, outputs, entries)
@@ -49,7 +49,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         process.leave_compiler_out()
     process.begin_work()
     head = {"command": str(context.obj), "input": subject.text}
-    with picture_style(there), working(verb, there.get("workers", 1)) as executor:
+    with picture_style(places), working(verb, places.get("workers", 1)) as executor:
         with answering() if verb.sound else verb.naming("option"):
             work = Work(executor, shown, outputs, note, True, head, view, at_end)
             with nullcontext() if verb.stepwise else elapsed_time("computing"):
@@ -63,7 +63,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         report.content["files"] = files.names  # type: ignore[index]
         writers = files_of(verb, answer, report)
         if "save_scene" in files.paths:
-            named = {name: there[name] for name in files.paths}
+            named = {name: places[name] for name in files.paths}
             writers["save_scene"] = scene_writer(verb, request, subject, entries, named)
         show = partial(show_answer, verb, answer, report)
         with verb.naming("option"):
@@ -73,7 +73,7 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
 
 
 def show_answer(verb: Verb, answer: Any, report: Report) -> None:
-    """The report of a verb and the files written, with the table of errors where it is requested."""
+    """Print the report of a verb and its files, with the table of errors if requested."""
     parts = [*verb.show(answer, report)]
     if report.content.get("files") and not verb.lists_files:
         parts.append([("files", ", ".join(report.content["files"]))])
@@ -85,13 +85,13 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
 
 
 def places_of(verb: Verb) -> set[str]:
-    """The options that say where results go, not what is computed: files, pictures, processes."""
+    """The options of files, pictures and processes, which do not change the results."""
     files = {each.name for each in verb.outputs} | {each.option for each in verb.extras if each.files is not None}
     return files | ({"json", "save_scene", "workers", *PLOT_NAMES} - verb.fields.keys())
 
 
 def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
-    """The texts, options that stand for several files replaced by these."""
+    """The texts by output; options that name several files are replaced by these files."""
     files: dict[str, Any] = {}
     for extra in verb.extras:
         if extra.files is not None and extra.option in typed:
@@ -101,7 +101,7 @@ def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
 
 @contextmanager
 def as_typed(verb: Verb, typed: Mapping[str, Any]) -> Iterator[None]:
-    """Inside, a ValueError about a file of an option that stands for several files names that option."""
+    """Context in which a ValueError about a file names the option that was typed, which may stand for several files."""
     try:
         yield
     except ValueError as error:
@@ -117,7 +117,7 @@ def as_typed(verb: Verb, typed: Mapping[str, Any]) -> Iterator[None]:
 
 
 def withhold(verb: Verb, answer: Any, files: Files) -> None:
-    """Leave out the files that are not written, with a note."""
+    """Leave out the withheld files, with a note."""
     reasons: dict[str, list[str]] = {}
     for name, reason in verb.withheld(answer, files.pending).items():
         reasons.setdefault(reason, []).extend(path.name for path in files.paths.pop(name))
@@ -126,7 +126,7 @@ def withhold(verb: Verb, answer: Any, files: Files) -> None:
 
 
 def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
-    """The texts of inputs alone, options that stand for others replaced by what they mean."""
+    """The texts of inputs; options that set several fields are replaced by these fields."""
     values = {name: value for name, value in typed.items() if name in verb.fields}
     for extra in verb.extras:
         if extra.option not in typed or extra.read is None:
@@ -145,7 +145,7 @@ def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def files_of_options(verb: Verb, typed: Mapping[str, Any]) -> Files:
-    """The files to write, each with a suffix that can be written."""
+    """The files to write; ValueError for a suffix or folder in which they cannot be written."""
     files = Files(growing={output.name for output in verb.outputs if output.grows})
     for output in verb.outputs:
         paths = typed.get(output.name, ())
@@ -157,10 +157,7 @@ def files_of_options(verb: Verb, typed: Mapping[str, Any]) -> Files:
 
 
 def refuse_overwriting(files: Files, typed: Mapping[str, Any]) -> None:
-    """ValueError where a file to write is a file that another option, or the source, names as what is read.
-
-    typed: everything that may name a file that is read.
-    """
+    """Raise ValueError if a file to write is an input. typed: texts that may name files to read."""
     texts = [text for value in typed.values() for text in (value if isinstance(value, tuple) else (value,))]
     inputs = {os.path.realpath(text) for text in texts if isinstance(text, str) and is_file(text)}
     for name, paths in files.paths.items():
@@ -170,14 +167,14 @@ def refuse_overwriting(files: Files, typed: Mapping[str, Any]) -> None:
 
 
 def refuse_nothing_to_draw(verb: Verb, answer: Any, files: Files) -> None:
-    """NoAnswerError where a picture or a profile is asked for and there is nothing to show in it."""
+    """Raise NoAnswerError for a picture or profile without content."""
     drawn = [name for name in ("plot", "profile_csv") if name in files.paths]
     if drawn and (reason := verb.nothing(answer)):
         raise NoAnswerError(f"{files.flags[drawn[0]]}: {reason}")
 
 
 def working(verb: Verb, workers: Any) -> Any:
-    """The executor that --workers asks for; None of a verb that has no such option."""
+    """The executor of --workers; None for a verb without this option."""
     if not verb.workers:
         return nullcontext()
     from rotor.cli.shared.workers import working as pool
@@ -192,7 +189,7 @@ def working(verb: Verb, workers: Any) -> Any:
 
 
 def scene_writer(verb: Verb, request: Any, subject: Subject, entries: Entries, typed: Mapping[str, Any]) -> Any:
-    """What writes the scene that gives the same tables again; a note names files that a scene does not write."""
+    """A function that writes the scene of the command; a note names files that a scene does not write."""
     outputs = {output.name: typed[output.name] for output in verb.outputs if output.scene and output.name in typed}
     if left := [output.flag for output in verb.outputs if not output.scene and output.name in typed]:
         note(f"the scene writes no {', '.join(left)}; its other files are those of this command")

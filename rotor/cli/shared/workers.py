@@ -1,4 +1,4 @@
-"""`--workers`: processes over which a verb spreads its pieces, and the bar on a terminal that says how many are done."""
+"""`--workers`: processes that share the pieces of a verb, and a bar of finished pieces on a terminal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MOST_WORKERS = 256
 
 @contextmanager
 def working(workers: int, what: str) -> Iterator[Executor | None]:
-    """An executor with a bar on standard error, or None where there is one worker and no terminal.
+    """An executor with a bar on standard error; None for one worker without a terminal.
 
     Raises ValueError for fewer than one worker, and for more than 256.
     """
@@ -39,7 +39,7 @@ def _nothing() -> Iterator[None]:
 
 
 class Counted(Executor):
-    """An executor, or this process where it is None, that reports after each piece of a `map` how many are done."""
+    """An executor, or this process if it is None, that reports the number of finished pieces of a `map`."""
 
     def __init__(self, pool: Executor | None, advance: Callable[[int, int], object] | None) -> None:
         self._pool, self._advance = pool, advance

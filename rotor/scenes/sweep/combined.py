@@ -1,8 +1,8 @@
 """A Parquet or CSV file with the rows of all points, each row with the values of its point.
 
-Rows of a finished point wait in a file of their own in the folder NAME.points; at the end they are joined with what the file
-has already, in the order of the points. The column `point` says to which point of the record a row belongs, so that points which
-are done are not computed again, and rows of points that the sweep has no more are left out.
+The rows of each finished point are stored in the folder NAME.points. At the end they are joined with the rows of the existing file, in
+the order of the points. The column `point` holds the key of the point: finished points are not computed again, and rows of points that
+the sweep no longer has are left out.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ if TYPE_CHECKING:
 
 KEY_LENGTH = 16  # hexadecimal digits of a point's key in its rows: two of a million points agree in 1 of 4e7 sweeps
 MEMORY_MB = 300  # for the sort; more goes to files
-SMALL_ROWS = 5_000  # of a point, up to which its rows wait as an array: DuckDB takes 20 ms for a file, numpy 0.2
+SMALL_ROWS = 5_000  # of a point whose rows are stored as an array: DuckDB takes 20 ms for a file, numpy 0.2
 BATCH_ROWS, BATCH_FILES = 100_000, 2_000  # of small files that are joined at once
 _SMALL, _LARGE = ".npy", ".parquet"
 _FORMAT = (3, 0)  # of numpy's files: names of columns are UTF-8
 
 
 def point_columns(values: Mapping[str, Any], table: Table) -> dict[str, Any]:
-    """Columns of the swept values, by the last part of their names where that is free, before those of a table."""
+    """Columns of the swept values, then those of a table. A swept value has the last part of its name if no other column has it."""
     from rotor.scenes.sweep.points import cell
 
-    own = dict(table.columns)
+    columns = dict(table.columns)
     short = [name.rpartition(".")[2] for name in values]
     out = {}
     for name, key in zip(values, short, strict=True):
-        free = short.count(key) == 1 and key not in own and key != "point"
+        free = short.count(key) == 1 and key not in columns and key != "point"
         out[key if free else name] = np.full(len(table), cell(values[name]))
-    return out | own
+    return out | columns
 
 
 class CombinedFile:
-    """The file of all points: what it has, where rows of finished points wait, and how they are joined.
+    """The file with the rows of all points.
 
-    targets: the same rows in one or several files; what is done stands in the first.
+    targets: one or several files with the same rows; the first is read to find the finished points.
     """
 
     def __init__(self, targets: Sequence[Path]) -> None:
@@ -58,7 +58,7 @@ class CombinedFile:
         return cls([Path(out) / name for name in names]) if names else None
 
     def keys(self) -> set[str]:
-        """The points whose rows are there, in the file or waiting; none of a file that is no table of points."""
+        """Keys of the points whose rows are stored, in the file or in the folder."""
         return self._waiting().keys() | self._joined()
 
     def _waiting(self) -> dict[str, Path]:
@@ -72,7 +72,7 @@ class CombinedFile:
             return set()
         import duckdb
 
-        with duckdb.connect() as engine, suppress(duckdb.Error):  # not such a file, or without the column: written anew
+        with duckdb.connect() as engine, suppress(duckdb.Error):  # not a table of points: it is replaced
             rows = engine.execute(f"SELECT DISTINCT point FROM {_table_of(first)}").fetchall()
             return {str(key) for (key,) in rows}
         return set()
@@ -82,11 +82,11 @@ class CombinedFile:
         import duckdb  # noqa: F401
 
     def open_folder(self) -> None:
-        """Make the folder in which rows wait."""
+        """Make the folder of the rows of finished points."""
         os.makedirs(self.folder, exist_ok=True)
 
     def write_part(self, key: str, values: Mapping[str, Any], table: Table) -> None:
-        """Write the rows of a finished point to where they wait."""
+        """Store the rows of a finished point in the folder."""
         from rotor.formats.tables import copy_columns
 
         columns = {"point": np.full(len(table), key[:KEY_LENGTH])} | point_columns(values, table)
@@ -101,7 +101,7 @@ class CombinedFile:
         os.replace(unfinished, path)
 
     def join(self, keys: Sequence[str], provenance: str) -> None:
-        """Write the files: the rows of the points with these keys, in their order; the folder is removed."""
+        """Write the files with the rows of these points, in this order, and remove the folder."""
         import duckdb
 
         from rotor.formats.atomic_write import atomic_path
@@ -136,7 +136,7 @@ class CombinedFile:
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _large_files(self, paths: Iterable[Path]) -> tuple[dict[str, Any] | None, list[str]]:
-        """The columns of many small files, and the other files; further batches of small ones are files of their own."""
+        """The columns of a first batch of small files, and the other files; further batches become files."""
         from rotor.formats.tables import copy_columns
 
         place = self.folder / "joined"

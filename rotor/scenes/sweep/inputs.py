@@ -1,7 +1,7 @@
-"""What a point is computed from besides its scene: the contents of every file that enters, as hashes.
+"""Hashes of the files that a point reads besides its scene.
 
-Files that enter are those that a scene names, the library's file of a molecule that it names, and what stands beside those:
-the .var of an .int, the table of levels of a molecule file.
+These are the files that a scene names, the library's file of a molecule that it names, and files beside those: the .var of an .int, the
+table of levels of a molecule file.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from rotor.molecules.readers.sdf_entries import entry_bytes, entry_of
 from rotor.scenes.scene import within
 from rotor.version import version
 
-_WRITTEN = ("outputs", "title", "sweep")  # tables and texts of a scene that name nothing that is read
+_WRITTEN = ("outputs", "title", "sweep")  # parts of a scene that name no input
 _MOLECULE_KEYS = ("molecule", "source")
 _SPCAT = (".par", ".var", ".int", ".lin")  # files of one case, read together
 
@@ -32,18 +32,18 @@ class InputHashes:
         self._of_file: dict[Path, str] = {}
 
     def key(self, content: Mapping[str, Any], values: Mapping[str, Any]) -> str:
-        """What a point depends on: its values, the tables of its scene, the files that it reads, the version of the package."""
+        """Hash of a point: its values, the tables of its scene, the files that it reads, and the version of the package."""
         parts = [version(), values, content, self.of(content)]
         return hashlib.sha256(json.dumps(parts, sort_keys=True, ensure_ascii=False, default=str).encode()).hexdigest()
 
     def of(self, content: Mapping[str, Any]) -> dict[str, str]:
-        """The hash of every file that a scene reads, by the name under which it is found."""
-        found: dict[str, str] = {}
+        """Hashes of the files that a scene reads, by name."""
+        hashes: dict[str, str] = {}
         for key, word in _texts({name: value for name, value in content.items() if name not in _WRITTEN}):
             if (key, word) not in self._of_word:
                 self._of_word[key, word] = dict(self._files(key, word))
-            found |= self._of_word[key, word]
-        return found
+            hashes |= self._of_word[key, word]
+        return hashes
 
     def _files(self, key: str, word: str) -> Iterator[tuple[str, str]]:
         entry = entry_of(within(self._folder, word))
@@ -73,7 +73,7 @@ class InputHashes:
 
 
 def _texts(content: Any, key: str = "") -> Iterator[tuple[str, str]]:
-    """Every text in tables and lists, with the key under which it stands."""
+    """All texts in tables and lists, each with its key."""
     if isinstance(content, str):
         yield key, content
     elif isinstance(content, Mapping):
@@ -85,7 +85,7 @@ def _texts(content: Any, key: str = "") -> Iterator[tuple[str, str]]:
 
 
 def _read_together(path: Path) -> Iterator[Path]:
-    """A file and those that are read with it."""
+    """A file and the files that are read with it."""
     yield path
     suffix = path.suffix.lower()
     if suffix in _SPCAT:

@@ -1,4 +1,4 @@
-"""Lists of molecules: an SDF file of several, or a CSV file with a column of SMILES or of names."""
+"""Lists of molecules: an SDF file with several, or a CSV file with a column of SMILES or names."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SMILES_COLUMNS, MOLECULE_COLUMNS, NAME_COLUMNS = ("smiles",), ("molecule", "sour
 
 @dataclass(frozen=True)
 class Entry:
-    """One molecule of a list. source: what reads it, as the molecule of a scene. name: what tables and files call it."""
+    """A molecule of a list. source: as the molecule of a scene. name: in tables and files."""
 
     source: str
     name: str
@@ -30,18 +30,18 @@ def is_list(source: str, folder: str | os.PathLike[str]) -> bool:
 
 
 def list_entries(source: str, folder: str | os.PathLike[str]) -> list[Entry]:
-    """The molecules of a list that is a file in a folder.
+    """The molecules of a list, a file in a folder.
 
-    Raises ValueError for a CSV file without a column of molecules, or without a row.
+    Raises ValueError for a CSV file without a column of molecules or without rows.
     """
     path = Path(within(folder, source))
     if path.suffix.lower() == ".csv":
-        return _of_csv(path)
+        return _csv_entries(path)
     names = entry_names(path)
     return [Entry(f"{source}#{n}", name or f"{path.stem}_{n}") for n, name in enumerate(names, 1)]
 
 
-def _of_csv(path: Path) -> list[Entry]:
+def _csv_entries(path: Path) -> list[Entry]:
     try:
         with open(path, encoding="utf-8-sig", newline="") as handle:
             rows = [row for row in csv.reader(handle) if any(cell.strip() for cell in row)]

@@ -1,6 +1,6 @@
-"""The points of a sweep: every combination of the swept values, each a scene of its own.
+"""The points of a sweep: all combinations of the swept values, each with its scene.
 
-Points are made when they are needed: a sweep over ten thousand molecules holds their names, not their scenes.
+Scenes are made when they are needed: a sweep over ten thousand molecules holds only their names.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ from rotor.scenes.sweep.molecule_list import is_list, list_entries
 
 _NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
 _PLACE = re.compile(r"\{([^{}]*)\}")
-JOINED = ("parquet", "csv")  # outputs that have the rows of all points where their names have no swept key
+JOINED = ("parquet", "csv")  # outputs that hold the rows of all points if their names have no swept key
 _MOLECULE = ("molecule", "molecule.source")  # swept names whose values may be lists of molecules
 
 
 @dataclass(frozen=True)
 class Axis:
-    """The values of one swept name. shown: what tables show for each. words: what file names show, no two of them equal."""
+    """The values of a swept name. shown: values in tables. words: distinct texts in file names."""
 
     name: str
     values: tuple[Any, ...]
@@ -45,26 +45,26 @@ class Axis:
 
     @property
     def key(self) -> str:
-        """The last part of the name, which stands in braces in the names of files."""
+        """The last part of the name, which file names have in braces."""
         return self.name.rpartition(".")[2]
 
 
 @dataclass(frozen=True)
 class Point:
-    """One point of a sweep: the values by dotted name, and the tables of its scene."""
+    """A point of a sweep: its values by dotted name, and the tables of its scene."""
 
     values: Mapping[str, Any]
     content: Mapping[str, Any]
 
     @property
     def scene(self) -> Scene:
-        """The scene of this point; ValueError where it cannot be."""
+        """The scene of this point; ValueError for invalid values."""
         return scene_of(self.content, f"sweep {text_of(self.values)}")
 
 
 @dataclass(frozen=True)
 class Points:
-    """All points of a sweep, made in order. combined: the files for the rows of all points, by their output."""
+    """All points of a sweep in order. combined: files for the rows of all points, by output."""
 
     axes: tuple[Axis, ...]
     base: Mapping[str, Any]
@@ -92,13 +92,13 @@ class Points:
         return itertools.product(*(range(len(axis.values)) for axis in self.axes))
 
     def _words(self, indices: tuple[int, ...]) -> dict[str, str]:
-        """What stands in the names of files for each key in braces; a key of two swept names is left out."""
+        """Texts for the keys in braces of file names; a key of two swept names is left out."""
         keys = [axis.key for axis in self.axes]
         pairs = zip(self.axes, indices, strict=True)
         return {axis.key: axis.words[i] for axis, i in pairs if keys.count(axis.key) == 1}
 
     def refuse_equal_names(self) -> None:
-        """ValueError where two points would write one file."""
+        """Raise ValueError if two points would write the same file."""
         seen: set[str] = set()
         patterns = list(_output_names(self.base.get("outputs", {}), self.base["kind"]))
         for indices in self._indices():
@@ -114,26 +114,26 @@ class Points:
 
 
 def is_sweep(scene: Scene, folder: str | os.PathLike[str] = ".") -> bool:
-    """Whether a scene has several points: swept values, or a list of molecules in place of one."""
+    """Whether a scene has several points: swept values, or a list of molecules as its molecule."""
     return bool(scene.sweep) or _listed(scene, folder) is not None
 
 
 def _listed(scene: Scene, folder: str | os.PathLike[str]) -> str | None:
-    """The list of molecules that stands in place of the molecule of a scene."""
+    """The list of molecules that a scene names as its molecule; None for a single molecule."""
     molecule = getattr(scene, "molecule", None)
     source = molecule if isinstance(molecule, str) else getattr(molecule, "source", None)
     return source if source is not None and is_list(source, folder) else None
 
 
 def points(scene: Scene, folder: str | os.PathLike[str] = ".") -> Points:
-    """Every combination of the values of a sweep, the last name running fastest.
+    """All combinations of the values of a sweep; the last name varies fastest.
 
     Parameters
     ----------
     scene : Scene
         With a sweep, or with a list of molecules (an SDF file of several, a CSV file) as its molecule.
     folder : path
-        From which the files that the scene reads are counted.
+        Folder of the files that the scene reads.
 
     Returns
     -------
@@ -143,8 +143,7 @@ def points(scene: Scene, folder: str | os.PathLike[str] = ".") -> Points:
     Raises
     ------
     ValueError
-        For a name without values, for braces in the name of a file that no swept name fills, and where two points would write
-        one file.
+        For a name without values, for braces in a file name without a swept name, and for two points that would write the same file.
 
     Examples
     --------
@@ -161,9 +160,9 @@ def points(scene: Scene, folder: str | os.PathLike[str] = ".") -> Points:
         swept = {"molecule.source" if isinstance(content["molecule"], dict) else "molecule": [whole]} | swept
     axes = tuple(_axis(name, values, folder) for name, values in swept.items())
     combined = _combined(content.get("outputs", {}), axes)
-    made = Points(axes, content, combined)
-    made.refuse_equal_names()
-    return made
+    sweep = Points(axes, content, combined)
+    sweep.refuse_equal_names()
+    return sweep
 
 
 def _axis(name: str, values: list[Any], folder: str | os.PathLike[str]) -> Axis:
@@ -189,7 +188,7 @@ def _axis(name: str, values: list[Any], folder: str | os.PathLike[str]) -> Axis:
 
 
 def _combined(outputs: dict[str, Any], axes: tuple[Axis, ...]) -> dict[str, str]:
-    """The names of the files of all points, taken out of the outputs of each; none where each point has its own."""
+    """Remove the files for the rows of all points from the outputs, and return their names by output."""
     if math.prod(len(axis.values) for axis in axes) == 1:
         return {}
     names = [name for name in JOINED if isinstance(outputs.get(name), str) and not _PLACE.search(outputs[name])]
@@ -203,7 +202,7 @@ def _output_names(outputs: Mapping[str, Any], kind: str) -> Iterator[str]:
 
 
 def numbered(texts: Iterable[str]) -> Iterator[str]:
-    """The texts, those that were there before with a number: a, b, a is a, b, a_2.
+    """The texts, with a number added to repeated ones.
 
     >>> list(numbered(["a", "b", "a", "a_2"]))
     ['a', 'b', 'a_2', 'a_2_2']
@@ -219,7 +218,7 @@ def numbered(texts: Iterable[str]) -> Iterator[str]:
 
 
 def named(text: str, words: Mapping[str, str]) -> str:
-    """A name of a file with its keys in braces filled: plain keys alone, {temperature} for conditions.temperature.
+    """A file name with its keys in braces filled, such as {temperature} for conditions.temperature.
 
     >>> named("{molecule}_{jmax}.csv", {"molecule": "CO", "jmax": "3"})
     'CO_3.csv'
@@ -238,7 +237,7 @@ def named(text: str, words: Mapping[str, str]) -> str:
 
 
 def put(content: dict[str, Any], name: str, value: Any) -> None:
-    """Put a value at a dotted name; the molecule's word becomes a table where one of its keys is meant."""
+    """Set the value of a dotted name; for a key of the molecule, its name becomes a table."""
     *path, last = name.split(".")
     table = content
     for part in path:
@@ -251,7 +250,7 @@ def put(content: dict[str, Any], name: str, value: Any) -> None:
 
 
 def check_first(points: Points, out: str | os.PathLike[str]) -> None:
-    """Check what all points share: the swept names, the folders and suffixes of the files that are written."""
+    """Check what all points have in common: swept names, and folders and suffixes of the outputs."""
     first = next(iter(points))
     checked_paths(first.scene, out)
     for name, text in points.combined.items():

@@ -1,4 +1,4 @@
-"""The record of a sweep: one line of JSON for each point that was run, appended as soon as it is done."""
+"""The record of a sweep: a line of JSON for each finished point, appended at once."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 Record = Mapping[str, Any]
-_CUT_OFF = '{"key"'  # how a line begins that a stop has cut off
+_CUT_OFF = '{"key"'  # start of a line that a stop has cut off
 
 
 def read_records(path: str | os.PathLike[str] | None) -> dict[str, Record]:
-    """What was run, by key, the last of several lines of one key; a line that a stop cut off is left out.
+    """The records of a file by key; of several lines with a key, the last. A line cut off by a stop is left out.
 
-    Raises ValueError, with file and line, for anything else that is no record of a point.
+    Raises ValueError, with file and line, for any other line.
     """
     if path is None or not Path(path).exists():
         return {}
@@ -33,22 +33,24 @@ def read_records(path: str | os.PathLike[str] | None) -> dict[str, Record]:
 
 
 def _record(line: str, where: str) -> Record | None:
-    """The record on a line; None for an empty line, and for one that was cut off."""
+    """The record on a line; None for an empty line or one that was cut off."""
     if not line.strip():
         return None
     try:
-        made = json.loads(line)
+        content = json.loads(line)
     except (json.JSONDecodeError, RecursionError):
         if line.startswith(_CUT_OFF) or _CUT_OFF.startswith(line.strip()):
             return None
         raise ValueError(
             f"{where}: {_short(line)}: is no record of a sweep; remove the line, or give another file"
         ) from None
-    if isinstance(made, dict) and isinstance(made.get("key"), str) and isinstance(made.get("values"), dict):
-        done = isinstance(made.get("files"), list) and all(isinstance(file, str) for file in made["files"])
-        numbers = all(isinstance(made.get(name), int | float) for name in ("rows", "seconds"))
-        if isinstance(made.get("error"), str) or (done and numbers and isinstance(made.get("results", {}), dict)):
-            return made
+    if isinstance(content, dict) and isinstance(content.get("key"), str) and isinstance(content.get("values"), dict):
+        files = isinstance(content.get("files"), list) and all(isinstance(file, str) for file in content["files"])
+        numbers = all(isinstance(content.get(name), int | float) for name in ("rows", "seconds"))
+        if isinstance(content.get("error"), str) or (
+            files and numbers and isinstance(content.get("results", {}), dict)
+        ):
+            return content
     raise ValueError(
         f"{where}: {_short(line)}: expected the record of a point: key, values, rows, seconds, files, results, or error; "
         "remove the line, or give another file"
@@ -62,7 +64,7 @@ def _short(line: str) -> str:
 
 @contextmanager
 def appended(path: str | os.PathLike[str] | None) -> Iterator[Callable[[Record], None]]:
-    """A function that appends a record as a line, written out at once; one that does nothing without a path."""
+    """A function that appends a record as a line and flushes it; without a path, it does nothing."""
     if path is None:
         yield lambda _: None
         return

@@ -1,4 +1,4 @@
-"""What came of a sweep: a row for each point, with its values and its results."""
+"""The result of a sweep: a row for each point, with its values and results."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ from rotor.table import Table
 
 @dataclass(frozen=True, repr=False)
 class SweepResult(Table):
-    """A sweep that was run: a row for each point. computed: how many points were run now; the others were done before. combined: the
-    files with the rows of all points."""
+    """A finished sweep, with a row for each point.
+
+    computed: number of points of this run; the others are from earlier runs. combined: files with the rows of all points.
+    """
 
     records: tuple[Mapping[str, Any], ...]
     computed: int
@@ -25,12 +27,12 @@ class SweepResult(Table):
 
     @property
     def failed(self) -> tuple[Mapping[str, Any], ...]:
-        """The records of the points that failed, each with its reason under "error"."""
+        """The records of failed points, with the reason under "error"."""
         return tuple(record for record in self.records if "error" in record)
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:
-        """The swept values, rows, seconds, every result, and the reasons of points that failed; NaN where a point has no such number."""
+        """The swept values, rows, seconds, results (NaN if a point lacks one), and the reasons of failed points."""
         first = self.records[0]["values"] if self.records else {}
         out = {name: np.array([cell(record["values"][name]) for record in self.records]) for name in first}
         out["rows"] = np.array([record.get("rows", 0) for record in self.records])
@@ -42,6 +44,6 @@ class SweepResult(Table):
 
     @property
     def files(self) -> tuple[str, ...]:
-        """All files of all points, and the files of all points."""
+        """The files of each point, then those with the rows of all points."""
         single = [file for record in self.records for file in record.get("files", ())]
         return (*single, *map(str, self.combined))

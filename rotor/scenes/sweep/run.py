@@ -1,4 +1,4 @@
-"""A sweep run: every point that is not done, spread over an executor, each recorded as soon as it is done or has failed."""
+"""Run a sweep: unfinished points are spread over an executor, and each is recorded once it has finished or failed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from rotor.scenes.sweep.result import SweepResult
 from rotor.temporary import locked_file
 from rotor.verbs.verb import verb_of
 
-AHEAD = 200  # points that are submitted before they are begun, so that workers never wait and memory stays bounded
+AHEAD = 200  # submitted points that have not begun: workers never wait, and memory stays bounded
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,10 @@ def run_sweep(
     on_point: Callable[[Record], None] = lambda _: None,
     progress: Callable[[int, int], object] = lambda done, total: None,
 ) -> SweepResult:
-    """Run every point of a sweep that the record has not yet; a point that fails is recorded with its reason, the others run.
+    """Run the unfinished points of a sweep. A point that fails is recorded with its reason, and the others run.
 
-    A point is done where the record has its key, a hash of its scene, of the content of every file that it reads, and of the
-    version of the package, and where its files are there.
+    A point is finished if the record has its key (a hash of its scene, of the contents of the files that it reads, and of the version
+    of the package) and its files exist.
 
     Parameters
     ----------
@@ -62,17 +62,17 @@ def run_sweep(
         With a sweep, or with a list of molecules as its molecule. Rows of all points go into one file where outputs.parquet or
         outputs.csv is a name without a swept key in braces.
     folder, out : path
-        From which the files that are read, and those that are written, are counted.
+        Folders of the files that are read and of those that are written.
     record : path, optional
-        A file with one line for each point that was run; no other run may use it meanwhile.
+        A file with a line for each finished point; locked during the run.
     executor : Executor, optional
-        Points are spread over it: `rotor.scenes.worker_processes.WorkerProcesses`, or any other.
+        Shares the points: `rotor.scenes.worker_processes.WorkerProcesses`, or any other.
     retry_failed : bool, optional
-        Run points again that the record has as failed.
+        Run failed points of the record again.
     on_point : callable
-        Called with the record of each point when it is done.
+        Called with the record of each finished point.
     progress : callable
-        Called with the number of points that are done, and of all.
+        Called with the numbers of finished points and of all points.
 
     Returns
     -------
@@ -82,66 +82,66 @@ def run_sweep(
     Raises
     ------
     ValueError
-        What no point could be: swept names that the scene has not, files that cannot be written; before any is run.
+        Before any point runs: for swept names that the scene does not have, and files that cannot be written.
     """
-    every = points(scene, folder)
-    check_first(every, out)
-    joined = CombinedFile.of(tuple(every.combined.values()), out)
+    sweep = points(scene, folder)
+    check_first(sweep, out)
+    joined = CombinedFile.of(tuple(sweep.combined.values()), out)
     finished = 0
     with ExitStack() as stack:
         for path in (record, *(() if joined is None else joined.targets)):
             if path is not None:
                 stack.enter_context(locked_file(path))
         done = dict(read_records(record))
-        there = None if joined is None else joined.keys()
+        joined_keys = None if joined is None else joined.keys()
         keys: list[str] = []
 
         def missing() -> Iterator[Job]:
             nonlocal finished
             hashes = InputHashes(folder)
-            for point in every:
+            for point in sweep:
                 key = hashes.key(point.content, point.values)
                 keys.append(key)
-                if _stands(done.get(key), retry_failed, there):
+                if _is_finished(done.get(key), retry_failed, joined_keys):
                     finished += 1
-                    progress(finished, len(every))
+                    progress(finished, len(sweep))
                 else:
-                    yield Job(key, point, os.fspath(folder), os.fspath(out), tuple(every.combined.values()))
+                    yield Job(key, point, os.fspath(folder), os.fspath(out), tuple(sweep.combined.values()))
             if joined is not None and executor is not None:  # while others compute
                 joined.load()
 
         if joined is not None:
             joined.open_folder()
         append, computed = stack.enter_context(appended(record)), 0
-        for made in _computed(missing(), executor):
-            done[made["key"]] = made
-            append(made)
+        for result in _computed(missing(), executor):
+            done[result["key"]] = result
+            append(result)
             computed, finished = computed + 1, finished + 1
-            on_point(made)
-            progress(finished, len(every))
+            on_point(result)
+            progress(finished, len(sweep))
         if joined is not None:
             joined.join([key for key in keys if "error" not in done[key]], scene_text(scene))
     combined = () if joined is None else tuple(target.resolve() for target in joined.targets)
     return SweepResult(tuple(done[key] for key in keys), computed, combined)
 
 
-def _stands(made: Record | None, retry_failed: bool, there: set[str] | None) -> bool:
-    """Whether a point need not be run: it failed before, or its files, and its rows in the file of all points, are there."""
-    if made is None:
+def _is_finished(record: Record | None, retry_failed: bool, joined_keys: set[str] | None) -> bool:
+    """Whether a point is not run again: it failed before, or its files and its rows in the file of all points exist."""
+    if record is None:
         return False
-    if "error" in made:
+    if "error" in record:
         return not retry_failed
-    rows = there is None or made["key"][:KEY_LENGTH] in there
-    return rows and all(Path(file).is_file() for file in made["files"])
+    has_rows = joined_keys is None or record["key"][:KEY_LENGTH] in joined_keys
+    return has_rows and all(Path(file).is_file() for file in record["files"])
 
 
 def _computed(jobs: Iterable[Job], executor: Executor | None) -> Iterator[Record]:
-    """The records of all jobs, as they are done."""
+    """The records of all jobs, in the order in which they finish."""
     if executor is None:
         yield from map(run_point, jobs)
         return
     waiting: dict[Future[Record], Job] = {}
-    done: SimpleQueue[Future[Record]] = SimpleQueue()  # asking all that wait which of them is done takes 1 ms a point
+    done: SimpleQueue[Future[Record]] = SimpleQueue()  # a search among all waiting futures takes 1 ms a point
     try:
         for job in jobs:
             future = executor.submit(run_point, job)
@@ -157,10 +157,10 @@ def _computed(jobs: Iterable[Job], executor: Executor | None) -> Iterator[Record
 
 
 def _record_of(future: Future[Record], job: Job) -> Record:
-    """The record of a job whose future is done."""
+    """The record of a finished job."""
     try:
         return future.result()
-    except (BrokenExecutor, CancelledError):  # nothing more can be submitted
+    except (BrokenExecutor, CancelledError):  # no further job can be submitted
         raise
     except OSError as error:  # a disk that is full, see run_point
         raise OSError(error.errno, error.strerror, error.filename) from error
@@ -169,9 +169,9 @@ def _record_of(future: Future[Record], job: Job) -> Record:
 
 
 def run_point(job: Job) -> Record:
-    """Run one point; what the record says of it, its error where it fails.
+    """Run a point and return its record, with the error if it fails.
 
-    Raises OSError where a disk is full: then no other point can be written either.
+    Raises OSError if the disk is full: then no other point can be written either.
     """
     start = time.perf_counter()
     try:
