@@ -11,7 +11,7 @@ request, the names in errors, and the reference page. A field that is made from 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from dataclasses import field as dataclass_field
 from functools import cache
@@ -214,6 +214,13 @@ def check_fields(request: Any) -> None:
     structure: Any = type(request)
     for name, field in declared_fields(structure).items():
         field.check(getattr(request, name))
+
+
+def changed_fields(instance: Any, names: Iterable[str] = ()) -> list[Field]:
+    """The declared fields of a dataclass, all or those with these names, that differ from their defaults."""
+    structure: Any = type(instance)
+    fields = declared_fields(structure)
+    return [fields[name] for name in names or fields if getattr(instance, name) != fields[name].default]
 
 
 def names_of(structure: Any, style: str) -> dict[str, str]:

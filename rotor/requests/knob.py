@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rotor.requests.field import Field, all_fields, declared_fields
+from rotor.requests.field import Field, all_fields, changed_fields
 
 NOTHING_CHEAPER = "exact: nothing cheaper"
 LOOSEST = ", nothing cheaper: the loosest there is"
@@ -197,11 +197,8 @@ def in_words(key: str) -> str:
 
 def refuse_set(request: Any, *names: str) -> None:
     """Raise ValueError if a field that the accuracy chooses was also set."""
-    structure: Any = type(request)
-    fields = declared_fields(structure)
-    for name in names:
-        if getattr(request, name) != fields[name].default:
-            raise ValueError(f"accuracy and {fields[name].key}: give one of them")
+    for field in changed_fields(request, names):
+        raise ValueError(f"accuracy and {field.key}: give one of them")
 
 
 def knobs_of_fields(request: Any) -> Iterator[tuple[Field, Knob]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rotor.requests.field import OUTPUT, REQUIRED, declared
+from rotor.requests.field import OUTPUT, REQUIRED, changed_fields, declared
 from rotor.requests.readers import INFINITE, Flag, Names, Quantity, Range, Text, Whole
 
 if TYPE_CHECKING:
@@ -61,12 +61,12 @@ class CatRequest:
     def __post_init__(self) -> None:
         """Check that options of a predicted molecule or of an .int file have such a file or molecule."""
         other = (self.compare or "").lower()
-        for name in ("as_spcat", "full_basis"):
-            if getattr(self, name) and not other.endswith(".int"):
-                raise ValueError(f"{name}: expected with --compare and an .int file to predict")
-        for name in ("temperature", "isotope"):
-            if getattr(self, name) and (not other or other.endswith((".cat", ".cat.gz", ".int"))):
-                raise ValueError(f"{name}: expected with --compare and a molecule to predict; a file has its own")
+        if not other.endswith(".int"):
+            for field in changed_fields(self, ("as_spcat", "full_basis")):
+                raise ValueError(f"{field.name}: expected with --compare and an .int file to predict")
+        if not other or other.endswith((".cat", ".cat.gz", ".int")):
+            for field in changed_fields(self, ("temperature", "isotope")):
+                raise ValueError(f"{field.name}: expected with --compare and a molecule to predict; a file has its own")
 
     def chosen(self, lines: Catalogue) -> Catalogue:
         """The lines in the range and above the intensity cut."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
-from rotor.requests.field import all_fields, declared_fields
-from rotor.verbs.observed_file import SpectrumFile
-from rotor.verbs.observed_request import FIT_OPTIONS, ObservedRequest, species_in
+from rotor.requests.field import changed_fields, declared_fields
+from rotor.verbs.observed_request import FIT_OPTIONS, ObservedRequest, each_species, species_in
 
 if TYPE_CHECKING:
     from rotor.observed.gas_cell import CellFit
@@ -21,15 +20,11 @@ _TELESCOPE_FILES = ("diagram", "corner")
 
 def refuse_telescope(request: ObservedRequest, files: Collection[str]) -> None:
     """ValueError for options that a gas cell has no place for."""
-    here, file = declared_fields(ObservedRequest), all_fields(SpectrumFile).values()
-    named = [here[name].flag for name in _TELESCOPE_INPUTS if getattr(request, name) != here[name].default]
-    named += [
-        each.flag for each in file if each.name in _BEAM_INPUTS and getattr(request.spectrum, each.name) is not None
-    ]
-    named += [f"--{name}" for name in _TELESCOPE_FILES if name in files]
-    named += ["--velocity"] if any(request.velocity_km_s or ()) else []
-    if named:
-        raise ValueError(f"{named[0]}: belongs to brightness in K; expected without a spectrum in absorbance")
+    fields = changed_fields(request, _TELESCOPE_INPUTS) + changed_fields(request.spectrum, _BEAM_INPUTS)
+    flags = [field.flag for field in fields] + [f"--{name}" for name in _TELESCOPE_FILES if name in files]
+    flags += ["--velocity"] if any(request.velocity_km_s or ()) else []
+    if flags:
+        raise ValueError(f"{flags[0]}: belongs to brightness in K; expected without a spectrum in absorbance")
 
 
 def cell_fit(spectrum: ObservedSpectrum, request: ObservedRequest, note: Note) -> CellFit:
@@ -39,16 +34,11 @@ def cell_fit(spectrum: ObservedSpectrum, request: ObservedRequest, note: Note) -
     from rotor.observed.gas_cell import fit_cell, start_cell
 
     kelvin, width = _single(request, "excitation_k"), _single(request, "fwhm_km_s")
-    columns = request.column_per_cm2 or ()
     species = species_in(spectrum, request, note)
-    if len(columns) not in (0, 1, len(species)):
-        raise ValueError(
-            f"--column: {len(columns)} numbers for {len(species)} species; expected one for all or one each"
-        )
+    columns = each_species("column_per_cm2", request, len(species))
     start = start_cell(spectrum, species, kelvin, width)
-    if columns:
-        typed = columns * len(species) if len(columns) == 1 else columns
-        start = [replace(each, column_per_cm2=n) for each, n in zip(start, typed, strict=True)]
+    if columns is not None:
+        start = [replace(part, column_per_cm2=column) for part, column in zip(start, columns, strict=True)]
     return fit_cell(spectrum, start)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.reports.screen import Part, record_table
+from rotor.requests.field import changed_fields
 from rotor.requests.readers import INFINITE
 from rotor.verbs.observed_request import ObservedRequest, components_of, fit_choices, sight_of, species_in
 from rotor.verbs.verb import Report, Work
@@ -95,11 +96,9 @@ def refuse(request: ObservedRequest, outputs: Mapping[str, Any], _: Any) -> None
             raise ValueError(
                 f"--{other.replace('_', '-')}: needs a single spectrum; expected without --maps, with --pixel X,Y"
             )
-        file = request.spectrum
-        for flag, typed in (("--pixel", file.pixel), ("--row", file.row), ("--baseline", file.baseline), ("--reject", request.reject),
-                            ("--sample", request.sample or None)):  # fmt: skip
-            if typed is not None:
-                raise ValueError(f"{flag}: needs a single spectrum; expected without --maps")
+        of_file = changed_fields(request.spectrum, ("pixel", "row", "baseline"))
+        for field in (*of_file, *changed_fields(request, ("reject", "sample"))):
+            raise ValueError(f"{field.flag}: needs a single spectrum; expected without --maps")
         return
     if request.mask is not None:
         raise ValueError("--mask: belongs to maps of a cube; expected with --maps FILE")

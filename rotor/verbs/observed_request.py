@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rotor.requests.field import all_fields, declared, declared_fields, identical, part
+from rotor.requests.field import changed_fields, declared, declared_fields, identical, part
 from rotor.requests.readers import INFINITE, NameList, Quantity, Text, Whole
 from rotor.spectra.emission_request import LayerInput, WindowInput
 from rotor.verbs.observed_file import PANEL, SeveralInput, SpectrumFile, padded, species_of
@@ -83,14 +83,12 @@ class ObservedRequest:
     def __post_init__(self) -> None:
         if self.over is not None and self.fit is not None:
             raise ValueError("--over, --fit: both name a spectrum; give one of them (a fit also shows the model)")
-        declared_here, file = declared_fields(ObservedRequest), all_fields(SpectrumFile).values()
-        named = [declared_here[name].flag for name in FIT_OPTIONS if getattr(self, name) != declared_here[name].default]
-        if named and self.fit is None:
-            raise ValueError(f"{named[0]}: belongs to a fit; expected with --fit FILE")
-        named = [field.flag for field in file if getattr(self.spectrum, field.name) != field.default]
+        if self.fit is None:
+            for field in changed_fields(self, FIT_OPTIONS):
+                raise ValueError(f"{field.flag}: belongs to a fit; expected with --fit FILE")
         if self.over is None and self.fit is None:
-            named += [declared_here[name].flag for name in ("catalogue", "mask") if getattr(self, name) is not None]
-            what = named[0] if named else "--maps, --diagram, --corner, --workers"
+            typed = [*changed_fields(self.spectrum), *changed_fields(self, ("catalogue", "mask"))]
+            what = typed[0].flag if typed else "--maps, --diagram, --corner, --workers"
             raise ValueError(f"{what}: belongs to an observed spectrum; expected with --over or --fit")
         if not self.names:
             raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
@@ -124,7 +122,7 @@ def components_of(
     from rotor.observed.start import start_components
 
     count, size = len(species), request.spectrum.size_arcsec
-    typed = {name: _each(name, request, count) for name in FREE.values() if name != "size_arcsec"}
+    typed = {name: each_species(name, request, count) for name in FREE.values() if name != "size_arcsec"}
     if request.fit is None:
         defaults = {name: declared_fields(LayerInput)[name].default * count for name in typed}
         values = {name: numbers or defaults[name] for name, numbers in typed.items()}
@@ -137,7 +135,7 @@ def components_of(
     return [replace(component, **change) for component, change in zip(start, changes, strict=True)]  # type: ignore[arg-type]
 
 
-def _each(name: str, request: ObservedRequest, count: int) -> tuple[float, ...] | None:
+def each_species(name: str, request: ObservedRequest, count: int) -> tuple[float, ...] | None:
     """One number for each species, or one for all."""
     values: tuple[float, ...] | None = getattr(request, name)
     if values is not None and len(values) not in (1, count):

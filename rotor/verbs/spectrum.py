@@ -12,7 +12,7 @@ from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part
 from rotor.reports.spins import hyperfine_lines
-from rotor.requests.field import OBSERVABLES, OUTPUT, declared
+from rotor.requests.field import OBSERVABLES, OUTPUT, changed_fields, declared
 from rotor.requests.fill import Entries, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
@@ -25,7 +25,7 @@ from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Ve
 
 MOST_FACTS_OF_STATES = 10  # in the head of a line list; rotor info shows all
 HITRAN_K = 296.0
-_FILE_ALONE = {"as_spcat": "--as-spcat", "full_basis": "--full-basis"}
+_FILE_ALONE = ("as_spcat", "full_basis")  # options of .int files
 
 EXAMPLES = """\b
 Examples:
@@ -80,10 +80,8 @@ class MoleculeOrFile(OneMolecule):
         shown, source = read_instance(SpectrumShown, entries), entries.values.get("molecule.source")
         basis = {name: getattr(shown, name) for name in _FILE_ALONE}
         if not int_files.is_int_file(source):
-            for name in (name for name, on in basis.items() if on):
-                raise ValueError(
-                    f"{_FILE_ALONE[name]}: expected with an .int file, which SPCAT reads with the .var beside it"
-                )
+            for field in changed_fields(shown, _FILE_ALONE):
+                raise ValueError(f"{field.flag}: expected with an .int file, which SPCAT reads with the .var beside it")
             return super().read(entries, place, verb)
         path = str(Path(place.folder) / str(source)) if entries.style == "key" else str(source)
         prediction = int_files.predicted(path, entries, place.note, **basis)

@@ -12,7 +12,7 @@ from rotor.quantum.fields.stark_request import StarkAnswer, StarkRequest, answer
 from rotor.reports import top_facts
 from rotor.reports.field_maps import accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
 from rotor.reports.screen import Part, Table
-from rotor.requests.field import declared_fields
+from rotor.requests.field import changed_fields
 from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.table import counted
@@ -61,9 +61,9 @@ def prepare(top: Top, reading: Reading, entries: Entries) -> Top:
 def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) -> None:
     """Refuse a picture of a single field, and inputs that no requested file depends on."""
     refuse_picture_of_one_field(request.fields_kv_per_cm, outputs)
-    for name, field in declared_fields(FieldSample).items():
-        files = OUTPUTS_OF_SAMPLE[name]
-        if getattr(shown, name) != field.default and not files & set(outputs):
+    for field in changed_fields(shown, OUTPUTS_OF_SAMPLE):
+        files = OUTPUTS_OF_SAMPLE[field.name]
+        if not files & set(outputs):
             names = " or ".join(f"--{file}" for file in sorted(files))
             raise ValueError(f"{field.option}: does not change the map itself; expected with {names}")
 
