@@ -38,12 +38,11 @@ class Goal:
         """Whether the knob of a field chooses."""
         return self.choose is None and self.knob is None
 
-    def chosen(self, scene: Any, request: Any, accuracy: float, answer: Callable[[Any], Any]) -> Choice | None:
-        """The settings for an accuracy; None if the knob of a field chooses. answer: computes a request."""
+    def chosen(self, scene: Any, request: Any, accuracy: float, answer: Callable[[Any], Any]) -> Choice:
+        """The settings for an accuracy, where no knob of a field chooses. answer: computes a request."""
         if self.choose is not None:
             return self.choose(scene, request, accuracy)
-        if self.knob is None:
-            return None
+        assert self.knob is not None
         error = stated if self.error is numerical_error else self.error
         return self.knob.search("", self.knob.key, request, accuracy, answer, error)
 

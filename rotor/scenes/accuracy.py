@@ -88,8 +88,9 @@ def chosen(scene: Scene, request: Any) -> Choice:
     goal, unit = accuracy_of(scene), unit_of(scene)
     assert goal is not None
     verb = verb_of(scene.kind)
-    if choice := verb.load_numerics().goals[unit].chosen(scene, request, goal, verb.compute):
-        return choice
+    declared = verb.load_numerics().goals[unit]
+    if not declared.by_field:
+        return declared.chosen(scene, request, goal, verb.compute)
     for field, knob in knobs_of_fields(request) if unit != "%" else ():
         if knob.least is not None or knob.tried:
             return knob.choose(field, request, goal, verb.compute)

@@ -285,3 +285,29 @@ def test_files_of_spcat_are_no_scene(call):
     assert code == 2
     assert "a scene cannot hold an .int file" in err
     assert not Path("s.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("style", "text"),
+    [
+        ("option", "--step: expected with --effect, not '{other}'"),
+        ("key", "numerics.step: expected with effects, not '{other}'"),
+        ("name", "step: expected with effects, not '{other}'"),
+    ],
+)
+def test_an_error_names_fields_in_the_style_of_the_user(style, text):
+    from rotor.requests.fill import NamedError, naming, renaming
+    from rotor.verbs.body_inputs import MOTION
+
+    with pytest.raises(ValueError) as error, naming(MOTION.values(), style), renaming({"step": "of other errors"}):
+        raise NamedError("{numerics.step}: expected with {effects}, not '{other}'")
+    assert str(error.value) == text
+
+
+def test_changed_fields_are_those_that_differ_from_their_defaults():
+    from rotor.requests.field import changed_fields
+    from rotor.verbs.cat_request import CatRequest
+
+    request = CatRequest("a.cat", compare="b.int", as_spcat=True, top_lines=20)
+    assert [field.flag for field in changed_fields(request)] == ["FILE", "--compare", "--as-spcat"]
+    assert [field.name for field in changed_fields(request, ("as_spcat", "isotope"))] == ["as_spcat"]

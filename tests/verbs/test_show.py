@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import html
+import inspect
 import json
+import re
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from matplotlib.figure import Figure
 
 import rotor
 from rotor.classical.tumble import TumbleRequest
+from rotor.plots.show import MODULES
 from rotor.plots.spectrum import spectrum_figure
 from rotor.spectra.emission import Source
 from rotor.spectra.emission_request import EmissionRequest
@@ -95,6 +99,29 @@ def test_tops_molecules_and_constants_are_one_line():
     assert repr(rotor.Top.from_constants("B=1 GHz")) == "Top(linear: B 1000 MHz; dipole not known)"
     assert "<td>DJ</td>" in top._repr_html_()
     assert len(repr(rotor.api.SpectrumRequest(top))) < 800
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_a_module_draws_the_classes_that_it_lists(module):
+    picture = import_module(f"rotor.plots.{module}").picture
+    first = next(iter(inspect.signature(picture).parameters.values()))
+    drawn = {name for name in re.findall(r"\w+", first.annotation) if name not in ("Sequence", "Panel")}
+    assert drawn == set(MODULES[module])
+
+
+def test_the_picture_of_an_answer_is_that_of_the_command(call, folder):
+    """Gas: the test and the correlations, with title; heat capacity: a smooth curve from two temperatures."""
+    code, _, err = call("thermo", "CO", "--temperature", "10,300", "--plot", "command.svg")
+    assert code == 0, err
+    rotor.thermo("CO", temperatures_k=(10.0, 300.0)).plot("answer.svg")
+    pictures = [
+        re.sub("<metadata>.*?</metadata>", "", (folder / name).read_text(), flags=re.S)
+        for name in ("command.svg", "answer.svg")
+    ]
+    assert pictures[0] == pictures[1]
+    figure = rotor.gas("CO", molecules=200, seed=1, times_ps=(0.0, 0.1)).plot()
+    assert len(figure.axes) == 2
+    assert figure.get_suptitle() == "carbon monoxide, CO, 300 K, 200 molecules"
 
 
 def test_what_cannot_be_drawn_is_refused(tmp_path):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -29,7 +29,9 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     """Carry out a verb. typed: texts of the options by identity."""
     verb = verb.verb_for(typed.keys())
     inputs = {name: value for name, value in typed.items() if name not in places_of(verb)}
-    entries = Entries(with_extras(verb, inputs), "option")
+    extras = {name: value for name, value in inputs.items() if name not in verb.fields}
+    values = {name: value for name, value in inputs.items() if name not in extras}
+    entries = Entries({**fields_of_extras(verb, extras, inputs.keys()), **values}, "option")
     places = with_files(verb, {name: value for name, value in typed.items() if name not in inputs})
     shown = verb.read_shown(entries)
     with as_typed(verb, places):
@@ -125,23 +127,19 @@ def withhold(verb: Verb, answer: Any, files: Files) -> None:
         note(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not written: {reason}")
 
 
-def with_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
-    """The texts of inputs; options that set several fields are replaced by these fields."""
-    values = {name: value for name, value in typed.items() if name in verb.fields}
+def fields_of_extras(verb: Verb, typed: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
+    """Values by identity from the typed options that set several fields. names: of all typed options."""
+    values: dict[str, Any] = {}
     for extra in verb.extras:
         if extra.option not in typed or extra.read is None:
             continue
-        if double := next((other for other in extra.instead_of if other in typed), None):
+        if double := next((other for other in extra.instead_of if other in names), None):
             raise ValueError(f"{extra.option} and {verb.fields[double].flag}: give one of them")
         try:
-            values = {**extra.read(typed[extra.option]), **values}
+            values |= extra.read(typed[extra.option])
         except ValueError as error:
             raise ValueError(f"{extra.option}: {error}") from None
-    if verb.read_extras is not None:
-        values |= verb.read_extras(
-            {extra.option: typed[extra.option] for extra in verb.extras if extra.option in typed}
-        )
-    return values
+    return values if verb.read_extras is None else {**values, **verb.read_extras(typed)}
 
 
 def files_of_options(verb: Verb, typed: Mapping[str, Any]) -> Files:
