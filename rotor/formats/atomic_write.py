@@ -9,7 +9,7 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -109,21 +109,59 @@ def unfinished_folder(parent: Path) -> AbstractContextManager[Path]:
     return locked_folder(parent, PREFIX)
 
 
-def write_together(writers: Mapping[Path, Callable[[Path], object]]) -> None:
+def check_target(path: Path, suffixes: Sequence[str]) -> Path:
+    """The target of links of a file to write; ValueError for another suffix, a folder, and a folder that is missing or closed.
+
+    >>> check_target(Path("a.txt"), (".csv", ".parquet"))
+    Traceback (most recent call last):
+        ...
+    ValueError: a.txt: the name must end in .csv or .parquet
+    """
+    if not path.name.lower().endswith(tuple(suffixes)):
+        raise ValueError(f"{path}: the name must end in {' or '.join(suffixes)}")
+    target = resolved(path)
+    if path.is_dir():
+        raise ValueError(f"{path}: is a folder; give the name of a file to write")
+    if not path.parent.is_dir():
+        raise ValueError(f"{path}: there is no folder {path.parent}; make it first")
+    if not os.access(path.parent, os.W_OK):
+        raise ValueError(f"{path}: cannot write in {path.parent}: no permission")
+    return target
+
+
+def write_together(
+    writers: Mapping[Path, Callable[[Path], object]], *, called: Callable[[Path], str] = str, leave_out: bool = False
+) -> dict[Path, DoesNotFitError]:
     """Write several files, each by its writer: all appear at the end, with accompanying files, or none.
+
+    called: name of a file in errors. leave_out: whether files whose format cannot hold the result are left out; their errors are returned.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_together({Path(folder) / "a.txt": lambda path: path.write_text("whole")})
     ...     (Path(folder) / "a.txt").read_text()
+    {}
     'whole'
     """
+    left_out: dict[Path, DoesNotFitError] = {}
     with ExitStack() as stack:
         moves: list[tuple[Path, Path]] = []
         for target, write in writers.items():
-            beside = stack.enter_context(unfinished_folder(target.parent))
-            with naming(target):
-                write(beside / target.name)
+            try:
+                beside = stack.enter_context(unfinished_folder(target.parent))
+            except OSError as error:
+                if error.errno in FULL:
+                    raise OSError(error.errno, error.strerror, str(target)) from error
+                raise ValueError(f"{called(target)}: cannot write in {target.parent}: {error.strerror}") from None
+            try:
+                with naming(target):
+                    write(beside / target.name)
+            except DoesNotFitError as error:
+                if not leave_out:
+                    raise
+                left_out[target] = error
+                continue
             moves += [(finished, target.parent / finished.name) for finished in sorted(beside.iterdir())]
         for finished, path in moves:
             place(finished, path)
+    return left_out

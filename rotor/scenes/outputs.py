@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from rotor.formats.atomic_write import check_target
 from rotor.scenes.scene import Scene, within
 from rotor.verbs.verb import verb_of
 
@@ -38,7 +39,7 @@ def checked_paths(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
     targets, suffixes = paths_of(scene, out), suffixes_of(scene.kind)
     for name, paths in targets.items():
         for path in paths:
-            check_path(f"outputs.{name}: {path}", path, suffixes[name])
+            check_path(name, path, suffixes[name])
     resolved = [path.resolve() for paths in targets.values() for path in paths]
     for path in resolved:
         if resolved.count(path) > 1:
@@ -47,13 +48,11 @@ def checked_paths(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
 
 
 def check_path(name: str, path: Path, suffixes: tuple[str, ...]) -> None:
-    """Raise ValueError, with the name, for a wrong suffix, a missing folder, and a file that cannot be written."""
-    if not path.name.lower().endswith(suffixes):
-        raise ValueError(f"{name}: the name must end in {' or '.join(suffixes)}")
-    if not path.parent.is_dir():
-        raise ValueError(f"{name}: there is no folder {path.parent}; make it first")
-    if path.is_dir() or not os.access(path.parent, os.W_OK):
-        raise ValueError(f"{name}: cannot be written; give another name")
+    """Raise ValueError, with the name of the output, for a file that cannot be written."""
+    try:
+        check_target(path, suffixes)
+    except ValueError as error:
+        raise ValueError(f"outputs.{name}: {error}") from None
 
 
 def refuse_outside(scene: Scene, out: Where) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -78,17 +77,14 @@ class Files:
         """Add a file; ValueError for a suffix that the option does not write, and for a folder that is missing or closed."""
         if path is None:
             return
+        from rotor.formats.atomic_write import check_target, resolved
+
         target = Path(path)
-        if not target.name.lower().endswith(tuple(suffixes)):
-            raise ValueError(f"{option} {path}: the name must end in {' or '.join(suffixes)}")
-        end = _resolved(option, target)
-        if target.is_dir():
-            raise ValueError(f"{option} {path}: is a folder; give the name of a file to write")
-        if not target.parent.is_dir():
-            raise ValueError(f"{option} {path}: there is no folder {target.parent}; make it first")
-        if not os.access(target.parent, os.W_OK):
-            raise ValueError(f"{option} {path}: cannot write in {target.parent}: no permission")
-        if any(end == _resolved(option, other) for others in self.paths.values() for other in others):
+        try:
+            end = check_target(target, suffixes)
+        except ValueError as error:
+            raise ValueError(f"{option} {error}") from None
+        if any(end == resolved(other) for others in self.paths.values() for other in others):
             raise ValueError(f"{option} {path}: another option writes the same file")
         _HELD.enter_context(locked_file(end))
         self.paths[name] = (*self.paths.get(name, ()), target)
@@ -99,38 +95,13 @@ class Files:
 
         Returns the reasons for files that are left out because their format cannot hold the result.
         """
-        from rotor.formats.atomic_write import FULL, DoesNotFitError, naming, place, unfinished_folder
+        from rotor.formats.atomic_write import write_together
 
-        left_out = list[str]()
-        with ExitStack() as stack:
-            moves: list[tuple[Path, Path]] = []
-            for name, target in ((output, path) for output in self.pending for path in self.paths[output]):
-                option = self.flags[name]
-                try:
-                    folder = stack.enter_context(unfinished_folder(target.parent))
-                except OSError as error:
-                    if error.errno in FULL:
-                        raise OSError(error.errno, error.strerror, str(target)) from error
-                    raise ValueError(f"{option} {target}: cannot write in {target.parent}: {error.strerror}") from None
-                try:
-                    with naming(target):
-                        writers[name](folder / target.name)
-                except DoesNotFitError as error:
-                    left_out.append(f"{option}: {target} is not written: {error}")
-                    continue
-                moves += [(file, target.parent / file.name) for file in sorted(folder.iterdir())]
-            for file, path in moves:
-                place(file, path)
-        return left_out
-
-
-def _resolved(option: str, path: Path) -> Path:
-    from rotor.formats.atomic_write import resolved
-
-    try:
-        return resolved(path)
-    except ValueError as error:
-        raise ValueError(f"{option} {error}") from None
+        names = {path: name for name in self.pending for path in self.paths[name]}
+        flags = {path: self.flags[name] for path, name in names.items()}
+        by_path = {path: writers[name] for path, name in names.items()}
+        left_out = write_together(by_path, called=lambda path: f"{flags[path]} {path}", leave_out=True)
+        return [f"{flags[path]}: {path} is not written: {error}" for path, error in left_out.items()]
 
 
 def deliver(files: Files, writers: Mapping[str, Writer], json: Callable[[], str], show: Callable[[], None]) -> None:

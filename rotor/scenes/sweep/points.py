@@ -254,7 +254,7 @@ def check_first(points: Points, out: str | os.PathLike[str]) -> None:
     first = next(iter(points))
     checked_paths(first.scene, out)
     for name, text in points.combined.items():
-        check_path(f"outputs.{name}: {Path(out) / text}", Path(out) / text, (f".{name}",))
+        check_path(name, Path(out) / text, (f".{name}",))
 
 
 def cell(value: Any) -> Any:
