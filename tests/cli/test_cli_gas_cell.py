@@ -100,7 +100,7 @@ def test_a_model_over_absorbance_is_the_law_of_beer_and_lambert(call, folder):
         (("--diagram", "d.png"), "--diagram: belongs to brightness in K"),
         (("--velocity", "3"), "--velocity: belongs to brightness in K"),
         (("--excitation", "100,200"), "--excitation: 2 numbers"),
-        (("--column", "1e12,1e12"), "--column: 2 numbers for 1 species"),
+        (("--column", "1e12,1e12"), "--column 1e+12,1e+12: 2 numbers for 1 species"),
         (("--range", "230330:230339"), "no lines from"),
     ],
 )
