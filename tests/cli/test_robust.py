@@ -17,7 +17,7 @@ import pytest
 from places import PROJECT
 
 import rotor
-from rotor.formats.atomic_write import PREFIX, atomic_path, unfinished_folder
+from rotor.formats.atomic_write import PREFIX, DoesNotFitError, atomic_path, unfinished_folder, write_together
 from rotor.molecules.molecule import Molecule, nearest_others
 
 SPCAT_CASE = PROJECT / "tests" / "oracles" / "ocs"
@@ -386,3 +386,16 @@ process.end(3)
 def test_a_process_that_ends_has_written_and_done_what_was_registered(words):
     done = subprocess.run([sys.executable, "-c", ENDS, *words], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (3, "written\nat the end\n", "")
+
+
+def test_files_whose_format_cannot_hold_the_result_are_left_out_only_on_request(tmp_path):
+    def refuses(path: Path) -> None:
+        raise DoesNotFitError("too wide")
+
+    writers = {tmp_path / "a.csv": lambda path: path.write_text("whole"), tmp_path / "b.egy": refuses}
+    with pytest.raises(DoesNotFitError, match="too wide"):
+        write_together(writers)
+    assert list(tmp_path.iterdir()) == []
+    left_out = write_together(writers, leave_out=True)
+    assert {path.name: str(error) for path, error in left_out.items()} == {"b.egy": "too wide"}
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]

@@ -205,6 +205,15 @@ def test_the_command_reports_a_scene(call, folder, kind):
     assert content["kind_of_scene"] == kind
 
 
+@pytest.mark.parametrize(("kind", "by"), [("levels", "levels"), ("thermo", "thermo"), ("info", "spectrum")])
+def test_spins_that_are_left_out_are_added_by_the_command_of_the_scene(call, folder, kind, by):
+    (folder / "s.toml").write_text(f'schema = 1\nkind = "{kind}"\nmolecule = "HCN"\n', encoding="utf-8")
+    _, ran, _ = call("run", "s.toml")
+    _, shown, _ = call(kind, "HCN")
+    assert f"rotor {by} --hyperfine" in ran
+    assert f"rotor {by} --hyperfine" in shown
+
+
 def test_a_body_by_its_angular_velocity():
     scene = TumbleScene(body=TumbleBody(moments=[0.3, 0.35, 0.4], angular_velocity=[0.1, 15.0, 0.1]))
     assert run_scene(scene).answer.facts()["period"] == pytest.approx(

@@ -66,14 +66,14 @@ class Files:
         """The outputs that are written after the work."""
         return [name for name in self.paths if name not in self.growing]
 
-    def ask_json(self, path: str | None) -> None:
+    def add_json(self, path: str | None) -> None:
         """Add the JSON: to a file, or to standard output (`-`)."""
         if path == "-":
             self.on_screen.add("json")
         else:
-            self.ask("json", "--json", path, (".json",))
+            self.add("json", "--json", path, (".json",))
 
-    def ask(self, name: str, option: str, path: str | None, suffixes: Sequence[str]) -> None:
+    def add(self, name: str, option: str, path: str | None, suffixes: Sequence[str]) -> None:
         """Add a file; ValueError for a suffix that the option does not write, and for a folder that is missing or closed."""
         if path is None:
             return

@@ -148,9 +148,9 @@ def files_of_options(verb: Verb, typed: Mapping[str, Any]) -> Files:
     for output in verb.outputs:
         paths = typed.get(output.name, ())
         for path in paths if isinstance(paths, tuple) else (paths,):
-            files.ask(output.name, output.flag, path, output.suffixes)
-    files.ask("save_scene", "--save-scene", typed.get("save_scene"), (".toml",))
-    files.ask_json(typed.get("json"))
+            files.add(output.name, output.flag, path, output.suffixes)
+    files.add("save_scene", "--save-scene", typed.get("save_scene"), (".toml",))
+    files.add_json(typed.get("json"))
     return files
 
 
