@@ -69,7 +69,7 @@ def printed(command: str) -> str:
 
 def _shown(line: str, columns: int | None) -> str:
     """A line of output without seconds and keys of points, cut after so many columns."""
-    line = re.sub(r"\b[0-9a-f]{16}\b", "KEY", re.sub(r"in [0-9.]+ s\b", "in ... s", line.rstrip()))
+    line = re.sub(r"^[0-9a-f]{16}(?=,)", "KEY", re.sub(r"in [0-9.]+ s\b", "in ... s", line.rstrip()))
     return line if columns is None or len(line) <= columns else line[:columns] + " ..."
 
 
@@ -100,10 +100,10 @@ def section(item: dict[str, Any], blocks: list[str]) -> str:
 
 def page(items: list[dict[str, Any]], blocks: list[list[str]]) -> str:
     parts = []
-    for item, of_item in zip(items, blocks, strict=True):
+    for item, shown in zip(items, blocks, strict=True):
         if heading := item.get("heading"):
             parts.append(f"## {heading}\n")
-        parts.append(section(item, of_item))
+        parts.append(section(item, shown))
     return INTRODUCTION + "\n".join(parts)
 
 
