@@ -23,6 +23,7 @@ from rotor.assignment.growth import (
     SMALLEST_MHZ,
     WINDOW,
     Grown,
+    Predicted,
     grown_from,
     merged_lines,
     predict,
@@ -62,18 +63,22 @@ class Places:
     second_mhz: float
 
 
-def confirmed(seen: Field, species: Grown) -> Grown:
-    """The species with groups of lines at their best places, without groups that have no clear place."""
+def confirmed(seen: Field, species: Grown, all_types: bool = False) -> Grown:
+    """The species with groups of lines at their best places, without groups that have no clear place.
+
+    all_types : types that the evidence leaves out, because lines at a wrong place are missed, count in groups while lines of them are
+    assigned; those that stay left out lose their lines.
+    """
     highest = species.evidence
     for _ in range(TURNS):
         for column, least in groups(seen, species):
-            checked = _checked(seen, species, column, least, highest + BETTER)
+            checked = _checked(seen, species, column, least, highest + BETTER, all_types)
             if checked is not species:
                 break
         else:
             break
         species, highest = checked, max(highest, checked.evidence)
-    return species
+    return _without_absent_types(seen, species) if all_types else species
 
 
 def groups(seen: Field, species: Grown) -> list[tuple[int, int]]:
@@ -90,14 +95,14 @@ def _largest(seen: Field, rows: Ints) -> Ints:
     return np.maximum(table.quanta[table.upper[rows]], table.quanta[table.lower[rows]])
 
 
-def _checked(seen: Field, species: Grown, column: int, least: int, enough: float) -> Grown:
+def _checked(seen: Field, species: Grown, column: int, least: int, enough: float, all_types: bool) -> Grown:
     """The species itself if the group has a clear place; else grown from a place with enough evidence, or without the group."""
     inside = _largest(seen, species.rows)[:, column] >= least
     taken = np.isin(species.peak, species.peak[inside])  # a peak belongs to the group with all its lines
     if not inside.any() or len(np.unique(species.peak[~taken])) < FEWEST_OTHERS:
         return species
     sigma0 = 1.3 * max(1.4826 * float(np.median(np.abs(species.residual))), SMALLEST_MHZ)
-    places = _places(seen, species, taken, column, least, sigma0)
+    places = _places(seen, species, taken, column, least, sigma0, all_types)
     if places is None:
         return species
     total = np.logaddexp.reduce(places.log_density)
@@ -110,7 +115,7 @@ def _checked(seen: Field, species: Grown, column: int, least: int, enough: float
     if places.second_mhz > SECOND * sigma0:  # places differ in more than one direction
         return species
     lost = places.log_density[here].max() + 0.5 * places.present**2 if here.any() else 0.0
-    return _without(seen, species, places, taken, max(float(lost), 0.0))
+    return _without(seen, species, places.constants, places.covariance, taken, max(float(lost), 0.0))
 
 
 def _others(seen: Field, species: Grown, taken: Mask) -> tuple[Floats, Floats]:
@@ -129,11 +134,15 @@ def _others(seen: Field, species: Grown, taken: Mask) -> tuple[Floats, Floats]:
     return species.constants + covariance @ pull, covariance
 
 
-def _places(seen: Field, species: Grown, taken: Mask, column: int, least: int, sigma0: float) -> Places | None:
+def _places(
+    seen: Field, species: Grown, taken: Mask, column: int, least: int, sigma0: float, all_types: bool
+) -> Places | None:
     """Likelihood of the group at all its places; None where the other lines place it, or do not predict it."""
     constants, covariance = _others(seen, species, taken)
-    scales = np.where(species.ratios > LEAST_RATIO, species.scales, -np.inf)
     predicted = predict(seen, species.constants, species.temperature_k)
+    scales = np.where(species.ratios > LEAST_RATIO, species.scales, -np.inf)
+    if all_types:
+        scales = np.maximum(scales, _scales_of_lines(seen, species, predicted))
     lines = merged_lines(seen, species.constants, predicted, scales)
     inside = np.flatnonzero(_largest(seen, lines.main)[:, column] >= least)
     inside = inside[np.argsort(-lines.height[inside], kind="stable")][:MOST_LINES]
@@ -182,15 +191,36 @@ def _moved(seen: Field, species: Grown, places: Places, sigma0: float) -> Grown 
     )
 
 
-def _without(seen: Field, species: Grown, places: Places, taken: Mask, lost: float) -> Grown:
-    """The species without a group of lines, and without what these add to the evidence."""
+def _scales_of_lines(seen: Field, species: Grown, predicted: Predicted) -> Floats:
+    """ln of the intensity scales (3,) of types without evidence, from the heights of their assigned lines; -inf without lines."""
+    expected = np.full(len(seen.table.upper), np.nan)
+    expected[predicted.row] = predicted.expected
+    heights = seen.peaks.log_intensity[species.peak] + np.log(species.share) - expected[species.rows]
+    kinds, scales = seen.table.kind[species.rows], np.full(3, -np.inf)
+    for q in np.flatnonzero(species.ratios <= LEAST_RATIO).tolist():
+        known = heights[(kinds == q) & np.isfinite(heights)]
+        scales[q] = float(np.median(known)) if len(known) else -np.inf
+    return scales
+
+
+def _without_absent_types(seen: Field, species: Grown) -> Grown:
+    """The species without lines of types that its evidence leaves out: they would determine constants all the same."""
+    absent = species.ratios[seen.table.kind[species.rows]] <= LEAST_RATIO
+    taken = np.isin(species.peak, species.peak[absent])
+    if not absent.any() or len(np.unique(species.peak[~taken])) < FEWEST_OTHERS:
+        return species
+    return _without(seen, species, *_others(seen, species, taken), taken, 0.0)
+
+
+def _without(seen: Field, species: Grown, constants: Floats, covariance: Floats, taken: Mask, lost: float) -> Grown:
+    """The species without a group of lines, with the constants from the others, and without what these add to the evidence."""
     table, rows, peak = seen.table, species.rows[~taken], species.peak[~taken]
-    shift = slopes_of(seen, rows, species.constants) @ (places.constants - species.constants)
+    shift = slopes_of(seen, rows, species.constants) @ (constants - species.constants)
     at = np.unique(peak, return_inverse=True)[1]
     share = species.share[~taken]
     moved = (np.bincount(at, share * shift) / np.bincount(at, share))[at]
     return replace(
-        species, constants=places.constants, covariance=places.covariance, rows=rows, peak=peak, share=share,
+        species, constants=constants, covariance=covariance, rows=rows, peak=peak, share=share,
         residual=species.residual[~taken] - moved, weight=species.weight[~taken], evidence=species.evidence - lost,
         moved=len(np.unique(peak[seen.jj[table.upper[rows]] != seen.jj[table.lower[rows]]])),
     )  # fmt: skip

@@ -22,7 +22,7 @@ ROUNDS = 24
 WINDOW = 3.5  # standard errors
 MOST_IN_WINDOW = 12  # peaks; a line with more is not matched
 LEAST_RATIO = 3.0  # ln of the likelihood ratio above which a type counts as present
-FEW, CHANCE_OF_FEW = 12, 0.25  # largest number of chance peaks in a window while few lines are assigned
+FEW = 12  # lines up to which a window may hold more chance peaks
 FIRST_CHANCE, LAST_CHANCE, RISE = 0.003, 0.05, 1.6  # this limit with more lines, increasing by round: safe lines first
 SMALLEST_MHZ = 0.003  # smallest standard error of a peak
 BLENDED_MHZ = 0.08  # predicted lines closer than this form one peak
@@ -181,10 +181,10 @@ def grown_from(
     for turn in range(rounds):
         if turn == 1 or (turn and turn % 3 == 0):
             temperature = best_temperature(field, constants, covariance, sigma0)
-        chance = min(LAST_CHANCE, FIRST_CHANCE * RISE**turn) if last > FEW else CHANCE_OF_FEW
+        chance = min(LAST_CHANCE, FIRST_CHANCE * RISE**turn) if last > FEW else field.chance_of_few
         matched = _matched(field, constants, covariance, temperature, sigma0, chance, grown)
-        while chance < CHANCE_OF_FEW and (matched is None or len(np.unique(matched.peak)) < FEW):
-            chance = min(3 * chance, CHANCE_OF_FEW)
+        while chance < field.chance_of_few and (matched is None or len(np.unique(matched.peak)) < FEW):
+            chance = min(3 * chance, field.chance_of_few)
             matched = _matched(field, constants, covariance, temperature, sigma0, chance, grown)
         if matched is None or len(matched.peak) < 5:
             return None

@@ -29,7 +29,7 @@ from rotor.assignment.isotopologues import expected_isotopologues, find_isotopol
 from rotor.assignment.peaks import PeakList, spurs
 from rotor.assignment.refinement import excess_scatter, refine
 from rotor.assignment.rigid_table import JMAX, rigid_table
-from rotor.assignment.search import Field
+from rotor.assignment.search import CHANCE_OF_FEW, Field
 from rotor.assignment.species import (
     FIRST_STAGES,
     GUESS_STAGES,
@@ -51,6 +51,7 @@ COLDEST_K, HOTTEST_K = 0.7, 12.0
 TRIED_K = (1.0, 2.0, 4.0, 8.0)
 GUESS_ERROR = 0.033  # of a guess: 3 % and a little
 SAMPLES_OF_GUESS = 120
+CHANCE_OF_GUESS = 1.0  # more chance peaks in a window at first: a root near a guess is seldom wrong, and distortion may move its lines
 ROOT_MARGINS = (0.15, 0.03, 0.03)  # of A, B, C of roots beyond the error of a guess
 STRONG, MANY = 20, 6  # so many of the strongest peaks without a species: a stronger one may be there
 HIGH, FEW_HIGH = 0.4, 3  # and so many peaks higher than this share of the strongest species
@@ -261,14 +262,19 @@ class _Search:
 
     def _as_doublets(self, centres: PeakList, rivals: list[Grown]) -> list[Grown]:
         """The species grown on centres of doublets, if its lines scatter less about these."""
-        seen = Field(centres, self.table, self.request.root_bounds, self.request.temperatures)
+        seen = self._field(centres, self.request)
         anew = [again for again in grown_anew(seen, rivals[0]) if again.rms_mhz < rivals[0].rms_mhz / 2]
         return sorted((again for again in anew if again.evidence > 0), key=lambda again: -again.evidence)[:1]
+
+    def _field(self, peaks: PeakList, request: AssignRequest) -> Field:
+        """The inputs of a search among peaks."""
+        chance = CHANCE_OF_FEW if request.guess_mhz is None else CHANCE_OF_GUESS
+        return Field(peaks, self.table, request.root_bounds, request.temperatures, chance_of_few=chance)
 
     def _rivals(self, peaks: PeakList, stages: Sequence[Stage]) -> list[Grown]:
         rivals = list[Grown]()
         for guess in self.request.each_guess:
-            seen = Field(peaks, self.table, guess.root_bounds, guess.temperatures)
+            seen = self._field(peaks, guess)
             rivals += [
                 grown for grown in next_species(seen, families_of(guess), stages, self.clock) if guess.allows(grown)
             ]
@@ -278,8 +284,8 @@ class _Search:
     def _add(self, peaks: PeakList, members: Ints, rivals: list[Grown], isotopologue: str = "") -> bool:
         """Accept the first of the rivals if it is likely, and remove the peaks that it explains; whether it was accepted."""
         first = rivals[0]
-        seen = Field(peaks, self.table, self.request.root_bounds, self.request.temperatures)
-        best = first if isotopologue else confirmed(seen, first)
+        seen = self._field(peaks, self.request)
+        best = first if isotopologue else confirmed(seen, first, all_types=self.request.guess_mhz is not None)
         twins = [other for other in rivals[1:] if other.evidence > first.evidence - 10 and differs(first, other)]
         p = probability_of_isotopologue(best) if isotopologue else probability(best)
         p /= 1 + sum(float(np.exp(other.evidence - first.evidence)) for other in twins)

@@ -34,6 +34,7 @@ STRIDE, FEWEST_POINTS = (
     4,
     12,
 )  # grid points of κ between tests for a crossing; least number of tests if the bounds are narrow
+CHANCE_OF_FEW = 0.25
 SAME = 3e-4  # relative difference below which roots are the same
 
 
@@ -51,6 +52,7 @@ class Field:
     """The inputs of a search: peaks, the table, bounds of constants, trial temperatures.
 
     parent : constants (8,) of a species with similar distortion. spread : a-priori standard errors of A, B, C (3,), if known.
+    chance_of_few : largest number of chance peaks in the window of a line while few lines are assigned
     """
 
     peaks: PeakList
@@ -59,6 +61,7 @@ class Field:
     temperatures: Floats
     parent: Floats | None = None
     spread: Floats | None = None
+    chance_of_few: float = CHANCE_OF_FEW
 
     @cached_property
     def jj(self) -> Floats:

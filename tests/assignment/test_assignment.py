@@ -127,6 +127,29 @@ def test_a_guess_is_enough_where_the_search_is_narrow() -> None:
     assert is_right(computed, 0, TRUTH)
 
 
+def test_a_guess_of_a_light_top_among_many_peaks() -> None:
+    """Distortion moves its rigid lines by some MHz, and chance peaks lie in such windows."""
+    truth = {
+        "A": 7253.57,
+        "B": 2992.51,
+        "C": 2820.16,
+        "DJ": 2.1e-3,
+        "DJK": -5.9e-3,
+        "DK": 0.04,
+        "d1": -7.2e-4,
+        "d2": -7.5e-5,
+    }
+    rng, band = np.random.default_rng(3), (18000.0, 26500.0)
+    f, i = lines_of(truth, (0.0, 1.0, 0.0), 100.0, 4.6, band)
+    f = np.concatenate([f + 0.005 * rng.normal(size=len(f)), rng.uniform(*band, 250)])
+    i = np.concatenate([i * np.exp(0.2 * rng.normal(size=len(i))), rng.random(250) ** (-1 / 0.8)])
+    computed = answer_assign(
+        AssignRequest(peak_list(f, i, 0.005, band_mhz=band), guess_mhz=(7462.8, 2971.0, 2791.8), seconds=120)
+    )
+    assert computed.word == "certain"
+    assert is_right(computed, 0, truth)
+
+
 @pytest.mark.parametrize(
     ("truth", "dipole"),
     [(SECOND, (1.0, 0.0, 0.0)), (PROLATE, (0.0, 0.0, 1.0))],

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from assignment_cases import BAND, SECOND, lines_of
 
-from rotor.assignment.confirmation import confirmed
+from rotor.assignment.confirmation import _scales_of_lines, confirmed
 from rotor.assignment.evidence import differs
 from rotor.assignment.families import Bounds, Family
 from rotor.assignment.growth import Grown, grow, predict, prior_weight, quartic_sizes, slopes_of
@@ -131,3 +131,18 @@ def test_twins_differ_by_more_than_their_errors(right: tuple[Field, Grown]) -> N
     shift = np.array([0.0, 1.0, 0, 0, 0, 0, 0, 0])
     assert not differs(grown, replace(grown, constants=grown.constants + 3 * errors * shift))
     assert differs(grown, replace(grown, constants=grown.constants + 9 * errors * shift))
+
+
+def test_lines_of_a_type_without_evidence_determine_nothing(right: tuple[Field, Grown]) -> None:
+    """Without evidence for the c type its lines go, and the error of A grows; their heights tell the scale by which they are looked for."""
+    seen, grown = right
+    absent = np.array([False, False, True])
+    hidden = replace(grown, ratios=np.where(absent, 0.0, grown.ratios), scales=np.where(absent, -np.inf, grown.scales))
+    scales = _scales_of_lines(seen, hidden, predict(seen, hidden.constants, hidden.temperature_k))
+    assert scales[2] == pytest.approx(grown.scales[2], abs=0.3)
+    assert np.isneginf(scales[:2]).all()
+    checked = confirmed(seen, hidden, all_types=True)
+    assert (TABLE.kind[hidden.rows] == 2).sum() > 5
+    assert not (TABLE.kind[checked.rows] == 2).any()
+    assert (np.abs(checked.constants - VALUES) < 5 * np.sqrt(np.diag(checked.covariance)))[:3].all()
+    assert checked.covariance[0, 0] > 4 * grown.covariance[0, 0]

@@ -16,13 +16,14 @@ SECOND = {"A": 3614.2, "B": 811.4, "C": 702.9, "DJ": 5e-5, "DJK": 2e-4, "DK": 1e
 
 
 def lines_of(
-    truth: dict[str, float], dipole: tuple[float, float, float], height: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies and intensities at 2 K down to a thousandth of the strongest."""
+    truth: dict[str, float], dipole: tuple[float, float, float], height: float,
+    temperature_k: float = 2.0, band: tuple[float, float] = BAND,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Frequencies and intensities above 1, of which `height` is the largest."""
     top = rotor.Top.from_constants(
         rotor.Constants(**truth, reduction="S", representation="Ir"), dipole_abc_debye=dipole
     )
-    lines = rotor.api.line_list(top, temperature_k=2.0, jmax=30, range_mhz=BAND)
+    lines = rotor.api.line_list(top, temperature_k=temperature_k, jmax=30, range_mhz=band)
     intensity = 10 ** lines.columns["lgint"]
     intensity *= height / intensity.max()
     return lines.frequency_mhz[intensity > 1.0], intensity[intensity > 1.0]
