@@ -42,12 +42,14 @@ EDGES = (0.0, 0.5, 0.8, 0.95, 0.99, 1.0)  # of probabilities in the reliability 
 
 @dataclass(frozen=True)
 class Truth:
-    """A list with its truth: constants (3,) of each species, the place of its parent or None, and facts that the list is sorted by."""
+    """A list with its truth: constants (3,) of each species, its strength, the place of its parent or None, and facts that the list is
+    sorted by."""
 
     number: int
     peaks: PeakList
     signal_to_noise: float
     constants: list[tuple[float, ...]]
+    strengths: list[float]
     parents: list[int | None]
     facts: dict[str, Any]
 
@@ -73,7 +75,7 @@ def simulated(first: int, count: int) -> Iterator[Truth]:
         yield Truth(
             case.seed, peak_list(*case.peaks.T, band_mhz=case.band_mhz), case.signal_to_noise,
             [tuple(component.constants[:3].tolist()) for component in case.species],
-            [component.parent for component in case.species], facts,
+            [component.strength for component in case.species], [component.parent for component in case.species], facts,
         )  # fmt: skip
 
 
@@ -88,7 +90,8 @@ def shared(folder: Path) -> Iterator[Truth]:
         species, (low, high) = truth["species"], truth["range_mhz"]
         yield Truth(
             int(truth["case"][-3:]), peak_list(*rows.T, band_mhz=(float(low), float(high))), truth["signal_to_noise"],
-            [(s["A"], s["B"], s["C"]) for s in species], [s.get("isotopologue_of") for s in species],
+            [(s["A"], s["B"], s["C"]) for s in species], [s["strength"] for s in species],
+            [s.get("isotopologue_of") for s in species],
             {"temperature_k": truth["temperature_k"], "main_lines": truth["main_lines_seen"], "type": kind_of(species[0]["dipole_abc"])},
         )  # fmt: skip
 
@@ -138,7 +141,8 @@ def row_of(case: Truth, answer: AssignAnswer, seconds: float) -> dict[str, Any]:
     a, b, c = case.constants[0]
     return {
         "case": case.number, "peaks": len(case.peaks), "signal_to_noise": case.signal_to_noise, "kappa": (2 * b - a - c) / (a - c),
-        "species": sum(parent is None for parent in case.parents), "parents": case.parents, "found": species, "seconds": seconds,
+        "species": sum(parent is None for parent in case.parents), "parents": case.parents, "strengths": case.strengths,
+        "found": species, "seconds": seconds,
         **case.facts,
     }  # fmt: skip
 
@@ -146,6 +150,12 @@ def row_of(case: Truth, answer: AssignAnswer, seconds: float) -> dict[str, Any]:
 def has(row: dict[str, Any], number: int) -> bool:
     """Whether a species of the truth is among the answers."""
     return any(number in entry["right"] for entry in row["found"])
+
+
+def second_strongest(row: dict[str, Any]) -> int:
+    """The species second in strength, 13C species left out; in old rows, which have no strengths, the second of the list."""
+    parents = [n for n, parent in enumerate(row["parents"]) if parent is None]
+    return sorted(parents, key=lambda n: -row["strengths"][n])[1] if "strengths" in row else parents[1]
 
 
 def wrong_and_certain(row: dict[str, Any]) -> bool:
@@ -168,9 +178,7 @@ def reliability(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Shares over all cases."""
     several = [row for row in rows if row["species"] > 1]
-    second = sum(
-        has(row, next(n for n, parent in enumerate(row["parents"]) if n and parent is None)) for row in several
-    )
+    second = sum(has(row, second_strongest(row)) for row in several)
     first = [row["found"][0] for row in rows if row["found"]]
     times = [row["seconds"] for row in rows]
     return {
