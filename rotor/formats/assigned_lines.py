@@ -338,7 +338,7 @@ def _refuse_columns(
     strange = [name for name in columns if name not in accepted]
     if missing or strange:
         what = f"no column {', '.join(missing)}" if missing else f"unknown column {', '.join(map(repr, strange))}"
-        present = f"; the file has {', '.join(columns)}" if missing else ""
+        present = f"; the file has {', '.join(columns) or 'none: its first line is empty'}" if missing else ""
         raise ValueError(
             f"{path}: {what}; columns are {', '.join(_shown(labels))}, a frequency ({' or '.join(_FREQUENCY)}), an error "
             f"({' or '.join(_ERROR)}), and, where needed, weight, blend, width_mhz, excluded, comment{present}"

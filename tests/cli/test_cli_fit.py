@@ -117,6 +117,13 @@ def test_a_list_of_another_kind_of_top_says_its_columns(call):
     assert "; the file has frequency_mhz, error_mhz, j_upper, j_lower" in err
 
 
+def test_an_empty_list_says_that_it_has_no_columns(call, folder):
+    (folder / "lines.csv").write_text("", encoding="utf-8")
+    code, _, err = call("fit", "lines.csv", "--start", "water")
+    assert code == 2
+    assert err.rstrip().endswith("; the file has none: its first line is empty")
+
+
 BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
 
 
