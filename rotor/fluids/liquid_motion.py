@@ -5,7 +5,7 @@
 
 (M. P. Allen and D. J. Tildesley, Computer Simulation of Liquids, chapter 2). C_l is integrated up to `WINDOW` of a block and extrapolated
 by the exponential of its last half. Means and standard errors come from `BLOCKS` successive blocks. If blocks are not long compared with
-τ, or shorter than `LEAST_BLOCK_PS`, the result is missing, with the reason.
+τ, or shorter than `LEAST_BLOCK_PS`, the result is missing, with the reason and the length of a run that has it.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ MOST_FRAMES = 4096  # of 56 bytes a molecule: 0.2 GB for 1000 molecules
 DIFFUSION_FROM_PS = 1.0  # earlier displacements are ballistic or inside the cage of the neighbours, not linear in t
 CM2_PER_S = 1e4  # 1 m²/s
 SMALL_DIPOLE = 1e-6  # e Å
+WHAT = "rotational correlation times and diffusion"
 
 
 class MotionFrames:
@@ -99,16 +100,19 @@ def motion_means(frames: MotionFrames, interval_ps: float, axes: Floats | None) 
     step = interval_ps * frames.stride
     length = (len(frames.centres) - 1) * step
     if length < BLOCKS * LEAST_BLOCK_PS:
-        return [], f"{length:.3g} ps are too short for {BLOCKS} blocks: run {BLOCKS * LEAST_BLOCK_PS:g} ps or more"
+        return (
+            [],
+            f"{WHAT}: {length:.3g} ps are too short for {BLOCKS} blocks, run {BLOCKS * LEAST_BLOCK_PS:g} ps or more",
+        )
     table: list[Mean] = []
-    missing = ""
+    missing: list[str] = []
     if axes is not None:
         turned = rotations.rotate(np.array(frames.attitudes), axes)
         blocks = np.array_split(turned, BLOCKS)
         for order in (1, 2):
             values = [correlation_time(block, step, order) for block in blocks]
             if any(math.isnan(value) for value in values):
-                missing = f"C_{order} has not decayed to 1/e within {WINDOW:g} of a block of {length / BLOCKS:.3g} ps: run longer"
+                missing.append(_not_decayed(blocks, step, order))
             else:
                 table.append(_mean(f"τ{order} of reorientation", "ps", values))
     window = (DIFFUSION_FROM_PS, WINDOW * length / BLOCKS)
@@ -122,7 +126,38 @@ def motion_means(frames: MotionFrames, interval_ps: float, axes: Floats | None) 
             BLOCKS,
         )
     )
-    return table, missing
+    return table, "; ".join(missing)
+
+
+def _not_decayed(blocks: Sequence[Floats], step: float, order: int) -> str:
+    """Why τ_l is missing, and the length of a run in whose blocks C_l falls to 1/e."""
+    curves = [_in_window(block, order) for block in blocks]
+    needed = BLOCKS / WINDOW * max(time_to_fall(curve, step) for curve in curves)
+    advice = f"run {math.ceil(needed):.3g} ps or more" if math.isfinite(needed) else "run much longer"
+    window = step * (min(map(len, curves)) - 1)
+    return (
+        f"rotational correlation time τ{order}: in {BLOCKS} blocks C_{order} has not decayed to 1/e within {window:.3g} ps, "
+        f"half of a block: {advice}"
+    )
+
+
+def time_to_fall(correlation: Floats, interval: float) -> float:
+    """Time at which a correlation function falls to 1/e, by the exponential of its last half; inf if that does not fall.
+
+    >>> round(time_to_fall(np.exp(-np.arange(41) / 100), 0.1), 9)
+    10.0
+    """
+    if correlation.min() <= FELL_TO:
+        return interval * int(np.argmax(correlation <= FELL_TO))
+    middle = len(correlation) // 2
+    slope = math.log(correlation[middle] / correlation[-1]) / (interval * (len(correlation) - 1 - middle))
+    end = interval * (len(correlation) - 1)
+    return end + math.log(correlation[-1] / FELL_TO) / slope if slope > 0 else math.inf
+
+
+def _in_window(vectors: Floats, order: int) -> Floats:
+    """C_l of a block up to the end of its window."""
+    return reorientation(vectors, order)[: max(int(WINDOW * len(vectors)), 2)]
 
 
 def _mean(quantity: str, unit: str, values: Sequence[float]) -> Mean:
@@ -138,7 +173,7 @@ def correlation_time(vectors: Floats, interval: float, order: int) -> float:
     >>> math.isnan(correlation_time(np.ones((50, 1, 3)) / math.sqrt(3), 0.1, 1))
     True
     """
-    c = reorientation(vectors, order)[: max(int(WINDOW * len(vectors)), 2)]
+    c = _in_window(vectors, order)
     if c.min() > FELL_TO:
         return math.nan
     # stop where noise exceeds the correlation

@@ -38,6 +38,7 @@ Examples:
   rotor fluid liquid.traj --ensemble nve --steps 50000 --every 10 --csv nve.csv --json -
   rotor fluid liquid.traj --steps 50000 --engine openmm --threads 2 --csv openmm.csv
   rotor fluid water --molecules 64 --cutoff 6 --ensemble langevin --steps 2000 --plot run.png
+  rotor fluid water --molecules 64 --cutoff 6 --steps 30000  # 60 ps: rotational correlation times and diffusion
   rotor fluid argon --molecules 500 --model argon --density 1.4 --temperature 90 --step 5fs"""
 
 
@@ -329,7 +330,7 @@ def _facts(content: Mapping[str, Any], settings: Settings) -> list[tuple[str, st
         edges = " x ".join(f"{edge:.6g}" for edge in content["box_angstrom"])
         facts.insert(1, ("box", f"{edges} Å, {content['density_g_cm3']:.5g} g/cm³"))
     if content["motion_reason"]:
-        facts.append(("no motion", content["motion_reason"]))
+        facts.append(("not computed", content["motion_reason"]))
     return facts
 
 
@@ -342,7 +343,7 @@ def results(answer: Any) -> dict[str, Any]:
 
 VERB = Verb(
     name="fluid",
-    about="Rigid molecules in a periodic box: a run, its temperatures, energies and pressure.",
+    about="Rigid molecules in a periodic box: temperatures, energies, pressure, rotational correlation times and diffusion.",
     examples=EXAMPLES,
     request=FluidRequest,
     answer=answer,

@@ -1,6 +1,7 @@
 """A box from a lattice becomes a liquid before averages are taken; reorientation and diffusion of the run with their errors."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -122,4 +123,33 @@ def test_motion_of_a_run_from_its_frames():
     for mean, truth in zip(table, (1 / 0.4, 1 / 1.2, 2.3), strict=True):  # ps, ps, 1e-5 cm²/s
         assert mean.error < 0.1 * truth
         assert abs(mean.mean - truth) < 4 * mean.error + 0.03 * truth  # τ within its window, steps of 0.14 rad
-    assert motion_means(frames, 1e-3, None)[1].startswith("2 ps are too short")
+    assert motion_means(frames, 1e-3, None)[1].startswith(
+        "rotational correlation times and diffusion: 2 ps are too short"
+    )
+
+
+def test_a_run_too_short_for_a_correlation_time_names_the_length_that_has_it():
+    """τ1 = 8 ps: C_1 of the slowest of five blocks falls to 1/e in about 8 ps, so the length named is five blocks of about twice that."""
+    short, reason = _turned_for(30.0)
+    assert [mean.quantity for mean in short] == ["τ2 of reorientation", "self-diffusion, in this box"]
+    words = re.fullmatch(
+        r"rotational correlation time τ1: in 5 blocks C_1 has not decayed to 1/e within 2.95 ps, half of a block: run (\d+) ps or more",
+        reason,
+    )
+    assert words, reason
+    length = float(words[1])
+    assert length == pytest.approx(80.0, rel=0.3)
+    longer, reason = _turned_for(length)
+    assert (longer[0].quantity, reason) == ("τ1 of reorientation", "")
+
+
+def _turned_for(length_ps: float, step: float = 0.05, tau1: float = 8.0):
+    """τ1, τ2 and D of 200 bodies that turn at random."""
+    from rotor.geometry import rotations
+
+    rng, frames, n = np.random.default_rng(5), MotionFrames(), 200
+    attitude = rotations.uniform(n, rng=rng)
+    for _ in range(round(length_ps / step) + 1):
+        frames.add(rng.standard_normal((n, 3)), attitude)
+        attitude = rotations.multiply(attitude, rotations.exp(math.sqrt(step / tau1) * rng.standard_normal((n, 3))))
+    return motion_means(frames, step, np.tile([0.0, 0.0, 1.0], (n, 1)))
