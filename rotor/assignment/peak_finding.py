@@ -10,6 +10,9 @@ Gaussian, gives the centre. With white noise σ, steps Δ and height h the match
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -17,6 +20,7 @@ from rotor.arrays import Floats, Ints
 from rotor.assignment.peaks import PeakList, peak_list
 
 THRESHOLD = 6.0  # times the noise
+LEAST_POINTS = 16  # fewest points of a spectrum or of a piece of it
 WINDOW = 4096  # points in a window with constant noise
 SMALLEST_MHZ = 0.001  # smallest standard error of a centre: accuracy of a parabola through three points
 MOST_PEAKS = 20_000
@@ -45,41 +49,64 @@ def peaks_of_spectrum(frequency_mhz: ArrayLike, intensity: ArrayLike, source: st
     >>> [round(float(x), 3) for x in peaks.frequency_mhz]
     [6020.011, 6071.3]
     """
-    f, x = np.asarray(frequency_mhz, dtype=np.float64), np.asarray(intensity, dtype=np.float64)
+    return peaks_of_pieces([(np.asarray(frequency_mhz, np.float64), np.asarray(intensity, np.float64))], source)
+
+
+def peaks_of_pieces(pieces: Sequence[tuple[Floats, Floats]], source: str = "") -> PeakList:
+    """Peaks of a spectrum in pieces (frequencies in MHz, intensities), each with a noise, a step and a width of lines of its own.
+
+    Two pieces or more are the recorded windows of the list. Raises ValueError as peaks_of_spectrum does.
+    """
     where = f"{source}: " if source else ""
-    steps = np.diff(f)
-    if len(f) < 16 or not (steps > 0).all():
-        raise ValueError(f"{where}expected a spectrum of at least 16 points with rising frequencies")
-    step = float(np.median(steps))
-    noise = noise_of(x)
-    width = _width(x, noise)  # in steps
-    reach = np.arange(-int(np.ceil(4 * width)), int(np.ceil(4 * width)) + 1)
-    kernel = np.exp(-0.5 * (reach / width) ** 2)
-    kernel /= kernel.sum()
-    smooth = np.convolve(x, kernel, mode="same")
-    quiet = noise * float(np.sqrt((kernel**2).sum()))
-    top = _maxima(smooth, quiet)
-    if len(top) > MOST_PEAKS:
+    for f, _ in pieces:
+        if len(f) < LEAST_POINTS or not (np.diff(f) > 0).all():
+            raise ValueError(f"{where}expected a spectrum of at least {LEAST_POINTS} points with rising frequencies")
+    parts = [_Piece(f, x) for f, x in pieces]
+    count = sum(len(part.top) for part in parts)
+    if count > MOST_PEAKS:
         raise ValueError(
-            f"{where}{len(top)} peaks above {THRESHOLD:g} times the noise; at most {MOST_PEAKS} can be searched"
+            f"{where}{count} peaks above {THRESHOLD:g} times the noise; at most {MOST_PEAKS} can be searched"
         )
-    if len(top) < 2:
-        down = len(_maxima(-smooth, quiet))
+    windows = np.array([(f[0], f[-1]) for f, _ in pieces])
+    band = (float(windows.min()), float(windows.max()))
+    columns = [np.concatenate(column) for column in zip(*(part.peaks() for part in parts), strict=True)]
+    given = windows if len(pieces) > 1 else None
+    if count < 2:
+        down = sum(part.count_down() for part in parts)
         if down > 2:
             raise ValueError(
-                f"{where}{len(top)} peaks above {THRESHOLD:g} times the noise and {down} below: the lines point down; change the sign"
+                f"{where}{count} peaks above {THRESHOLD:g} times the noise and {down} below: the lines point down; change the sign"
             )
-        return PeakList(f[top], x[top], np.full(len(top), step), (float(f[0]), float(f[-1])), source)
-    shift, bend, centre = _parabola(smooth, top)
-    height = np.sqrt(2) * np.exp(centre - 0.5 * bend * shift**2)  # smoothing made the line √2 wider and lower
-    error = noise[top] / height * np.sqrt(2 * width / np.sqrt(np.pi)) * step
-    return peak_list(
-        f[top] + shift * step,
-        height,
-        np.maximum(error, SMALLEST_MHZ),
-        band_mhz=(float(f[0]), float(f[-1])),
-        source=source,
-    )
+        return PeakList(*columns, band, source, given)
+    return replace(peak_list(*columns, band_mhz=band, source=source), given_windows=given)
+
+
+class _Piece:
+    """A piece of a spectrum, smoothed, and its maxima."""
+
+    def __init__(self, f: Floats, x: Floats) -> None:
+        self.f = f
+        self.noise = noise_of(x)
+        self.width = _width(x, self.noise)  # in steps
+        reach = np.arange(-int(np.ceil(4 * self.width)), int(np.ceil(4 * self.width)) + 1)
+        kernel = np.exp(-0.5 * (reach / self.width) ** 2)
+        kernel /= kernel.sum()
+        edge = len(reach) // 2
+        self.smooth = np.convolve(x, kernel)[edge : edge + len(x)]
+        self.quiet = self.noise * float(np.sqrt((kernel**2).sum()))
+        self.top = _maxima(self.smooth, self.quiet)
+
+    def peaks(self) -> tuple[Floats, Floats, Floats]:
+        """Frequencies, heights and standard errors of the frequencies."""
+        step, top = float(np.median(np.diff(self.f))), self.top
+        shift, bend, centre = _parabola(self.smooth, top)
+        height = np.sqrt(2) * np.exp(centre - 0.5 * bend * shift**2)  # smoothing made the line √2 wider and lower
+        error = self.noise[top] / height * np.sqrt(2 * self.width / np.sqrt(np.pi)) * step
+        return self.f[top] + shift * step, height, np.maximum(error, SMALLEST_MHZ)
+
+    def count_down(self) -> int:
+        """Number of minima as deep as a peak is high."""
+        return len(_maxima(-self.smooth, self.quiet))
 
 
 def _maxima(x: Floats, noise: Floats) -> Ints:

@@ -55,6 +55,12 @@ class PeakList(Table):
         last = np.concatenate([f[inner] + 1.0, [f[-1]]])
         return np.column_stack([first, last])
 
+    def covers(self, frequency_mhz: Floats) -> NDArray[np.bool_]:
+        """Which frequencies were recorded: those in the band, or in its parts where they are known."""
+        parts = np.array([self.band_mhz]) if self.given_windows is None else self.given_windows
+        part = np.maximum(np.searchsorted(parts[:, 0], frequency_mhz, side="right") - 1, 0)
+        return np.asarray((frequency_mhz >= parts[part, 0]) & (frequency_mhz <= parts[part, 1]))
+
     def where(self, mask: NDArray[np.bool_]) -> PeakList:
         """The peaks selected by a mask."""
         return replace(

@@ -1,31 +1,41 @@
-"""Lists of peaks and spectra on a grid, read as peaks: .csv, .npy, FITS."""
+"""Lists of peaks and spectra on a grid, read as peaks: columns of text, .npy, FITS."""
 
 from __future__ import annotations
 
 import csv
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.assignment.peak_finding import peaks_of_spectrum
+from rotor.assignment.peak_finding import LEAST_POINTS, peaks_of_pieces, peaks_of_spectrum
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.formats.packed import first_bytes, load
 from rotor.formats.spectra.axis import AXIS_UNITS
 
 EQUAL_STEPS = 0.02  # largest relative spread of the steps of a grid
-LEAST_GRID = 64  # fewest points of a grid
+LEAST_GRID = 64  # fewest steps of a grid
+EQUAL_NEIGHBOURS = 0.05  # largest relative difference of neighbouring steps inside a piece; frequencies may be rounded
+MOSTLY = 0.9  # least share of such steps in a spectrum with gaps
+LEAST_WITH_GAPS = 300  # fewest points of a spectrum with gaps
+COMMENTS = ("#", "!", "//", "%")
 _FITS = b"SIMPLE  ="
+_UNIT = re.compile(r"(?:^|[^a-z])([kmgt]?hz|cm-1|cm\^-1|1/cm)(?![a-z0-9])", re.IGNORECASE)
+_NAME_IN_COMMENT = re.compile(r"\W*(?:x\s*label\s*:\s*)?([a-z]\w*\s*(?:[\[(][^\])]*[\])])?)", re.IGNORECASE)
 
 
 def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | None = None) -> PeakList:
     """The peaks of a file.
 
-    A .csv file, packed or not, has two or three columns: frequency, intensity, and the standard error of the frequency; a heading is
-    optional. Frequencies are in MHz, or in the unit of their heading (frequency_ghz, f (cm-1)). A .npy file has the same as columns
-    or rows. Frequencies in equal steps are a spectrum, whose peaks are found; a FITS file is always a spectrum.
+    A text file, packed or not, has two or three columns between commas, semicolons or blanks: frequency, intensity, and the standard
+    error of the frequency; a heading and lines of comment (#) are optional. Frequencies are in MHz, or in the unit of their heading
+    (frequency_ghz, f (cm-1)). A .npy file has the same as columns or rows. Frequencies in equal steps are a spectrum, whose peaks are
+    found. A spectrum may have gaps: then at least 300 rows, of which nine in ten lie on grids of equal steps; its peaks are found piece
+    by piece. A FITS file is always a spectrum.
 
     Parameters
     ----------
@@ -55,13 +65,47 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
 
 
 def peaks_of_columns(columns: Floats, band_mhz: tuple[float, float] | None = None, name: str = "") -> PeakList:
-    """The peaks of columns (n, 2 or 3): a list of them, or a spectrum where frequencies rise in equal steps."""
-    frequency = columns[:, 0]
-    steps = np.diff(frequency)
-    if len(steps) >= LEAST_GRID and steps.mean() > 0 and np.ptp(steps) < EQUAL_STEPS * steps.mean():
-        return _in_band(peaks_of_spectrum(frequency, columns[:, 1], name), band_mhz)
+    """The peaks of columns (n, 2 or 3): a list of them, or a spectrum on a grid, which may have gaps."""
+    pieces = _pieces(columns)
+    if pieces:
+        return _in_band(peaks_of_pieces(pieces, name), band_mhz)
     error = columns[:, 2] if columns.shape[1] > 2 else None
-    return _in_band(peak_list(frequency, columns[:, 1], error, source=name), band_mhz)
+    try:
+        return _in_band(peak_list(columns[:, 0], columns[:, 1], error, source=name), band_mhz)
+    except ValueError as reason:
+        if len(columns) <= LEAST_GRID:
+            raise
+        raise ValueError(f"{reason} (read as a list of peaks, as its steps are not equal)") from None
+
+
+def _pieces(columns: Floats) -> list[tuple[Floats, Floats]]:
+    """Frequencies and intensities of the pieces of a spectrum, rising and without overlap; none for a list of peaks."""
+    if len(columns) <= LEAST_GRID:
+        return []
+    order = -1 if np.median(np.diff(columns[:, 0])) < 0 else 1
+    f, x = columns[::order, 0], columns[::order, 1]
+    steps = np.diff(f)
+    if steps.mean() > 0 and np.ptp(steps) < EQUAL_STEPS * steps.mean():
+        return [(f, x)]
+    joined = _equal_neighbours(steps)
+    if len(columns) < LEAST_WITH_GAPS or joined.mean() < MOSTLY:
+        return []
+    parts = sorted(np.split(np.arange(len(f)), np.flatnonzero(~joined) + 1), key=lambda part: float(f[part[0]]))
+    out, end = list[tuple[Floats, Floats]](), -np.inf
+    for part in parts:
+        new = part[f[part] > end]  # of overlapping windows the first one counts
+        if len(new) >= LEAST_POINTS:
+            out.append((f[new], x[new]))
+            end = float(f[new[-1]])
+    return out
+
+
+def _equal_neighbours(steps: Floats) -> NDArray[np.bool_]:
+    """Which steps rise and equal the step before or after; of two grids side by side the second begins with a step that does not."""
+    alike = (np.abs(np.diff(steps)) <= EQUAL_NEIGHBOURS * np.abs(steps[1:])) & (steps[1:] > 0)
+    equal = np.append(alike, False) | np.append(False, alike)
+    equal[1:] &= alike | ~equal[:-1]
+    return equal
 
 
 def _in_band(peaks: PeakList, band_mhz: tuple[float, float] | None) -> PeakList:
@@ -69,10 +113,14 @@ def _in_band(peaks: PeakList, band_mhz: tuple[float, float] | None) -> PeakList:
     if band_mhz is None or len(peaks) < 2:  # noise has none
         return peaks
     inside = (peaks.frequency_mhz >= band_mhz[0]) & (peaks.frequency_mhz <= band_mhz[1])
-    return peak_list(
+    chosen = peak_list(
         peaks.frequency_mhz[inside], peaks.intensity[inside], peaks.uncertainty_mhz[inside], band_mhz=band_mhz,
         source=peaks.source,
     )  # fmt: skip
+    if peaks.given_windows is None:
+        return chosen
+    windows = np.clip(peaks.given_windows, *band_mhz)
+    return replace(chosen, given_windows=windows[windows[:, 1] > windows[:, 0]])
 
 
 def _from_npy(name: str) -> Floats:
@@ -91,16 +139,17 @@ def _from_csv(path: Path) -> Floats:
     lines = text.decode("utf-8", "replace").splitlines()
     for number, line in enumerate(lines, 1):
         cells = [cell.strip() for cell in _cells(line) if cell.strip()]
-        if not cells or cells[0].startswith("#"):
+        if not cells or cells[0].startswith(COMMENTS):
+            factor = _unit_of_comment(line) or factor if not rows else factor
             continue
         try:
             values = [float(cell) for cell in cells[:3]]
         except ValueError:
             if heading and not rows:
-                heading, factor = False, _unit_of_heading(cells[0])
+                heading, factor = False, _unit_of_heading(line) or factor
                 continue
             raise ValueError(
-                f"{name}, line {number}: {','.join(cells)[:60]!r}: expected two or three numbers"
+                f"{name}, line {number}: {line.strip()[:60]!r}: expected two or three numbers, separated by commas or blanks"
             ) from None
         if len(values) < 2 or (rows and len(values) != len(rows[0])):
             raise ValueError(
@@ -115,13 +164,19 @@ def _from_csv(path: Path) -> Floats:
 
 
 def _cells(line: str) -> list[str]:
-    """The cells of a line. Where they stand between semicolons, a comma is a decimal point."""
+    """The cells of a line between commas or blanks. Where they stand between semicolons, a comma is a decimal point."""
     if ";" in line:
         return line.replace(",", ".").split(";")
-    return next(csv.reader([line]), [])
+    return next(csv.reader([line]), []) if "," in line else line.split()
 
 
-def _unit_of_heading(text: str) -> float:
-    """MHz for each unit of frequency that ends a heading such as frequency_ghz or "f (GHz)"; 1 without a unit."""
-    unit = re.search(r"(?:^|[^a-z])([kmgt]?hz|cm-1|cm\^-1|1/cm)\W*$", text.casefold())
-    return AXIS_UNITS[unit[1]] if unit else 1.0
+def _unit_of_heading(line: str) -> float | None:
+    """MHz for the first unit of frequency in a heading such as frequency_ghz,intensity or "f (GHz) T (K)"; None without a unit."""
+    unit = _UNIT.search(_cells(line)[0] if set(",;") & set(line) else line)
+    return AXIS_UNITS[unit[1].casefold()] if unit else None
+
+
+def _unit_of_comment(line: str) -> float | None:
+    """MHz for the unit that the first name of a comment states: "# frequency_ghz ...", "# f (GHz) ...", "#xLabel: frequency [GHz]"."""
+    name = _NAME_IN_COMMENT.match(line)
+    return _unit_of_heading(name[1]) if name else None

@@ -62,9 +62,12 @@ def predicted(source: str, entries: Entries, note: Note, **basis: bool) -> Predi
 
     basis: as_spcat and full_basis.
     """
-    for identity, field in ANSWERED.items():
-        if entries.values.get(identity) is not None:
-            raise NamedError(f"{{{identity}}}: {source} determines it ({field}); change it there{_or_its_var(source)}")
+    given = [identity for identity in ANSWERED if entries.values.get(identity) is not None]
+    if given:
+        flags = ", ".join(f"{{{identity}}}" for identity in given)
+        fields = ", ".join(dict.fromkeys(ANSWERED[identity] for identity in given))
+        them = "them" if len(given) > 1 else "it"
+        raise NamedError(f"{flags}: {source} determines {them} ({fields}); change {them} there{_or_its_var(source)}")
     from rotor.formats.spcat.predict import predict_file
 
     prediction = predict_file(source, **basis)
@@ -82,7 +85,7 @@ def _or_its_var(source: str) -> str:
         read_spcat_top(path)
     except (OSError, ValueError):
         return ""
-    return f", or give {path} instead, which has no such settings"
+    return f", or give {path} with --dipole-abc instead, which has no such settings and no dipole"
 
 
 def with_names(prediction: Prediction, source: Path) -> Prediction:

@@ -25,7 +25,7 @@ class Comparison:
 
         self.peaks: PeakList = read_peaks(path)
         low, high = self.peaks.band_mhz
-        self.lines = lines.where((lines.frequency_mhz >= low) & (lines.frequency_mhz <= high))
+        self.lines = lines.where(self.peaks.covers(lines.frequency_mhz))
         if not len(self.lines):
             raise ValueError(f"--over {path}: no line lies in its band, {low:g} to {high:g} MHz")
         self.fit: Intensities | None = None

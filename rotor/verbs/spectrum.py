@@ -61,8 +61,8 @@ class SpectrumShown(Shown):
         False, Flag(), "For an .int file: every K in the basis, ignoring KNMIN and KNMAX", panel=OBSERVABLES
     )
     over: str | None = declared(
-        None, Text(metavar="FILE"), "Compare with a measured spectrum or its peaks (.csv, .npy, FITS): --plot draws both",
-        panel=OBSERVABLES,
+        None, Text(metavar="FILE"), "Compare with a measured spectrum or its peaks (columns of text, .npy, FITS): --plot draws both",
+        panel=OBSERVABLES, common=True,
     )  # fmt: skip
     top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
     tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag", panel=OUTPUT)

@@ -51,7 +51,7 @@ def test_command_scene_and_python_agree(call: Call, peaks_csv: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("7000,1\n9000,abc\n", "line 2: '9000,abc': expected two or three numbers"),
+        ("7000,1\n9000,abc\n", "line 2: '9000,abc': expected two or three numbers, separated by commas or blanks"),
         ("7000,1\n9000\n", "line 2: 1 columns"),
         ("7,1\n9,1\n", "if they are in GHz, multiply by 1000"),
         ("7000,1\n9000,-3\n", "row 2: intensity is -3"),
@@ -172,3 +172,65 @@ def test_a_spectrum_with_decimal_commas(folder):
     spectrum = read_text_spectrum(Path("s.csv"))
     np.testing.assert_allclose(spectrum.frequency_mhz, 8000 + 100 * np.arange(5))
     np.testing.assert_array_equal(spectrum.intensity, np.arange(5) + 0.5)
+
+
+def in_pieces(edges: tuple[tuple[float, float, float], ...]) -> np.ndarray:
+    """Rows of a spectrum in windows (first, last, step): noise about 0 and Gaussian lines in each window."""
+    rng, rows = np.random.default_rng(3), []
+    for first, last, step in edges:
+        f = np.arange(first, last, step)
+        centres = np.linspace(first, last, 7)[1:-1] + 0.013
+        x = sum(np.exp(-(((f - centre) / 0.3) ** 2) / 2) for centre in centres) + 0.01 * rng.normal(size=len(f))
+        rows.append(np.column_stack([f, x]))
+    return np.concatenate(rows)
+
+
+WINDOWS = ((9000.0, 9050.0, 0.1), (9300.0, 9340.0, 0.1), (9340.03, 9390.0, 0.06), (12000.0, 12040.0, 0.1))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("digits", [2, 6])  # rounded to a tenth of the step, too
+def test_a_spectrum_with_gaps_is_read_piece_by_piece(folder: Path, digits: int, order: int) -> None:
+    """Rows of noise are below 0, so that they are no list of peaks; each window has its five lines."""
+    np.savetxt(folder / "alma.txt", in_pieces(WINDOWS)[::order], fmt=f"%.{digits}f")
+    peaks = read_peaks(folder / "alma.txt")
+    expected = [x + 0.013 for first, last, _ in WINDOWS for x in np.linspace(first, last, 7)[1:-1]]
+    np.testing.assert_allclose(peaks.frequency_mhz, expected, atol=0.02)
+    np.testing.assert_allclose(peaks.windows, [(a, b - step) for a, b, step in WINDOWS], atol=0.12)
+    assert peaks.covers(np.array([8999.0, 9020.0, 9100.0, 9341.0, 12020.0, 12041.0])).tolist() == [0, 1, 0, 1, 1, 0]
+    part = read_peaks(folder / "alma.txt", (9310.0, 12010.0))
+    assert part.windows[0, 0] == 9310.0
+    assert part.windows[-1, 1] == 12010.0
+
+
+def test_overlapping_windows_count_once(folder: Path) -> None:
+    rows = in_pieces(((9000.0, 9050.0, 0.1),))
+    second = rows[200:] + np.array([0.03, 0.0])
+    np.savetxt(folder / "twice.txt", np.concatenate([rows, second]))
+    assert len(read_peaks(folder / "twice.txt")) == 5
+
+
+def test_a_long_list_that_is_no_grid_says_how_it_was_read(call: Call) -> None:
+    f = np.sort(np.random.default_rng(1).uniform(8000, 18000, 400))
+    np.savetxt("peaks.csv", np.column_stack([f, np.full(400, -1.0)]), delimiter=",")
+    code, _, error = call("assign", "peaks.csv")
+    assert code == 2
+    assert "row 1: intensity is -1" in error
+    assert "read as a list of peaks, as its steps are not equal" in error
+
+
+@pytest.mark.parametrize(
+    ("heading", "ghz"),
+    [
+        ("", False), ("# made at 300 K with a 100 GHz multiplier\n", False), ("# frequency_ghz intensity\n", True),
+        ("#xLabel: frequency [GHz]\n#yLabel: (K)\n", True), ("# f (GHz)  T (K)\n", True), ("f (GHz)   T (K)\n", True),
+        ("frequency_ghz intensity\n", True), ("frequency intensity\n", False), ("! f(GHz) T(K)\n", True),
+    ],
+)  # fmt: skip
+def test_columns_between_blanks(folder: Path, heading: str, ghz: bool) -> None:
+    factor = 1000.0 if ghz else 1.0
+    rows = f"  {9000 / factor:.6f}   2.0 \n  {9100 / factor:.6f}\t5.7719E-03\n"
+    (folder / "peaks.txt").write_text(heading + rows)
+    peaks = read_peaks(folder / "peaks.txt")
+    assert peaks.frequency_mhz.tolist() == pytest.approx([9000.0, 9100.0])
+    assert peaks.intensity.tolist() == [2.0, 5.7719e-3]

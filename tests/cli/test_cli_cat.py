@@ -37,6 +37,11 @@ def test_options_that_the_files_answer_are_refused_and_silences_told(call, tmp_p
         code, _, err = call("spectrum", source, *option)
         assert code == 2
         assert err.startswith(f"error: {option[0]}: {source} determines it")
+    code, _, err = call("spectrum", source, "--range", "0:9GHz", "--jmax", "3", "--isotope", "S=34S")
+    assert code == 2
+    assert err.startswith(
+        f"error: --jmax, --range, --isotope: {source} determines them (FEND, FQLIM, the constants); change them there"
+    )
     shutil.copy(SAMPLES / "so2" / "so2.int", tmp_path / "so2.int")
     text = (SAMPLES / "so2" / "so2.var").read_text()
     (tmp_path / "so2.var").write_text(text.replace("a 1 1 0 60 ", "a 1 1 0 20 "))
@@ -56,7 +61,7 @@ def test_the_other_way_is_named_only_where_it_works(call, tmp_path):
         code, _, err = call("spectrum", "a.int", "--temperature", "10 K")
         assert code == 2
         assert err.startswith("error: --temperature: a.int determines it (TEMP); change it there")
-        assert ("or give a.var" in err) == other
+        assert ("or give a.var with --dipole-abc" in err) == other
         assert (call("spectrum", "a.var", "--dipole-abc", "1,0,0", "--temperature", "10 K")[0] == 0) == other
 
 

@@ -128,3 +128,23 @@ def test_strongest_lines_are_named_above_their_peaks() -> None:
     }
     assert len(names) >= 8
     assert all(x == at[name] and y > 0 for name, (x, y) in names.items())
+
+
+def test_lines_in_gaps_of_the_spectrum_are_not_compared(call: Call) -> None:
+    """Two windows 1 GHz apart: the lines between them were not recorded. The short help names --over."""
+    known = known_lines().frequency_mhz
+    windows = ((8000.0, 9000.0), (10000.0, 11000.0))
+    f = np.concatenate([np.arange(a, b, 0.1) for a, b in windows])
+    x = sum(np.exp(-(((f - at) / 0.3) ** 2) / 2) for at in known) + 0.005 * np.random.default_rng(2).normal(size=len(f))
+    np.savetxt("gaps.txt", np.column_stack([f, x]), fmt="%.5f")
+    code, _, error = call(
+        "spectrum", "--constants", CONSTANTS, "--dipole-abc", "1,1,1", "--temperature", "5", "--over", "gaps.txt",
+        "--json", "over.json", "--csv", "lines.csv",
+    )  # fmt: skip
+    assert code == 0, error
+    over = json.loads(Path("over.json").read_text())["over"]
+    lines = np.genfromtxt("lines.csv", delimiter=",", names=True, usecols=(0,))["frequency_mhz"]
+    inside = sum(int(((lines > a) & (lines < b)).sum()) for a, b in windows)
+    assert 0 < inside < ((lines > 8000) & (lines < 11000)).sum() - 20
+    assert abs(over["lines"] - inside) <= 2
+    assert "--over FILE" in call("spectrum", "--help")[1]
