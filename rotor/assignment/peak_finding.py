@@ -69,7 +69,9 @@ def peaks_of_pieces(pieces: Sequence[tuple[Floats, Floats]], source: str = "") -
         )
     windows = np.array([(f[0], f[-1]) for f, _ in pieces])
     band = (float(windows.min()), float(windows.max()))
-    columns = [np.concatenate(column) for column in zip(*(part.peaks() for part in parts), strict=True)]
+    frequency, height, error = (
+        np.concatenate(column) for column in zip(*(part.peaks() for part in parts), strict=True)
+    )
     given = windows if len(pieces) > 1 else None
     if count < 2:
         down = sum(part.count_down() for part in parts)
@@ -77,8 +79,8 @@ def peaks_of_pieces(pieces: Sequence[tuple[Floats, Floats]], source: str = "") -
             raise ValueError(
                 f"{where}{count} peaks above {THRESHOLD:g} times the noise and {down} below: the lines point down; change the sign"
             )
-        return PeakList(*columns, band, source, given)
-    return replace(peak_list(*columns, band_mhz=band, source=source), given_windows=given)
+        return PeakList(frequency, height, error, band, source, given)
+    return replace(peak_list(frequency, height, error, band_mhz=band, source=source), given_windows=given)
 
 
 class _Piece:

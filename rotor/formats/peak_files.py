@@ -103,7 +103,7 @@ def _pieces(columns: Floats) -> list[tuple[Floats, Floats]]:
 def _equal_neighbours(steps: Floats) -> NDArray[np.bool_]:
     """Which steps rise and equal the step before or after; of two grids side by side the second begins with a step that does not."""
     alike = (np.abs(np.diff(steps)) <= EQUAL_NEIGHBOURS * np.abs(steps[1:])) & (steps[1:] > 0)
-    equal = np.append(alike, False) | np.append(False, alike)
+    equal: NDArray[np.bool_] = np.append(alike, False) | np.append(False, alike)
     equal[1:] &= alike | ~equal[:-1]
     return equal
 
