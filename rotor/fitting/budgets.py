@@ -62,10 +62,20 @@ def _budget(fit: Fit, of: str, unit: str, scale: float, rounding: float, line: f
         ),
         model=_misfit(fit, line),
         data=ErrorTerm(scale, f"errors of {len(fit.groups)} frequencies; {confidence_text(free)}", LINES),
-        statistics=ErrorTerm(scale / math.sqrt(2 * free), f"{counted(free, 'degree')} of freedom", LINES)
+        statistics=ErrorTerm(scale / math.sqrt(2 * free), freedom_text(fit), LINES)
         if free
         else ErrorTerm(None, UNCHECKED, LINES),
     )
+
+
+def freedom_text(fit: Fit) -> str:
+    """The degrees of freedom, and what they count where some data are a-priori values."""
+    text = f"{counted(fit.degrees_of_freedom, 'degree')} of freedom"
+    priors = fit.parameters.prior_count
+    if not priors:
+        return text
+    data = f"{len(fit.residuals) - priors} frequencies and {counted(priors, 'a-priori value')}"
+    return f"{text} from {data} for {counted(fit.statistics.rank, 'constant')}"
 
 
 def weighted_rounding(fit: Fit) -> float:

@@ -57,11 +57,21 @@ class Trial:
 
     @property
     def better(self) -> bool:
-        """Whether all three criteria favour this model."""
+        """Whether the fit converged and all criteria favour this model."""
+        return self.fit.converged and not self.objections
+
+    @property
+    def objections(self) -> tuple[str, ...]:
+        """The criteria that do not favour this model: "by chance", "AICc", "left-one-out rms"."""
         if self.added:
-            needed = self.chance < CHANCE and self.aicc < self.aicc_before
-            return self.fit.converged and needed and self.cross_validated < self.cross_validated_before
-        return self.fit.converged and self.chance >= CHANCE and self.aicc <= self.aicc_before
+            favoured = {
+                "by chance": self.chance < CHANCE,
+                "AICc": self.aicc < self.aicc_before,
+                "left-one-out rms": self.cross_validated < self.cross_validated_before,
+            }
+        else:
+            favoured = {"by chance": self.chance >= CHANCE, "AICc": self.aicc <= self.aicc_before}
+        return tuple(name for name, favours in favoured.items() if not favours)
 
     @property
     def error_ratio(self) -> float:

@@ -96,7 +96,7 @@ class Fit:
 
         For a blend of known width the spread of its components counts too.
         """
-        r = self.residuals[: len(self.residuals) - int(np.isfinite(self.parameters.prior).sum())]
+        r = self.residuals[: len(self.residuals) - self.parameters.prior_count]
         return float(np.sqrt(r @ r / len(r))) if len(r) else float("nan")
 
     @property

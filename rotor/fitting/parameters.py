@@ -51,6 +51,11 @@ class Parameters:
         """A-priori values (n,), MHz, with the standard errors `prior`."""
         return self.start if self.centre is None else self.centre
 
+    @property
+    def prior_count(self) -> int:
+        """The number of a-priori values."""
+        return int(np.isfinite(self.prior).sum())
+
     def constants_of(self, parameters: Floats) -> Floats:
         """The constants (c,) in MHz."""
         return np.asarray(self.base + self.matrix @ parameters)

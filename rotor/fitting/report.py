@@ -11,11 +11,14 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.fit import Fit
+from rotor.fitting.orders import order_of
 from rotor.fitting.publication import value_text
 from rotor.fitting.top_constants import DIPOLES
 from rotor.table import counted
+from rotor.tops.operators import distortion_terms
 
 FAR_OFF = 3.0  # errors beyond which a line is listed as far off
+_LISTED, _FEW_LISTED = 20, 5  # most lines that are listed as far off; and where most lines are
 _CORRELATED = 0.95  # correlation from which a pair is listed
 _INFLUENTIAL = 10  # most influential lines that are listed
 _MOVED = 3  # constants listed for each of them
@@ -145,22 +148,39 @@ def error_text(error: float, form: str) -> str:
 
 def _with_priors(fit: Fit) -> list[str]:
     """SPFIT's weighted rms, if there are a-priori values: they count in χ², but not in the number of lines."""
-    priors = int(np.isfinite(fit.parameters.prior).sum())
+    priors = fit.parameters.prior_count
     if not priors:
         return []
     lines = len(fit.residuals) - priors
     rms = math.sqrt(float(fit.residuals @ fit.residuals) / max(lines, 1))
-    return [f"{priors} a-priori values; with their part in chi2 the weighted rms is {rms:.5f} (RMS ERROR of SPFIT)"]
+    counts = f"{counted(priors, 'a-priori value')}, counted in the degrees of freedom"
+    return [f"{counts}; with their part in chi2 the weighted rms is {rms:.5f} (RMS ERROR of SPFIT)"]
 
 
 def far_off(fit: Fit, errors: float = FAR_OFF) -> list[str]:
-    """Lines that count with residuals above `errors` standard errors, largest first."""
+    """Lines that count with residuals above `errors` standard errors, largest first, and how many more there are than are listed."""
     parts = np.abs(fit.residuals[: len(fit.groups)])
     order = [int(i) for i in np.argsort(-parts) if parts[i] > errors]
+    most = _FEW_LISTED if mostly_off(fit, errors) else _LISTED
+    more = [f"{counted(len(order) - most, 'further line')} of {len(parts)}"] if len(order) > most else []
     return [
         f"line {fit.lines.number(int(fit.groups[i]))}, {fit.lines.text(int(fit.groups[i]))}: {fit.residuals[i]:+.1f} errors"
-        for i in order[:20]
-    ]
+        for i in order[:most]
+    ] + more
+
+
+def mostly_off(fit: Fit, errors: float = FAR_OFF) -> bool:
+    """Whether more than half of the frequencies that count deviate by more than `errors` standard errors."""
+    return bool((np.abs(fit.residuals[: len(fit.groups)]) > errors).sum() > len(fit.groups) / 2)
+
+
+def quartics_not_free(fit: Fit) -> list[str]:
+    """Quartic distortion constants of the top that are not free; none for SPFIT's codes, which are no named constants."""
+    if fit.constants is None:
+        return []
+    named = fit.constants
+    names = distortion_terms(named.kind, named.reduction)
+    return [name for name in names if order_of(name, named) == 4 and name not in fit.parameters.names]
 
 
 def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:

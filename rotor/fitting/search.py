@@ -251,7 +251,7 @@ def round_off(search: Search, slopes: Floats) -> Floats:
 
 def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters) -> str:
     """A message if there are fewer measured frequencies than free constants; empty otherwise."""
-    count = len(set(lines.blend[used].tolist())) + int(np.isfinite(parameters.prior).sum())
+    count = len(set(lines.blend[used].tolist())) + parameters.prior_count
     if count >= len(parameters.names):
         return ""
     return f"{len(parameters.names)} free constants for {count} measured frequencies; free fewer, or add lines"

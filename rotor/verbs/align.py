@@ -18,6 +18,7 @@ from rotor.verbs.verb import Extra, Report, Subject, Verb, picture, tables
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
+    from rotor.arrays import Floats
     from rotor.tops.top import Top
 
 FIELDS = all_fields(AlignRequest)
@@ -178,7 +179,16 @@ def _facts(trace: AlignmentTrace, content: Mapping[str, Any]) -> list[tuple[str,
         ("J max", str(trace.jmax)),
         ("method", f"{trace.method}, {counted(sum(trace.steps), 'step')}"),
         ("numerical error", accuracy),
+        ("samples", _samples_text(trace.t_ps)),
     ]
+
+
+def _samples_text(times: Floats) -> str:
+    """The number of times and their step, and that max and min are samples."""
+    import numpy as np
+
+    longest = float(np.diff(times).max(initial=0.0))
+    return f"{counted(len(times), 'time')}, at most {longest:.3g} ps apart; max and min are the largest and the smallest sample"
 
 
 def _pulse_text(pulse: Pulse) -> str:

@@ -16,6 +16,7 @@ from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom, Range, Text
+from rotor.table import counted
 from rotor.verbs.subjects import saved_inputs
 from rotor.verbs.verb import Output, Place, Report, Subject, SubjectKind, Verb, picture
 
@@ -110,12 +111,19 @@ def show(answer: AssignAnswer, report: Report) -> Iterable[Part | None]:
         ("spectrum", f"{record['peaks']} peaks, {record['band_mhz'][0]:g} to {record['band_mhz'][1]:g} MHz"),
         ("spurs", f"{record['spurs']} harmonics of a clock are left out"),
         ("answer", _verdict(answer)),
-        ("left", f"{record['unexplained']} peaks belong to no species"),
+        ("left", f"{counted(record['unexplained'], 'peak belongs', 'peaks belong')} to no species{_hint(answer)}"),
     ]
     for number, species in enumerate(answer.species, 1):
         yield _table(number, species)
         yield _facts(species)
     yield error_facts(record.get("errors"))
+
+
+def _hint(answer: AssignAnswer) -> str:
+    """How to look for isotopologues, where peaks are left that may be theirs and no search was made."""
+    if answer.request.isotopologues or not answer.species or not answer.unexplained.any():
+        return ""
+    return "; isotopologues are looked for with --isotopologues --molecule FILE"
 
 
 def _verdict(answer: AssignAnswer) -> str:

@@ -236,11 +236,27 @@ def show(answer: FitAnswer, report: Report) -> Iterable[Part | None]:
     yield f"{answer.request.title}: {status_text(fit)}"
     yield _parameter_table(fit, answer.spread)
     yield "\n".join(statistics_text(fit))
-    yield _trial_table("chosen, in this order", answer.steps)
-    yield _trial_table("tried", answer.trials)
+    yield _advice(fit)
+    poor_rms = answer.request.options.poor_rms
+    yield _trial_table("chosen, in this order", answer.steps, poor_rms)
+    yield _trial_table("tried", answer.trials, poor_rms)
     yield _suggestion_table(fit, answer.suggestions)
     close = [] if far_off(fit) else [("lines", "none deviates by more than 3 errors")]
     yield [*close, *error_facts(report.content.get("errors"))]
+
+
+def _advice(fit: Fit) -> list[tuple[str, str]] | None:
+    """What may help a fit that failed with most lines far off: distortion constants that are not free."""
+    from rotor.fitting.report import mostly_off, quartics_not_free
+
+    names = "" if fit.converged or not mostly_off(fit) else ",".join(quartics_not_free(fit))
+    if not names:
+        return None
+    text = (
+        f"most lines are off: constants may be missing (--choose {names} adds those that the lines need, "
+        f"--try {names} tests each alone), or the start or the assignments are wrong"
+    )
+    return [("advice", text)]
 
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
@@ -271,7 +287,7 @@ def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
     return Table("", columns, rows, frozenset({"parameter"}))
 
 
-def _trial_table(title: str, trials: Sequence[Trial]) -> Table:
+def _trial_table(title: str, trials: Sequence[Trial], poor_rms: float) -> Table:
     columns = {
         "constant": "{0.name}",
         "step": lambda trial: "added" if trial.added else "left out",
@@ -281,9 +297,18 @@ def _trial_table(title: str, trials: Sequence[Trial]) -> Table:
         "from": "{0.aicc_before:.1f}",
         "left-one-out rms": "{0.cross_validated:.4g}",
         "weighted rms": "{0.fit.weighted_rms:.4g}",
-        "better": lambda trial: "yes" if trial.better else "no",
+        "better": lambda trial: "yes" if trial.better else f"no: {', '.join(_reasons(trial, poor_rms))}",
     }
-    return record_table(title, columns, trials, {"constant", "step"})
+    return record_table(title, columns, trials, {"constant", "step", "better"})
+
+
+def _reasons(trial: Trial, poor_rms: float) -> tuple[str, ...]:
+    """Why a trial is not better: its fit failed, or the columns that do not favour it."""
+    fit = trial.fit
+    if fit.converged:
+        return trial.objections
+    poor = fit.minimum.converged and max(fit.weighted_rms, fit.minimum.rms) > poor_rms
+    return (f"rms above {poor_rms:g}" if poor else "not converged", *trial.objections)
 
 
 def _suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
