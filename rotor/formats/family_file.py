@@ -16,7 +16,7 @@ constants = "B=6081.492114(6) MHz"            # those of A, B, C that are known
 source = "..."
 
 [[isotopologue]]
-isotopes = "C=13C"                            # or "2=13C"
+isotopes = "C=13C"                            # or "2=13C", "C2=13C"
 lines = "c061502.cat.gz"                      # instead of constants: measured lines (.cat, .lin, .csv) that are fitted here,
 start = "B=6062 D=0.0013 MHz"                 # from these constants, all of them free; a path counts from the file's folder
 corrections = "B=13.2 MHz"                    # to be added to the constants of the ground state: B_e = B_0 + correction

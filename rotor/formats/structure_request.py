@@ -19,7 +19,7 @@ from rotor.requests.readers import Flag, NameList, Text
 from rotor.structures.budgets import lengths_budget
 from rotor.structures.consistency import PlanarMoment, Without, doubts, gains, moments_across_planes, without_each
 from rotor.structures.family import Family
-from rotor.structures.least_squares import FittedStructure, fit_structure
+from rotor.structures.least_squares import FittedStructure, TooFewMomentsError, fit_structure
 from rotor.structures.substitution import SubstitutionStructure, Value, substitution_structure
 from rotor.table import Table
 
@@ -91,7 +91,9 @@ class StructureTable(Table):
 
 @dataclass(frozen=True, eq=False)
 class StructureAnswer:
-    """Results of all methods. without: fits without each isotopologue, by method. doubts: about isotopologues."""
+    """Results of all methods. without: fits without each isotopologue, by method. doubts: about isotopologues. refused: reasons of
+    methods with more unknowns than moments, where another method has a result.
+    """
 
     request: StructureRequest
     substitution: SubstitutionStructure | None
@@ -99,6 +101,7 @@ class StructureAnswer:
     planar: tuple[PlanarMoment, ...] = ()
     without: Mapping[str, list[Without]] = field(default_factory=dict)
     doubts: tuple[str, ...] = ()
+    refused: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def table(self) -> StructureTable:
@@ -187,7 +190,16 @@ def answer_structure(request: StructureRequest) -> StructureAnswer:
             leave_out=tuple(request.leave_out),
         )
 
-    fitted = tuple(fitted_to(file.family, name) for name in request.methods if name != "rs")
+    fits, refused = list[FittedStructure](), dict[str, str]()
+    for name in request.methods:
+        if name != "rs":
+            try:
+                fits.append(fitted_to(file.family, name))
+            except TooFewMomentsError as error:
+                refused[name] = str(error)
+    if refused and substitution is None and not fits:
+        raise ValueError(next(iter(refused.values())))
+    fitted = tuple(fits)
     without = {
         fit.method: without_each(file.family, fit, partial(fitted_to, name=fit.method))
         for fit in fitted
@@ -195,7 +207,7 @@ def answer_structure(request: StructureRequest) -> StructureAnswer:
     }
     said = [text for fit in fitted for text in gains(fit.method, without.get(fit.method, []), fit.rms_u_angstrom2)]
     planar = tuple(moments_across_planes(file.family))
-    return StructureAnswer(request, substitution, fitted, planar, without, (*doubts(file.family), *said))
+    return StructureAnswer(request, substitution, fitted, planar, without, (*doubts(file.family), *said), refused)
 
 
 def _substitution_record(structure: SubstitutionStructure | None) -> dict[str, Any] | None:

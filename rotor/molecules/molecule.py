@@ -142,8 +142,8 @@ class Molecule:
         Parameters
         ----------
         changes : mapping or str
-            Isotope names by 1-based atom number or by element for all its atoms: `{1: "2H"}`, `{"O": "18O"}`,
-            or as text `"1=2H,O=18O"`. Atom numbers have precedence.
+            Isotope names by 1-based atom number, by atom (element and number, as in r(O1-C2)) or by element for all its atoms:
+            `{1: "2H"}`, `{"C2": "13C"}`, `{"O": "18O"}`, or as text `"1=2H,O=18O"`. Single atoms have precedence.
 
         Returns
         -------
@@ -163,7 +163,7 @@ class Molecule:
         """
         table = _parse_changes(changes) if isinstance(changes, str) else dict(changes)
         numbers = list(self.mass_numbers)
-        for key, name in sorted(table.items(), key=lambda item: isinstance(item[0], int)):
+        for key, name in sorted(table.items(), key=lambda item: str(item[0])[-1:].isdecimal()):
             for atom in self._atoms_named(key):
                 numbers[atom] = _same_element(self.symbols[atom], name, atom).mass_number
         changed = replace(self, mass_numbers=tuple(numbers))
@@ -174,15 +174,22 @@ class Molecule:
         return replace(changed, dipole_debye=self.dipole_debye - self.charge * DEBYE_PER_E_ANGSTROM * shift)
 
     def _atoms_named(self, key: int | str) -> list[int]:
-        """Indices of the atoms with this number or element."""
-        if isinstance(key, int):
-            if not 1 <= key <= len(self.symbols):
+        """Indices of the atoms with this number, element, or both."""
+        element, digits = ("", str(key)) if isinstance(key, int) else _split_atom(key)
+        if digits:
+            number = int(digits)
+            if not 1 <= number <= len(self.symbols):
                 raise ValueError(f"atom {key} to substitute: {self.formula} has atoms 1 to {len(self.symbols)}")
-            return [key - 1]
+            if element not in ("", self.symbols[number - 1]):
+                raise ValueError(
+                    f"atom {key} to substitute: atom {number} of {self.formula} is {self.symbols[number - 1]}"
+                )
+            return [number - 1]
         atoms = [i for i, symbol in enumerate(self.symbols) if symbol == key]
         if not atoms:
             raise ValueError(
-                f"element {key!r} to substitute is not in {self.formula}; name an element of it or an atom number"
+                f"element {key!r} to substitute is not in {self.formula}; "
+                f"name an element of it or an atom, by number or as {self.symbols[0]}1"
             )
         return atoms
 
@@ -343,6 +350,12 @@ def _parse_changes(text: str) -> dict[int | str, str]:
             raise ValueError(f"isotopes {text!r}: {item!r} is not of the kind of '1=2H' or 'O=18O'")
         table[int(match[1]) if match[1].isdecimal() else match[1]] = match[2]
     return table
+
+
+def _split_atom(name: str) -> tuple[str, str]:
+    """Element and number of an atom such as C2; the number is empty for an element alone."""
+    match = re.fullmatch(r"([A-Z][a-z]?)([0-9]+)", name)
+    return (match[1], match[2]) if match else (name, "")
 
 
 def _same_element(symbol: str, name: str, atom: int) -> Isotope:

@@ -39,6 +39,10 @@ STUDENT = {
 _FAR = 0.5  # Å: largest displacement of an atom from the start
 
 
+class TooFewMomentsError(ValueError):
+    """A fit with more unknowns than moments."""
+
+
 @dataclass(frozen=True)
 class Moment:
     """A moment of a species: species and axis, observed value with error, calculated value; u Å²."""
@@ -122,8 +126,9 @@ def fit_structure(
     problem = _Problem.of(family, method, coordinates, held, weights, leave_out)
     count = problem.count
     if len(problem.observed) < count:
-        raise ValueError(
-            f"{family.name}: {count} unknowns for {len(problem.observed)} moments; hold coordinates or add isotopologues"
+        raise TooFewMomentsError(
+            f"{family.name}: {count} unknowns for {len(problem.observed)} moments; "
+            "fit fewer coordinates and hold the others, or add isotopologues"
         )
     minimum = minimise(problem.evaluate, np.zeros(count), tolerance=1e-9, most_iterations=200)
     return _result(problem, minimum)
@@ -141,6 +146,8 @@ def _refuse_settings(method: str, weights: str, coordinates: Sequence[Named], he
                 raise ValueError(
                     f"{once[image]} and {each.name} are the same coordinate, or equal by symmetry; leave one of them out"
                 )
+    if held and not coordinates:
+        raise ValueError(f"{held[0].name} is held, but no coordinate is named that is fitted; name those, too")
     both = {atoms for each in coordinates for atoms in each.alike} & {atoms for each in held for atoms in each.alike}
     if both:
         raise ValueError(f"atoms {sorted(both)[0]}: the same coordinate is both fitted and held")

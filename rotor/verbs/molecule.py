@@ -48,8 +48,8 @@ class MoleculeInput:
         common=True, example="A=9.2 B=3 C=2.5 GHz",
     )  # fmt: skip
     isotopes: tuple[str, ...] = declared(
-        (), Names(metavar="1=2H"), "Isotope of an atom, by atom number or element; repeatable", "molecule.isotopes", option="--isotope",
-        common=True, example=["1=2H"],
+        (), Names(metavar="1=2H"), "Isotope of an atom, by number (1=2H), atom (C1=13C) or element; repeatable",
+        "molecule.isotopes", option="--isotope", common=True, example=["1=2H"],
     )  # fmt: skip
     dipole: tuple[float, ...] | None = declared(
         None, Numbers("D", (3,), "0,0,1.85 (debye)", "X,Y,Z"), "Dipole in the frame of the input (D)", "molecule.dipole",

@@ -88,16 +88,16 @@ class Isotopologues(SubjectKind):
         return saved_inputs(subject.molecules[0], folder)
 
 
-def _geometry(answer: StructureAnswer) -> Any:
+def _geometry(answer: StructureAnswer, option: str) -> Any:
     try:
         return answer.geometry
     except ValueError as error:
-        raise NoAnswerError(f"--xyz and --plot: {error}") from None
+        raise NoAnswerError(f"{option}: {error}") from None
 
 
 def write_geometry(answer: StructureAnswer, path: Path, report: Report) -> None:
     """Write the geometry as .xyz."""
-    molecule, _, method = _geometry(answer)
+    molecule, _, method = _geometry(answer, "--xyz")
     positions = (molecule.positions_angstrom.round(8) + 0.0).tolist()
     rows = [f"{s:2s} {x:14.8f} {y:14.8f} {z:14.8f}" for s, (x, y, z) in zip(molecule.symbols, positions, strict=True)]
     head = f"{answer.request.file.family.name}, {method}, principal axes a b c"
@@ -106,14 +106,16 @@ def write_geometry(answer: StructureAnswer, path: Path, report: Report) -> None:
 
 def draw(answer: StructureAnswer, path: Path, report: Report) -> None:
     """Draw the molecule with its bonds."""
-    _geometry(answer)
+    _geometry(answer, "--plot")
     draw_answer(answer, path, report)
 
 
 def failure(answer: StructureAnswer) -> str:
     """Reason why a method has no result; empty if all converged."""
     unconverged = [fit for fit in answer.fitted if not fit.minimum.converged]
-    return f"{unconverged[0].method} has not converged: {unconverged[0].minimum.reason}" if unconverged else ""
+    if unconverged:
+        return f"{unconverged[0].method} has not converged: {unconverged[0].minimum.reason}"
+    return "; ".join(f"{method}: {reason}" for method, reason in answer.refused.items())
 
 
 def show(answer: StructureAnswer, report: Report) -> Iterable[Part | None]:

@@ -695,3 +695,64 @@ def test_the_bound_of_bond_lengths_holds_for_a_loose_search(monkeypatch):
         bounds.append(budget.truncation.value)
     assert bounds[0] > bounds[-1]
     assert budget.data.value == max(value.error for value in computed.values if value.unit == "Å")
+
+
+@pytest.mark.parametrize(
+    ("isotopes", "said"),
+    [
+        ("C2=13C", ""),
+        ("2=13C", ""),
+        ("C1=13C", "atom C1 to substitute: atom 1 of COS is O"),
+        ("C4=13C", "atom C4 to substitute: COS has atoms 1 to 3"),
+        ("N=15N", "name an element of it or an atom, by number or as O1"),
+    ],
+)
+def test_isotopes_by_the_atoms_that_the_answer_names(isotopes, said):
+    """r(O1-C2) is in the answer, and C2=13C ended in "element 'C2' to substitute is not in COS"."""
+    if said:
+        with pytest.raises(ValueError, match=said):
+            OCS.with_isotopes(isotopes)
+    else:
+        assert OCS.with_isotopes(isotopes).mass_numbers == (16, 13, 32)
+    both = Molecule(("O", "C", "O"), [[0, 0, 1.16], [0, 0, 0], [0, 0, -1.16]])
+    assert (
+        both.with_isotopes("O1=17O,O=18O").mass_numbers
+        == both.with_isotopes("O=18O,1=17O").mass_numbers
+        == (17, 12, 18)
+    )
+
+
+def test_a_method_with_too_few_moments_leaves_the_others(call, folder):
+    """--method rs,r0 with two unknowns for one moment ended without rs; --plot was refused with the name of --xyz."""
+    text = (
+        'name = "OCS"\n[geometry]\natoms = [["O", 0, 0, 1.16], ["C", 0, 0, 0], ["S", 0, 0, -1.56]]\n'
+        '[[isotopologue]]\nconstants = "B=6081.492114(6) MHz"\n'
+        '[[isotopologue]]\nisotopes = "C2=13C"\nconstants = "B=6061.92385(2) MHz"\n'
+    )
+    (folder / "ocs.toml").write_text(text)
+    code, out, err = call("structure", "ocs.toml", "--method", "rs,rm1")
+    assert code == 1
+    assert "rs: coordinates" in out
+    assert err.rstrip().endswith(
+        "rm1: OCS: 3 unknowns for 2 moments; fit fewer coordinates and hold the others, or add isotopologues"
+    )
+    code, out, err = call("structure", "ocs.toml", "--method", "rm1")
+    assert (code, out, err) == (
+        2,
+        "",
+        "error: OCS: 3 unknowns for 2 moments; fit fewer coordinates and hold the others, or add isotopologues\n",
+    )
+    for option, name in (("--plot", "o.png"), ("--xyz", "o.xyz")):
+        code, _, err = call("structure", "ocs.toml", "--method", "rs", option, name)
+        assert code == 1
+        assert f"error: {option}: rs has not every atom" in err
+    (folder / "held.toml").write_text(text + "[held]\nCS = [2, 3]\n")  # was passed over without a word
+    code, out, err = call("structure", "held.toml", "--method", "r0")
+    assert (code, out, err) == (
+        2,
+        "",
+        "error: CS is held, but no coordinate is named that is fitted; name those, too\n",
+    )
+    (folder / "held.toml").write_text(text + "[coordinates]\nCO = [1, 2]\n[held]\nCS = [2, 3]\n")
+    code, out, err = call("structure", "held.toml", "--method", "rm1")
+    assert code == 0, err
