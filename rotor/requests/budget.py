@@ -21,6 +21,15 @@ NOT_ESTIMATED = "not estimated"
 ROUNDING = 8 * sys.float_info.epsilon  # of an eigenvalue, relative to the largest: a few units in the last place
 
 
+def two_digits(value: float) -> str:
+    """A size as reports print it.
+
+    >>> two_digits(734.2), two_digits(0.0651), two_digits(4.13e-7)
+    ('730', '0.065', '4.1e-07')
+    """
+    return f"{float(f'{value:.2g}'):g}"
+
+
 @dataclass(frozen=True)
 class ErrorTerm:
     """One source of error of a result.
@@ -47,7 +56,7 @@ class ErrorTerm:
         """Value, unit and source as on the screen."""
         if self.value is None:
             return f"{NOT_ESTIMATED}: {self.source}"
-        number = "exact" if self.value == 0 else f"{self.value:.2g} {unit}".rstrip()
+        number = "exact" if self.value == 0 else f"{two_digits(self.value)} {unit}".rstrip()
         return f"{number} ({self.source})"
 
     def as_json(self, unit: str) -> dict[str, Any]:
@@ -129,13 +138,13 @@ class ErrorBudget:
         >>> exact = ErrorTerm(0.0, "exact")
         >>> geometry = ErrorTerm(300.0, "error of the geometry", "measured constants")
         >>> ErrorBudget("frequencies", "MHz", exact, ErrorTerm(7e-9, "J max 9"), geometry, exact, exact).shortfall(1e-3)
-        'left out about 3e+02 MHz is larger (error of the geometry); measured constants would lower it'
+        'left out about 300 MHz is larger (error of the geometry); measured constants would lower it'
         """
         parts = []
         for name, term in self.shown():
             if term.value is None or term.value <= accuracy:
                 continue
-            size = f"{'about ' if name == 'left out' else ''}{term.value:.2g} {self.unit}".rstrip()
+            size = f"{'about ' if name == 'left out' else ''}{two_digits(term.value)} {self.unit}".rstrip()
             remedy = f"; {term.remedy} would lower it" if term.remedy else ""
             parts.append(f"{name} {size} is larger ({term.source}){remedy}")
         return "; ".join(parts)

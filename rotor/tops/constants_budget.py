@@ -17,7 +17,7 @@ def constants_budget(tops: Sequence[Top]) -> ErrorBudget:
     >>> from rotor.molecules.molecule import Molecule
     >>> co = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]], source="a guess", uncertainty=0.01)
     >>> constants_budget([Top.from_molecule(co)]).line()
-    'errors of rotational constants: left out about 5.8e+02 MHz (error of the geometry), numerical 1e-10 MHz, data not estimated: \
+    'errors of rotational constants: left out about 580 MHz (error of the geometry), numerical 1e-10 MHz, data not estimated: \
 no uncertainties of the constants are known'
     """
     largest = max((top.constants[name] for top in tops for name in _rigid(top)), default=0.0)

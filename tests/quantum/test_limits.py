@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -174,9 +175,11 @@ def test_reports_end_with_the_limits(call, verb):
     words = ("HCN", "--polarizability", "3,2") if verb == "raman" else ("HCN",)
     code, out, _ = call(verb, *words)
     assert code == 0
-    last = out.rstrip().splitlines()[-4:]
+    last = out.rstrip().splitlines()[-5:]
     assert last[0].startswith("effects   at J = ")
-    assert last[1].startswith("left out  nuclear quadrupole: about 4 MHz; 14N splits J = 1 by 3.53 MHz: rotor")
+    assert " ".join([last[1], last.pop(2).lstrip()]).startswith(
+        "left out  nuclear quadrupole: about 2.4 MHz; levels shift by so much, 14N splits J = 1 by 3.53 MHz: rotor"
+    )
     assert last[2].lstrip() == "magnetic coupling of nuclear spins: not estimated; 1H: small splittings"
     assert last[3].lstrip() == "and smaller or not estimated: spin-rotation"  # below a tenth of the largest
     printed = json.loads(call(verb, *words, "--json", "-")[1])
@@ -189,11 +192,33 @@ def test_reports_end_with_the_limits(call, verb):
 
 
 @pytest.mark.parametrize(
+    ("command", "effect", "size"),
+    [
+        (("CH3CN", "--field", "0:1kV/cm:2"), "nuclear quadrupole", "2.1"),  # χ/2
+        (("OCS", "--field", "0:100kV/cm:2"), "polarization by the static field", "65"),  # ½ α F²
+    ],
+)
+def test_a_report_has_the_same_size_of_an_effect_twice(call, command, effect, size):
+    """In the line of errors, where other effects add less than a digit, and in that of what is left out."""
+    out = " ".join(call("stark", *command, "--states", "J<=1")[1].split())
+    assert f"left out about {size} MHz ({effect} and" in out
+    assert f"left out {effect}: about {size} MHz; " in out
+
+
+def test_the_size_of_neglected_distortion_names_its_levels(call):
+    """The estimate grows as a high power of J: H2CO at 300 K has its strongest lines from J = 13."""
+    out = " ".join(call("spectrum", "H2CO", "--range", "840:1540GHz")[1].split())
+    assert "(centrifugal distortion of order J^10 at J = 13, K up to 13)" in out
+    out = " ".join(call("spectrum", "OCS", "--temperature", "10", "--jmax", "20")[1].split())
+    assert re.search(r"\(centrifugal distortion of order J\^\d+ at J = \d+\)", out)
+
+
+@pytest.mark.parametrize(
     ("command", "said"),
     [
         (("raman", "CO2", "--jmax", "4"), "nothing that the molecule shows signs of"),
-        (("thermo", "HCN", "--temperature", "10"), "nuclear quadrupole: about 4 MHz"),
-        (("stark", "HCN", "--field", "0,1", "--states", "0"), "nuclear quadrupole: about 4 MHz"),
+        (("thermo", "HCN", "--temperature", "10"), "nuclear quadrupole: about 2.4 MHz"),
+        (("stark", "HCN", "--field", "0,1", "--states", "0"), "nuclear quadrupole: about 2.4 MHz"),
         (
             ("align", "CO2", "--pulse", "1e12 W/cm2, 50 fs", "--until", "1ps"),
             "nothing that the molecule shows signs of",

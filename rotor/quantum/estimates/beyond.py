@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
+from rotor.requests.budget import two_digits
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -24,17 +25,22 @@ OF_CHI = 0.5  # largest shift relative to χ: χ/2 for J = 1 with I = 1, χ/4 fo
 
 @dataclass(frozen=True)
 class Limit:
-    """A neglected effect. size_mhz: for a line at the highest J; None if not estimated. at_most: whether the size is an upper bound."""
+    """A neglected effect.
+
+    size_mhz: for a line at the highest J; None if not estimated. at_most: whether the size is an upper bound. levels: J and K for which
+    the size holds, where it grows fast with them.
+    """
 
     name: str
     size_mhz: float | None
     text: str
     at_most: bool = False
+    levels: str = ""
 
     @property
     def sentence(self) -> str:
         """Name, size and consequence, as reports print them."""
-        estimate = "not estimated" if self.size_mhz is None else f"about {float(f'{self.size_mhz:.1g}'):g} MHz"
+        estimate = "not estimated" if self.size_mhz is None else f"about {two_digits(self.size_mhz)} MHz"
         size = f"at most {estimate}" if self.at_most else estimate
         return f"{self.name}: {size}; {self.text}"
 
@@ -56,7 +62,10 @@ def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> Limit | No
     (_, before), (order, last) = sizes[-2:]
     which = "higher" if order > 4 else "linear" if top.kind == "linear" else "other"
     text = f"{FACTORS[which]:g} times the order J^{order} ({last:.2g} MHz) squared over the order before"
-    return Limit(f"centrifugal distortion of order J^{order + 2}", FACTORS[which] * last**2 / before, text)
+    levels = f"J = {j}" if top.kind == "linear" else f"J = {j}, K up to {j}"
+    return Limit(
+        f"centrifugal distortion of order J^{order + 2}", FACTORS[which] * last**2 / before, text, levels=levels
+    )
 
 
 def known_couplings(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Limit]:

@@ -46,16 +46,18 @@ def model_term(limits: Sequence[Limit]) -> ErrorTerm:
 
     >>> model_term([Limit("centrifugal distortion", 2.0, ""), Limit("electron spin", None, "")]).text("MHz")
     '2 MHz (centrifugal distortion; electron spin not estimated)'
+    >>> model_term([Limit("centrifugal distortion of order J^8", 734.0, "", levels="J = 30, K up to 30")]).text("MHz")
+    '730 MHz (centrifugal distortion of order J^8 at J = 30, K up to 30)'
     """
-    sizes = [(limit.size_mhz, limit.name) for limit in limits if limit.size_mhz is not None]
+    sizes = [(limit.size_mhz, limit.name, limit.levels) for limit in limits if limit.size_mhz is not None]
     unknown = ", ".join(limit.name for limit in limits if limit.size_mhz is None)
     if not sizes:
         return ErrorTerm(None, unknown or "no effect that is left out has a known size")
-    largest = max(sizes)[1]
-    source = largest + (f" and {len(sizes) - 1} more" if len(sizes) > 1 else "")
+    _, largest, levels = max(sizes)
+    source = largest + (f" at {levels}" if levels else "") + (f" and {len(sizes) - 1} more" if len(sizes) > 1 else "")
     remedy = "measured constants" if largest in GEOMETRY else f"{largest} in the calculation"
     return ErrorTerm(
-        float(sum(size for size, _ in sizes)), source + (f"; {unknown} not estimated" if unknown else ""), remedy
+        float(sum(size for size, *_ in sizes)), source + (f"; {unknown} not estimated" if unknown else ""), remedy
     )
 
 

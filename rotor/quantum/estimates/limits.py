@@ -86,10 +86,12 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     >>> [limit.name for limit in model_limits(Top.from_constants("B=57.6 GHz"), 7, ())]
     ['centrifugal distortion']
     """
-    known_limits = known_couplings(top, j, effects)
-    couplings = [limit for limit in known_limits if limit.name != QUADRUPOLE]  # estimated by _nuclear_limits
-    present = {effect.name for effect in effects} | {limit.name for limit in couplings}
-    limits = [*couplings, *_limits_of_constants(top, j), *_nuclear_limits(top, j, effects, present)]
+    known_limits = {limit.name: limit for limit in known_couplings(top, j, effects)}
+    quadrupole = known_limits.pop(QUADRUPOLE, None)
+    present = {effect.name for effect in effects} | set(known_limits)
+    shift_mhz = 0.0 if quadrupole is None else quadrupole.size_mhz or 0.0
+    nuclear = _nuclear_limits(top, effects, present, shift_mhz)
+    limits = [*known_limits.values(), *_limits_of_constants(top, j), *nuclear]
     if top.molecule is not None:
         limits += _limits_of_geometry(top, top.molecule, j, present)
     return largest_first(limits)
@@ -98,14 +100,11 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
 def every_limit(top: Top, j: int, effects: Sequence[QuantumEffect], *, tabulated: bool = False) -> list[Limit]:
     """`model_limits` with the effects that follow from the constants, however small (`rotor.quantum.estimates.beyond`).
 
-    Known spin couplings replace estimated ones. tabulated: all energies are from the table of the top, so that the
-    distortion series does not matter.
+    tabulated: all energies are from the table of the top, so that the distortion series does not matter.
     """
-    couplings = known_couplings(top, j, effects)
     further = None if tabulated else next_order(top, j, effects)
-    known = {limit.name for limit in couplings}
-    limits = [*couplings, *(limit for limit in model_limits(top, j, effects) if limit.name not in known)]
-    return largest_first(limits if further is None else [*limits, further])
+    limits = model_limits(top, j, effects)
+    return limits if further is None else largest_first([*limits, further])
 
 
 def largest_first(limits: Sequence[Limit]) -> list[Limit]:
@@ -196,12 +195,21 @@ def _largest(top: Top) -> float:
     return (b + c) / 2
 
 
-def _nuclear_limits(top: Top, j: int, effects: Sequence[QuantumEffect], sized: Collection[str]) -> list[Limit]:
-    """Nuclear spin couplings that the calculation neglects; sized: names of couplings whose size is listed already."""
+def _nuclear_limits(
+    top: Top, effects: Sequence[QuantumEffect], sized: Collection[str], shift_mhz: float
+) -> list[Limit]:
+    """Nuclear spin couplings that the calculation neglects.
+
+    sized: names of couplings whose size is listed already. shift_mhz: largest shift of a level by known quadrupole coupling.
+    """
     limits = []
     if absent_sizes(top, effects):
         nuclei = splitting_nuclei(top)
-        size = max(nucleus.splitting_mhz if nucleus.known else abs(nucleus.chi_mhz) for nucleus in nuclei)
+        known = {
+            nucleus.nucleus.partition("_")[0] for nucleus in nuclei if nucleus.known
+        }  # isotopes, if no atom is named
+        others = [nucleus for nucleus in nuclei if not nucleus.known and nucleus.nucleus not in known]
+        size = max([shift_mhz, *(abs(nucleus.chi_mhz) for nucleus in others)])
         limits.append(Limit(QUADRUPOLE, size, _split_text(nuclei)))
     if top.molecule is None:
         return limits
@@ -227,7 +235,7 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
         f"{nucleus.nucleus} splits J = 1 by {nucleus.splitting_mhz:.3g} MHz" for nucleus in nuclei if nucleus.known
     ]
     others = sorted({nucleus.nucleus for nucleus in nuclei if not nucleus.known})
-    texts = [f"{', '.join(known_splittings)}: {COMPUTE}"] if known_splittings else []
+    texts = [f"levels shift by so much, {', '.join(known_splittings)}: {COMPUTE}"] if known_splittings else []
     if others:
         texts.append(
             f"{', '.join(others)} split{'s' if len(others) == 1 else ''} lines of low J, by so much in covalent bonds; its spin "

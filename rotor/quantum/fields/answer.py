@@ -101,10 +101,10 @@ def static_polarization(top: Top, strongest_kv_per_cm: float) -> list[Limit]:
     """
     if not strongest_kv_per_cm:
         return []
-    text = f"energies in {strongest_kv_per_cm:g} kV/cm; lines shift by less, its anisotropy"
+    text = f"all levels are lower by about so much in {strongest_kv_per_cm:g} kV/cm, lines shift only by what differs between them"
     name, tensor = "polarization by the static field", top.polarizability_abc_angstrom3
     if tensor is None:
-        return [Limit(name, None, f"{text}; the polarizability is not known")]
+        return [Limit(name, None, "the polarizability is not known")]
     largest = float(np.abs(np.linalg.eigvalsh(np.array(tensor))).max())
     return [Limit(name, MHZ_PER_ANGSTROM3 * largest * strongest_kv_per_cm**2, text)]
 
