@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 SHOWN = 20  # rows of the table, and reasons of failed points, in the report
 SHOWN_OF_REASON = 3  # points listed for one reason
+SHOWN_NOTES = 3  # notes on the molecules of a sweep
 
 EXAMPLES = """\b
 Examples:
@@ -263,7 +265,16 @@ def _sweep(scene: Scene, options: Options, pool: Executor | None) -> SweepRun:
             progress=advance,
         )
     print(_summary(result, record, time.monotonic() - start), file=sys.stderr)
-    return SweepRun(options, scene.kind, result, record)
+    return SweepRun(options, scene.kind, result, record, _notes(result, record))
+
+
+def _notes(result: SweepResult, record: str) -> tuple[str, ...]:
+    """The notes on the molecules, each once with the number of its points; warnings first, then the most frequent."""
+    counts = Counter(text for point in result.records for text in dict.fromkeys(point.get("notes", ())))
+    ordered = sorted(counts, key=lambda text: (not text.startswith("WARNING"), -counts[text]))
+    listed = [f"{text} ({counts[text]} of {counted(len(result), 'point')})" for text in ordered[:SHOWN_NOTES]]
+    more = len(ordered) - len(listed)
+    return (*listed, *([f"{counted(more, 'more note')} on molecules: see {record}"] if more > 0 else []))
 
 
 def _summary(result: SweepResult, record: str, seconds: float) -> str:

@@ -18,7 +18,7 @@ from rotor.structures.substitution import Value
 from rotor.table import counted
 
 REMAINING = 2.0  # times the next step: each step at least halves the distance to the minimum
-NO_LENGTH = ErrorTerm(None, "no bond length follows from these moments")
+NO_LENGTH = ErrorTerm(None, "no error of a bond length follows from these moments")
 VIBRATION = {
     "rs": "effect of vibration on the moments; Costain's error is a part of it",
     "r0": "what vibration adds to the moments",

@@ -673,3 +673,20 @@ def test_small_points_wait_as_one_array_of_any_names_and_lengths(folder):
     table = duckdb.sql("SELECT * FROM 'a.parquet'").fetchall()
     assert table == [("b" * 16, 1, "longer", None), ("b" * 16, 1, "Å", None), ("a" * 16, 1, "x", 1.5)]
     assert not joined.folder.exists()
+
+
+def test_notes_on_the_molecules_of_a_list_are_told_once(call, folder):
+    """A single `rotor info SMILES:...` says that its constants are estimates; a list of them said nothing. A second run says it, too."""
+    names = {"formaldehyde": "C=O", "acetaldehyde": "CC=O", "sulphur dioxide": "O=S=O"}
+    Path("list.csv").write_text("name,smiles\n" + "".join(f"{name},{smiles}\n" for name, smiles in names.items()))
+    Path("s.toml").write_text('schema = 1\nkind = "info"\nmolecule = "list.csv"\nconditions.temperature = "300 K"\n')
+    for _ in range(2):
+        code, _, err = call("run", "s.toml")
+        notes = [line for line in err.splitlines() if line.startswith("note: ")]
+        assert code == 0, err
+        assert notes[0].startswith("note: WARNING: geometry from MMFF94 with hypervalent")
+        assert notes[0].endswith("(1 of 3 points)")
+        (estimate,) = (line for line in notes if "half of such constants are wrong by" in line)
+        assert estimate.endswith("(2 of 3 points)")
+    Path("list.csv").write_text("name\nCO\nOCS\n")
+    assert "note:" not in call("run", "s.toml")[2]

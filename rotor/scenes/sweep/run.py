@@ -189,6 +189,7 @@ def run_point(job: Job) -> Record:
         if isinstance(error, OSError) and error.errno in FULL:
             raise
         return _failed(job, f"{type(error).__name__}: {error}; this is a defect", time.perf_counter() - start)
+    notes = getattr(getattr(result.request, "top", None), "notes", ())
     return {
         "key": job.key,
         "values": dict(job.point.values),
@@ -196,6 +197,7 @@ def run_point(job: Job) -> Record:
         "seconds": round(result.seconds, 6),
         "files": files,
         "results": results,
+        **({"notes": list(notes)} if notes else {}),
     }
 
 
