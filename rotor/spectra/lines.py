@@ -24,7 +24,13 @@ from rotor.checks import require_positive, require_whole
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.convergence import warnings_of
-from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, line_errors, source_of_errors
+from rotor.quantum.estimates.uncertainty import (
+    known_covariance,
+    level_spread,
+    line_errors,
+    source_of_errors,
+    without_errors,
+)
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.quanta import heading
 from rotor.quantum.solve import solve_levels
@@ -149,6 +155,11 @@ class Lines(TransitionTable):
     def errors_from(self) -> str | None:
         """Source of the uncertainties in the errors of frequencies; None if there are none."""
         return source_of_errors(self.top, self._parameters, self.covariance)
+
+    @property
+    def exact_constants(self) -> list[str]:
+        """Constants without an uncertainty, which `error_mhz` takes as exact."""
+        return without_errors(self.top, self._parameters, self.covariance)
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -224,9 +224,22 @@ def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str,
         ("cut", cut + _range_text(lines.range_mhz)),
         *hyperfine_lines(record["hyperfine"]),
         ("lines", _count_text(answer, record["line_count"])),
+        *_error_column(answer),
         *_layer_facts(record),
         *(over_facts(record["over"]) if "over" in record else []),
     ]
+
+
+def _error_column(answer: SpectrumAnswer) -> list[tuple[str, str]]:
+    """What the column of errors holds; nothing without the column."""
+    lines = answer.lines
+    if lines.error_mhz is None:
+        return []
+    if lines.top.level_table is not None:
+        return [("column error", "from the table of energies; effects left out are not in it")]
+    exact = ", ".join(lines.exact_constants if lines.levels.of_named_constants else ())
+    without = f", with {exact} as exact" if exact else ""
+    return [("column error", f"from errors of the constants alone{without}; effects left out are not in it")]
 
 
 def _layer_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -162,3 +162,22 @@ def test_constants_of_spins_beside_a_covariance_count_by_their_own_uncertainties
     plain = line_list(top, jmax=1)
     assert plain.error_mhz == pytest.approx([0.02])
     assert plain.errors_from == "covariance of B"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("HC3N", "--spin-constants", "chi_aa(14N)=-4.31924 MHz"),
+            "the constants alone, with chi_aa(14N) as exact; effects",
+        ),
+        (("HC3N",), "the constants alone; effects"),
+        (("H2CO",), None),  # without a column of errors
+    ],
+)
+def test_a_report_says_what_its_column_of_errors_holds(call, words, said):
+    code, out, _ = call("spectrum", *words, "--range", "9.05:73GHz", "--temperature", "30")
+    assert code == 0
+    assert ("error (MHz)" in out) == (said is not None)
+    assert ("\ncolumn error" in out) == (said is not None)
+    assert said is None or f"from errors of {said} left out are not in it" in " ".join(out.split())

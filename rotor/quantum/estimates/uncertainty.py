@@ -76,6 +76,15 @@ def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None
     return covariance.beside(alone) if alone else covariance
 
 
+def without_errors(top: Top, parameters: Collection[str], covariance: Covariance | None) -> list[str]:
+    """Constants that count as exact beside others with errors; `covariance` replaces that of the top."""
+    used = covariance or known_covariance(top, parameters)
+    if used is None:
+        return []
+    values = {**top.constants.values, **(top.spin_constants.values if top.spin_constants else {})}
+    return [name for name in parameters if values.get(name) and name not in used.names]
+
+
 def source_of_errors(top: Top, parameters: Collection[str], covariance: Covariance | None) -> str | None:
     """Text on the uncertainties behind errors of frequencies, None without any; `covariance` replaces that of the top."""
     if covariance is None and top.level_table is not None:
