@@ -185,7 +185,7 @@ def in_pieces(edges: tuple[tuple[float, float, float], ...]) -> np.ndarray:
     return np.concatenate(rows)
 
 
-WINDOWS = ((9000.0, 9050.0, 0.1), (9300.0, 9340.0, 0.1), (9340.03, 9390.0, 0.06), (12000.0, 12040.0, 0.1))
+WINDOWS = ((9000.0, 9050.0, 0.1), (9300.0, 9340.0, 0.1), (9340.0, 9390.0, 0.06), (12000.0, 12040.0, 0.1))
 
 
 @pytest.mark.parametrize("order", [1, -1])
