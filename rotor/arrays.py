@@ -95,12 +95,12 @@ def runs_of_similar_size(
     """
     start, least, largest, cost = 0, 0, 0, 0
     for place, size in enumerate(sizes):
-        own = size * size if costs is None else costs[place]
-        least, largest, cost = min(least, size), max(largest, size), max(cost, own)
+        matrix_cost = size * size if costs is None else costs[place]
+        least, largest, cost = min(least, size), max(largest, size), max(cost, matrix_cost)
         if place == start or largest > max(ratio * least, small) or (place + 1 - start) * cost > most:
             if place > start:
                 yield slice(start, place)
-            start, least, largest, cost = place, size, size, own
+            start, least, largest, cost = place, size, size, matrix_cost
     if len(sizes):
         yield slice(start, len(sizes))
 

@@ -72,15 +72,15 @@ def peaks_of_pieces(pieces: Sequence[tuple[Floats, Floats]], source: str = "") -
     frequency, height, error = (
         np.concatenate(column) for column in zip(*(part.peaks() for part in parts), strict=True)
     )
-    given = windows if len(pieces) > 1 else None
+    recorded = windows if len(pieces) > 1 else None
     if count < 2:
         down = sum(part.count_down() for part in parts)
         if down > 2:
             raise ValueError(
                 f"{where}{count} peaks above {THRESHOLD:g} times the noise and {down} below: the lines point down; change the sign"
             )
-        return PeakList(frequency, height, error, band, source, given)
-    return replace(peak_list(frequency, height, error, band_mhz=band, source=source), given_windows=given)
+        return PeakList(frequency, height, error, band, source, recorded)
+    return replace(peak_list(frequency, height, error, band_mhz=band, source=source), given_windows=recorded)
 
 
 class _Piece:

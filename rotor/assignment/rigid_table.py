@@ -61,12 +61,12 @@ class RigidTable:
         return np.asarray(-np.cos(self.theta))
 
     @cached_property
-    def _of_types(self) -> list[RigidTable]:
+    def _tables_by_type(self) -> list[RigidTable]:
         return [self._selected(np.flatnonzero(self.kind == q)) for q in range(len(TYPES))]
 
-    def of_type(self, kind: int) -> RigidTable:
+    def with_type(self, kind: int) -> RigidTable:
         """The table with the lines of a type alone, or of all for a kind beyond those."""
-        return self._of_types[kind] if kind < len(TYPES) else self
+        return self._tables_by_type[kind] if kind < len(TYPES) else self
 
     def _selected(self, lines: Ints) -> RigidTable:
         return replace(

@@ -151,7 +151,7 @@ def quick_ratios(field: Field, tops: Floats, kind: int, least: float = 0.0) -> t
     least : of a ratio of one type that matters; lower ones count as 0.
     """
     table, peaks = field.table, field.peaks
-    lines = table.of_type(kind)
+    lines = table.with_type(kind)
     ratios: tuple[Floats, Floats] = _kernels.quick_ratios(
         table.reduced, table.theta, field.jj, lines.upper, lines.lower, lines.kind, lines.strength, kind == _kernels.MIXED, tops,
         field.temperatures, peaks.windows, ROUGH_MHZ, SOFTNESS, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,

@@ -71,9 +71,26 @@ def _knobs(of: str, lost: Measure, error: Callable[[Any, Any], float]) -> tuple[
     return highest_j(lost), distortion(frequency), hyperfine(frequency)
 
 
-def _with_jmax(request: Any, answer: Callable[[Any], Any]) -> Any:
-    """The request with the highest J of its answer."""
-    return replace(request, jmax=answer(request).lines.jmax)
+def _numerics_of_lines(
+    names: tuple[str, str],
+    cut: Cut,
+    knobs: tuple[Knob, ...],
+    plan: Callable[[Any], Plan],
+    rounding: Callable[[Any], float],
+) -> Numerics:
+    """Numerics of a list of lines; names of its frequencies and of its intensities."""
+    frequencies, intensities = names
+    return Numerics(
+        {
+            "MHz": Goal(frequencies, choose_spins, error_of_list),
+            "%": Goal(intensities, cut.choose, error_of_intensities),
+        },
+        knobs=knobs,
+        prepare=lambda request: replace(request, jmax=cut.answer(request).lines.jmax),
+        remarks=lambda request: reason_of_no_distortion_sweep(request.top),
+        plan=plan,
+        rounding=rounding,
+    )
 
 
 def _jmax_of_spectrum(request: Any) -> tuple[int, str]:
@@ -193,35 +210,19 @@ def _lower_factor(cut: float, decades: int) -> float:
     return float(cut * 10.0**-decades)
 
 
-SPECTRUM = Numerics(
-    {
-        "MHz": Goal("frequencies", choose_spins, error_of_list),
-        "%": Goal(
-            "intensities",
-            Cut("min_lgint", _lower_decades, intensity_left_out, answer_spectrum).choose,
-            error_of_intensities,
-        ),
-    },
-    knobs=_knobs("frequency of a line", INTENSITY, line_error),
-    prepare=lambda request: _with_jmax(request, answer_spectrum),
-    remarks=lambda request: reason_of_no_distortion_sweep(request.top),
-    plan=plan_of_spectrum,
-    rounding=lambda request: rounding_of(request.top, _jmax_of_spectrum(request)[0]),
+SPECTRUM = _numerics_of_lines(
+    ("frequencies", "intensities"),
+    Cut("min_lgint", _lower_decades, intensity_left_out, answer_spectrum),
+    _knobs("frequency of a line", INTENSITY, line_error),
+    plan_of_spectrum,
+    lambda request: rounding_of(request.top, _jmax_of_spectrum(request)[0]),
 )
-RAMAN = Numerics(
-    {
-        "MHz": Goal("shifts", choose_spins, error_of_list),
-        "%": Goal(
-            "cross sections",
-            Cut("min_relative", _lower_factor, section_left_out, answer_raman).choose,
-            error_of_intensities,
-        ),
-    },
-    knobs=_knobs("shift of a line", SECTION, shift_error),
-    prepare=lambda request: _with_jmax(request, answer_raman),
-    remarks=lambda request: reason_of_no_distortion_sweep(request.top),
-    plan=plan_of_raman,
-    rounding=_rounding_of_raman,
+RAMAN = _numerics_of_lines(
+    ("shifts", "cross sections"),
+    Cut("min_relative", _lower_factor, section_left_out, answer_raman),
+    _knobs("shift of a line", SECTION, shift_error),
+    plan_of_raman,
+    _rounding_of_raman,
 )
 
 

@@ -62,11 +62,11 @@ def predicted(source: str, entries: Entries, note: Note, **basis: bool) -> Predi
 
     basis: as_spcat and full_basis.
     """
-    given = [identity for identity in ANSWERED if entries.values.get(identity) is not None]
-    if given:
-        flags = ", ".join(f"{{{identity}}}" for identity in given)
-        fields = ", ".join(dict.fromkeys(ANSWERED[identity] for identity in given))
-        them = "them" if len(given) > 1 else "it"
+    clashes = [identity for identity in ANSWERED if entries.values.get(identity) is not None]
+    if clashes:
+        flags = ", ".join(f"{{{identity}}}" for identity in clashes)
+        fields = ", ".join(dict.fromkeys(ANSWERED[identity] for identity in clashes))
+        them = "them" if len(clashes) > 1 else "it"
         raise NamedError(f"{flags}: {source} determines {them} ({fields}); change {them} there{_or_its_var(source)}")
     from rotor.formats.spcat.predict import predict_file
 

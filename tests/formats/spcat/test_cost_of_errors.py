@@ -48,7 +48,7 @@ def test_errors_cost_no_more_calls_than_the_prediction_does(name: str):
 
 
 def test_functions_beyond_knmax_are_left_out_before_they_become_blocks(monkeypatch):
-    """CH3CN with ¹⁴N to F = 30, K to 3 of 31: 4 functions an N; all were made into blocks, and most of them thrown away."""
+    """CH3CN with ¹⁴N to F = 30, K to 3 of 31: 4 functions an N; all became blocks, and most of these were discarded."""
     from rotor.quantum.spins import rotor
 
     made = []
