@@ -87,44 +87,44 @@ def diagram(rows: list[Row]) -> Any:
             stated, wrong = 100 * (1 - group["stated"]), 100 * (1 - group["share"])
             low, high = 100 * (1 - group["high"]), 100 * (1 - group["low"])
             axes.errorbar(stated, wrong, yerr=[[wrong - low], [high - wrong]], fmt="o", ms=4, capsize=3, color=BLUE)
-            axes.annotate(f"  {group['of']}", (stated, wrong), fontsize=7, va="center")
+            axes.annotate(f"  {group['of']}", (stated, wrong), va="center")
         axes.plot([1e-3, 100], [1e-3, 100], color=GREY, lw=0.6, ls=":")
         axes.set(xscale="log", yscale="log", xlim=(1e-3, 100), ylim=(0.03, 100))
         axes.set(xlabel="Stated probability of being wrong (%)", ylabel="Wrong answers (%)")
         return figure
 
 
+NAMES = {
+    "COc1ccccc1": "anisole",
+    "CC(=O)c1ccccc1": "acetophenone",
+    "CC1CCCCC1=O": "2-methylcyclohexanone",
+    "CC1=CCC(CC1)C(C)=C": "limonene",
+    "COc1ccccc1O": "guaiacol",
+    "O=Cc1ccc(OC)cc1": "anisaldehyde",
+    "OC1CCCCC1C": "2-methylcyclohexanol",
+    "CC1CCC(C(C)C)CC1=O": "menthone",
+    "C1CCc2ncccc2C1": "tetrahydroquinoline",
+    "CCOC(=O)C1CC1": "ethyl cyclopropanecarboxylate",
+}  # by SMILES
+
+
 def isotopologues(result: dict[str, Any]) -> Any:
-    """Found 13C species of each molecule."""
+    """¹³C species of each molecule: all, those with enough lines, those found."""
+    rows, least = result["rows"][::-1], result["summary"]["enough_lines"]
+    y = np.arange(len(rows))
+    enough = [sum(component["lines"] >= least for component in row["species"]) for row in rows]
+    right = [sum(component["right"] for component in row["species"]) for row in rows]
+    wrong = [row["wrong"] for row in rows]
     with styled():
-        rows = result["rows"]
-        figure = new_figure((6.0, 3.6))
+        figure = new_figure((6.0, 4.2))
         axes = figure.add_subplot()
-        x = np.arange(len(rows))
-        axes.bar(x, [len(row["species"]) for row in rows], color=GREY, alpha=0.35, label="13C species")
-        enough = [
-            sum(component["lines"] >= result["summary"]["enough_lines"] for component in row["species"]) for row in rows
-        ]
-        axes.bar(
-            x,
-            enough,
-            color=GREY,
-            alpha=0.6,
-            label=f"with {result['summary']['enough_lines']} lines or more above the threshold",
-        )
-        axes.bar(
-            x,
-            [sum(component["right"] for component in row["species"]) for row in rows],
-            width=0.5,
-            color=BLUE,
-            label="found, right",
-        )
-        axes.bar(x, [-row["wrong"] for row in rows], width=0.5, color=ORANGE, label="wrong")
-        axes.set_xticks(x, [row["smiles"] for row in rows], rotation=30, ha="right")
-        axes.axhline(0, color="black", lw=0.5)
-        axes.set_ylabel("Species")
-        axes.set_ylim(top=1.75 * max(len(row["species"]) for row in rows))
-        axes.legend(loc="upper left")
+        axes.barh(y, [len(row["species"]) for row in rows], color=GREY, alpha=0.35, label="all")
+        axes.barh(y, enough, color=GREY, alpha=0.6, label=f"{least} lines or more above the threshold")
+        axes.barh(y, right, height=0.45, color=BLUE, label="found, right")
+        axes.barh(y, wrong, height=0.45, left=right, color=ORANGE, label="found, wrong")
+        axes.set_yticks(y, [NAMES[row["smiles"]] for row in rows])
+        axes.set_xlabel("Number of $^{13}$C species")
+        figure.legend(loc="outside lower right", ncols=2)
         return figure
 
 

@@ -147,7 +147,7 @@ CURVES = ((500, 30, 0.001), (500, 30, 0.03), (5_000, 60, 0.001))  # lines, J max
 
 def picture(path: Path) -> None:
     """Error against time of the fits of CURVES, a point for each iteration until the search ends by itself."""
-    from rotor.plots.picture import PALETTE, new_figure, save, styled
+    from rotor.plots.picture import GREY, PALETTE, new_figure, save, styled
 
     with styled():
         figure = new_figure()
@@ -158,17 +158,19 @@ def picture(path: Path) -> None:
             label = f"{count} lines, J ≤ {jmax}, start {100 * share:g} % off"
             facts[label] = rows
             x, y = [row["ms"] for row in rows], [max(row["off_sigma"], 1e-9) for row in rows]
-            axes.semilogy(x, y, "o-", color=color, label=label, markersize=3.5)
+            axes.loglog(x, y, "o-", color=color, label=label, markersize=3.5)
             for row, cost, other in zip(rows, x, y, strict=True):
-                axes.annotate(
-                    f"{row['iterations']:g}", (cost, other), fontsize=6, xytext=(3, 3), textcoords="offset points"
-                )
-        axes.axhline(1.0, color="#555555", linewidth=0.7)
-        axes.axhline(1e-4, color="#555555", linewidth=0.7, linestyle="--")
-        axes.set_xlim(left=0)
-        axes.set_xlabel("Processor time of the whole fit (ms); numbers: iterations")
-        axes.set_ylabel("Largest error of 15 constants\n(standard errors)")
-        axes.legend(frameon=False)
+                axes.annotate(f"{row['iterations']:g}", (cost, other), xytext=(3, 3), textcoords="offset points")
+        axes.axhline(1.0, color=GREY, linewidth=0.7)
+        axes.axhline(1e-4, color=GREY, linewidth=0.7, linestyle="--")
+        axes.set_title("Fits of 15 constants; numbers: iterations")
+        axes.set_xlabel("Processor time of the whole fit (ms)")
+        axes.set_ylabel("Largest error of a constant\n(standard errors)")
+        low, high = axes.get_xlim()
+        axes.set_xlim(0.9 * low, 1.1 * high)
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_minor_formatter("{x:g}")
+        figure.legend(loc="outside lower left")
     save(figure, path, "Fits: accuracy against time", facts)
 
 

@@ -302,36 +302,29 @@ def _fluctuation(energy: np.ndarray, steps: int, seconds: float, n: int) -> dict
 
 def draw(table: dict[str, Any], picture: Path) -> None:
     """Energy error against step, and against cost."""
-    import matplotlib
+    from rotor.plots.picture import BLUE, GREEN, ORANGE, new_figure, save, styled
 
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
-
-    from rotor.plots.picture import BLUE, GREEN, ORANGE
-
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained", sharey=True)
     looks = {"rotor": (ORANGE, "o"), "OpenMM": (BLUE, "s"), "LAMMPS": (GREEN, "^")}
-    for name, rows in table.items():
-        step = np.array([float(key) for key in rows])
-        rms, cost = (np.array([row[key] for row in rows.values()]) for key in ("rms", "seconds_per_ps"))
-        color, marker = looks[name]
-        left.loglog(step, rms, marker=marker, color=color, label=name)
-        if name != "LAMMPS":
-            right.loglog(cost, rms, marker=marker, color=color, label=name)
     guide = np.array([0.5, 4.0])
-    anchor = table["rotor"]["1.0"]["rms"]
-    left.loglog(guide, anchor * guide**2, "k:", lw=1, label="order 2")
-    left.set_xlabel("Step (fs)")
-    left.set_ylabel("Error of the total energy per degree, rms (kT)")
-    right.set_xlabel("Processor time per ps on one core (s)")
-    left.set_title("216 SPC/E, reaction field, constant energy")
-    right.set_title("What accuracy costs")
-    for axes, ticks in ((left, [0.25, 0.5, 1, 2, 3, 4, 6]), (right, [0.1, 0.2, 0.5, 1, 2, 4])):
-        axes.set_xticks(ticks, map(str, ticks))
-        axes.minorticks_off()
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=9)
-    figure.savefig(picture, dpi=130)
+    with styled():
+        figure = new_figure((6.0, 3.6))
+        left, right = figure.subplots(1, 2, sharey=True)
+        for name, rows in table.items():
+            rms, cost = (np.array([row[key] for row in rows.values()]) for key in ("rms", "seconds_per_ps"))
+            color, marker = looks[name]
+            left.loglog([float(step) for step in rows], rms, marker=marker, color=color, label=name, ms=4)
+            if name != "LAMMPS":
+                right.loglog(cost, rms, marker=marker, color=color, ms=4)
+        left.loglog(guide, table["rotor"]["1.0"]["rms"] * guide**2, "k:", lw=1, label="order 2")
+        left.set(xlabel="Step (fs)", ylabel="Rms error of the total energy\nper degree of freedom (kT)")
+        right.set(xlabel="Processor time of a ps (s)")
+        figure.suptitle("216 SPC/E molecules, reaction field, constant energy", x=0.01, ha="left")
+        for axes, ticks in ((left, [0.25, 0.5, 1, 2, 4]), (right, [0.1, 0.2, 0.5, 1, 2, 4])):
+            axes.set_xticks(ticks, map(str, ticks))
+            axes.minorticks_off()
+            axes.grid(alpha=0.3)
+        figure.legend(loc="outside lower left", ncols=4)
+    save(figure, picture, "Drift of rigid water", {"made by": "benchmarks/bench_fluid.py"})
 
 
 def main() -> None:

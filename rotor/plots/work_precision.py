@@ -16,13 +16,11 @@ from typing import Any
 
 from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, name_text, new_figure, save, styled
 
-PANEL_INCHES = (
-    2.75,
-    2.6,
-)  # of two in a row: at the width of a journal column (8.5 cm) the smallest exponents have 3.4 pt
+PANEL_INCHES = (2.75, 2.6)  # of two in a row: letters of 8.5 pt have 5.2 pt at the width of a journal column (8.5 cm)
 SINGLE_INCHES = (4.8, 3.4)
 TITLE_LETTERS = 34  # that fit above one of two panels
-NAME_POINTS = 8.0  # size of the settings at the points, and of the legend
+MOST_CURVES = 2  # of a panel beside another; panels with more have the whole width
+NAME_POINTS = 8.5  # size of the settings at the points, and of the legend
 LEAST_DRAWN = 1e-17  # an error of 0 is drawn as an open point below all others
 PLACES = (
     (6.0, 2.0, "left"),
@@ -32,6 +30,7 @@ PLACES = (
     (0.0, 8.0, "center"),
 )  # offset (points) of a name from its mark, and its alignment
 MARK_PIXELS = 3.0  # half of a mark
+GAP_PIXELS = 4.0  # around a name, at 200 pixels an inch
 LEAST_JOINED = 4  # settings; fewer are not joined by a line
 MARKERS = "osD^vP*X"  # one more than colours, so that no two curves are alike
 
@@ -57,13 +56,13 @@ class Panel:
 
 
 def work_precision_figure(panels: Sequence[Panel], title: str = "") -> Any:
-    """A matplotlib figure of panels side by side, two in a row.
+    """A matplotlib figure of panels, two in a row, or below each other where a panel has more than two curves.
 
     Raises ValueError where there is no point to draw.
     """
     if not any(points for panel in panels for points in panel.curves.values()):
         raise ValueError("a work-precision picture needs a setting that was measured; there is none")
-    across = min(len(panels), 2)
+    across = 1 if any(len(panel.curves) > MOST_CURVES for panel in panels) else min(len(panels), 2)
     down = math.ceil(len(panels) / across)
     wide, high = PANEL_INCHES if across > 1 else SINGLE_INCHES
     with styled():
@@ -234,7 +233,7 @@ def _fits_at(text: Any, axes: Any, place: tuple[float, float, str], boxes: list[
     across, up, side = place
     text.set_position((across, up))
     text.set_horizontalalignment(side)
-    box = text.get_window_extent().padded(1.0)
+    box = text.get_window_extent().padded(GAP_PIXELS)
     around = box.padded(MARK_PIXELS)
     x, y = marks[:, 0], marks[:, 1]
     covered = ((x > around.x0) & (x < around.x1) & (y > around.y0) & (y < around.y1)).any()
