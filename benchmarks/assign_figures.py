@@ -1,4 +1,4 @@
-"""Figures of docs/assign.md from the rows of `bench_assign.py`.
+"""Figures of docs/assign.md and docs/validation/assign.md from the rows of `bench_assign.py`.
 
     python benchmarks/assign_figures.py
 

@@ -21,7 +21,7 @@ def sentences(text: str) -> list[str]:
     """Sentences of the prose of a Markdown page."""
     text = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
     text = re.sub(r"^(    |\||#|!\[).*$", "\n", text, flags=re.MULTILINE)
-    text = re.sub(r"`[^`]*`", "code", re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text))
+    text = re.sub(r"`[^`]*`", "Code", re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text))
     paragraphs = re.split(r"\n\s*\n|\n(?=\s*(?:[-*]|\d+\.) )", text)
     parts = [
         part

@@ -2,8 +2,8 @@
 
 The evidence ln Z (`rotor.assignment.growth.with_evidence`) compares a species with a random background of peaks. Real spectra are not
 random: another species' pattern, a multiple of J or a twin fit in part. The odds of right constants therefore rise as a power of ln Z
-up to a ceiling. Both were fitted to the answers of 1,000 synthetic spectra (`benchmarks/bench_assign.py`; docs/assign.md shows the
-calibration): each half of them predicts how often the other half is right.
+up to a ceiling. Both were fitted to the answers of 1,000 synthetic spectra (`benchmarks/bench_assign.py`; calibration:
+docs/validation/assign.md): each half of them predicts how often the other half is right.
 """
 
 from __future__ import annotations

@@ -79,8 +79,9 @@ def peaks_of_pieces(pieces: Sequence[tuple[Floats, Floats]], source: str = "") -
             raise ValueError(
                 f"{where}{count} peaks above {THRESHOLD:g} times the noise and {down} below: the lines point down; change the sign"
             )
-        return PeakList(frequency, height, error, band, source, recorded)
-    return replace(peak_list(frequency, height, error, band_mhz=band, source=source), given_windows=recorded)
+        return PeakList(frequency, height, error, band, source, recorded, tuple(pieces))
+    peaks = peak_list(frequency, height, error, band_mhz=band, source=source)
+    return replace(peaks, given_windows=recorded, trace=tuple(pieces))
 
 
 class _Piece:

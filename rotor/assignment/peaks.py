@@ -23,7 +23,7 @@ class PeakList(Table):
     """Peaks in order of frequency.
 
     frequency_mhz, intensity, uncertainty_mhz (n,). band_mhz : first and last recorded frequency. given_windows (k, 2) : recorded parts
-    of the band, if known.
+    of the band, if known. trace : frequencies and intensities of each piece of the spectrum in which the peaks were found.
     """
 
     frequency_mhz: Floats
@@ -32,6 +32,7 @@ class PeakList(Table):
     band_mhz: tuple[float, float]
     source: str = ""
     given_windows: Floats | None = None
+    trace: tuple[tuple[Floats, Floats], ...] = ()
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:

@@ -117,6 +117,7 @@ def _in_band(peaks: PeakList, band_mhz: tuple[float, float] | None) -> PeakList:
         peaks.frequency_mhz[inside], peaks.intensity[inside], peaks.uncertainty_mhz[inside], band_mhz=band_mhz,
         source=peaks.source,
     )  # fmt: skip
+    chosen = replace(chosen, trace=peaks.trace)
     if peaks.given_windows is None:
         return chosen
     windows = np.clip(peaks.given_windows, *band_mhz)

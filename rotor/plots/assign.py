@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
-from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, new_figure, styled
+from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, new_figure, styled, without_signs
 from rotor.plots.view import WHOLE, View, show_part
 
 
@@ -33,7 +33,8 @@ def assignment_figure(answer: AssignAnswer, title: str = "", view: View = WHOLE)
         left = answer.unexplained
         lower.vlines(peaks.frequency_mhz[left], 0, peaks.intensity[left], color=GREY, lw=0.7)
         upper.axhline(0, color="black", lw=0.5)
-        upper.set_ylabel("Intensity")
+        upper.set_ylabel("Intensity: peaks up, predictions down")
+        without_signs(upper)
         lower.set_ylabel("Unexplained")
         lower.set_xlabel("Frequency (MHz)")
         count = f"{answer.request.peaks.source or 'spectrum'}: {len(answer.species)} species"

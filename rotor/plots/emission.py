@@ -131,7 +131,7 @@ def _title(answer: EmissionAnswer) -> str:
     def values(name: str) -> str:
         return ", ".join(f"{value:g}" for value in dict.fromkeys(getattr(source, name) for source in sources))
 
-    text = f"excitation {values('excitation_k')} K, width {values('fwhm_km_s')} km/s"
+    text = f"Excitation {values('excitation_k')} K, width {values('fwhm_km_s')} km/s"
     moving = any(source.velocity_km_s for source in sources)
     text += f", velocity {values('velocity_km_s')} km/s" if moving else ""
     return text + (f", z = {sources[0].redshift:g}" if sources[0].redshift else "")

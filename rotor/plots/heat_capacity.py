@@ -91,7 +91,15 @@ def _draw(axes: Any, panel: Panel) -> None:
     classical = float(first.cv_over_r_classical[0])
     axes.axhline(classical, color=GREY, linewidth=2.5, alpha=0.5, label="classical")
     if np.isfinite(first.cv_over_r_corrected).any():
-        _line(axes, first, first.cv_over_r_corrected, color="black", linestyle=":", linewidth=1.1, label="corrected")
+        _line(
+            axes,
+            first,
+            first.cv_over_r_corrected,
+            color="black",
+            linestyle=":",
+            linewidth=1.1,
+            label="classical, corrected",
+        )
     colour = dict(zip(panel.curves, PALETTE * len(panel.curves), strict=False))
     for label, functions in panel.curves.items():
         _line(axes, functions, functions.cv_over_r, color=colour[label], linewidth=1.5, label=label)

@@ -163,7 +163,7 @@ def _species(table: SelectedLevels, top: Top | None) -> list[_Species]:
     words = ("para, ", "ortho, ") if top is not None and _is_ortho_and_para(top.spin_weights) else ("",) * len(weights)
     kinds = zip(weights.tolist(), (BLUE, ORANGE, GREEN, PALETTE[3]), words, strict=False)
     return [
-        *(_Species(weight == value, colour, "-", f"{word}spin weight {value:g}") for value, colour, word in kinds),
+        *(_Species(weight == value, colour, "-", f"{word}spin weight {value:.4g}") for value, colour, word in kinds),
         missing,
     ]
 

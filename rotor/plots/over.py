@@ -11,7 +11,18 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.assignment.peaks import PeakList
 from rotor.plots.names import SPACE, Peak, name_peaks
-from rotor.plots.picture import BLUE, GREY, WIDTH_INCHES, checked_suffix, name_of_top, new_figure, save, styled
+from rotor.plots.picture import (
+    BLUE,
+    GREY,
+    WIDTH_INCHES,
+    checked_suffix,
+    name_of_top,
+    new_figure,
+    save,
+    styled,
+    without_signs,
+)  # fmt: skip
+from rotor.plots.spectrum import thinned
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import line_text
 from rotor.spectra.lines import Lines
@@ -40,12 +51,15 @@ def plot_over(
 
 
 def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view: View = WHOLE) -> Any:
-    """A matplotlib figure of peaks above the axis and lines below."""
+    """A matplotlib figure of a spectrum, or of peaks without one, above the axis, and of lines below."""
     with styled():
         figure = new_figure((WIDTH_INCHES, 4.2))
         axes = figure.add_subplot()
         shown = heights > LEAST_SHOWN * heights.max(initial=0.0)
-        axes.vlines(peaks.frequency_mhz, 0, peaks.intensity, color=GREY, lw=0.7, label="peaks")
+        for number, (frequency, height) in enumerate(peaks.trace):
+            axes.plot(*thinned(frequency, height), color=GREY, lw=0.7, label=None if number else "spectrum")
+        if not peaks.trace:
+            axes.vlines(peaks.frequency_mhz, 0, peaks.intensity, color=GREY, lw=0.7, label="peaks")
         axes.vlines(
             lines.frequency_mhz[shown],
             -heights[shown],
@@ -56,13 +70,15 @@ def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view
         )
         axes.axhline(0, color="black", lw=0.5)
         axes.set_xlabel("Frequency (MHz)")
-        axes.set_ylabel("Intensity")
+        axes.set_ylabel("Intensity: measured up, lines down")
+        without_signs(axes)
         axes.set_title(title, loc="left")
         axes.legend(frameon=False, fontsize=9, loc="upper left")
         axes.set_xlim(*peaks.band_mhz)
         axes.set_ylim(-1.05 * float(heights.max(initial=0.0)), SPACE * float(peaks.intensity.max()))
         show_part(axes, view)
-        drawn = np.stack([peaks.frequency_mhz, peaks.intensity], axis=1)
+        curves = [(peaks.frequency_mhz, peaks.intensity), *(thinned(*piece) for piece in peaks.trace)]
+        drawn = np.concatenate([np.stack(curve, axis=1) for curve in curves])
         name_peaks(axes, _named_lines(axes, lines, heights, peaks), drawn, MOST_NAMES)
         return figure
 

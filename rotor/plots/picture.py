@@ -158,6 +158,11 @@ def panel(axes: Any = None, size: tuple[float, float] = SIZE_INCHES) -> tuple[An
     return figure, figure.add_subplot()
 
 
+def without_signs(axes: Any) -> None:
+    """Label the vertical axis of a mirrored picture by sizes: lines that are drawn downwards are not negative."""
+    axes.yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
+
+
 def legend_below(figure: Any, axes: Any, **options: Any) -> None:
     """Put a legend below the only panel of a figure, or inside the user's axes, whose figure may have others."""
     layout = figure.get_layout_engine() if hasattr(figure, "get_layout_engine") else None

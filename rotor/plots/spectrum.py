@@ -22,11 +22,11 @@ from rotor.units import MHZ_PER_CM
 
 UNITS = {"MHz": 1.0, "GHz": 1e3, "THz": 1e6, "cm-1": MHZ_PER_CM}  # units of the frequency axis, in MHz
 VISIBLE = 4e-3  # lines below this part of the strongest do not stretch the axis of frequency
-LEAST_NAMED = 0.005  # of a linear axis: lower lines cannot be seen
-LEAST_HEIGHT = 0.55  # part of a linear axis for the strongest line; long names have the rest
+LEAST_NAMED = 0.02  # of a linear axis: lower lines cannot be seen
+LEAST_HEIGHT = 0.55  # part of the axis for the strongest line; long names have the rest
 TALL = 1e-2  # below this part of the strongest, lines cannot be seen on a linear axis
 NARROW = 1e-3  # a range narrower than this part of its frequency is shown in MHz, with all digits
-MOST_DECADES = 8
+MOST_DECADES = 6
 MOST_VERTICES = 20_000  # per curve; more cannot be distinguished on paper
 
 
@@ -282,18 +282,23 @@ def _strongest_first(thing: Lines | Spectrum, lines: Lines, heights: Floats, x: 
 def _leave_space(
     figure: Any, axes: Any, thing: Lines | Spectrum, lines: Lines, heights: Floats, x: _Axis, transition: str
 ) -> None:
-    """Raise the upper limit of a linear axis until the name of the strongest line stands inside."""
+    """Raise the upper limit until the name of the strongest line stands inside."""
     rows = _strongest_first(thing, lines, heights, x)
-    if not len(rows) or axes.get_yscale() == "log":
+    if not len(rows):
         return
     figure.canvas.draw()  # places the axes, so that sizes in pixels are known
     name = _label(axes, lines, int(rows[0]), heights[rows[0]], x, transition)
-    box, top = name.get_window_extent(), axes.get_ylim()[1]
+    box = name.get_window_extent()
     name.remove()
-    beyond = box.y1 + 4 - axes.bbox.y1
-    if beyond > 0:  # the part above the line keeps its height in pixels
-        above = (axes.bbox.height - (heights[rows[0]] / top) * axes.bbox.height + beyond) / axes.bbox.height
-        axes.set_ylim(0.0, heights[rows[0]] / max(1 - above, LEAST_HEIGHT))
+    if box.y1 + 4 <= axes.bbox.y1:
+        return
+    place = axes.transData.transform((lines.frequency_mhz[rows[0]] / x.mhz, heights[rows[0]]))[1]
+    share = max(1 - (box.y1 + 4 - place) / axes.bbox.height, LEAST_HEIGHT)  # the name keeps its height in pixels
+    if axes.get_yscale() == "log":
+        low = axes.get_ylim()[0]
+        axes.set_ylim(low, low * (heights[rows[0]] / low) ** (1 / share))
+    else:
+        axes.set_ylim(0.0, heights[rows[0]] / share)
 
 
 def _stands_out(thing: Lines | Spectrum, lines: Lines, heights: Floats) -> NDArray[np.bool_]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -10,8 +11,10 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, name_of_top, new_figure, styled
 from rotor.plots.view import WHOLE, View, show_part
+from rotor.quantum.fields.blocks import BEFORE_J
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.stark_request import StarkAnswer
+from rotor.quantum.quanta import as_mathtext
 from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM
 
@@ -19,7 +22,9 @@ NARROW_INCHES = 5.0
 SIZE_INCHES = (WIDTH_INCHES, 6.0)
 LEAST_DRAWN = 1e-4  # relative to the strongest line
 MOST_LABELS = 27  # on the axis of energies; a name takes 1/27 of its height
-LETTER = 0.016  # width of a letter, relative to the range of fields
+LETTER = 0.016  # width of a letter, relative to the range of fields; of a subscript 0.7 of it
+GAP_OF_PANELS = 10.0  # of lines in a field: gap to the next panel, relative to the widest shift
+MOST_PANELS = 4
 SAME_HEIGHT = 0.1  # part of the height of a name; nearer levels share one
 
 
@@ -73,13 +78,18 @@ def picture(
 def _energies(axes: Any, field_map: FieldMap, view: View) -> None:
     seen: set[float] = set()
     ends: list[tuple[float, str]] = []
+    levels = field_map.request.space(field_map.jmax).levels
+    first = [name for name in BEFORE_J if name in levels.quanta]
+    names = [*first, "j", *(name for name in levels.quanta if name not in first)]  # in the order of labels
     for rows in _curves(field_map, view):
         m = float(field_map.m[rows[0]])
         energies = field_map.energy_mhz[rows] / MHZ_PER_CM
         label = None if m in seen else ("M mixed" if m < 0 else f"|M| = {m:g}")
         axes.plot(field_map.field[rows], energies, color=_colour(m), linewidth=0.9, label=label)
         seen.add(m)
-        ends.append((float(energies[0]), str(field_map.label[rows[0]])))
+        ends.append(
+            (float(energies[0]), as_mathtext(dict(zip(names, str(field_map.label[rows[0]]).split(), strict=True))))
+        )
     show_part(axes, replace(view, horizontal=None))
     fields = field_map.field[_curves(field_map, view)[0]]
     _labels(axes, (float(fields[0]), float(fields[-1])), ends)
@@ -112,14 +122,21 @@ def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]
     first, end = fields
     height = (high - low) / MOST_LABELS
     named = _grouped(sorted({(energy, label) for energy, label in ends if low <= energy <= high}), height)
-    places = _apart(np.array([energy for energy, _ in named]), height, low, high)
-    longest = max((len(label) for _, label in named), default=0)
+    places = _apart(np.array([energy for energy, _ in named]), height, low, high - height / 2)
+    longest = max((_letters(label) for _, label in named), default=0.0)
     axes.set_xlim(first - (0.045 + LETTER * longest) * (end - first), end + 0.02 * (end - first))
     for (energy, label), place in zip(named, places.tolist(), strict=True):
         axes.annotate(
             label, (first, energy), (first - 0.035 * (end - first), place), ha="right", va="center", fontsize=9,
-            arrowprops={"arrowstyle": "-", "linewidth": 0.4, "color": GREY, "shrinkA": 0.0, "shrinkB": 2.0},
+            arrowprops={"arrowstyle": "-", "linewidth": 0.4, "color": GREY, "shrinkA": 0.0, "shrinkB": 2.0, "relpos": (1.0, 0.5)},
         )  # fmt: skip
+
+
+def _letters(label: str) -> float:
+    """Width of a label in letters, subscripts at 0.7 of a letter."""
+    below = "".join(re.findall(r"_\{([^}]*)\}", label))
+    plain = re.sub(r"_\{[^}]*\}|[${}\\]", "", label)
+    return len(plain) + 0.7 * len(below)
 
 
 def _grouped(levels: list[tuple[float, str]], height: float) -> list[tuple[float, str]]:
@@ -174,31 +191,49 @@ def _with_curve(field_map: FieldMap, rows: Ints) -> tuple[Floats, Floats]:
 def lobes_figure(lines: FieldLines, title: str = "") -> Any:
     """A matplotlib figure of lines in a field: frequency against field, the width of a curve by its intensity.
 
+    Lines that lie far apart compared with their shifts have a panel each.
+
     Raises ValueError for lines at one field.
     """
     if len(lines.fields) < 2:
         raise ValueError("a picture of lines in a field needs two fields or more")
+    strongest = float(lines.intensity_nm2_mhz.max(initial=0.0)) or 1.0
+    shares = [float(lines.intensity_nm2_mhz[rows].max()) / strongest for rows in lines.pairs()]
+    drawn = [(rows, share) for rows, share in zip(lines.pairs(), shares, strict=True) if share >= LEAST_DRAWN]
+    groups = _line_groups(lines, drawn)
     with styled():
-        figure = new_figure(SIZE_INCHES)
-        axes = figure.subplots()
-        strongest = float(lines.intensity_nm2_mhz.max(initial=0.0)) or 1.0
-        seen: set[int] = set()
-        for rows in lines.pairs():
-            m, share = int(lines.lower_m[rows.start]), float(lines.intensity_nm2_mhz[rows].max()) / strongest
-            if share < LEAST_DRAWN:
-                continue
-            label = None if m in seen else f"|M″| = {m}"
-            axes.plot(
-                lines.fields,
-                lines.frequency_mhz[rows],
-                color=_colour(m),
-                linewidth=0.5 + 2 * np.sqrt(share),
-                linestyle="-" if lines.upper_m[rows.start] == m else "--",
-                label=label,
-            )
-            seen.add(m)
-        axes.set_xlabel("Field (kV/cm)")
-        axes.set_ylabel("Frequency (MHz)")
-        axes.set_title(f"{title}, light {lines.light}: full ΔM = 0, dashed ΔM = ±1".strip(", "), loc="left", fontsize=9)
-        axes.legend(frameon=False, fontsize=9)
+        figure = new_figure((WIDTH_INCHES, 3.0 + 1.6 * len(groups)))
+        panels = figure.subplots(len(groups), sharex=True, squeeze=False)[::-1, 0]
+        handles: dict[str, Any] = {}
+        for axes, group in zip(panels, groups, strict=True):
+            for rows, share in group:
+                m, style = (
+                    int(lines.lower_m[rows.start]),
+                    "-" if lines.upper_m[rows.start] == lines.lower_m[rows.start] else "--",
+                )
+                (curve,) = axes.plot(
+                    lines.fields, lines.frequency_mhz[rows], style, color=_colour(m), linewidth=0.5 + 2 * np.sqrt(share)
+                )
+                handles.setdefault(f"|M″| = {m}", curve)
+            axes.ticklabel_format(axis="y", useOffset=False, style="plain")
+        panels[0].set_xlabel("Field (kV/cm)")
+        figure.supylabel("Frequency (MHz)")
+        heading = f"{title}, light {lines.light}: full ΔM = 0, dashed ΔM = ±1".strip(", ")
+        figure.suptitle(heading, x=0.01, ha="left", fontsize=9)
+        figure.legend(handles.values(), handles, loc="outside lower right", ncols=min(len(handles), 5))
     return figure
+
+
+def _line_groups(lines: FieldLines, drawn: list[tuple[slice, float]]) -> list[list[tuple[slice, float]]]:
+    """Lines by frequency, apart where the gap is ten times the widest group; all together if that makes too many groups."""
+    ordered = sorted(drawn, key=lambda line: float(lines.frequency_mhz[line[0]].min()))
+    low = [float(lines.frequency_mhz[rows].min()) for rows, _ in ordered]
+    high = [float(lines.frequency_mhz[rows].max()) for rows, _ in ordered]
+    widest = max((b - a for a, b in zip(low, high, strict=True)), default=0.0)
+    groups: list[list[tuple[slice, float]]] = []
+    for n, line in enumerate(ordered):
+        if n and low[n] - max(high[:n]) < GAP_OF_PANELS * widest:
+            groups[-1].append(line)
+        else:
+            groups.append([line])
+    return groups if len(groups) <= MOST_PANELS else [ordered]

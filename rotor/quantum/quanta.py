@@ -205,7 +205,7 @@ def merged_text(quanta: Quanta, rows: Ints, halves: Collection[str] = ()) -> str
         text[last] = ",".join(values) if listed else f"{values[0]}\\ldots{values[-1]}"
         if len(differing) > 1:
             text[last] += f"\\;({len(rows)})"
-    return _as_mathtext(text)
+    return as_mathtext(text)
 
 
 def state_text(quanta: Quanta, row: int, halves: Collection[str] = ()) -> str:
@@ -218,10 +218,15 @@ def state_text(quanta: Quanta, row: int, halves: Collection[str] = ()) -> str:
     >>> state_text({"j": np.array([7])}, 0)
     '7'
     """
-    return _as_mathtext({name: value_text(column[row], name in halves) for name, column in quanta.items()})
+    return as_mathtext({name: value_text(column[row], name in halves) for name, column in quanta.items()})
 
 
-def _as_mathtext(text: dict[str, str]) -> str:
+def as_mathtext(text: dict[str, str]) -> str:
+    r"""Quantum numbers by name as a plot writes them; removes them from `text`.
+
+    >>> as_mathtext({"v": "1", "j": "3", "k": "-2"})
+    '$v{=}1\\;3_{-2}$'
+    """
     total = text.pop("n", None) or text.pop("j")
     below = [text.pop(name) for name in ("k", "ka", "kc", "irrep") if name in text]
     before = f"v{{=}}{text.pop('v')}\\;" if "v" in text else ""

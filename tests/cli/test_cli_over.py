@@ -12,8 +12,9 @@ from assignment_cases import BAND, TRUTH, lines_of, spectrum
 
 import rotor
 from rotor.assignment.intensities import fit_intensities, matched, types_of
+from rotor.assignment.peak_finding import peaks_of_spectrum
 from rotor.assignment.peaks import peak_list
-from rotor.plots.over import loomis_wood_figure
+from rotor.plots.over import loomis_wood_figure, over_figure
 from rotor.spectra.lines import Lines
 
 Call = Callable[..., tuple[int, str, str]]
@@ -148,3 +149,16 @@ def test_lines_in_gaps_of_the_spectrum_are_not_compared(call: Call) -> None:
     assert 0 < inside < ((lines > 8000) & (lines < 11000)).sum() - 20
     assert abs(over["lines"] - inside) <= 2
     assert "--over FILE" in call("spectrum", "--help")[1]
+
+
+def test_a_spectrum_on_a_grid_is_drawn_as_a_curve() -> None:
+    """The picture has the recorded points, not the peaks found in them."""
+    frequency = np.arange(6000.0, 6100.0, 0.02)
+    noise = 1e-3 * np.random.default_rng(1).normal(size=len(frequency))
+    height = np.exp(-(((frequency - 6020.0) / 0.06) ** 2)) + np.exp(-(((frequency - 6071.3) / 0.06) ** 2)) + noise
+    peaks = peaks_of_spectrum(frequency, height)
+    lines = known_lines()
+    axes = over_figure(lines, lines.intensity_nm2_mhz, peaks, "").axes[0]
+    curve = next(line for line in axes.lines if line.get_label() == "spectrum")
+    np.testing.assert_array_equal(curve.get_ydata(), height)
+    assert all(label >= "0" for label in (tick.get_text() for tick in axes.get_yticklabels()))  # no negative intensity

@@ -176,11 +176,22 @@ def test_lines_of_one_transition_are_named_by_their_spins_alone():
     assert {text.get_text() for text in axes.texts} == {f"$F = {f} – 1$" for f in (0, 1, 2)}
 
 
-def test_every_free_level_of_a_stark_map_is_named():
-    request = rotor.api.StarkRequest(rotor.read("indole"), (0.0, 2.0, 4.0))
+@pytest.mark.parametrize("molecule", ["indole", "CH3CN"])
+def test_every_free_level_of_a_stark_map_is_named(molecule):
+    request = rotor.api.StarkRequest(rotor.read(molecule), (0.0, 2.0, 4.0))
     answer = rotor.api.answer_stark(request)
     named = ", ".join(text.get_text() for text in rotor.plot(answer).axes[0].texts).split(", ")
-    assert sorted(named) == sorted(set(answer.states.label.tolist()))
+    levels = [label.split() for label in answer.states.label.tolist()]
+    expected = {f"${j}_{{{','.join(projections)}}}$" for j, *projections in levels}
+    assert sorted(named) == sorted(expected)
+
+
+def test_lines_in_a_field_that_lie_far_apart_have_a_panel_each():
+    fields = np.linspace(0.0, 1.0, 5)
+    figure = rotor.plot(rotor.api.field_lines(rotor.read("OCS"), fields))
+    low = [axes.get_ylim()[0] for axes in figure.axes]
+    assert len(figure.axes) == 3  # 1 - 0, 2 - 1, 3 - 2, 12 GHz apart, with shifts below 1 MHz
+    assert low == sorted(low, reverse=True)  # the highest frequency above
 
 
 @pytest.mark.parametrize(

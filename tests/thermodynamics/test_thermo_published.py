@@ -134,8 +134,10 @@ def test_the_page():
 def test_the_picture_has_every_curve_and_point():
     figure = heat_capacity_figure(MAKE.panels())
     labels = [{text.get_text() for text in axes.get_legend().get_texts()} for axes in figure.axes]
-    assert labels[0] == {"classical", "corrected", "para", "ortho", "normal", "equilibrium"}
-    assert all(label == {"classical", "corrected", "quantum", "with vibration", "published"} for label in labels[1:])
+    assert labels[0] == {"classical", "classical, corrected", "para", "ortho", "normal", "equilibrium"}
+    assert all(
+        label == {"classical", "classical, corrected", "quantum", "with vibration", "published"} for label in labels[1:]
+    )
     with pytest.raises(ValueError, match="needs a panel"):
         heat_capacity_figure([])
     with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
