@@ -92,17 +92,8 @@ class Well:
 
 @dataclass(frozen=True, eq=False)
 class BondTorsion:
-    """F(α) and V(α) of a bond in MHz, and the number s of equal periods in a turn.
+    """F(α) and V(α) of a bond in MHz, and the number of equal periods in a turn, `fold`; V counts from its lowest value, `foot_mhz`.
 
-    Parameters
-    ----------
-    kinetic, potential : FourierSeries
-        F and V; V counts from its lowest value (`foot_mhz` is subtracted).
-    fold : int
-        s.
-
-    Examples
-    --------
     >>> free = BondTorsion(FourierSeries(150.0, *no_terms()), FourierSeries(0.0, *no_terms()), 3)
     >>> free.species_levels(1, 2).round(6).tolist()  # F m² of m = 1, -2
     [150.0, 600.0]

@@ -59,24 +59,7 @@ class QuantumEffect(ABC):
         return {}
 
     def j_operator(self, top: Top, name: str, j: int, representation: str) -> JOperator | None:
-        """∂H/∂c of one parameter for one J in |J k⟩ of a representation.
-
-        Parameters
-        ----------
-        top : Top
-            The top that the effect acts on.
-        name : str
-            The parameter.
-        j : int
-            Rotational angular momentum J.
-        representation : str
-            Which principal axes are x, y, z.
-
-        Returns
-        -------
-        JOperator or None
-            None where `operators` has all of it.
-        """
+        """∂H/∂c of the parameter `name` for one J in |J k⟩ of a representation; None where `operators` has all of it."""
         return None
 
     def spins(self, top: Top) -> tuple[Spin, ...]:
@@ -143,28 +126,8 @@ class EffectSize(NamedTuple):
 def effect_sizes(
     top: Top, j: int, present: Sequence[QuantumEffect], absent: Iterable[QuantumEffect] = ()
 ) -> list[EffectSize]:
-    """The sizes of effects at one J, largest first, those of the calculation and those that it leaves out.
+    """The sizes of effects at one J that are above 0, largest first; `absent` ones are not in the calculation.
 
-    The one source of sizes: `rotor info`, the limitations shown with a spectrum and plans use it.
-
-    Parameters
-    ----------
-    top : Top
-        The constants.
-    j : int
-        Rotational angular momentum J.
-    present : sequence of QuantumEffect
-        Effects of the calculation.
-    absent : iterable of QuantumEffect, optional
-        Effects that it leaves out.
-
-    Returns
-    -------
-    list of EffectSize
-        Those above 0, each with name, size in MHz, and whether it is present.
-
-    Examples
-    --------
     >>> from rotor.quantum.effects.watson import SEMI_RIGID
     >>> from rotor.tops.top import Top
     >>> [(s.name, round(s.size_mhz, 6)) for s in effect_sizes(Top.from_constants("B=6000 D=0.001 MHz"), 10, SEMI_RIGID)]

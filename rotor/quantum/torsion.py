@@ -78,37 +78,12 @@ def torsional_states(
     waves: int = WAVES,
     count: int | None = None,
 ) -> TorsionalStates:
-    """Energies and states of F (p - ρK)² + V(α).
+    """Energies, above the foot of the cosine series, and states of F (p - ρK)² + V(α) at ρK = `shifts`.
 
-    Parameters
-    ----------
-    f_mhz : float
-        F = ħ²/2I_r, MHz.
-    potential : TorsionalPotential
-        V(α), MHz.
-    shifts : (points,) array, optional
-        ρK; 0 for a torsion without rotation.
-    species : int, optional
-        σ of m = s k + σ.
-    fold : int, optional
-        s; by default that of the potential. A divisor of it mixes its species: 1 gives the states of all species together.
-    waves : int, optional
-        k from -waves to waves.
-    count : int, optional
-        How many of the lowest states; all by default.
+    species: σ of m = s k + σ, k from -waves to waves. fold: s; by default that of the potential. A divisor of it mixes its species: 1 gives
+    the states of all together. count: how many of the lowest states; all by default. Vectors are real where the potential is even. Raises
+    ValueError for F not above 0, and a fold that does not divide the terms of the potential.
 
-    Returns
-    -------
-    TorsionalStates
-        Energies above the foot of the cosine series, MHz. Vectors are real where the potential is even.
-
-    Raises
-    ------
-    ValueError
-        For F not above 0, and a fold that does not divide the terms of the potential.
-
-    Examples
-    --------
     >>> free = torsional_states(150.0, TorsionalPotential(), count=3)  # F m²
     >>> free.energies[0].tolist()
     [0.0, 150.0, 150.0]

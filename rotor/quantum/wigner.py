@@ -36,27 +36,10 @@ CANCELLATION = 32.0  # Σ|term| / |Σ term| above which the sum is made in integ
 
 
 def three_j(j1: ArrayLike, j2: ArrayLike, j3: ArrayLike, m1: ArrayLike, m2: ArrayLike, m3: ArrayLike) -> Floats:
-    """Wigner's 3j symbols (j1 j2 j3; m1 m2 m3) of arrays that broadcast.
+    """Wigner's 3j symbols (j1 j2 j3; m1 m2 m3) of arrays that broadcast, right to some 1e-15 of themselves; 0 where a rule forbids them.
 
-    Parameters
-    ----------
-    j1, j2, j3 : (...) arrays
-        Angular momenta, integers or half-integers.
-    m1, m2, m3 : (...) arrays
-        Their projections.
+    Raises ValueError for a number that is not a multiple of ½, a negative j, and an m that does not belong to its j.
 
-    Returns
-    -------
-    (...) array
-        The symbols, right to some 1e-15 of themselves; 0 where a rule forbids them.
-
-    Raises
-    ------
-    ValueError
-        For a number that is not a multiple of ½, a negative j, and an m that does not belong to its j.
-
-    Examples
-    --------
     >>> round(float(three_j(2, 1, 1, 0, 0, 0)) ** 2 * 15, 12)
     2.0
     >>> three_j(0.5, 0.5, [0, 1], 0.5, -0.5, 0).round(6).tolist()
@@ -72,27 +55,10 @@ def three_j(j1: ArrayLike, j2: ArrayLike, j3: ArrayLike, m1: ArrayLike, m2: Arra
 
 
 def six_j(j1: ArrayLike, j2: ArrayLike, j3: ArrayLike, l1: ArrayLike, l2: ArrayLike, l3: ArrayLike) -> Floats:
-    """Wigner's 6j symbols {j1 j2 j3; l1 l2 l3} of arrays that broadcast.
+    """Wigner's 6j symbols {j1 j2 j3; l1 l2 l3} of arrays that broadcast, right to some 1e-15 of themselves; 0 where a rule forbids them.
 
-    Parameters
-    ----------
-    j1, j2, j3 : (...) arrays
-        Angular momenta of the upper row, integers or half-integers.
-    l1, l2, l3 : (...) arrays
-        Angular momenta of the lower row.
+    Raises ValueError for a number that is negative or not a multiple of ½.
 
-    Returns
-    -------
-    (...) array
-        The symbols, right to some 1e-15 of themselves; 0 where a rule forbids them.
-
-    Raises
-    ------
-    ValueError
-        For a number that is negative or not a multiple of ½.
-
-    Examples
-    --------
     >>> round(float(six_j(1, 1, 1, 1, 1, 1)) * 6, 12)
     1.0
     """

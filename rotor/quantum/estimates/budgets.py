@@ -77,17 +77,10 @@ def parameter_names(top: Top, levels: Levels) -> tuple[str, ...]:
 
 
 def energy_errors(top: Top, levels: Levels) -> Floats | None:
-    """One standard deviation of every energy above the lowest level that exists, by the errors of the constants or of a level table.
+    """One standard deviation (levels,) in MHz of every energy above the lowest level that exists; None where no errors are known.
 
-    Returns
-    -------
-    (levels,) array or None
-        In MHz; nan for a level that is missing in the table. None where no errors are known.
-
-    Notes
-    -----
-    σ² = d C dᵀ with d = ∂E/∂c - ∂E₀/∂c, E₀ the lowest level (`rotor.quantum.estimates.uncertainty`). Neglected: what the Hamiltonian
-    leaves out; constants without an uncertainty count as exact. Errors of a table count from J = 0, whichever level is the lowest.
+    σ² = d C dᵀ with d = ∂E/∂c - ∂E₀/∂c, E₀ the lowest level (`rotor.quantum.estimates.uncertainty`). Constants without an uncertainty
+    count as exact. Errors of a level table count from J = 0, whichever level is the lowest; nan for a level that is missing in the table.
     """
     covariance = known_covariance(top, parameter_names(top, levels))
     if covariance is None:

@@ -33,33 +33,10 @@ RATIO_LIMIT = 0.3  # ratio of successive orders above which the series does not 
 def order_sizes_mhz(
     top: Top, j: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID
 ) -> dict[int, float]:
-    """The size of each order of the Hamiltonian for one J and |K| up to `kmax`.
+    """The size in MHz of each order of the Hamiltonian by its power of J, rising, for one J and |K| up to `kmax` (J by default).
 
-    The size of an order is the largest sum of absolute values of a row of its matrix, which bounds its eigenvalues
-    (Gershgorin).
-
-    Parameters
-    ----------
-    top : Top
-        The constants and the kind of top.
-    j : int
-        Rotational angular momentum J.
-    kmax : int, optional
-        The highest |K| of the rows; J by default.
-    effects : sequence of QuantumEffect, optional
-        What the Hamiltonian consists of.
-
-    Returns
-    -------
-    dict of int to float
-        {power of J: size in MHz}, in rising order of the powers.
-
-    Notes
-    -----
     D_t of a spherical top counts as order four, although its expansion contains terms of J² too.
 
-    Examples
-    --------
     >>> from rotor.tops.top import Top
     >>> order_sizes_mhz(Top.from_constants("B=6000 D=0.01 MHz"), 10)
     {2: 660000.0, 4: 121.0}
@@ -90,32 +67,8 @@ def _row_bound(operators: Operators, j: int, kmax: int) -> float:
 
 
 def series_ratio(top: Top, jmax: int, kmax: int | None = None, effects: Sequence[QuantumEffect] = SEMI_RIGID) -> float:
-    """The largest ratio of one order of the Hamiltonian to the order before it, at J = `jmax` and |K| ≤ `kmax`.
+    """The largest ratio of one order of the Hamiltonian to the order before it, at J = `jmax` and |K| ≤ `kmax`; 0 for a rigid top.
 
-    Above 0.3 the series is unreliable.
-
-    Parameters
-    ----------
-    top : Top
-        The constants and the kind of top.
-    jmax : int
-        The J at which the orders are compared.
-    kmax : int, optional
-        The highest |K| of the rows; `jmax` by default.
-    effects : sequence of QuantumEffect, optional
-        What the Hamiltonian consists of.
-
-    Returns
-    -------
-    float
-        The ratio, a pure number; 0 for a rigid top.
-
-    Notes
-    -----
-    Orders without a constant are passed over.
-
-    Examples
-    --------
     >>> from rotor.tops.top import Top
     >>> round(series_ratio(Top.from_constants("A=835840 B=435352 C=278139 DeltaK=973 MHz"), 20), 2)
     0.45

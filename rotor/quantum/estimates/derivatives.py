@@ -36,33 +36,11 @@ _LIKE, _SMALL = 1.5, 8  # largest ratio of sizes of blocks whose vectors share a
 
 
 def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = None, rows: Rows | None = None) -> Floats:
-    """∂E/∂c of levels by named parameters of their effects.
+    """∂E/∂c (rows, names) of levels by named parameters of their effects, exact at those that the levels were solved with.
 
-    Exact at the parameters that `levels` were solved with (Hellmann and Feynman).
+    By default of all levels and by all parameters. Raises ValueError for a name that no effect has, and for levels of an asymmetric top
+    that were solved without vectors.
 
-    Parameters
-    ----------
-    top : Top
-        Constants with which the levels were solved.
-    levels : Levels
-        Levels, with eigenvectors for an asymmetric top.
-    names : sequence of str, optional
-        Parameters, in the order of the columns; by default all parameters of the effects.
-    rows : (rows,) array of int, optional
-        Indices of the levels; by default all.
-
-    Returns
-    -------
-    (rows, names) array
-        Derivatives, MHz per MHz.
-
-    Raises
-    ------
-    ValueError
-        For a name that no effect has, and for levels of an asymmetric top that were solved without vectors.
-
-    Examples
-    --------
     >>> from rotor.quantum.solve import solve_levels
     >>> from rotor.tops.top import Top
     >>> top = Top.from_constants("A=10 B=6 C=4 MHz")

@@ -45,25 +45,8 @@ class InternalRotor:
 
 
 def rotor_of_moments(top_moment: float, cosines: Floats, moments: Floats, barrier_mhz: float) -> InternalRotor:
-    """F = ħ²/2rI_α and ρ_g = λ_g I_α/I_g of a group, with its barrier.
+    """F = ħ²/2rI_α and ρ_g = λ_g I_α/I_g of a group from I_α, the cosines λ_g of its axis, and I_g (3,) of the whole molecule, u Å².
 
-    Parameters
-    ----------
-    top_moment : float
-        I_α, moment of the group about its axis, u Å².
-    cosines : (3,) array
-        λ_g, cosines of this axis to the principal axes.
-    moments : (3,) array
-        I_g of the whole molecule, u Å².
-    barrier_mhz : float
-        V3.
-
-    Returns
-    -------
-    InternalRotor
-
-    Examples
-    --------
     >>> rotor_of_moments(3.0, np.array([1.0, 0, 0]), np.array([6.0, 50, 50]), 0.0).rho  # half of the molecule turns
     (0.5, 0.0, 0.0)
     """
@@ -105,26 +88,6 @@ def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRot
 
     They are ordered by ⟨P_z²⟩ and thus by Ka: first K = 0, then pairs with the lower level first.
 
-    Parameters
-    ----------
-    constants_mhz : tuple of float
-        A, B, C of the whole molecule.
-    rotor : InternalRotor
-    j : int
-    species : int
-        A_SPECIES or E_SPECIES.
-
-    Returns
-    -------
-    (2J+1,) array
-        MHz.
-
-    Notes
-    -----
-    Excited torsional states are neglected, and ⟨K', σ|K, σ⟩ multiplies ⟨K'|H_rot|K⟩; see the head of this module.
-
-    Examples
-    --------
     >>> levels = species_levels((9.0, 4.0, 3.0), InternalRotor(150_000.0, 1e7, (0.0, 0.0, 0.0)), 1, A_SPECIES)
     >>> (levels - levels[0]).round(6).tolist()  # above 1(0,1): B - C of 1(1,1) with A - B
     [0.0, 5.0, 6.0]

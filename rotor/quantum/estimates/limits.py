@@ -120,24 +120,7 @@ def _rank(limit: Limit) -> float:
 
 
 def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Sequence[Limit] = ()) -> dict[str, Any]:
-    """Sizes of effects and neglected effects at one J, by the keys of docs/verbs.
-
-    Parameters
-    ----------
-    top : Top
-        Constants, geometry and spins.
-    j : int
-        The J for which sizes are estimated.
-    effects : sequence of QuantumEffect
-        Effects of the calculation.
-    further : sequence of Limit
-        Further neglected effects.
-
-    Returns
-    -------
-    dict
-        Values for JSON.
-    """
+    """Sizes of effects and neglected effects at one J, `further` ones too, by the keys of docs/verbs."""
     return {
         "sizes_at_j": j,
         "effects": [size._asdict() for size in model_sizes(top, j, effects)],
@@ -277,21 +260,7 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
 
 
 def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: int) -> tuple[float, str]:
-    """Size of the A - E splitting, and text on the barrier, its source and its uncertainty.
-
-    Parameters
-    ----------
-    top : Top
-        The dipole decides whether lines with ΔK = 0 or with ΔK = 1 are the strong ones.
-    what : str
-        Number of groups, as text.
-    group : MethylGroup
-        The group, with its barrier.
-    shifts : LineShifts
-        Splittings by this group.
-    j : int
-        J of the lower levels.
-    """
+    """Size of the A - E splitting of lines J+1 ← J, and text on the barrier; the dipole decides between ΔK = 0 and ΔK = 1."""
     barrier, rotor = group.barrier, group.rotor
     sizes = [("within one K", shifts.typical_same_mhz), ("between two K", shifts.typical_other_mhz)]
     along = int(np.argmax(np.abs(rotor.rho)))

@@ -99,21 +99,7 @@ def _first_order(twice_spin: int, j: int, k: int, twice_f: int) -> float:
 def depth_lost(nuclei: Sequence[Splitting], numbers: tuple[int, int], k: int | None, fwhm_mhz: float) -> float:
     """The relative loss of depth at the centre of an unresolved line: 1 - Σ w exp(-4 ln 2 (δ/Δν)²) over components (shift δ, weight w).
 
-    Parameters
-    ----------
-    nuclei : sequence of Splitting
-        Nuclei, treated as independent.
-    numbers : (int, int)
-        J of the upper and of the lower level.
-    k : int or None
-        K, 0 for a linear top; None averages over all K, as for an asymmetric top.
-    fwhm_mhz : float
-        Full width of the line at half maximum.
-
-    Returns
-    -------
-    float
-        A number from 0 to 1.
+    numbers: J of the upper and of the lower level. k: 0 for a linear top; None averages over all K. Δν: full width at half maximum.
     """
     left = 1.0
     k_values = range(min(numbers) + 1) if k is None else (k,)

@@ -153,22 +153,7 @@ def joined_data(*terms: ErrorTerm) -> ErrorTerm:
 
 
 def map_budget(states: FieldMap, limits: Sequence[Limit], data: ErrorTerm) -> ErrorBudget:
-    """The errors of the energies of a map.
-
-    Parameters
-    ----------
-    states : FieldMap
-        The map, with bounds of each energy.
-    limits : sequence of Limit
-        Neglected effects, at the highest J of the map and in the strongest field.
-    data : ErrorTerm
-        Errors from constants and moments.
-
-    Returns
-    -------
-    ErrorBudget
-        Errors in MHz, the largest over all states and fields.
-    """
+    """The errors of the energies of a map in MHz, the largest over all states and fields."""
     return ErrorBudget(
         of="energies",
         unit="MHz",

@@ -52,24 +52,7 @@ def count_of(request: MapRequest, block: FieldBlock, order: Ints) -> int:
 def solve_blocks(
     request: MapRequest, blocks: Sequence[tuple[FieldBlock, Terms]], fields: Floats, jmax: int
 ) -> list[BlockStates]:
-    """The states that a map follows, block by block.
-
-    Parameters
-    ----------
-    request : MapRequest
-        Hamiltonian and states of the map.
-    blocks : sequence of (FieldBlock, Terms)
-        Blocks of the space of `jmax + request.margin`, with their matrices.
-    fields : (f,) array
-        Fields in the unit of the request.
-    jmax : int
-        Highest J of the basis.
-
-    Returns
-    -------
-    list of BlockStates
-        Energies (f, states) in MHz, and the states; the bound of the truncation error is added to the error of the solver.
-    """
+    """The states that a map follows in blocks of the space of `jmax + request.margin`; the bound of truncation is added to the solver's."""
     orders = [basis_order(block, jmax) for block, _ in blocks]
     counts = [count_of(request, block, order) for (block, _), order in zip(blocks, orders, strict=True)]
     bases = [
@@ -97,27 +80,9 @@ def solve_block(request: MapRequest, block: FieldBlock, fields: Floats, jmax: in
 def enough_states(
     terms: Terms, order: Ints, count: int, fields: Floats, tolerance_mhz: float
 ) -> tuple[Ints, tuple[Floats, Matrix, Floats] | None]:
-    """The lowest free states that form a sufficient basis at the strongest field.
+    """The lowest free states, in rising places, that suffice as a basis at the strongest field, and their solution there if it was solved.
 
-    Parameters
-    ----------
-    terms : tuple of (n, n) arrays
-        H_0, H_1, ... over the block.
-    order : (n,) array
-        States of the basis by energy.
-    count : int
-        Number of lowest energies that are computed.
-    fields : (f,) array
-        Fields in the unit of the request.
-    tolerance_mhz : float
-        Further states of the basis may change an energy by a tenth of it.
-
-    Returns
-    -------
-    places : (m,) array
-        Places in the block, rising.
-    states : tuple or None
-        The lowest states in this basis at the strongest field, as from `solve_fields`; None if they were not solved.
+    order: states of the basis by energy. Further states of it may change an energy by a tenth of the tolerance.
     """
     size, rising = max(FIRST_BASIS, 2 * count), np.sort(order)
     if len(order) <= max(size, 2 * DENSE):

@@ -22,28 +22,9 @@ DEEPEST = 24  # most halvings of an interval
 
 
 def diabatic_ranks(solve: Solve, fields: Floats, count: int, gap_mhz: float) -> Ints:
-    """For each state at each field, the adiabatic rank at the first field of the state whose label it has.
+    """The adiabatic rank (fields, count), at the first of the rising fields, of the state whose label each of the lowest states has.
 
-    Parameters
-    ----------
-    solve : callable
-        Fields (f,) to energies (f, states) in MHz and slopes dE/dx (f, states) in MHz per unit of the field.
-    fields : (f,) array
-        Rising fields, in any unit.
-    count : int
-        Number of lowest states to label.
-    gap_mhz : float
-        Avoided crossings with a smaller gap (MHz) are passed diabatically.
-
-    Returns
-    -------
-    (f, count) array of int
-        Ranks from 0.
-
-    Raises
-    ------
-    ValueError
-        If the gap is not above 0.
+    Avoided crossings with a gap below `gap_mhz` are passed diabatically; ValueError unless it is above 0.
     """
     if not gap_mhz > 0:
         raise ValueError(f"diabatic gap {gap_mhz} MHz: a number above 0 is expected")

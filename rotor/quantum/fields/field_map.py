@@ -185,25 +185,7 @@ def _check_highest(jmax: int) -> None:
 
 
 def smallest_jmax(request: MapRequest, executor: Executor | None = None) -> int:
-    """The lowest J max for which the bounds of all energies at the strongest field are within the tolerance.
-
-    Parameters
-    ----------
-    request : MapRequest
-        Hamiltonian, fields and states of the map.
-    executor : Executor, optional
-        Solves blocks in parallel.
-
-    Returns
-    -------
-    int
-        J max, at most 300.
-
-    Raises
-    ------
-    ValueError
-        If J max of 300 is not enough.
-    """
+    """The lowest J max, at most 300, for which the bounds of all energies at the strongest field are within the tolerance."""
     lowest = _lowest_jmax(request)
     highest = lowest + STEP_J
     while True:

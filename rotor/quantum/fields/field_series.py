@@ -39,26 +39,11 @@ class FieldSeries(NamedTuple):
 
 
 def field_series(terms: Terms, count: int, orders: int, even: bool = False) -> FieldSeries:
-    """Power series of the lowest states at zero field.
+    """Power series at zero field of the lowest `count` states, in order of energy at a small positive field.
 
-    Parameters
-    ----------
-    terms : tuple of (n, n) arrays
-        H_0, H_1, ... in MHz per power of the unit of the field, real symmetric or Hermitian.
-    count : int
-        Number of states, in order of energy at a small positive field.
-    orders : int
-        Highest power.
-    even : bool, optional
-        Whether reversing the field changes no energy; odd coefficients of a single state are then 0.
+    terms: H_0, H_1, ... in MHz per power of the unit of the field. orders: the highest power. even: whether reversing the field changes no
+    energy; odd coefficients of a single state are then 0.
 
-    Returns
-    -------
-    FieldSeries
-        Coefficients in MHz per power of the unit of the field.
-
-    Examples
-    --------
     >>> two = (np.diag([0.0, 2.0]), np.array([[0.0, 1.0], [1.0, 0.0]]))
     >>> field_series(two, 2, 4).coefficients.tolist()  # 1 -+ √(1 + x²)
     [[0.0, -0.5, 0.0, 0.125], [0.0, 0.5, 0.0, -0.125]]

@@ -53,30 +53,10 @@ def expectation(matrix: Matrix, vectors: Matrix) -> Floats:
 
 
 def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float = 0.0) -> tuple[Floats, Matrix, Floats]:
-    """The lowest `count` states of Σ x^n H_n at many fields x.
+    """Energies (f, count), vectors (f, n, count) and errors (f, count) of the lowest states of Σ x^n H_n at fields x (f,).
 
     Small matrices are solved for all fields at once, large ones one by one or, at many fields, in a basis of eigenvectors at a few fields
-    (`spanned_states`).
-
-    Parameters
-    ----------
-    terms : tuple of (n, n) arrays
-        H_0, H_1, ... real symmetric or complex Hermitian, MHz per power of the unit of the field.
-    fields : (f,) array
-        Values of x.
-    count : int
-        How many states.
-    tolerance_mhz : float, optional
-        Largest error of an energy in the reduced basis; 0 solves all fields in full.
-
-    Returns
-    -------
-    energies : (f, count) array
-        MHz, rising.
-    vectors : (f, n, count) array
-        Eigenvectors in columns.
-    error : (f, count) array
-        Error of energies in a reduced basis, MHz; 0 for full solutions.
+    (`spanned_states`), with errors of up to `tolerance_mhz`; 0 solves all fields in full.
     """
     if len(fields) >= MANY_FIELDS and is_chain(terms):
         states = chain_states([(terms, count)], fields)
@@ -128,31 +108,12 @@ def _lowest(matrix: Matrix, count: int) -> tuple[Floats, Matrix]:
 def spanned_states(
     terms: Terms, fields: Floats, count: int, tolerance_mhz: float
 ) -> tuple[Matrix, tuple[Floats, Matrix, Floats]] | None:
-    """A basis for the lowest states at all fields, from eigenvectors at a few of them, and the states in it.
+    """A basis (n, r) for the lowest states at all rising fields, from eigenvectors at a few of them, and the states in it.
 
     The eigenvectors at some fields, a few more than requested, span a small space for the fields between. The error of an energy is
     |residual|²/gap, where the gap reaches to the highest of the further states. The field with the largest error is solved in full and
-    added, until the error is below a tenth of the tolerance, first between full solutions, then at all fields.
-
-    Parameters
-    ----------
-    terms : tuple of (n, n) arrays
-        H_0, H_1, ... in MHz per power of the unit of the field.
-    fields : (f,) array
-        Values of the field, rising.
-    count : int
-        How many states.
-    tolerance_mhz : float
-        Largest error of an energy in the basis.
-
-    Returns
-    -------
-    basis : (n, r) array
-        Orthonormal columns.
-    states : tuple
-        Energies (f, count) in MHz, eigenvectors (f, n, count) in columns, and errors (f, count) in MHz.
-    None
-        Instead of both, if the basis would have more than half the size of the matrix.
+    added, until the error is below a tenth of the tolerance, first between full solutions, then at all fields. None if the basis would have
+    more than half the size of the matrix.
     """
     anchors = np.unique(np.linspace(0, len(fields) - 1, FIRST_ANCHORS).astype(int)).tolist()
     full = [_lowest(at_fields(terms, fields[place : place + 1])[0], count + BUFFER)[1] for place in anchors]

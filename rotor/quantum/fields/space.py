@@ -19,28 +19,10 @@ if TYPE_CHECKING:
 def field_space(
     top: Top, jmax: int, operators: Sequence[FieldOperator], effects: Sequence[QuantumEffect] = ()
 ) -> FieldSpace:
-    """The states of a top up to `jmax` and the blocks that operators do not connect.
+    """The states of a top up to `jmax` (of N with spins) and the blocks that the operators, all that will act, do not connect.
 
-    Parameters
-    ----------
-    top : Top
-        Constants, kind and spin weights.
-    jmax : int
-        Highest J (N with spins).
-    operators : sequence of FieldOperator
-        All operators that will act.
-    effects : sequence of QuantumEffect, optional
-        The Hamiltonian without the field; by default all effects of the top except spins.
-
-    Returns
-    -------
-    FieldSpace
-        Closed forms for linear and symmetric tops, else solved states of the Hamiltonian.
-
-    Raises
-    ------
-    ValueError
-        For a spherical top, and for a field at an angle with Z beside spins or internal rotation.
+    effects: the Hamiltonian without the field; by default all effects of the top except spins. Raises ValueError for a spherical top, and
+    for a field at an angle with Z beside spins or internal rotation.
     """
     if not all(operator.along_z for operator in operators):
         return tilted_space(top, jmax, operators, effects)

@@ -24,25 +24,10 @@ HELD = 1 << 22  # most numbers in a temporary array
 
 
 def left_out_mhz(terms: Terms, places: Ints, energies: Floats, vectors: Matrix, fields: Floats) -> Floats:
-    """Bound of the lowering of each energy by functions of a block outside the basis.
+    """Bound (fields, states) of the lowering of each energy by functions of a block outside the basis, not negative.
 
-    Parameters
-    ----------
-    terms : tuple of (m, m) arrays
-        H_0, H_1, ... over the block, which reaches at least twice as far in J beyond the basis as they connect.
-    places : (n,) array
-        Functions of the basis, rising.
-    energies : (f, s) array
-        Energies of the lowest states in the basis, MHz.
-    vectors : (f, n, s) array
-        Eigenvectors of these states.
-    fields : (f,) array
-        Fields in the unit of the terms.
-
-    Returns
-    -------
-    (f, s) array
-        MHz, not negative; 0 where the basis is the whole block.
+    terms: H_0, H_1, ... over the block, which reaches at least twice as far in J beyond the basis as they connect. places: rising, of the
+    functions of the basis. energies (f, s) and vectors (f, n, s): of the lowest states in the basis.
     """
     outside = np.ones(len(terms[0]), dtype=bool)
     outside[places] = False
