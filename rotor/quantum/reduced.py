@@ -16,17 +16,28 @@ from rotor.quantum.levels import MomentBlock, SolvedBlock
 from rotor.quantum.tensors import BodyTensor, Tensors, acting_on, add_acting_on, rank_of, tensor_between
 
 AnyBlock = Any  # SolvedBlock, MomentBlock or SpinBlock
+Connections = tuple[list[tuple[AnyBlock, AnyBlock]], Callable[[AnyBlock, AnyBlock], Floats]]
+"""Pairs of blocks that an operator connects, and the function that returns the reduced elements between them."""
 
 
-def amplitudes(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> Floats:
-    """Real reduced elements between all states of two blocks of one kind, (n_up, n_low)."""
-    if isinstance(up, SolvedBlock):
-        return wang_amplitudes(up, low, tensors[0, 0]) if up.alone else _coupled_amplitudes(up, low, tensors)
-    if isinstance(up, MomentBlock):
-        return up.amplitudes(low, tensors)
-    from rotor.quantum.spins import lines
+def connections(blocks: Sequence[AnyBlock], tensors: Tensors) -> Connections:
+    """Every pair (up, low) of blocks that the tensors connect, and the function that returns their reduced elements (n_up, n_low).
 
-    return lines.amplitudes(up, low, tensors)
+    Each pair occurs once, the higher or equal J (or F) first, J rising; a block with itself where it has elements between its states.
+    """
+    if not blocks:
+        return [], lambda up, low: np.zeros((0, 0))
+    if blocks[0].alone:
+        tensor = tensors[0, 0]
+        return list(connected_wang_blocks(blocks, tensor)), lambda up, low: wang_amplitudes(up, low, tensor)
+    if blocks[0].with_spins:
+        from rotor.quantum.spins.many_f_lines import connections_of, tensor_moments
+
+        return connections_of(blocks, tensor_moments(blocks[0].shared, tensors))
+    pairs = list(pairs_where(blocks, rank_of(tensors), lambda up, low: _connects(up, low, tensors)))
+    if isinstance(blocks[0], MomentBlock):
+        return pairs, lambda up, low: up.amplitudes(low, tensors)
+    return pairs, lambda up, low: _coupled_amplitudes(up, low, tensors)
 
 
 def _coupled_amplitudes(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> Floats:
@@ -37,25 +48,6 @@ def _coupled_amplitudes(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> 
             if tensor is not None:
                 moved[target.place] += acting_on(low.vectors[source.place], target.basis, source.basis, tensor)
     return np.asarray(up.vectors.T @ moved)
-
-
-def connected_pairs(blocks: Iterable[AnyBlock], tensors: Tensors) -> Iterator[tuple[AnyBlock, AnyBlock]]:
-    """Every pair (up, low) of blocks that the tensors connect, each once, the higher or equal J (or F) first, J rising.
-
-    A block with itself is among them where it has elements between its states.
-    """
-    blocks = list(blocks)
-    if not blocks:
-        return
-    if blocks[0].alone:
-        yield from connected_wang_blocks(blocks, tensors[0, 0])
-        return
-    if not isinstance(blocks[0], SolvedBlock | MomentBlock):
-        from rotor.quantum.spins.lines import connected_blocks
-
-        yield from connected_blocks(blocks, tensors)
-        return
-    yield from pairs_where(blocks, rank_of(tensors), lambda up, low: _connects(up, low, tensors))
 
 
 def pairs_where(

@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,20 +80,12 @@ def raman_transitions(
             )
         return _joined([])
     if levels.representation is not None:
-        if levels.blocks and _is_axial(levels.blocks[0]):
+        if levels.blocks and levels.blocks[0].axial_k is not None:
             _refuse_without_axis(levels, tensor)
         return _inelastic(levels, _joined(list(_block_transitions(levels, tensor))))
     if levels.kind == "linear":
         return _linear(levels, tensor)
     return _symmetric(levels, tensor, spin_weights)
-
-
-def _is_axial(block: Any) -> bool:
-    """Whether states with spins consist of functions with one sign of K, each of which stands for both signs."""
-    from rotor.quantum.spins.blocks import SpinBlock
-    from rotor.quantum.spins.operators import AxialState
-
-    return isinstance(block, SpinBlock) and isinstance(block.parts[0].rotor.parts[0].basis, AxialState)
 
 
 def _refuse_without_axis(levels: Levels, tensor: Floats) -> None:
@@ -224,8 +215,9 @@ def _block_transitions(levels: Levels, tensor: Floats) -> Iterator[RamanTransiti
         for block in levels.blocks
         if (levels.weight[block.start : block.start + len(block.energies_mhz)] > 0).any()
     ]
-    for up, low in reduced.connected_pairs(existing, tensors):
-        yield _between(levels, up, low, 1.5 * reduced.amplitudes(up, low, tensors) ** 2)
+    pairs, amplitudes = reduced.connections(existing, tensors)
+    for up, low in pairs:
+        yield _between(levels, up, low, 1.5 * amplitudes(up, low) ** 2)
 
 
 def _inelastic(levels: Levels, transitions: RamanTransitions) -> RamanTransitions:

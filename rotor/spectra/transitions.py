@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Indices, Workspace
 from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.reduced import amplitudes, connected_pairs, pairs_where, wang_columns
+from rotor.quantum.reduced import connections, wang_columns
 from rotor.quantum.stacked_blocks import are_whole
 from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import IntensityCut
@@ -109,16 +109,17 @@ def _connections(
 ) -> tuple[list[Pair], Amplitudes]:
     """Pairs of blocks that the moments connect, and the function of their amplitudes."""
     if moments:
+        from rotor.quantum.spins.many_f_lines import connections_of
         from rotor.quantum.spins.moments import moments_of
 
-        acting = moments_of(levels, dict(dipoles), moments)
-        return list(pairs_where(blocks, 1, acting.connected)), _side_by_side(acting.amplitudes)
+        pairs, between = connections_of(blocks, moments_of(levels, dict(dipoles), moments))
+        return pairs, _side_by_side(between)
     representation = str(levels.representation)
     tensors = {states: body_tensor(mu, 1, representation) for states, mu in dipoles.items()}
-    pairs = list(connected_pairs(blocks, tensors))
+    pairs, between = connections(blocks, tensors)
     if blocks and blocks[0].alone:
         return pairs, lambda up, lows: wang_columns(up, lows, tensors[0, 0])
-    return pairs, _side_by_side(lambda up, low: amplitudes(up, low, tensors))
+    return pairs, _side_by_side(between)
 
 
 def _side_by_side(pair_amplitudes: Callable[[Any, Any], Floats]) -> Amplitudes:
@@ -213,15 +214,13 @@ def _many_f_transitions(
     cut: IntensityCut,
 ) -> Transitions | None:  # fmt: skip
     """All transitions of levels with spins that were solved for many F together; None for other levels."""
-    if not blocks or blocks[0].alone:
+    needed = cut.needed
+    if not blocks or not blocks[0].with_spins or not (needed > 0).all():
         return None
-    from rotor.quantum.spins.many_f_lines import amplitudes_of_groups, can_be_stacked
+    from rotor.quantum.spins.many_f_lines import amplitudes_of_groups, tensor_moments
 
     tensors = {states: body_tensor(mu, 1, str(levels.representation)) for states, mu in dipoles.items()}
-    needed = cut.needed
-    if not can_be_stacked(blocks, tensors) or not (needed > 0).all():
-        return None
-    groups = amplitudes_of_groups(blocks, tensors, len(levels))  # type: ignore[arg-type]
+    groups = amplitudes_of_groups(blocks, tensor_moments(blocks[0].shared, tensors), len(levels))  # type: ignore
     energies, needed = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
     space = Workspace()
     return _joined([_group_transitions(energies, needed, group, range_mhz, cut, space) for group in groups])

@@ -1,4 +1,4 @@
-"""Levels and lines of many F at once, against the same F by F and pair by pair."""
+"""Levels and lines of many F at once, against the same block by block and sums over parts."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from spin_elements import elements_of_parts
 
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.spins import many_f_lines, solve
+from rotor.quantum.reduced import connections
+from rotor.quantum.spins import many_f, many_f_lines
 from rotor.quantum.spins.levels import levels_of_f
+from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import intensity_cut
 from rotor.spectra.transitions import all_transitions
 from rotor.tops.spins.spin_constants import SpinConstants
@@ -42,33 +45,50 @@ def _levels(case: str):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_levels_are_those_of_one_f_at_a_time(case, monkeypatch):
+def test_levels_are_those_of_one_block_at_a_time(case, monkeypatch):
     together = _levels(case)
-    assert all(block.group is not None for block in together.blocks)
-    monkeypatch.setattr(solve, "MOST", 0)
+    assert len({id(block.group) for block in together.blocks}) < len(together.blocks)
+    monkeypatch.setattr(many_f, "_MOST", 0)
     apart = _levels(case)
-    assert all(block.group is None for block in apart.blocks)
-    assert np.array_equal(together.energy_mhz, apart.energy_mhz)  # the same matrices, to the last bit
+    assert np.abs(together.energy_mhz - apart.energy_mhz).max() < 1e-9
     assert all(np.array_equal(together.quanta[name], column) for name, column in apart.quanta.items())
-    assert all(np.array_equal(a.vectors, b.vectors) for a, b in zip(together.blocks, apart.blocks, strict=True))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_elements_are_sums_over_parts(case):
+    """⟨F'‖μ‖F⟩ of all pairs of blocks, part by part, with coefficients of each pair of F."""
+    levels = _levels(case)
+    tensors = {(v, v): body_tensor(DIPOLE, 1, str(levels.representation)) for v in range(2 if "two s" in case else 1)}
+    pairs, amplitudes = connections(levels.blocks, tensors)
+    assert len(pairs) > 10
+    starts = {(up.start, low.start) for up, low in pairs}
+    assert len(starts) == len(pairs)
+    for up in levels.blocks:
+        for low in levels.blocks:
+            expected = elements_of_parts(up, low, tensors)
+            if (up.start, low.start) in starts:
+                assert np.abs(amplitudes(up, low) - expected).max() < 1e-12
+            elif up.twice_f > low.twice_f or (up.twice_f == low.twice_f and up.start >= low.start):
+                assert not expected.any()
 
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("range_mhz", [(0.0, float("inf")), (8000.0, 40000.0)], ids=["all", "in a range"])
-def test_lines_are_those_of_pairs(case, range_mhz, monkeypatch):
+def test_lines_above_a_cut_are_among_all_lines(case, range_mhz, monkeypatch):
     levels = _levels(case)
     dipoles = {(v, v): DIPOLE for v in (0, 1)} if "v" in levels.quanta else DIPOLE
     cut = intensity_cut(levels, 5.0, 100.0, -7.0)
     together = all_transitions(levels, dipoles, range_mhz, cut)
-    monkeypatch.setattr(many_f_lines, "can_be_stacked", lambda *a: False)
-    apart = all_transitions(levels, dipoles, range_mhz, cut)
-    assert len(apart.upper) > 50
-    first, second = (np.lexsort((item.lower, item.upper)) for item in (together, apart))
-    assert np.array_equal(together.upper[first], apart.upper[second])
-    assert np.array_equal(together.lower[first], apart.lower[second])
-    assert np.array_equal(together.frequency_mhz[first], apart.frequency_mhz[second])
+    monkeypatch.setattr(many_f_lines, "_IN_MEMORY", 0)
+    listed = all_transitions(levels, dipoles, range_mhz)
+    kept = cut.keeps(listed.frequency_mhz, listed.strength_debye2, cut.population[listed.lower])
+    first, second = np.lexsort((together.lower, together.upper)), np.lexsort((listed.lower[kept], listed.upper[kept]))
+    assert len(first) > 50
+    assert np.array_equal(together.upper[first], listed.upper[kept][second])
+    assert np.array_equal(together.lower[first], listed.lower[kept][second])
+    assert np.array_equal(together.frequency_mhz[first], listed.frequency_mhz[kept][second])
     # strengths of up to 20 D² from sums of products in two orders; of a weak one the amplitude has that error
-    assert np.abs(together.strength_debye2[first] - apart.strength_debye2[second]).max() < 1e-12
+    assert np.abs(together.strength_debye2[first] - listed.strength_debye2[kept][second]).max() < 1e-12
 
 
 def test_levels_without_a_weight_make_no_lines():

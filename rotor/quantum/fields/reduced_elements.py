@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +18,7 @@ from rotor.arrays import Floats
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import Levels, MomentBlock, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.reduced import AnyBlock, amplitudes, connected_pairs, pairs_where, wang_amplitudes
-from rotor.quantum.tensors import Tensors
-
-if TYPE_CHECKING:
-    from rotor.quantum.spins.blocks import Shared
-    from rotor.quantum.spins.moments import SpinMoments
+from rotor.quantum.reduced import AnyBlock, Connections, connections, pairs_where
 
 Pair = tuple[int, int]  # numbers of blocks, the higher or equal F first
 
@@ -41,8 +36,7 @@ class ReducedElements:
         self.states = tuple(np.unique(quanta["v"]).tolist()) if "v" in quanta else (0,)
         self._cache: dict[tuple[Key, Pair], NDArray[Any] | None] = {}
         self._pairs: dict[Key, list[Pair]] = {}
-        self._tensors: dict[Key, Tensors] = {}
-        self._moments: dict[Key, SpinMoments] = {}
+        self._acting: dict[Key, Connections] = {}
 
     @property
     def representation(self) -> str:
@@ -72,19 +66,22 @@ class ReducedElements:
         def acts(up: AnyBlock, low: AnyBlock) -> bool:
             return self.between(operator, number[up.start], number[low.start]) is not None
 
-        if isinstance(operator, Contraction):
-            tensors = self._tensors_of(operator)
-            pairs = connected_pairs(self.blocks, tensors) if tensors else iter(())
+        if isinstance(operator, Contraction) or self.blocks[0].with_spins:
+            pairs, _ = self._connections(operator)
         else:
-            pairs = pairs_where(self.blocks, operator.rank, acts)
+            pairs = list(pairs_where(self.blocks, operator.rank, acts))
         for up, low in pairs:
             yield number[up.start], number[low.start]
 
-    def _tensors_of(self, operator: Contraction) -> Tensors:
-        """Spherical tensors of a contraction, computed once."""
-        if operator.key not in self._tensors:
-            self._tensors[operator.key] = operator.tensors(self.states, self.representation)
-        return self._tensors[operator.key]
+    def _connections(self, operator: FieldOperator) -> Connections:
+        """Pairs of blocks that an operator connects, and the function that returns the elements between them, computed once."""
+        if operator.key not in self._acting:
+            if isinstance(operator, Magnet):
+                self._acting[operator.key] = _magnetic_connections(operator, self.states, self.blocks)
+            else:
+                tensors = operator.tensors(self.states, self.representation)
+                self._acting[operator.key] = connections(self.blocks, tensors) if tensors else ([], _no_elements)
+        return self._acting[operator.key]
 
     def between(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
         """Elements (n_up, n_low) of a pair of blocks, F' ≥ F; None where all are 0."""
@@ -97,14 +94,12 @@ class ReducedElements:
         """Elements of a pair of blocks, computed anew."""
         first, second = self.blocks[up], self.blocks[low]
         if isinstance(operator, Magnet):
-            moment = self._moment(operator, first, second)
-            return moment if moment is not None and moment.any() else None
-        tensors = self._tensors_of(operator)
-        if first.alone:
-            return wang_amplitudes(first, second, tensors[0, 0])
-        if isinstance(first, MomentBlock):
-            return first.moments.reduced(first, second, tensors)
-        elements = amplitudes(first, second, tensors)
+            if not second.with_spins:
+                moment = self._moment(operator, first, second)
+                return moment if moment is not None and moment.any() else None
+        elif isinstance(first, MomentBlock):
+            return first.moments.reduced(first, second, operator.tensors(self.states, self.representation))
+        elements = self._connections(operator)[1](first, second)
         return elements / np.sqrt(2.0) if self.paired[up] else elements  # that of one sign of K
 
     def _moment(self, magnet: Magnet, up: AnyBlock, low: AnyBlock) -> Floats | None:
@@ -117,12 +112,7 @@ class ReducedElements:
             )
         if up.axial_k != low.axial_k or abs(up.twice_total - low.twice_total) > 2:
             return None
-        if isinstance(up, SolvedBlock):
-            return _rotational_moment(magnet.g, up, low, self.representation)
-        if magnet.key not in self._moments:
-            self._moments[magnet.key] = _spin_moments(magnet, self.states, low.shared)
-        moment: Floats = self._moments[magnet.key].amplitudes(up, low)
-        return moment / np.sqrt(2.0) if up.paired else moment  # that of one sign of K
+        return _rotational_moment(magnet.g, up, low, self.representation)
 
 
 def _matrix(g: Floats) -> Any:
@@ -130,15 +120,22 @@ def _matrix(g: Floats) -> Any:
     return tuple(tuple(row) for row in g.tolist())
 
 
-def _spin_moments(magnet: Magnet, states: Sequence[int], shared: Shared) -> SpinMoments:
-    """½ Σ g_ij {Φ_i, N_j} and g_I I for each state."""
-    from rotor.quantum.spins.moments import SpinMoments
+def _magnetic_connections(magnet: Magnet, states: Sequence[int], blocks: Sequence[AnyBlock]) -> Connections:
+    """`connections` of ½ Σ g_ij {Φ_i, N_j} and g_I I of each state, of levels with spins."""
+    from rotor.quantum.spins.many_f_lines import connections_of
+    from rotor.quantum.spins.moments import spin_moments
 
+    shared = blocks[0].shared
     scheme, g = shared.scheme, _matrix(magnet.g)
     nuclei = [(name, value / scheme.count_of((scheme.place(name),))) for name, value in magnet.nuclei.items()]
     moments = [Moment(1.0, (v, v), tensor=g) for v in states]
     moments += [Moment(value, (v, v), spin=name) for v in states for name, value in nuclei]
-    return SpinMoments(tuple(moments), scheme, shared.representation)
+    return connections_of(blocks, spin_moments(shared, moments))
+
+
+def _no_elements(up: AnyBlock, low: AnyBlock) -> Floats:
+    """Elements of an operator that connects no blocks."""
+    return np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
 
 
 def _rotational_moment(g: Floats, up: SolvedBlock, low: SolvedBlock, representation: str) -> Floats | None:

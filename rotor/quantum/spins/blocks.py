@@ -26,7 +26,7 @@ from rotor.quantum.levels import Block, SolvedBlock, Used
 from rotor.quantum.spins.axial import are_axial, contracted_operators
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stacks_of
 from rotor.quantum.spins.families import families_of, links_of_stacks
-from rotor.quantum.spins.many_f import Group
+from rotor.quantum.spins.many_f import Frame, Group
 from rotor.quantum.spins.parts import SpinPart, named_states
 from rotor.quantum.spins.pattern_tables import couplings_of
 from rotor.quantum.spins.rotor import (
@@ -110,18 +110,9 @@ class SpinBlock(Block):
         """Treatment of the spins, the same for all blocks of a calculation."""
         return self.shared.used
 
-    @cached_property
-    def single(self) -> bool:
-        """Whether each part has a single pattern."""
-        return all(part.repeats == 1 for part in self.parts)
-
-    @cached_property
-    def by_number(self) -> dict[int, list[SpinPart]]:
-        """The parts by the number of their rotational block."""
-        parts: dict[int, list[SpinPart]] = {}
-        for part in self.parts:
-            parts.setdefault(part.number, []).append(part)
-        return parts
+    def twice_row(self, frame: Frame) -> int:
+        """The doubled row of the block in tables of a frame."""
+        return frame.twice_row(self.twice_f, self.parts[0].number)
 
 
 class Member(NamedTuple):

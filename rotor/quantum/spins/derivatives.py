@@ -5,7 +5,7 @@
     ∂E_i/∂c = Σ_r'r X_c(r', r) D_i(r', r),     D_i(r', r) = Σ_p'p V_p'r' c(p', p) V_pr.
 
 The density D of a channel is computed once and contracted with all constants. Blocks whose functions differ only in F share arrays
-(`many_f`); elements of the rotation are tables by N. For axial tops see `axial_levels`.
+(`many_f`); elements of the rotation are tables by row.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ import numpy as np
 from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.axial_levels import axial_derivatives
+from rotor.quantum.spins.axial import contracted_operators
 from rotor.quantum.spins.blocks import Shared, SpinBlock
-from rotor.quantum.spins.contraction import operators_of_stacks, powers_of_stacks
-from rotor.quantum.spins.many_f import Frame, Group, RotationColumns, Tables, frame_of, groups_of, tables_of
-from rotor.quantum.spins.many_f_lines import States, groups_of_blocks, states_of_group
-from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
+from rotor.quantum.spins.contraction import powers_of_stacks
+from rotor.quantum.spins.many_f import Frame, Places, RotationColumns, Tables, tables_of
+from rotor.quantum.spins.many_f_lines import groups_of_blocks
+from rotor.quantum.spins.pattern_tables import couplings_by_f
 from rotor.quantum.spins.rotor import ALONE, Channel, Channels, Piece, parameter_channels
 
 if TYPE_CHECKING:
@@ -47,45 +47,32 @@ class UnitTables(NamedTuple):
 
 
 Kinds = tuple[int, int, int]  # kinds of both blocks and N' - N
-Rows = slice | list[int]
 
 
-def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
+def derivatives(top: Top, levels: Levels, names: Sequence[str], rows_of_levels: Ints) -> Floats:
     """∂E/∂c (rows, names) of levels with spins, MHz per MHz; ValueError for levels without vectors."""
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")
     shared: Shared = levels.blocks[0].shared
-    if shared.axial:
-        return np.asarray(axial_derivatives(top, levels.effects, names, levels.blocks, len(levels))[rows])
-    frame, groups = _frame_and_groups(levels.blocks, shared)
+    frame: Frame = shared.cache["frame"]
     out = np.zeros((len(levels) + 1, len(names)))  # the last row takes the padding
     tables = [
         (couplings_by_f(shared.scheme, channel, frame.twice_f[0], frame.twice_f[-1]), elements)
         for channel, elements in _unit_tables(top, levels, names, shared, frame)
     ]
-    for group, blocks in groups:
-        for run in runs_of_similar_size([len(block.vectors) for block in blocks], _LIKE, most=_PADDED):
-            alike = blocks[run]
-            states = states_of_group(group, alike, len(levels))
-            total = np.zeros((len(alike), len(names), states.rows.shape[1]))
-            twice_f = list(states.places)
-            rows_of_f, rows_of_n = frame.rows_of_f(twice_f), [frame.rows_of_n(twice_f, r) for r in group.rotations]
+    for states in groups_of_blocks(levels.blocks, len(levels)):
+        group = states.group
+        for run in runs_of_similar_size([len(block.vectors) for block in states.blocks], _LIKE, most=_PADDED):
+            places = np.arange(run.start, run.stop)
+            at = states.in_group[places]
+            vectors = states.vectors(places)
+            total = np.zeros((len(places), len(names), vectors.shape[3]))
+            rows_of_f = frame.rows_of_f(group.twice_f[at])
+            rows_of_n = [frame.rows_of(group.twice_rows[at], rotation) for rotation in group.rotations]
             for coefficients, elements in tables:
-                _add(total, states, elements, coefficients[rows_of_f], rows_of_n)
-            out[states.rows] = total.transpose(0, 2, 1)
-    return np.asarray(out[:-1][rows])
-
-
-def _frame_and_groups(blocks: Sequence[SpinBlock], shared: Shared) -> tuple[Frame, list[tuple[Group, list[SpinBlock]]]]:
-    """Groups of blocks that differ only in F: those in which they were solved, or new ones for blocks solved one by one."""
-    if all(block.group is not None for block in blocks):
-        frame: Frame = shared.cache["frame"]
-        return frame, groups_of_blocks(blocks)
-    twice_f = [block.twice_f for block in blocks]
-    table = pattern_table(shared.scheme, min(twice_f), max(twice_f))
-    frame = frame_of(shared.stacks, table.places, table.distances)
-    grouped = groups_of([(block.twice_f, block.parts) for block in blocks], frame)
-    return frame, [(group, [blocks[i] for i in numbers]) for group, numbers in grouped]
+                _add(total, group.rotations, vectors, elements, coefficients[rows_of_f], rows_of_n)
+            out[states.rows[run, : vectors.shape[3]]] = total.transpose(0, 2, 1)
+    return np.asarray(out[:-1][rows_of_levels])
 
 
 def _unit_tables(
@@ -111,7 +98,7 @@ def _spin_tables(
     """Spin operators of channels of one rank: one unit for each operator of N, which a parameter multiplies by ½(N'^2p + N^2p)."""
     units = [_units([by_channel.get(channel, []) for by_channel in by_parameter]) for channel in channels]
     reach, alone = min(_REACH, channels[0].rank), [[unit] for units_of_channel in units for unit in units_of_channel]
-    contracted = iter(operators_of_stacks(shared.stacks, reach, alone, shared.representation))
+    contracted = iter(contracted_operators(shared.stacks, reach, alone, shared.representation))
     for channel, units_of_channel in zip(channels, units, strict=True):
         terms = [
             (units_of_channel.index(_unit(piece)), piece, column)
@@ -122,9 +109,8 @@ def _spin_tables(
         tables = [tables_of(next(contracted), frame) for _ in units_of_channel]
         by_kinds = {}
         for key, elements in _side_by_side(tables).items():
-            mix = np.zeros((frame.count_of_n, len(columns), len(units_of_channel)))
-            n = frame.lowest + np.arange(frame.count_of_n)
-            m = n + key[2]
+            n = frame.n_of_rows
+            mix, m = np.zeros((len(n), len(columns), len(units_of_channel))), n + key[2]
             for unit, piece, column in terms:
                 powers = ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
                 mix[:, columns.index(column), unit] += piece.value * powers
@@ -161,10 +147,10 @@ def _link_tables(
     for (number, rotor), block in zip(rotors.items(), linear, strict=True):
         kind, size = frame.kinds[number], block.size
         states = frame.energies_mhz[kind].shape[1]
-        table = tables.setdefault((kind, kind, 0), np.zeros((frame.count_of_n, len(linked), states, states)))
+        table = tables.setdefault((kind, kind, 0), np.zeros((len(frame.n_of_rows), len(linked), states, states)))
         units = [linked.index(parameter) for parameter in block.parameters.tolist()]
-        table[rotor.j - frame.lowest, units, :size, :size] = rotor.vectors.T @ block.matrices() @ rotor.vectors
-    mix = np.tile(np.eye(len(linked)), (frame.count_of_n, 1, 1))
+        table[frame.rows[number], units, :size, :size] = rotor.vectors.T @ block.matrices() @ rotor.vectors
+    mix = np.tile(np.eye(len(linked)), (len(frame.n_of_rows), 1, 1))
     return {key: UnitTables(table, np.array(linked), mix) for key, table in tables.items()}
 
 
@@ -178,7 +164,7 @@ def _power_tables(state_terms: StateTerms, shared: Shared, frame: Frame) -> dict
     ]
     units = list(dict.fromkeys(unit for unit, *_ in terms))
     columns = sorted({column for _, _, column, _ in terms})
-    n = frame.lowest + np.arange(frame.count_of_n)
+    n = frame.n_of_rows
     mix = np.zeros((len(n), len(columns), len(units)))
     for unit, p, column, factor in terms:
         mix[:, columns.index(column), units.index(unit)] += factor * (n * (n + 1.0)) ** p
@@ -186,22 +172,23 @@ def _power_tables(state_terms: StateTerms, shared: Shared, frame: Frame) -> dict
     for stack, matrices in powers_of_stacks(shared.stacks, units) if units else ():
         count, states = frame.energies_mhz[stack.kind].shape
         table = tables.setdefault((stack.kind, stack.kind, 0), np.zeros((count, len(units), states, states)))
-        table[stack.n - frame.lowest, :, : matrices.shape[2], : matrices.shape[3]] = matrices
+        table[frame.rows[stack.numbers], :, : matrices.shape[2], : matrices.shape[3]] = matrices
     return {key: UnitTables(elements, np.array(columns), mix) for key, elements in tables.items()}
 
 
 def _add(
-    total: Floats, states: States, tables: dict[Kinds, UnitTables], coefficients: Floats, rows_of_n: Sequence[Rows]
-) -> None:
+    total: Floats, rotations: Sequence[RotationColumns], vectors: Floats, tables: dict[Kinds, UnitTables],
+    coefficients: Floats, rows: Sequence[Places],
+) -> None:  # fmt: skip
     """Add the derivatives (blocks, parameters, states) from one channel for blocks of a group.
 
-    coefficients: of the F of these blocks. rows_of_n: for each kind of rotational block the places of its N in the tables.
+    coefficients: of the F of these blocks. rows: for each kind of rotational block its rows in the tables.
     """
-    for left in states.group.rotations:
-        for right, rows in zip(states.group.rotations, rows_of_n, strict=True):
+    for left in rotations:
+        for right, rows_of_right in zip(rotations, rows, strict=True):
             key = (left.kind, right.kind, (left.rise - right.rise) // 2)
             if key in tables:
-                slopes = _between(states, left, right, tables[key], coefficients, rows)
+                slopes = _between(vectors, left, right, tables[key], coefficients, rows_of_right)
                 twice = (
                     1.0 if left.kind == right.kind and left.rise == right.rise else 2.0
                 )  # the other order has no table
@@ -209,15 +196,15 @@ def _add(
 
 
 def _between(
-    states: States, left: RotationColumns, right: RotationColumns, table: UnitTables, coefficients: Floats,
-    places: Rows,
+    vectors: Floats, left: RotationColumns, right: RotationColumns, table: UnitTables, coefficients: Floats,
+    places: Places,
 ) -> Floats:  # fmt: skip
     """Σ_p'r' V_p'r' Σ_pr c(p', p) X_c(r', r) V_pr between two kinds of rotational blocks: (blocks, parameters, states)."""
     elements = table.elements[places]  # (blocks, units, r', r)
     blocks, units, rows, columns = elements.shape
-    rows, columns = min(rows, states.vectors.shape[2]), min(columns, states.vectors.shape[2])
+    rows, columns = min(rows, vectors.shape[2]), min(columns, vectors.shape[2])
     elements = elements[:, :, :rows, :columns].reshape(blocks, 1, units * rows, columns)
-    bra, ket = states.vectors[:, left.columns, :rows], states.vectors[:, right.columns, :columns]
+    bra, ket = vectors[:, left.columns, :rows], vectors[:, right.columns, :columns]
     between = coefficients[:, left.patterns, right.patterns]
     if between.shape[1:] == (1, 1):
         moved = between[:, :, :, None] * ket

@@ -1,25 +1,51 @@
-"""Elements of molecule-fixed tensors between the levels of many F at once (see `many_f`); `lines` computes them pair by pair."""
+"""Reduced elements of moments and molecule-fixed tensors between levels with spins, of many F at once (see `many_f`).
+
+An electric moment does not act on spins: its element between two functions is that of the rotation times a product of 6j symbols,
+
+    ⟨r' p'‖T^K‖r p⟩ = t(p', p) ⟨r'‖T^K‖r⟩,
+
+see `coupling.moment_coefficients`, which has the coefficients of magnetic moments of spins too.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Indices, Workspace
-from rotor.quantum.spins.blocks import SpinBlock
-from rotor.quantum.spins.contraction import tensors_of_stacks
-from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, functions_of, tables_of
+from rotor.arrays import Floats, Indices, Ints
+from rotor.quantum.reduced import Connections
+from rotor.quantum.spins.axial import contracted_tensors
+from rotor.quantum.spins.blocks import Shared, SpinBlock
+from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, consecutive, tables_of
 from rotor.quantum.spins.pattern_tables import tensors_by_f
-from rotor.quantum.spins.stack_elements import MOST_RANK
 from rotor.quantum.tensors import Tensors, rank_of
 
 _ELEMENT, _PRODUCT = 1.5e-4, 2e-6  # time of an element, and of one step of its products, relative to that of a call
+_IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that are kept side by side: 32 MB
+
+
+class Acting(NamedTuple):
+    """A moment: its rotational elements, their rank, and the place of the spin that it contains, if any."""
+
+    tables: Tables
+    rank: int
+    spin: int | None = None
+
+
+class Moments(NamedTuple):
+    """Moments of one rank; those of an inner sequence interfere, squares of the sums are added."""
+
+    rank: int
+    sums: Sequence[Sequence[Acting]]
 
 
 class Rows(NamedTuple):
-    """Amplitudes (F, n_up, n_low) between blocks of rising F, and rows (F, states) of their levels.
+    """Amplitudes (blocks, n_up, n_low) between blocks of two groups, and rows (blocks, states) of their levels.
 
     Rows beyond a block are `len(levels)`, which is no level. alike: whether each block is taken with itself.
     """
@@ -30,96 +56,151 @@ class Rows(NamedTuple):
     alike: bool
 
 
-class States(NamedTuple):
-    """Blocks of a group, side by side.
-
-    places: index by doubled F. vectors: (F, columns, rotational states, states). rows: of the levels, (F, states). sizes: number of states
-    of each block. heights: number of rotational states of each block.
-    """
+@dataclass(frozen=True, eq=False)
+class GroupStates:
+    """Solved blocks of a group by rising row. places: index by doubled row. rows: of the levels, (blocks, states)."""
 
     group: Group
+    blocks: list[SpinBlock]
     places: dict[int, int]
-    vectors: Floats
     rows: Indices
-    sizes: list[int]
-    heights: list[int]
+
+    @cached_property
+    def sizes(self) -> Ints:
+        """Number of states of each block."""
+        return np.array([len(block.energies_mhz) for block in self.blocks])
+
+    @cached_property
+    def in_group(self) -> Ints:
+        """Number of each block in the group."""
+        return np.array([self.group.places[row] for row in self.places])
+
+    def vectors(self, places: Ints) -> Floats:
+        """Vectors (blocks, columns, rotational states, states) of some blocks."""
+        if self._whole is None:
+            return self._scattered(places)
+        height = self.group.heights[self.in_group[places]].max()
+        return self._whole[consecutive(places), :, :height, : self.sizes[places].max()]
+
+    @cached_property
+    def _whole(self) -> Floats | None:
+        """Vectors of all blocks; None where they are large."""
+        numbers = len(self.blocks) * self.group.columns * self.group.heights[self.in_group].max() * self.sizes.max()
+        return self._scattered(np.arange(len(self.blocks))) if numbers <= _IN_MEMORY else None
+
+    def _scattered(self, places: Ints) -> Floats:
+        """Vectors of some blocks over the functions of the group."""
+        height, count = self.group.heights[self.in_group[places]].max(), self.sizes[places].max()
+        vectors = np.zeros((len(places), self.group.columns, height, count))
+        for row, place in enumerate(places.tolist()):
+            block = self.blocks[place]
+            vectors[row, *self.group.functions[self.in_group[place]], : len(block.energies_mhz)] = block.vectors
+        return vectors
 
 
-def can_be_stacked(blocks: Sequence[object], tensors: Tensors) -> bool:
-    """Whether all blocks are spin blocks that were solved in groups."""
-    if rank_of(tensors) > MOST_RANK or not blocks:
-        return False
-    return all(isinstance(block, SpinBlock) and block.group is not None for block in blocks)
+def tensor_moments(shared: Shared, tensors: Tensors) -> Moments:
+    """A tensor of the molecule by pairs of states."""
+    rank, frame = rank_of(tensors), shared.cache["frame"]
+    return Moments(rank, [[Acting(tables_of(contracted_tensors(shared.stacks, tensors), frame), rank)]])
 
 
-def amplitudes_of_groups(blocks: Sequence[SpinBlock], tensors: Tensors, levels: int) -> Iterator[Rows]:
-    """Real reduced elements between all blocks, (F, n_up, n_low) at a time, each pair of blocks once; `levels` is the row of padding.
+def amplitudes_of_groups(
+    blocks: Sequence[SpinBlock], moments: Moments, levels: int, both_orders: bool = False
+) -> Iterator[Rows]:
+    """Real reduced elements between all blocks, many at a time, each pair of blocks once; `levels` is the row of padding.
 
-    Amplitudes are zero beyond a block. Their array may be changed; the next step overwrites it.
+    Amplitudes are zero beyond a block. both_orders: pairs of blocks of one F occur in both orders.
     """
-    shared, rank = blocks[0].shared, rank_of(tensors)
+    shared = blocks[0].shared
     frame: Frame = shared.cache["frame"]
-    tables = tables_of(tensors_of_stacks(shared.stacks, tensors), frame)
-    groups = [states_of_group(group, members, levels) for group, members in groups_of_blocks(blocks)]
-    space = Workspace()
-    for step in range(0, 2 * rank + 1, 2):
-        coefficients = tensors_by_f(shared.scheme, rank, step, frame.twice_f[0], frame.twice_f[-1])
-        for place, low in enumerate(groups):
-            for up in groups[place:] if step == 0 else groups:
-                yield from _between(up, low, step, rank, tables, coefficients, frame, space)
+    groups = groups_of_blocks(blocks, levels)
+    rises_of_k = range(-moments.rank, moments.rank + 1) if shared.axial else range(1)
+    for rise, rise_of_k, (place, low) in product(range(0, 2 * moments.rank + 1, 2), rises_of_k, enumerate(groups)):
+        if rise or both_orders or rise_of_k >= 0:
+            for up in groups if rise or both_orders or rise_of_k else groups[place:]:
+                yield from _between(up, low, rise, rise + 2 * frame.count * rise_of_k, moments, shared)
 
 
-def groups_of_blocks(blocks: Sequence[SpinBlock]) -> list[tuple[Group, list[SpinBlock]]]:
-    """The groups in which blocks were solved, each with its blocks by rising F."""
-    members: dict[int, tuple[Group, list[SpinBlock]]] = {}
-    for block in blocks:
-        assert block.group is not None
-        members.setdefault(id(block.group), (block.group, []))[1].append(block)
-    return [(group, sorted(group_blocks, key=lambda block: block.twice_f)) for group, group_blocks in members.values()]
+def connections_of(blocks: Sequence[Any], moments: Moments) -> Connections:
+    """The pairs of blocks that moments connect, F rising, and the function that returns their reduced elements (n_up, n_low)."""
+    block_at, count = {block.start: block for block in blocks}, blocks[-1].start + len(blocks[-1].energies_mhz)
+    elements: dict[tuple[int, int], Floats] = {}
+    for rows in amplitudes_of_groups(blocks, moments, count, both_orders=True):
+        acting = np.flatnonzero(rows.amplitudes.any(axis=(1, 2)))
+        starts = zip(rows.up[acting, 0].tolist(), rows.low[acting, 0].tolist(), strict=True)
+        for place, (up, low) in zip(acting.tolist(), starts, strict=True):
+            if up >= low:
+                sizes = len(block_at[up].energies_mhz), len(block_at[low].energies_mhz)
+                elements[up, low] = rows.amplitudes[place, : sizes[0], : sizes[1]].copy()
+    pairs = [(block_at[up], block_at[low]) for up, low in sorted(elements, key=lambda pair: pair[::-1])]
+    return pairs, lambda up, low: elements[up.start, low.start]
 
 
-def states_of_group(group: Group, blocks: Sequence[SpinBlock], levels: int) -> States:
-    """Blocks of a group by rising F, side by side; levels: the row of padding."""
-    sizes = [len(block.energies_mhz) for block in blocks]
-    vectors = np.zeros((len(blocks), group.columns * group.states, max(sizes)))
-    starts, counts = np.array([block.start for block in blocks], dtype=np.int32), np.array(sizes)
-    state_numbers = np.arange(max(sizes), dtype=np.int32)
-    rows = np.where(state_numbers < counts[:, None], starts[:, None] + state_numbers, np.int32(levels))
-    for place, (block, size) in enumerate(zip(blocks, sizes, strict=True)):
-        functions = group.functions[group.places[block.twice_f]]
-        vectors[place, functions, :size] = block.vectors
-    heights = [group.heights[group.places[block.twice_f]] for block in blocks]
-    by_column = vectors.reshape(len(blocks), group.columns, group.states, -1)
-    return States(group, {block.twice_f: place for place, block in enumerate(blocks)}, by_column, rows, sizes, heights)
+def groups_of_blocks(blocks: Sequence[SpinBlock], levels: int) -> list[GroupStates]:
+    """The groups in which blocks were solved with these blocks; levels: the row of padding."""
+    members: dict[int, list[SpinBlock]] = {}
+    frame: Frame = blocks[0].shared.cache["frame"]
+    for block in sorted(blocks, key=lambda block: block.twice_row(frame)):
+        members.setdefault(id(block.group), []).append(block)
+    return [_states_of_group(alike, frame, levels) for alike in members.values()]
+
+
+def _states_of_group(blocks: list[SpinBlock], frame: Frame, levels: int) -> GroupStates:
+    """Blocks of one group by rising row."""
+    sizes = np.array([len(block.energies_mhz) for block in blocks])
+    starts, numbers = np.array([block.start for block in blocks], dtype=np.int32), np.arange(max(sizes), dtype=np.int32)
+    rows = np.where(numbers < sizes[:, None], starts[:, None] + numbers, np.int32(levels))
+    group = blocks[0].group
+    assert group is not None
+    return GroupStates(group, blocks, {block.twice_row(frame): place for place, block in enumerate(blocks)}, rows)
 
 
 def _between(
-    up: States, low: States, step: int, rank: int, tables: Tables, coefficients: Floats, frame: Frame, space: Workspace
+    up: GroupStates, low: GroupStates, rise: int, step: int, moments: Moments, shared: Shared
 ) -> Iterator[Rows]:
-    """Elements between two groups with doubled F' = F + step."""
-    twice_f = [f for f in low.places if f + step in up.places and 2 * f + step >= 2 * rank]
-    if not twice_f or not are_connected((up.group, low.group), step, tables):
+    """Elements between two groups, whose doubled F differ by `rise` and doubled rows by `step`."""
+    frame, first, last = shared.cache["frame"], *_range_of_f(shared)
+    chosen = [row for row in low.places if row + step in up.places]
+    chosen = [row for row in chosen if 2 * low.blocks[low.places[row]].twice_f + rise >= 2 * moments.rank]
+    sums = [
+        [
+            (acting.tables, tensors_by_f(shared.scheme, acting.rank, rise, first, last, acting.spin))
+            for acting in interfering
+            if are_connected(up.group, low.group, step, acting.tables)
+        ]
+        for interfering in moments.sums
+    ]
+    if not chosen or not any(sums):
         return
-    whole = between(up.group, low.group, twice_f, step, tables, coefficients, frame, space)
-    lefts, rights = [up.places[f + step] for f in twice_f], [low.places[f] for f in twice_f]
-    for run in _runs_of_similar_size([low.sizes[place] for place in rights]):
-        left, right = _places(lefts[run]), _places(rights[run])
-        height, width = (
-            max(up.heights[place] for place in lefts[run]),
-            max(low.heights[place] for place in rights[run]),
-        )
-        ups, lows = max(up.sizes[place] for place in lefts[run]), max(low.sizes[place] for place in rights[run])
-        elements = functions_of(whole[run, :, :height, :, :width])
-        bra = up.vectors[left, :, :height, :ups].reshape(len(elements), -1, ups)
-        ket = low.vectors[right, :, :width, :lows].reshape(len(elements), -1, lows)
-        moved = np.matmul(elements, ket, out=space.array("moved", len(elements), bra.shape[1], lows))
-        amplitudes = np.matmul(bra.transpose(0, 2, 1), moved, out=space.array("found", len(elements), ups, lows))
-        yield Rows(up.rows[left, :ups], low.rows[right, :lows], amplitudes, up is low and not step)
+    lefts = np.array([up.places[row + step] for row in chosen])
+    rights = np.array([low.places[row] for row in chosen])
+    for run in _runs_of_similar_size(low.sizes[rights].tolist()):
+        bra, ket, in_group = up.vectors(lefts[run]), low.vectors(rights[run]), low.in_group[rights[run]]
+        each = [_elements(up.group, low.group, in_group, step, terms, frame, bra, ket) for terms in sums if terms]
+        amplitudes = each[0] if len(each) == 1 else np.sqrt(sum(elements**2 for elements in each))
+        up_rows, low_rows = up.rows[lefts[run], : bra.shape[3]], low.rows[rights[run], : ket.shape[3]]
+        yield Rows(up_rows, low_rows, amplitudes, up is low and not step)
 
 
-def _places(places: list[int]) -> slice | list[int]:
-    """The places as a slice if they are consecutive."""
-    return slice(places[0], places[-1] + 1) if places[-1] - places[0] + 1 == len(places) else places
+def _elements(
+    up: Group, low: Group, chosen: Ints, step: int, terms: Sequence[tuple[Tables, Floats]], frame: Frame,
+    bra: Floats, ket: Floats,
+) -> Floats:  # fmt: skip
+    """Σ V' c ⟨r'‖X‖r⟩ V of operators between blocks of two groups, (blocks, n_up, n_low)."""
+    shape = len(bra), *bra.shape[1:3], *ket.shape[1:3]
+    whole = np.empty(shape)
+    between(up, low, chosen, step, *terms[0], frame, whole)
+    for term in terms[1:]:
+        whole += between(up, low, chosen, step, *term, frame, np.empty(shape))
+    functions_up, functions_low = bra.shape[1] * bra.shape[2], ket.shape[1] * ket.shape[2]
+    moved = np.matmul(whole.reshape(-1, functions_up, functions_low), ket.reshape(len(ket), functions_low, -1))
+    return np.asarray(np.matmul(bra.reshape(len(bra), functions_up, -1).transpose(0, 2, 1), moved))
+
+
+def _range_of_f(shared: Shared) -> tuple[int, int]:
+    """The first and the last doubled F of a calculation."""
+    twice_f = shared.cache["frame"].twice_f
+    return twice_f[0], twice_f[-1]
 
 
 def _runs_of_similar_size(sizes: Sequence[int]) -> Iterator[slice]:

@@ -11,138 +11,109 @@ the rank,
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from itertools import product
 from math import sqrt
-from typing import Any
 
 import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.spins.blocks import SpinBlock
-from rotor.quantum.spins.lines import Acting, between_states
-from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_elements
-from rotor.quantum.spins.parts import SpinPart
-from rotor.quantum.spins.pattern_tables import tensor_coefficients
-from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.spins.blocks import Shared, SpinBlock
+from rotor.quantum.spins.many_f import Tables
+from rotor.quantum.spins.many_f_lines import Acting, Moments
+from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_elements, tensor_of
 from rotor.quantum.spins.written_moments import written_elements
-from rotor.quantum.tensors import BodyTensor, body_tensor
 from rotor.quantum.wang.basis import Part, WangBlock, character
 
+_REACH = 2  # largest difference of N and of K that a moment connects
 
-@dataclass(frozen=True)
-class SpinMoments:
-    """The moments of a calculation with the coupling scheme and representation of its levels."""
 
-    moments: tuple[Moment, ...]
-    scheme: Scheme
-    representation: str
-    _cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
-
-    def amplitudes(self, up: SpinBlock, low: SpinBlock) -> Floats:
-        """Square roots of line strengths between all states of two blocks, (n_up, n_low)."""
-        kinds = dict.fromkeys((moment.electric, moment.imaginary) for moment in self.moments)
-        sums = [self._sum(up, low, kind) for kind in kinds]
-        return np.asarray(sums[0] if len(sums) == 1 else np.sqrt(sum(each * each for each in sums)))
-
-    def connected(self, up: SpinBlock, low: SpinBlock) -> bool:
-        """Whether one of the moments has an element between two blocks."""
-        if not abs(up.twice_f - low.twice_f) <= 2 <= up.twice_f + low.twice_f:
-            return False
-        return any(self._acting(place, up, low) for place in range(len(self.moments)))
-
-    def _sum(self, up: SpinBlock, low: SpinBlock, kind: tuple[bool, bool]) -> Floats:
-        """Sum over moments that interfere with each other: electric or magnetic, real or imaginary."""
-        places = (k for k, moment in enumerate(self.moments) if (moment.electric, moment.imaginary) == kind)
-        return between_states(up, low, [(self._coefficients(k, up, low), self._acting(k, up, low)) for k in places])
-
-    def _acting(self, place: int, up: SpinBlock, low: SpinBlock) -> Acting:
-        """Pairs of parts between which a moment acts, with its rotational element."""
-        elements = ((left, right, self._element(place, left, right)) for left in up.parts for right in low.parts)
-        return [(left, right, element) for left, right, element in elements if element is not None]
-
-    def _coefficients(self, place: int, up: SpinBlock, low: SpinBlock) -> Floats:
-        """m(p', p) of a moment between all patterns of two F."""
-        moment = self.moments[place]
+def spin_moments(shared: Shared, moments: Sequence[Moment]) -> Moments:
+    """Moments between levels with spins; electric and magnetic, real and imaginary ones do not interfere."""
+    kinds: dict[tuple[bool, bool], list[Acting]] = {}
+    for moment in moments:
         plain = moment.tensor is None and moment.along_abc is None
-        rank, acting = (0 if plain else 2, self.scheme.place(moment.spin)) if moment.spin else (1, None)
-        key = (rank, acting, up.twice_f, low.twice_f)
-        if key not in self._cache:
-            self._cache[key] = tensor_coefficients(self.scheme, rank, up.patterns, low.patterns, acting)
-        coefficients: Floats = self._cache[key]
-        return coefficients
+        rank, spin = (0 if plain else 2, shared.scheme.place(moment.spin)) if moment.spin else (1, None)
+        acting = Acting(_tables(moment, shared), rank, spin)
+        kinds.setdefault((moment.electric, moment.imaginary), []).append(acting)
+    return Moments(1, list(kinds.values()))
 
-    def _element(self, place: int, target: SpinPart, source: SpinPart) -> Floats | None:
-        """The rotational element of a moment, summed over both signs of K of axial states."""
-        key = (place, target.number, source.number)
-        if key not in self._cache:
-            self._cache[key] = self._block_element(self.moments[place], target.rotor, source.rotor)
-        element: Floats | None = self._cache[key]
-        return element
 
-    def _block_element(self, moment: Moment, up: SolvedBlock, low: SolvedBlock) -> Floats | None:
-        """The element of a moment between the eigenstates of two rotational blocks; None where it is zero."""
+def _tables(moment: Moment, shared: Shared) -> Tables:
+    """Elements of a moment between all rotational blocks, by row."""
+    frame, out = shared.cache["frame"], dict[tuple[int, int, int], Floats]()
+    numbered = [item for stack in shared.stacks for item in zip(stack.numbers.tolist(), stack.blocks, strict=True)]
+    at_row: dict[int, list[tuple[int, SolvedBlock]]] = {}
+    for number, block in numbered:
+        at_row.setdefault(int(frame.rows[number]), []).append((number, block))
+    rises_of_k = range(-_REACH, _REACH + 1) if shared.axial else range(1)
+    for (number, low), rise, rise_of_k in product(numbered, range(-_REACH, _REACH + 1), rises_of_k):
+        row, step = int(frame.rows[number]), rise + frame.count * rise_of_k
+        for other, up in at_row.get(row + step, ()):
+            element = _block_element(moment, up, low, shared.representation)
+            if element is not None:
+                key = frame.kinds[other], frame.kinds[number], step
+                count, states = frame.energies_mhz[key[1]].shape
+                table = out.setdefault(key, np.zeros((count, frame.energies_mhz[key[0]].shape[1], states)))
+                table[row, : element.shape[0], : element.shape[1]] = element
+    return out
 
-        def between(left: Part, right: Part) -> Floats | None:
-            if (left.v, right.v) not in (moment.states, moment.states[::-1]):
-                return None
-            element = self._between(moment, left, right)
-            return None if element is None else moment.value_debye * _order(moment, left, right) * element
 
-        total = up.elements(low, between)
-        first, second = up.parts[0].basis, low.parts[0].basis
-        if total is not None and isinstance(first, AxialState) and (first.axial_k or second.k[0]):
-            return np.asarray(sqrt(2.0) * total)
-        return total
+def _block_element(moment: Moment, up: SolvedBlock, low: SolvedBlock, representation: str) -> Floats | None:
+    """The element of a moment between the eigenstates of two rotational blocks, summed over both signs of K; None where it is zero."""
 
-    def _between(self, moment: Moment, left: Part, right: Part) -> Floats | None:
-        """The element of a moment between the functions of two parts; None where it is zero."""
-        up, low = left.basis, right.basis
-        if moment.written is not None:
-            back = left.v != right.v and (left.v, right.v) != moment.states
-            element = written_elements(moment.written, up, low, self.representation, back)
-            return element * _factor(moment.powers, left, right) if element is not None and moment.powers else element
-        if moment.along_abc is not None and moment.spin:
-            element = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
-            return None if element is None else element * _stretch(up.j, low.j)
-        if moment.along_abc is not None:
-            element = tensor_elements(up, low, self._tensor(moment.along_abc, 1))
-            if element is None:
-                return None
-            turned = character(up, moment.turned) if moment.turned and isinstance(up, WangBlock) else 1
-            return element * (turned * _factor(moment.powers, left, right) * _cosine(moment, left, right))
-        if moment.tensor is not None and not moment.spin:
-            return CosinesWithN(moment.tensor).elements(up, low, self.representation)
-        if moment.tensor is not None:
-            element = tensor_elements(up, low, self._tensor(moment.tensor, 2))
-            back = moment.with_i and left.v != right.v and (left.v, right.v) != moment.states
-            return -element if element is not None and back else element
-        if up != low:
+    def between(left: Part, right: Part) -> Floats | None:
+        if (left.v, right.v) not in (moment.states, moment.states[::-1]):
             return None
-        n = low.j
-        diagonal = np.full(low.size, 1.0 if moment.spin else sqrt(n * (n + 1.0) * (2 * n + 1)))
-        if moment.powers == "3K-J":
-            diagonal *= (3.0 * low.k.astype(float) ** 2 - n * (n + 1.0)) / 2
-        return np.diag(diagonal)
+        element = _between_parts(moment, left, right, representation)
+        return None if element is None else moment.value_debye * _order(moment, left, right) * element
 
-    def _tensor(self, components: Any, rank: int) -> BodyTensor:
-        """The spherical tensor of these components, computed once."""
-        key = (rank, components)
-        if key not in self._cache:
-            self._cache[key] = body_tensor(components, rank, self.representation)
-        tensor: BodyTensor = self._cache[key]
-        return tensor
+    total = up.elements(low, between)
+    first, second = up.parts[0].basis, low.parts[0].basis
+    if total is not None and isinstance(first, AxialState) and (first.axial_k or second.k[0]):
+        return np.asarray(sqrt(2.0) * total)
+    return total
+
+
+def _between_parts(moment: Moment, left: Part, right: Part, representation: str) -> Floats | None:
+    """The element of a moment between the functions of two parts; None where it is zero."""
+    up, low = left.basis, right.basis
+    if moment.written is not None:
+        back = left.v != right.v and (left.v, right.v) != moment.states
+        element = written_elements(moment.written, up, low, representation, back)
+        return element * _factor(moment.powers, left, right) if element is not None and moment.powers else element
+    if moment.along_abc is not None and moment.spin:
+        element = tensor_elements(up, low, tensor_of(moment.along_abc, 1, representation))
+        return None if element is None else element * _stretch(up.j, low.j)
+    if moment.along_abc is not None:
+        element = tensor_elements(up, low, tensor_of(moment.along_abc, 1, representation))
+        if element is None:
+            return None
+        turned = character(up, moment.turned) if moment.turned and isinstance(up, WangBlock) else 1
+        return element * (turned * _factor(moment.powers, left, right) * _cosine(moment, left, right))
+    if moment.tensor is not None and not moment.spin:
+        return CosinesWithN(moment.tensor).elements(up, low, representation)
+    if moment.tensor is not None:
+        element = tensor_elements(up, low, tensor_of(moment.tensor, 2, representation))
+        back = moment.with_i and left.v != right.v and (left.v, right.v) != moment.states
+        return -element if element is not None and back else element
+    if up != low:
+        return None
+    n = low.j
+    diagonal = np.full(low.size, 1.0 if moment.spin else sqrt(n * (n + 1.0) * (2 * n + 1)))
+    if moment.powers == "3K-J":
+        diagonal *= (3.0 * low.k.astype(float) ** 2 - n * (n + 1.0)) / 2
+    return np.diag(diagonal)
 
 
 def moments_of(
     levels: Levels, dipoles: dict[tuple[int, int], tuple[float, float, float]], moments: Sequence[Moment]
-) -> SpinMoments:
+) -> Moments:
     """Dipoles by pairs of states and other moments, for levels with spins; ValueError for levels without."""
     if not levels.blocks or not isinstance(levels.blocks[0], SpinBlock):
         raise ValueError("moments besides plain dipoles need levels that were solved with spins")
-    shared = levels.blocks[0].shared
-    return SpinMoments(with_dipoles(dipoles, moments), shared.scheme, shared.representation)
+    return spin_moments(levels.blocks[0].shared, with_dipoles(dipoles, moments))
 
 
 def with_dipoles(

@@ -65,10 +65,13 @@ def couplings_by_f(scheme: Scheme, channel: Channel, first: int, last: int) -> F
 
 
 @lru_cache(maxsize=64)
-def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int) -> Floats:
-    """t(p', p) of a tensor from each F to F + step, (F, patterns', patterns), 0 where there is no F + step; shared and read-only."""
+def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int, acting: int | None = None) -> Floats:
+    """t(p', p) from each F to F + step, (F, patterns', patterns), 0 where there is no F + step; shared and read-only.
+
+    Of a tensor, or of the vector of a spin if one acts (see `coupling`).
+    """
     table = pattern_table(scheme, first, last)
-    return _by_f(table, coefficients_of_step(scheme, table.patterns, rank, step), step)
+    return _by_f(table, _coefficients_of_step(scheme, table.patterns, rank, step, acting), step)
 
 
 def _by_f(table: PatternTable, coefficients: Mapping[int, Floats], step: int) -> Floats:
@@ -124,19 +127,18 @@ def _with_total(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
     return np.asarray(turn.T @ values @ turn)
 
 
-def coefficients_of_step(scheme: Scheme, patterns: dict[int, Ints], rank: int, step: int) -> dict[int, Floats]:
-    """t(p', p) of a tensor between doubled F' = F + step and F, by F, where both have patterns."""
+def _coefficients_of_step(
+    scheme: Scheme, patterns: Mapping[int, Ints], rank: int, step: int, acting: int | None
+) -> dict[int, Floats]:
+    """t(p', p) between doubled F' = F + step and F, by F, where both have patterns."""
+
+    def compute(bra: Ints, ket: Ints) -> Floats:
+        if not scheme.equivalent:
+            return moment_coefficients(scheme.twice, rank, acting, bra, ket)
+        (up, left), (low, right) = (scheme.recoupling(int(patterns[0, -1])) for patterns in (bra, ket))
+        values = left.T @ moment_coefficients(scheme.twice, rank, acting, up, low) @ right
+        values *= scheme.count_of(() if acting is None else (acting,))
+        return np.where(np.abs(values) > ROUND_OFF, values, 0.0)
+
     tables = {f: (patterns[f + step], patterns_of_f) for f, patterns_of_f in patterns.items() if f + step in patterns}
-    if scheme.equivalent:
-        return {f: tensor_coefficients(scheme, rank, *bra_and_ket) for f, bra_and_ket in tables.items()}
-    return for_all_f(tables, lambda bra, ket: tensor_coefficients(scheme, rank, bra, ket))
-
-
-def tensor_coefficients(scheme: Scheme, rank: int, bra: Ints, ket: Ints, acting: int | None = None) -> Floats:
-    """t(p', p) between patterns of two F, with or without a total spin, of the vector of a spin if one acts (see `coupling`)."""
-    if not scheme.equivalent:
-        return moment_coefficients(scheme.twice, rank, acting, bra, ket)
-    (up, left), (low, right) = (scheme.recoupling(int(patterns[0, -1])) for patterns in (bra, ket))
-    values = left.T @ moment_coefficients(scheme.twice, rank, acting, up, low) @ right
-    values *= scheme.count_of(() if acting is None else (acting,))
-    return np.where(np.abs(values) > ROUND_OFF, values, 0.0)
+    return {f: compute(*both) for f, both in tables.items()} if scheme.equivalent else for_all_f(tables, compute)

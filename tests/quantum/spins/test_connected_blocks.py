@@ -1,18 +1,19 @@
-"""Pairs of blocks with spins between which a dipole acts: found by their rotational blocks, the same as of all pairs."""
+"""Pairs of blocks with spins that a dipole connects, and the elements between them, against sums over parts of all pairs."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from places import ORACLES
+from spin_elements import elements_of_parts
 
 from rotor.formats.spcat.file_model import groups_of
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
-from rotor.quantum.reduced import connected_pairs, pairs_where
-from rotor.quantum.spins import lines
-from rotor.quantum.tensors import body_tensor, rank_of
+from rotor.quantum.reduced import connections
+from rotor.quantum.tensors import body_tensor
 
 KINDS = ORACLES / "kinds"
 
@@ -27,22 +28,17 @@ def _group(name: str, span: int):
     "name", ["ch3cn_quad", "h2coh", "patterns_of_i_tot", "vinylcl35_quad", "methyl_i_tot", "l_doubled_quad"]
 )
 def test_pairs_are_those_of_all_blocks(name: str):
-    group = _group(name, 5)
-    levels = group.levels((sum(group.spins) % 2, 10))
+    group = _group(name, 4)
+    blocks = (levels := group.levels((sum(group.spins) % 2, 6))).blocks
     tensors = {(0, 0): body_tensor((1.0, 0.7, 0.4), 1, str(levels.representation))}
-    rank = rank_of(tensors)
-    expected = list(pairs_where(levels.blocks, rank, lambda up, low: bool(lines._acting(up, low, tensors, rank))))
-    assert expected
-    computed = list(connected_pairs(levels.blocks, tensors))
-    assert [(up.start, low.start) for up, low in computed] == [(up.start, low.start) for up, low in expected]
-
-
-def test_few_pairs_are_tested_beside_those_that_are_connected(monkeypatch):
-    """Every pair of blocks of neighbouring F was tested: two spins to F = 50 took more than 20 s (fuzzed input 538100)."""
-    group = _group("ch3cn_quad", 12)
-    levels = group.levels((0, 24))
-    tensors = {(0, 0): body_tensor((1.0, 0.0, 0.0), 1, str(levels.representation))}
-    tests, original = [], lines._acting
-    monkeypatch.setattr(lines, "_acting", lambda *arguments: tests.append(1) or original(*arguments))
-    pairs = list(connected_pairs(levels.blocks, tensors))
-    assert len(tests) < 1.5 * len(pairs)
+    pairs, amplitudes = connections(blocks, tensors)
+    expected = {
+        (up.start, low.start): elements
+        for low in blocks
+        for up in blocks
+        if (up.twice_f, up.start) >= (low.twice_f, low.start)
+        and (elements := elements_of_parts(up, low, tensors)).any()
+    }
+    assert [(up.start, low.start) for up, low in pairs] == sorted(expected, key=lambda pair: pair[::-1])
+    for up, low in pairs:
+        assert np.abs(np.abs(amplitudes(up, low)) - np.abs(expected[up.start, low.start])).max() < 1e-12

@@ -1,0 +1,34 @@
+"""Reduced elements of a vector between two blocks with spins, part by part: coefficients of one pair of F, elements of one pair of N."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rotor.quantum.spins.coupling import moment_coefficients
+from rotor.quantum.spins.operators import AxialState, tensor_elements
+
+
+def elements_of_parts(up, low, tensors):
+    """⟨F'‖T‖F⟩ (n_up, n_low); those of |N K⟩ count both signs of K."""
+    total, scheme = np.zeros((len(up.vectors), len(low.vectors))), up.shared.scheme
+    if not abs(up.twice_f - low.twice_f) <= 2 <= up.twice_f + low.twice_f:
+        return total
+    if scheme.equivalent:
+        (bra, left), (ket, right) = (scheme.recoupling(block.twice_f) for block in (up, low))
+        t = left.T @ moment_coefficients(scheme.twice, 1, None, bra, ket) @ right
+        t = np.where(np.abs(t) > 1e-13, t, 0.0)
+    else:
+        t = moment_coefficients(scheme.twice, 1, None, up.patterns, low.patterns)
+
+    def between(first, second):
+        tensor = tensors.get((first.v, second.v))
+        return None if tensor is None else tensor_elements(first.basis, second.basis, tensor)
+
+    for a in up.parts:
+        for b in low.parts:
+            element = a.rotor.elements(b.rotor, between)
+            if element is not None:
+                bases = a.rotor.parts[0].basis, b.rotor.parts[0].basis
+                both = isinstance(bases[0], AxialState) and any(basis.axial_k for basis in bases)
+                total[a.place, b.place] = (np.sqrt(2.0) if both else 1.0) * np.kron(t[a.patterns, b.patterns], element)
+    return up.vectors.T @ total @ low.vectors
