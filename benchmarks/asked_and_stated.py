@@ -238,11 +238,11 @@ def _align(scene: Any, request: Any, answer: Any) -> Reference:
 
 
 def _tumble(scene: Any, request: Any, answer: Any) -> Reference:
-    from rotor.classical.driven import DrivenRequest, motion_of
+    from rotor.classical.driven import DrivenRequest, driven_motion
     from rotor.classical.step_errors import apart
 
     if isinstance(request, DrivenRequest):
-        return apart(answer.motion, motion_of(replace(request, step=None, tolerance=1e-14))), "steps to 1e-14"
+        return apart(answer.motion, driven_motion(replace(request, step=None, tolerance=1e-14))), "steps to 1e-14"
     return exact_attitude_error(request, answer), "Euler's equations to 25 digits, by Taylor series"
 
 

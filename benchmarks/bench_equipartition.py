@@ -19,12 +19,12 @@ import numpy as np
 from ase.units import fs
 
 from rotor import units
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.fluids.initial_box import heat, lattice_box, relax
-from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.motion.bodies import rigid_bodies
 from rotor.fluids.motion.dynamics import RigidDynamics
 from rotor.fluids.motion.thermostats import Langevin
-from rotor.fluids.run import calculator_of
+from rotor.fluids.run import make_calculator
 from rotor.fluids.settings import Settings
 from rotor.statistics.equipartition import Equipartition, KineticDegrees, equipartition, kinetic_degrees
 
@@ -55,13 +55,13 @@ def frames_of(
     fluid: Fluid, molecules: int, frames: int, seed: int, stretch: float = 1.0, on_step: bool = False
 ) -> KineticDegrees:
     """Kinetic energies over kT by degree of freedom, (frames, molecules)."""
-    model = model_of(fluid.model)
+    model = find_model(fluid.model)
     settings = Settings(model=fluid.model, temperature_k=fluid.temperature_k)
     atoms = lattice_box(model, molecules, fluid.density_g_cm3, np.random.default_rng([seed, 1]))
-    atoms.calc = calculator_of(settings)
+    atoms.calc = make_calculator(settings)
     shapes = {model.symbols: model.positions_angstrom[: len(model.symbols)]}
     relax(atoms, shapes=shapes)
-    bodies, pose = bodies_of(atoms, shapes=shapes)
+    bodies, pose = rigid_bodies(atoms, shapes=shapes)
     heat(atoms, bodies, pose.attitude, fluid.temperature_k, np.random.default_rng([seed, 2]))
     step = stretch * fluid.step_fs
     thermostat = Langevin(fluid.temperature_k, FRICTION_PER_PS / (1000.0 * fs), np.random.default_rng([seed, 3]))

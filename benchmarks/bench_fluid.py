@@ -33,11 +33,11 @@ from ase.io import read, write
 
 from rotor.fluids.analysis import drift_per_ns
 from rotor.fluids.engines import lammps, openmm
-from rotor.fluids.engines.engine_input import engine_input_of
+from rotor.fluids.engines.engine_input import make_engine_input
 from rotor.fluids.engines.pair_tables import Form
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.fluids.initial_box import lattice_box, relax
-from rotor.fluids.run import calculator_of, dynamics_of
+from rotor.fluids.run import make_calculator, make_dynamics
 from rotor.fluids.settings import Settings
 
 KJ_PER_MOL = units.mol / units.kJ
@@ -59,11 +59,11 @@ def water(model: str, molecules: int, folder: Path) -> Atoms:
     """An equilibrated box at 0.997 g/cm³ and 298.15 K with velocities, made once."""
     path = folder / f"{model}_{molecules}.extxyz"
     if not path.exists():
-        atoms = lattice_box(model_of(model), molecules, 0.997, np.random.default_rng(11))
+        atoms = lattice_box(find_model(model), molecules, 0.997, np.random.default_rng(11))
         settings = Settings(model=model, ensemble="langevin", friction_per_ps=10.0)
-        atoms.calc = calculator_of(settings)
+        atoms.calc = make_calculator(settings)
         relax(atoms)
-        dynamics = dynamics_of(atoms, settings)
+        dynamics = make_dynamics(atoms, settings)
         for _ in range(5000):
             dynamics.step()
             dynamics.nsteps += 1
@@ -74,8 +74,8 @@ def water(model: str, molecules: int, folder: Path) -> Atoms:
 
 def ours(atoms: Atoms, settings: Settings, steps: int) -> Iterator[float]:
     """Seconds of pieces of a run."""
-    atoms.calc = calculator_of(settings)
-    dynamics = dynamics_of(atoms, settings)
+    atoms.calc = make_calculator(settings)
+    dynamics = make_dynamics(atoms, settings)
     while True:
         begin = time.process_time()
         for _ in range(steps):
@@ -86,7 +86,7 @@ def ours(atoms: Atoms, settings: Settings, steps: int) -> Iterator[float]:
 
 def by_openmm(atoms: Atoms, settings: Settings, steps: int) -> Iterator[float]:
     """Seconds of pieces of a run, the barostat that measures pressure left out."""
-    run = openmm.session(engine_input_of(atoms, settings), settings, accuracy=5e-4, platform="CPU")
+    run = openmm.session(make_engine_input(atoms, settings), settings, accuracy=5e-4, platform="CPU")
     stepper = run.context.getIntegrator()
     while True:
         begin = time.process_time()
@@ -99,7 +99,7 @@ def by_lammps(
     atoms: Atoms, settings: Settings, steps: int, change: Callable[[str], str], arguments: list[str]
 ) -> Iterator[float]:
     """Seconds of pieces of a run in its own process, which waits for its turn; change: of the input file."""
-    engine_input = engine_input_of(atoms, settings)
+    engine_input = make_engine_input(atoms, settings)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         lammps.write_files(folder, engine_input, settings, Form(), accuracy=1e-4)
@@ -185,7 +185,7 @@ def one_style(text: str) -> str:
 
 def _pairs(text: str, style: str, after: list[str]) -> str:
     lines = [line for line in text.splitlines() if not line.startswith(("pair_", "kspace_"))]
-    oxygen = model_of("spce").sites[0]
+    oxygen = find_model("spce").sites[0]
     mine = [style, "pair_coeff * * 0.0 1.0", f"pair_coeff 1 1 {oxygen.epsilon_ev} {oxygen.sigma_angstrom}", *after]
     at = next(k for k, line in enumerate(lines) if line.startswith("neighbor "))
     return "\n".join([*lines[:at], *mine, *lines[at:]]) + "\n"
@@ -215,8 +215,8 @@ def drift(folder: Path, ps: float) -> dict[str, Any]:
 
 def our_energies(atoms: Atoms, settings: Settings) -> tuple[float, np.ndarray, np.ndarray]:
     """Processor time of the steps, times in ps and total energies in eV."""
-    atoms.calc = calculator_of(settings)
-    dynamics = dynamics_of(atoms, settings)
+    atoms.calc = make_calculator(settings)
+    dynamics = make_dynamics(atoms, settings)
 
     def advance() -> None:
         for _ in range(settings.every):
@@ -228,7 +228,7 @@ def our_energies(atoms: Atoms, settings: Settings) -> tuple[float, np.ndarray, n
 
 def openmm_energies(atoms: Atoms, settings: Settings) -> tuple[float, np.ndarray, np.ndarray]:
     """The same by OpenMM, its velocities put back onto the step."""
-    run = openmm.session(engine_input_of(atoms, settings), settings, platform="CPU")
+    run = openmm.session(make_engine_input(atoms, settings), settings, platform="CPU")
     stepper = run.context.getIntegrator()
 
     def energy() -> float:
@@ -253,7 +253,7 @@ def _followed(
 def lammps_energies(atoms: Atoms, settings: Settings) -> tuple[float, np.ndarray, np.ndarray]:
     """The same by LAMMPS (time of the wall: another process)."""
     begin = time.perf_counter()
-    frames = list(lammps.frames(engine_input_of(atoms, settings), settings))
+    frames = list(lammps.frames(make_engine_input(atoms, settings), settings))
     energies = np.array([frame.potential_ev + frame.motion.kinetic().total_ev for frame in frames])
     return time.perf_counter() - begin, settings.step_fs / 1000 * settings.every * np.arange(len(energies)), energies
 

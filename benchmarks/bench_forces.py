@@ -21,7 +21,7 @@ import numpy as np
 from ase import Atoms
 from bench_tops import processor
 
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.fluids.forces.potential import RigidPotential
 from rotor.geometry.rotations import uniform
 
@@ -30,7 +30,7 @@ PER_CUBIC_ANGSTROM = 33.36e-3
 
 def water(n: int, rng: np.random.Generator) -> Atoms:
     """n molecules on a cubic lattice, turned at random."""
-    model, edge, side = model_of("spce"), (n / PER_CUBIC_ANGSTROM) ** (1 / 3), math.ceil(n ** (1 / 3) - 1e-9)
+    model, edge, side = find_model("spce"), (n / PER_CUBIC_ANGSTROM) ** (1 / 3), math.ceil(n ** (1 / 3) - 1e-9)
     lattice = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)[:n]
     w, x, y, z = np.moveaxis(uniform(n, rng=rng), -1, 0)
     u = np.stack((x, y, z), axis=-1)[:, None]

@@ -147,9 +147,9 @@ def iteration_of_a_fit() -> Callable[[], object]:
     start = TopConstants(top)
     start = start.replace(**{name: 0.0 for name in free if name not in start})
     from rotor.fitting.assignment import levels_in
-    from rotor.fitting.top_levels import model_of
+    from rotor.fitting.top_levels import label_model
 
-    levels = model_of(start, levels_in(lines)[0])
+    levels = label_model(start, levels_in(lines)[0])
     values = np.array(list(start.values.values()))
     return lambda: levels.levels(values)
 

@@ -23,18 +23,18 @@ from ase.units import fs
 
 from rotor import units
 from rotor.classical.integrators.splitting import RotationSplitting
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.fluids.initial_box import heat, lattice_box, relax
-from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.motion.bodies import rigid_bodies
 from rotor.fluids.motion.dynamics import RigidDynamics
 from rotor.fluids.motion.state import Flows, State
 from rotor.fluids.motion.thermometers import THERMOMETERS, kinetic_energy, step_correction
-from rotor.fluids.run import calculator_of, run_fluid
+from rotor.fluids.run import make_calculator, run_fluid
 from rotor.fluids.settings import Settings
 
 MOLECULES = 216
 STEPS_FS = (1.0, 2.0, 3.0, 4.0)
-MODEL = model_of("spce")
+MODEL = find_model("spce")
 SHAPES = {MODEL.symbols: MODEL.positions_angstrom}
 LIBRATION_PER_PS = 112.0  # of water, from one fit to 4 fs in another program
 BLOCKS = 20
@@ -44,7 +44,7 @@ def liquid(span_ps: float) -> Atoms:
     """A box of water at temperature, with momenta of a Langevin run."""
     settings = Settings(ensemble="langevin", friction_per_ps=5.0, step_fs=2.0, steps=round(span_ps * 500), every=500)
     atoms = lattice_box(MODEL, MOLECULES, 0.997, np.random.default_rng(1))
-    atoms.calc = calculator_of(settings)
+    atoms.calc = make_calculator(settings)
     relax(atoms, shapes=SHAPES)
     run_fluid(atoms, settings)
     return atoms
@@ -53,8 +53,8 @@ def liquid(span_ps: float) -> Atoms:
 def dynamics_from(atoms: Atoms, step_fs: float) -> RigidDynamics:
     """The same box with fresh momenta and a calculator of its own."""
     box = atoms.copy()
-    box.calc = calculator_of(Settings())
-    bodies, pose = bodies_of(box, shapes=SHAPES)
+    box.calc = make_calculator(Settings())
+    bodies, pose = rigid_bodies(box, shapes=SHAPES)
     heat(box, bodies, pose.attitude, 298.15, np.random.default_rng(5))
     return RigidDynamics(box, step_fs * fs, shapes=SHAPES)
 

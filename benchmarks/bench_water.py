@@ -23,13 +23,13 @@ from ase.io import read, write
 
 from rotor.fluids.analysis import block_errors, diffusion, drift_per_ns, pair_distribution, yeh_hummer_correction
 from rotor.fluids.engines.results import run_engine
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.fluids.forces.potential import RigidPotential
 from rotor.fluids.initial_box import lattice_box, relax
 from rotor.fluids.record import FluidRecord
-from rotor.fluids.run import dynamics_of, pressure_bar
+from rotor.fluids.run import make_dynamics, pressure_bar
 from rotor.fluids.settings import Settings
-from rotor.fluids.summary import mean_of
+from rotor.fluids.summary import series_mean
 
 KJ_PER_MOL = units.mol / units.kJ  # of 1 eV
 VISCOSITY = 0.729e-3  # Pa s, SPC/E at 298 K: M. A. González and J. L. F. Abascal, J. Chem. Phys. 132, 096101 (2010)
@@ -45,7 +45,7 @@ def potential(settings: Settings) -> RigidPotential:
 def ours(atoms: Atoms, settings: Settings) -> tuple[FluidRecord, np.ndarray]:
     """Run with our dynamics: the table with the molecular pressure, and the path of the atoms."""
     atoms.calc = potential(settings)
-    dynamics, rows, path = dynamics_of(atoms, settings), [], []
+    dynamics, rows, path = make_dynamics(atoms, settings), [], []
     for step in range(settings.steps + 1):
         if step % settings.every == 0:
             kinetic, heat = dynamics.kinetic(), dynamics.temperatures()
@@ -62,7 +62,7 @@ def ours(atoms: Atoms, settings: Settings) -> tuple[FluidRecord, np.ndarray]:
 def start(settings: Settings, molecules: int, box: Path) -> Atoms:
     """The equilibrated box with velocities, made once."""
     if not box.exists():
-        atoms = lattice_box(model_of(settings.model), molecules, 0.997, np.random.default_rng(7))
+        atoms = lattice_box(find_model(settings.model), molecules, 0.997, np.random.default_rng(7))
         atoms.calc = potential(settings)
         relax(atoms)
         for friction, interval in ((10.0, 1000), (2.0, 50)):
@@ -70,7 +70,7 @@ def start(settings: Settings, molecules: int, box: Path) -> Atoms:
             record, _ = ours(atoms, warm)
         # the mean energy of the ensemble is potential + f kT/2; the momenta are scaled to it
         energy = float(np.mean(record.potential_ev)) + (6 * molecules - 3) / 2 * units.kB * settings.temperature_k
-        dynamics = dynamics_of(atoms, settings)
+        dynamics = make_dynamics(atoms, settings)
         expected = energy - atoms.get_potential_energy()
         atoms.set_momenta(atoms.get_momenta() * np.sqrt(expected / dynamics.kinetic("full").total_ev))
         atoms.calc = None
@@ -99,7 +99,10 @@ def measured(engine: str, atoms: Atoms, settings: Settings) -> dict[str, Any]:
         ("pressure_bar", record.pressure_bar[1:]),
     ):
         # the slow share of the correlations of water is small and long: blocks of an eighth of the run see it
-        table[name] = [float(np.mean(series)), float(max(mean_of(name, "", series).error, *block_errors(series)[-2:]))]
+        table[name] = [
+            float(np.mean(series)),
+            float(max(series_mean(name, "", series).error, *block_errors(series)[-2:])),
+        ]
     shells = [pair_distribution(part, edges, edges.min() / 2, 180) for part in np.array_split(oxygen[::4], 5)]
     peaks = np.array([shell.first_peak() for shell in shells])
     table["first_peak_angstrom"], table["first_peak_height"] = (

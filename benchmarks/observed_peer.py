@@ -19,7 +19,7 @@ import numpy as np
 from rotor import units
 from rotor.formats.read_write import read
 from rotor.observed.model import KM_PER_S, Component, Sight, model
-from rotor.observed.species import SpeciesLines, species_of_lines
+from rotor.observed.species import SpeciesLines, species_from_lines
 from rotor.spectra.lines import line_list
 
 WIDTH_KM_S, BACKGROUND_K, CHANNEL = 3.0, 2.725, 0.1
@@ -44,7 +44,7 @@ json.dump({"version": pyspeckit.__version__, "brightness": out}, sys.stdout)
 def species() -> SpeciesLines:
     """Lines of SO2 of the library between 200 and 260 GHz."""
     top = read("SO2")
-    return species_of_lines(line_list(top, temperature_k=300.0, min_lgint=-8.0, range_mhz=(200e3, 260e3)), "SO2")
+    return species_from_lines(line_list(top, temperature_k=300.0, min_lgint=-8.0, range_mhz=(200e3, 260e3)), "SO2")
 
 
 def question(lines: SpeciesLines, grid: np.ndarray, cases: list[dict[str, float]]) -> dict[str, Any]:

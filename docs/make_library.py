@@ -16,7 +16,7 @@ import numpy as np
 
 from rotor.formats.molecules.library import folders
 from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
-from rotor.formats.read_write import top_of_file
+from rotor.formats.read_write import file_top
 from rotor.formats.spcat.text.cat import Catalogue, read_cat
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.quantum.solve import solve_levels
@@ -209,7 +209,7 @@ def _dipole(file: MoleculeFile) -> str:
 
 def _rows(files: dict[str, MoleculeFile]) -> Iterator[str]:
     for stem, file in files.items():
-        top = top_of_file(file)
+        top = file_top(file)
         kappa = f"{top.kappa:.3f}" if top.kind == "asymmetric" else ""
         unverified = ", ".join(name.replace("constants.", "").replace("_", " ") for name in sorted(file.unverified))
         yield (

@@ -9,14 +9,14 @@ from collections.abc import Callable
 from itertools import groupby
 from pathlib import Path
 
-from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.hamiltonian.code_table import split_code
 from rotor.formats.spcat.hamiltonian.codes import AXES
-from rotor.formats.spcat.hamiltonian.dipole_codes import moment_of, split_dipole
-from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
-from rotor.formats.spcat.hamiltonian.operators import operator_of
-from rotor.formats.spcat.hamiltonian.series import Series, term_of
-from rotor.formats.spcat.hamiltonian.states import states_of
+from rotor.formats.spcat.hamiltonian.dipole_codes import line_moment, split_dipole
+from rotor.formats.spcat.hamiltonian.l_doubled import l_doubled_pairs
+from rotor.formats.spcat.hamiltonian.operators import code_operator
+from rotor.formats.spcat.hamiltonian.series import Series, series_term
+from rotor.formats.spcat.hamiltonian.states import file_states
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import read_par
 
@@ -261,8 +261,8 @@ def operator_answer(code: int) -> str:
     if digits.is_constant:
         return "a constant of a series"
     if digits.is_series:
-        return answer(lambda: term_of(digits, AXES["Ir"], Series(), (0, 0)))
-    return answer(lambda: operator_of(digits, AXES["Ir"]))
+        return answer(lambda: series_term(digits, AXES["Ir"], Series(), (0, 0)))
+    return answer(lambda: code_operator(digits, AXES["Ir"]))
 
 
 def type_rows() -> list[str]:
@@ -298,12 +298,12 @@ def other_rows() -> list[str]:
 def levels_answer(lines: str) -> str:
     """Whether a file of one state with these parameters computes."""
     file = read_par(f"a case\n {1 + lines.count(chr(10))} 0 0 0\na 1 1 0 20\n {lines}\n".encode())
-    return answer(lambda: groups_of(file, IntensityFile("", Request(), ())))
+    return answer(lambda: connected_groups(file, IntensityFile("", Request(), ())))
 
 
 def option_answer(line: str) -> str:
     """Whether an option line is understood."""
-    return answer(lambda: pairs_of(states_of(read_par(f"a case\n 1 0 0 0\n{line}\n 100 1.0 0\n".encode()))))
+    return answer(lambda: l_doubled_pairs(file_states(read_par(f"a case\n 1 0 0 0\n{line}\n 100 1.0 0\n".encode()))))
 
 
 def option_rows() -> list[str]:
@@ -339,7 +339,7 @@ def dipole_answer(code: int, states: tuple[int, int] = (1, 0)) -> str:
     split = split_dipole(code, 1)
     if code in (1, 2, 3):
         return "yes"
-    return answer(lambda: moment_of(Dipole(code, 1.0), split, states, 1))
+    return answer(lambda: line_moment(Dipole(code, 1.0), split, states, 1))
 
 
 def dipole_rows() -> list[str]:

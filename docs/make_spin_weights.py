@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.symmetry.point_group import Symmetry, symmetry_of
+from rotor.molecules.symmetry.point_group import Symmetry, molecule_symmetry
 from rotor.tops.spins.spin_statistics import STATES, CharacterRow, character_rows, inverting_symmetry, spin_weights
 
 TARGET = Path(__file__).with_name("spin_weights.md")
@@ -148,7 +148,7 @@ def row(species: Species) -> str:
 
 def _state(species: Species, molecule: Molecule) -> tuple[Symmetry, str | tuple[int, ...]]:
     if species.inversion is None:
-        return symmetry_of(molecule), species.electronic
+        return molecule_symmetry(molecule), species.electronic
     kinds = list(zip(molecule.symbols, molecule.mass_numbers, strict=True))
     flat, signs = inverting_symmetry(kinds, molecule.masses_u, molecule.positions_angstrom)
     return flat, signs if species.inversion == STATES[1] else "even"

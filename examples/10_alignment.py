@@ -103,9 +103,9 @@ assert apart.max() > 0.05
 
 # %%
 after = np.linspace(0.01, period, 20001)
-best = align(ocs, Kick.of_strength(55.0, 4.04), after).cosines["cos2theta"].max()
+best = align(ocs, Kick.from_strength(55.0, 4.04), after).cosines["cos2theta"].max()
 delay = 0.45 * period
-double = align(ocs, [Kick.of_strength(3.0, 4.04), Kick.of_strength(6.0, 4.04, delay)], delay + after)
+double = align(ocs, [Kick.from_strength(3.0, 4.04), Kick.from_strength(6.0, 4.04, delay)], delay + after)
 print(f"the best of all single kicks, P = 55: {best:.4f}; P = 3 and then 6: {double.cosines['cos2theta'].max():.4f}")
 assert abs(best - 0.92217) < 1e-4
 assert double.cosines["cos2theta"].max() > best

@@ -13,6 +13,7 @@ import rotor
 from rotor.api import (
     adjoint,
     bracket,
+    chasles_screw,
     compose,
     exp,
     mean_rotation,
@@ -20,7 +21,6 @@ from rotor.api import (
     power,
     rigid_parts,
     rotate,
-    screw_of,
     step_parameters,
     step_pose,
     to_matrix,
@@ -328,6 +328,6 @@ torques = np.array([power(joints[0], wrench), power(second_now, wrench)])
 jacobian = np.array([[-closed[1], closed[0]], [-L2 * np.sin(T1 + T2), L2 * np.cos(T1 + T2)]])
 assert np.allclose(torques, jacobian @ normal[:2], atol=1e-14)  # Jᵀ f
 print(f"the hand at {hand.round(4)}; a unit push of the wall is held by joint torques {torques.round(4)}")
-half_turn = screw_of([0, 0, 0, 1.0], [2.0, 0, 0])  # the elbow straight back
+half_turn = chasles_screw([0, 0, 0, 1.0], [2.0, 0, 0])  # the elbow straight back
 assert np.allclose(half_turn.point, [1, 0, 0], atol=1e-15)
 assert np.isclose(half_turn.angle, np.pi)

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 import rotor
-from rotor.api import assignment_figure, fit_intensities, loomis_wood_figure, peaks_of_spectrum, publication_table
+from rotor.api import assignment_figure, fit_intensities, loomis_wood_figure, pick_peaks, publication_table
 
 # %matplotlib inline
 
@@ -64,7 +64,7 @@ plt.show()
 # Maxima above six times the noise, each with the standard error of its frequency.
 
 # %%
-peaks = peaks_of_spectrum(grid, spectrum)
+peaks = pick_peaks(grid, spectrum)
 print(peaks)
 strong = sticks[0][1] > 5
 nearest = np.array([np.abs(peaks.frequency_mhz - one).min() for one in sticks[0][0][strong]])

@@ -32,7 +32,7 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.alignment.request import AlignRequest as AlignRequest
     from rotor.alignment.request import answer_align as answer_align
     from rotor.assignment.intensities import fit_intensities as fit_intensities
-    from rotor.assignment.peak_finding import peaks_of_spectrum as peaks_of_spectrum
+    from rotor.assignment.peak_finding import pick_peaks as pick_peaks
     from rotor.assignment.request import AssignRequest as AssignRequest
     from rotor.assignment.request import answer_assign as answer_assign
     from rotor.classical.effect import Torque as Torque
@@ -76,7 +76,7 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.classical.lyapunov import lyapunov_exponents as lyapunov_exponents
     from rotor.classical.lyapunov import orbit as orbit
     from rotor.classical.lyapunov import poincare_section as poincare_section
-    from rotor.classical.system import momentum_of as momentum_of
+    from rotor.classical.system import total_momentum as total_momentum
     from rotor.classical.tumble import TumbleRequest as TumbleRequest
     from rotor.classical.tumble import answer_tumble as answer_tumble
     from rotor.fitting.assignment import assignments as assignments
@@ -114,9 +114,9 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.geometry.inertia import rectangle as rectangle
     from rotor.geometry.rigid_motions import adjoint as adjoint
     from rotor.geometry.rigid_motions import bracket as bracket
+    from rotor.geometry.rigid_motions import chasles_screw as chasles_screw
     from rotor.geometry.rigid_motions import compose as compose
     from rotor.geometry.rigid_motions import power as power
-    from rotor.geometry.rigid_motions import screw_of as screw_of
     from rotor.geometry.rigid_motions import twist_exp as twist_exp
     from rotor.geometry.rigid_motions import twist_log as twist_log
     from rotor.geometry.rigid_parts import rigid_parts as rigid_parts

@@ -73,10 +73,10 @@ def rising_order(values: Floats) -> Ints:
     return np.asarray(order)
 
 
-def whole_of_lower(lower: Floats) -> Floats:
+def symmetric_from_lower(lower: Floats) -> Floats:
     """Symmetric matrices (..., n, n) from their lower triangles (zeros above the diagonal).
 
-    >>> whole_of_lower(np.array([[1.0, 0.0], [2.0, 3.0]])).tolist()
+    >>> symmetric_from_lower(np.array([[1.0, 0.0], [2.0, 3.0]])).tolist()
     [[1.0, 2.0], [2.0, 3.0]]
     """
     return np.asarray(lower + np.tril(lower, -1).swapaxes(-1, -2))
@@ -110,10 +110,10 @@ def end_to_end(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
     return np.concatenate(columns) if len(columns) > 1 else columns[0]
 
 
-def rows_of(table: NDArray[np.int16], rows: NDArray[Any]) -> NDArray[np.int16]:
+def copy_rows(table: NDArray[np.int16], rows: NDArray[Any]) -> NDArray[np.int16]:
     """Rows of a table of up to eight columns, in a fifth of the time: each row is copied as one number of 16 bytes.
 
-    >>> rows_of(np.array([[1, 2], [3, 4]], dtype=np.int16), np.array([1, 1])).tolist()
+    >>> copy_rows(np.array([[1, 2], [3, 4]], dtype=np.int16), np.array([1, 1])).tolist()
     [[3, 4], [3, 4]]
     """
     count, width = table.shape

@@ -17,7 +17,7 @@ from rotor.checks import did_you_mean
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import Field
 from rotor.requests.fill import Entries
-from rotor.table import Table, html_of_errors
+from rotor.table import Table, errors_html
 from rotor.verbs.verb import Place, Subject, Verb, Work, file_writer, report_of, verb_of
 
 EXAMPLES = {
@@ -152,7 +152,7 @@ class Result:
 
     def _repr_html_(self) -> str:
         """The table and the error budget, for notebooks."""
-        return self.table._repr_html_() + html_of_errors(self.answer)
+        return self.table._repr_html_() + errors_html(self.answer)
 
 
 def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Result:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable
+from typing import Any
 
 
 def require_positive(name: str, value: float, unit: str = "") -> float:
@@ -73,7 +74,7 @@ def require_between(name: str, value: float, low: float, high: float) -> float:
     return value
 
 
-def require_one_of(name: str, value: str, allowed: Collection[str]) -> str:
+def require_choice(name: str, value: str, allowed: Collection[str]) -> str:
     """The value; ValueError unless it is one of the allowed words."""
     if value not in allowed:
         raise ValueError(f"{name}: {value!r}: expected one of {', '.join(allowed)}")
@@ -92,6 +93,23 @@ class NoAnswerError(RuntimeError):
 
 class RunStopped(ValueError):
     """A run stopped after it began; files written so far remain."""
+
+
+class Renamed:
+    """The former name of a method, which works for one minor release with a DeprecationWarning."""
+
+    def __init__(self, new: str) -> None:
+        self.new = new
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.old = name
+
+    def __get__(self, instance: object, owner: type) -> Any:
+        import warnings
+
+        text = f"{owner.__name__}.{self.old} is {self.new} from version 0.3 on; see docs/migration.md"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return getattr(owner if instance is None else instance, self.new)
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:

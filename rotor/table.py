@@ -122,10 +122,10 @@ class TextOf:
 
         value = getattr(self, self.shown)
         inner = value._repr_html_() if hasattr(value, "_repr_html_") else f"<pre>{html.escape(repr(value))}</pre>"
-        return f"<p>{html.escape(type(self).__name__)}</p>{inner}{html_of_errors(self)}"
+        return f"<p>{html.escape(type(self).__name__)}</p>{inner}{errors_html(self)}"
 
 
-def html_of_errors(answer: Any) -> str:
+def errors_html(answer: Any) -> str:
     """The line of an answer's error budget as a paragraph; empty without a budget."""
     import html
 

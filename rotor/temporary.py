@@ -140,14 +140,14 @@ def _locked_handle(lock: Path, path: str | os.PathLike[str]) -> int | None:
             raise ValueError(
                 f"{os.fspath(path)}: another run{process} is writing this file; wait for it, or give another name"
             ) from None
-        if _is_file_of(handle, lock):
+        if _is_same_file(handle, lock):
             os.ftruncate(handle, 0)
             os.write(handle, str(os.getpid()).encode("ascii"))
             return handle
         os.close(handle)  # the previous run just ended and removed its lock
 
 
-def _is_file_of(handle: int, path: Path) -> bool:
+def _is_same_file(handle: int, path: Path) -> bool:
     try:
         return os.path.samestat(os.fstat(handle), os.stat(path))
     except OSError:

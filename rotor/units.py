@@ -110,7 +110,7 @@ MOST_POINTS = 10_000_000  # of a grid: 80 MB of numbers
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*?)?\s*$")
 
 
-def _kind_of(unit: str) -> str:
+def _unit_kind(unit: str) -> str:
     return next(kind for kind, table in _KINDS.items() if unit in table)
 
 
@@ -119,7 +119,7 @@ def _factor(unit: str | None, expected: str, text: str) -> float:
     if not unit:
         return 1.0
     unit = _ALIASES.get(unit, unit)
-    table = _KINDS[_kind_of(expected)]
+    table = _KINDS[_unit_kind(expected)]
     if expected in ("", "fraction") and unit not in table:
         raise ValueError(f"{text!r}: expected plain numbers here, without the unit {unit!r}")
     if unit not in table:

@@ -20,9 +20,9 @@ from rotor.api import (
     conjugate,
     from_matrix,
     integrate,
-    momentum_of,
     multiply,
     rotate,
+    total_momentum,
 )
 
 inertia = np.array([[2.0, -0.2, 0.0], [-0.2, 16.0, 0.0], [0.0, 0.0, 17.0]])  # along the ellipsoid's axes
@@ -41,7 +41,7 @@ def spun(spin, times, effects):
     across = np.cross([0.0, 1.0, 0.0], down)
     across /= np.linalg.norm(across)
     attitude = multiply(from_matrix([across, np.cross(down, across), down]), conjugate(to_principal))
-    start = momentum_of(rotate(to_principal, [0.0, 0.0, spin]), moments, effects, attitude)
+    start = total_momentum(rotate(to_principal, [0.0, 0.0, spin]), moments, effects, attitude)
     return integrate(LieRungeKutta(1e-7), moments, start, times, attitude, effects)
 
 

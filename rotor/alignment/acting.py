@@ -50,13 +50,13 @@ def _traceless(tensor: Floats) -> Floats:
     return out
 
 
-def contraction_of(top: Top, channel: Channel) -> Contraction:
+def channel_contraction(top: Top, channel: Channel) -> Contraction:
     body, space = acted_on(top, channel.acts_on), np.array(channel.space)
     return Contraction(body, _traceless(space) if space.ndim == 2 else space)
 
 
-def contractions_of(top: Top, windows: Sequence[Window]) -> tuple[tuple[Contraction, ...], ...]:
-    return tuple(tuple(contraction_of(top, channel) for channel in window.channels) for window in windows)
+def window_contractions(top: Top, windows: Sequence[Window]) -> tuple[tuple[Contraction, ...], ...]:
+    return tuple(tuple(channel_contraction(top, channel) for channel in window.channels) for window in windows)
 
 
 def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: float) -> int:

@@ -21,12 +21,12 @@ from numpy.typing import ArrayLike
 
 from rotor.alignment import observables as observe
 from rotor.alignment import propagate
-from rotor.alignment.acting import contractions_of, guessed_jmax
-from rotor.alignment.carry import EDGE, Outcome, Plan, Problem, Task, run, tasks_of
+from rotor.alignment.acting import guessed_jmax, window_contractions
+from rotor.alignment.carry import EDGE, Outcome, Plan, Problem, Task, block_tasks, run
 from rotor.alignment.ensemble import Ensemble, ground_level, single_level, thermal
 from rotor.alignment.observables import Harmonics
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
-from rotor.alignment.steps import Pilot, lowest_jmax, pilot_of
+from rotor.alignment.steps import Pilot, lowest_jmax, run_pilot
 from rotor.alignment.timeline import timeline
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import FieldSpace, FreeLevels
@@ -135,10 +135,10 @@ class BasisTooSmallError(ValueError):
 
 def truncation_apart(trace: AlignmentTrace) -> float:
     """The error of the cosines from steps, omitted populations and rounded phases, without that of the truncated basis."""
-    return trace.step_error * 2 + trace.ensemble.left_out * trace.moved + rounding_of_phases(trace)
+    return trace.step_error * 2 + trace.ensemble.left_out * trace.moved + phase_rounding(trace)
 
 
-def rounding_of_phases(trace: AlignmentTrace) -> float:
+def phase_rounding(trace: AlignmentTrace) -> float:
     """The error of the cosines from rounded phases of the highest level at the last time."""
     farthest = RAD_PER_PS_MHZ * float(np.abs(trace.levels.energy_mhz).max()) * float(np.abs(trace.t_ps).max())
     return float(np.finfo(np.float64).eps) * farthest * trace.moved
@@ -205,7 +205,7 @@ def align(
     ensemble = _ensemble(top, temperature_k, state, m, tolerance)
     followed = tuple(observe.observable(name, top) for name in observables)
     windows = timeline(pulses)
-    problem = Problem(top, pulses, windows, times, ensemble, followed, tolerance, contractions_of(top, windows))
+    problem = Problem(top, pulses, windows, times, ensemble, followed, tolerance, window_contractions(top, windows))
     jmax_option = jmax
     jmax = guessed_jmax(top, pulses, ensemble.jmax, tolerance) if jmax_option is None else jmax_option
     if jmax < ensemble.jmax + EDGE:
@@ -220,7 +220,7 @@ def align(
     if jmax_option is None:
         jmax = lowest_jmax(problem, jmax)
     while True:
-        pilot = pilot_of(problem, jmax)
+        pilot = run_pilot(problem, jmax)
         if pilot.edge <= 0.3 * tolerance:
             trace = carried(problem, pilot, executor, progress)
             if trace.edge_population <= tolerance:
@@ -295,7 +295,7 @@ def carried(
     space, before = pilot.space, problem.begins_before
     if pilot.whole and pilot.task is not None and pilot.outcome is not None:
         return _trace(problem, space, [pilot.task], [pilot.outcome], pilot, before)
-    tasks = list(tasks_of(problem, space, pilot.plan, before))
+    tasks = list(block_tasks(problem, space, pilot.plan, before))
     outcomes = []
     for done, outcome in enumerate(executor.map(run, tasks) if executor else map(run, tasks), 1):
         outcomes.append(outcome)

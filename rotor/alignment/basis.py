@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.alignment import observables as observe
-from rotor.alignment.acting import contractions_of
+from rotor.alignment.acting import window_contractions
 from rotor.alignment.carry import EDGE, Outcome, Plan, Problem, run
 from rotor.alignment.pulse import RAD_PER_PS_MHZ
-from rotor.alignment.steps import PILOT_TIMES, pilot_of, pilot_task, relative_edge
+from rotor.alignment.steps import PILOT_TIMES, pilot_task, relative_edge, run_pilot
 from rotor.alignment.timeline import timeline
 
 if TYPE_CHECKING:
@@ -45,8 +45,8 @@ def least_jmax(trace: AlignmentTrace, allowed: float) -> tuple[int, float]:
     -----
     The estimate is for one block; `AlignmentTrace.edge_population` of a run with this J max covers all blocks.
     """
-    problem = _problem_of(trace)
-    pilot = pilot_of(problem, trace.jmax)
+    problem = _traced_problem(trace)
+    pilot = run_pilot(problem, trace.jmax)
     if pilot.task is None:
         return trace.jmax, 0.0
     true = _signals(problem, trace.jmax, pilot.plan)[0]
@@ -71,14 +71,14 @@ def trace_with(trace: AlignmentTrace, jmax: int) -> AlignmentTrace:
     """
     from rotor.alignment.align import carried
 
-    problem = _problem_of(trace)
-    return carried(problem, pilot_of(problem, jmax))
+    problem = _traced_problem(trace)
+    return carried(problem, run_pilot(problem, jmax))
 
 
-def _problem_of(trace: AlignmentTrace) -> Problem:
+def _traced_problem(trace: AlignmentTrace) -> Problem:
     followed = tuple(observe.observable(name, trace.top) for name in trace.cosines)
     windows = timeline(trace.pulses)
-    acting = contractions_of(trace.top, windows)
+    acting = window_contractions(trace.top, windows)
     return Problem(
         trace.top, trace.pulses, windows, trace.t_ps, trace.ensemble, followed, trace.tolerance, acting
     )  # fmt: skip

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rotor.alignment.align import rounding_of_phases
+from rotor.alignment.align import phase_rounding
 from rotor.alignment.pulse import RAD_PER_PS_MHZ
 from rotor.quantum.estimates.budgets import NO_SAMPLES, model_term
 from rotor.requests.budget import ErrorBudget, ErrorTerm
@@ -34,7 +34,7 @@ def cosines_budget(trace: AlignmentTrace, limits: Sequence[Limit]) -> ErrorBudge
     ErrorBudget
         Absolute errors of the cosines.
     """
-    rounding = rounding_of_phases(trace)
+    rounding = phase_rounding(trace)
     parts = {
         "steps": trace.step_error,
         "populations left out": trace.ensemble.left_out * trace.moved,
@@ -46,7 +46,7 @@ def cosines_budget(trace: AlignmentTrace, limits: Sequence[Limit]) -> ErrorBudge
         unit="",
         rounding=ErrorTerm(rounding + trace.norm_error, "phases at the last time, norm of the states"),
         truncation=ErrorTerm(max(trace.error_estimate - rounding, 0.0), source, "a smaller tolerance"),
-        model=model_of_cosines(trace, limits),
+        model=cosine_model_error(trace, limits),
         data=ErrorTerm(None, f"the {_acting(trace)} no stated uncertainty"),
         statistics=NO_SAMPLES,
     )
@@ -57,7 +57,7 @@ def _acting(trace: AlignmentTrace) -> str:
     return " and ".join(names) + (" has" if len(names) == 1 else " have")
 
 
-def model_of_cosines(trace: AlignmentTrace, limits: Sequence[Limit]) -> ErrorTerm:
+def cosine_model_error(trace: AlignmentTrace, limits: Sequence[Limit]) -> ErrorTerm:
     """Error of the cosines at the last time from errors of the frequencies."""
     term = model_term(limits)
     if term.value is None:

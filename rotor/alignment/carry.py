@@ -20,7 +20,7 @@ from rotor.quantum.fields.axial import AxialBlock
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
-from rotor.tops.top import one_state
+from rotor.tops.top import require_single_state
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -47,7 +47,7 @@ class Problem:
     def space(self, jmax: int) -> FieldSpace:
         """The states up to J max and their blocks."""
         return field_space(
-            one_state(self.top, "alignment"),
+            require_single_state(self.top, "alignment"),
             jmax,
             [contraction for window_contractions in self.contractions for contraction in window_contractions],
         )
@@ -214,7 +214,7 @@ class _Snapshots(list[Complexes]):
         return np.concatenate(self._made, axis=1)
 
 
-def task_of(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Task | None:
+def block_task(problem: Problem, block: FieldBlock, plan: Plan, before: bool) -> Task | None:
     """The task of a block; None if nothing in it is populated.
 
     Parameters
@@ -277,7 +277,7 @@ def _cached_matrix(block: FieldBlock, contraction: Contraction, matrices: dict[i
     return matrices[key]
 
 
-def tasks_of(problem: Problem, space: FieldSpace, plan: Plan, before: bool) -> Iterator[Task]:
+def block_tasks(problem: Problem, space: FieldSpace, plan: Plan, before: bool) -> Iterator[Task]:
     """The tasks of all blocks with populated states.
 
     Parameters
@@ -298,6 +298,6 @@ def tasks_of(problem: Problem, space: FieldSpace, plan: Plan, before: bool) -> I
     """
     for m in problem.m_values(space):
         for block in space.blocks(m):
-            task = task_of(problem, block, plan, before)
+            task = block_task(problem, block, plan, before)
             if task is not None:
                 yield task

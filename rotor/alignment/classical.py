@@ -75,7 +75,7 @@ def classical_trace(
     times = np.asarray(times_ps, dtype=np.float64)
     if molecules < 1:
         raise ValueError(f"{molecules} molecules: 1 or more are expected")
-    moments = moments_of(top)
+    moments = scaled_moments(top)
     momentum = np.zeros((molecules, 3))
     if temperature_k:
         momentum = thermal_momenta(moments, RAD_PER_PS_MHZ * units.MHZ_PER_K * temperature_k, molecules, rng=rng)
@@ -88,7 +88,7 @@ def classical_trace(
     return dict(zip(observables, out / molecules, strict=True))
 
 
-def moments_of(top: Top) -> Floats:
+def scaled_moments(top: Top) -> Floats:
     """Principal moments along a, b, c in ħ² per rad/ps·ħ, 1/(2B); 0 for the axis of a linear top."""
     return np.array([0.0 if math.isinf(x) else 1 / (2 * RAD_PER_PS_MHZ * x) for x in top.rotational_constants_mhz])
 

@@ -17,7 +17,7 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.fields.blocks import FreeLevels
-from rotor.tops.top import one_state
+from rotor.tops.top import require_single_state
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -70,7 +70,7 @@ def single_level(top: Top, state: Mapping[str, int], m: int | None = None) -> En
     j = int(state.get("j", -1))
     if not 0 <= j <= MOST_J:
         raise ValueError(f"state: {dict(state)}: expected J from 0 to {MOST_J} among its quantum numbers")
-    levels = solve_levels(one_state(top, "alignment"), j)
+    levels = solve_levels(require_single_state(top, "alignment"), j)
     row = levels.find(**dict(state))
     if levels.weight[row] == 0:
         raise ValueError(f"state: {dict(state)}: its nuclear-spin weight is 0, so that it does not exist")
@@ -83,7 +83,7 @@ def ground_level(top: Top) -> Ensemble:
     """The ensemble of the lowest existing level with equal populations of all M: a gas at 0 K."""
     from rotor.quantum.solve import solve_levels
 
-    levels = solve_levels(one_state(top, "alignment"), 4)
+    levels = solve_levels(require_single_state(top, "alignment"), 4)
     existing = np.flatnonzero(levels.weight > 0)
     row = int(existing[np.argmin(levels.energy_mhz[existing])])
     return single_level(top, {name: int(column[row]) for name, column in levels.quanta.items()})
@@ -98,7 +98,7 @@ def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
         raise ValueError(
             f"temperature {temperature_k} K: expected a finite temperature above 0 K (0 means a single level)"
         )
-    levels = _levels_for(one_state(top, "alignment"), temperature_k, cut)
+    levels = _levels_for(require_single_state(top, "alignment"), temperature_k, cut)
     exists = levels.weight > 0
     ground = float(levels.energy_mhz[exists].min())
     factor = levels.weight * np.exp(-(levels.energy_mhz - ground) / (units.MHZ_PER_K * temperature_k))

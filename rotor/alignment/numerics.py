@@ -108,7 +108,7 @@ def _least_basis(request: Any, tolerance: float, trace: Any, allowed: float) -> 
     return Choice(replace(request, tolerance=tolerance), f"tolerance {tolerance:g}, and J max {trace.jmax} from it")
 
 
-def plan_of_align(request: Any) -> Plan:
+def plan_align(request: Any) -> Plan:
     """The plan of a gas under pulses: timed with a coarse tolerance; the number of steps grows with its fourth root."""
     coarse = replace(request, tolerance=max(request.tolerance, 1e-3), points=11, classical_molecules=0)
     trace = answer_align(coarse).trace
@@ -128,4 +128,4 @@ def plan_of_align(request: Any) -> Plan:
     )
 
 
-ALIGN = Numerics({"": Goal("cosines", choose_basis)}, knobs=(BASIS, CLASSICAL), plan=plan_of_align)
+ALIGN = Numerics({"": Goal("cosines", choose_basis)}, knobs=(BASIS, CLASSICAL), plan=plan_align)

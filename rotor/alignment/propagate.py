@@ -122,7 +122,7 @@ class Grid:
         return Grid(self.starts, self.steps / factor, self.counts * factor, self.sampled)
 
 
-def grid_of(window: Window, longest_step_ps: float, times_ps: Floats) -> Grid:
+def step_grid(window: Window, longest_step_ps: float, times_ps: Floats) -> Grid:
     """Steps no longer than `longest_step_ps` that meet the window's breaks and all `times_ps` inside it."""
     first, last = np.searchsorted(times_ps, window.start_ps, "right"), np.searchsorted(times_ps, window.stop_ps)
     inside = times_ps[first:last]

@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.checks import Renamed
 from rotor.requests.field import REQUIRED, declared
 from rotor.requests.readers import Custom, Numbers, Quantity
 
@@ -302,7 +303,7 @@ class Kick(Pulse):
     fluence_j_per_cm2 = ∫ I dt. The error for a Gaussian pulse is proportional to its width: for OCS with P = 4.3
     it is 3e-4 in the cosine for 10 fs and 1.5e-3 for 50 fs.
 
-    >>> kick = Kick.of_strength(5.0, anisotropy_angstrom3=4.04)
+    >>> kick = Kick.from_strength(5.0, anisotropy_angstrom3=4.04)
     >>> round(float(kick.area * 4.04), 12)
     5.0
     """
@@ -322,9 +323,11 @@ class Kick(Pulse):
         object.__setattr__(self, "axis", polarization(self.axis))
 
     @classmethod
-    def of_strength(cls, p: float, anisotropy_angstrom3: float, time_ps: float = 0.0) -> Kick:
+    def from_strength(cls, p: float, anisotropy_angstrom3: float, time_ps: float = 0.0) -> Kick:
         """The kick with P = `p` for a linear molecule with this polarizability anisotropy."""
         return cls(p / (anisotropy_angstrom3 * RAD_PER_PS_ANGSTROM3_W_PER_CM2) * 1e-12, time_ps)
+
+    of_strength = Renamed("from_strength")
 
     @property
     def area(self) -> float:

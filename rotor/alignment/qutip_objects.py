@@ -26,7 +26,7 @@ from rotor.quantum.fields.axial import cosine_bands
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
 from rotor.quantum.symmetric_top_elements import coupling
-from rotor.tops.top import one_state
+from rotor.tops.top import require_single_state
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -121,7 +121,9 @@ def block_objects(
             channels.append(channel)
     contractions = [Contraction(acted_on(top, each.acts_on), each.space) for each in channels]
     space = field_space(
-        one_state(top, "alignment"), guessed_jmax(top, pulses, 0, 1e-10) if jmax is None else jmax, contractions
+        require_single_state(top, "alignment"),
+        guessed_jmax(top, pulses, 0, 1e-10) if jmax is None else jmax,
+        contractions,
     )
     blocks = space.blocks(m)
     if not 0 <= block < len(blocks):
@@ -304,10 +306,10 @@ def _turn(jmax: int, p: int) -> Any:
     ).tocsr()
 
 
-def chain_of(jmax: int, k: int, m: int) -> Any:
+def cosine_chain(jmax: int, k: int, m: int) -> Any:
     """cosθ over |J k M⟩, J = max(|k|, |M|) ... J max, as a Qobj.
 
-    >>> chain_of(1, 0, 0).full().real.round(6).tolist()
+    >>> cosine_chain(1, 0, 0).full().real.round(6).tolist()
     [[0.0, 0.57735], [0.57735, 0.0]]
     """
     import qutip

@@ -15,7 +15,7 @@ from rotor.alignment.align import DEFAULT_TOLERANCE, AlignmentTrace, align
 from rotor.alignment.pulse import SHAPES, Pulse
 from rotor.arrays import Floats
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.estimates.limits import every_limit, limit_facts
+from rotor.quantum.estimates.limits import all_limits, limit_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, check_fields, declared
@@ -179,7 +179,7 @@ class AlignAnswer(TextOf):
 
         trace = self.trace
         effects = effects_of(trace.top, hyperfine=False)
-        return cosines_budget(trace, every_limit(trace.top, max(trace.ensemble.jmax, 1), effects))
+        return cosines_budget(trace, all_limits(trace.top, max(trace.ensemble.jmax, 1), effects))
 
     def facts(self) -> dict[str, Any]:
         """Facts of the answer except its table, by the keys of docs/verbs."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.alignment import observables as observe
 from rotor.alignment import propagate
-from rotor.alignment.carry import Outcome, Plan, Problem, Task, run, task_of
+from rotor.alignment.carry import Outcome, Plan, Problem, Task, block_task, run
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick
 from rotor.quantum.fields.blocks import FieldSpace
 
@@ -46,12 +46,12 @@ def _grids(problem: Problem, steps: Sequence[int]) -> list[propagate.Grid | None
     """Grids with about this number of steps per window; None for a kick."""
     lengths = [(window.stop_ps - window.start_ps) / count for window, count in zip(problem.windows, steps, strict=True)]
     return [
-        None if window.is_kick else propagate.grid_of(window, length, problem.times)
+        None if window.is_kick else propagate.step_grid(window, length, problem.times)
         for window, length in zip(problem.windows, lengths, strict=True)
     ]
 
 
-def _plan_of(problem: Problem, grids: Sequence[propagate.Grid | None], rule: str | None, factor: int = 1) -> Plan:
+def _step_plan(problem: Problem, grids: Sequence[propagate.Grid | None], rule: str | None, factor: int = 1) -> Plan:
     """The plan with `factor` times the steps of the grids; a Magnus method if `rule` is None."""
     out: list[propagate.KickPlan | propagate.Grid | float] = []
     for window, coarse in zip(problem.windows, grids, strict=True):
@@ -65,12 +65,12 @@ def _plan_of(problem: Problem, grids: Sequence[propagate.Grid | None], rule: str
     return Plan(problem.windows, tuple(out))
 
 
-def pilot_of(problem: Problem, jmax: int) -> Pilot:
+def run_pilot(problem: Problem, jmax: int) -> Pilot:
     """Steps that meet the tolerance, determined with the most populated block M = 0."""
     space = problem.space(jmax)
     task, whole = pilot_task(problem, space)
     if task is None or all(window.is_kick for window in problem.windows):
-        plan = _plan_of(problem, _grids(problem, [1] * len(problem.windows)), "nystrom 4")
+        plan = _step_plan(problem, _grids(problem, [1] * len(problem.windows)), "nystrom 4")
         outcome = None if task is None else run(replace(task, plan=plan))
         edge = relative_edge(outcome, task) if outcome and task else 0.0
         return Pilot(plan, (0,) * len(problem.windows), 0.0, edge, space, task, outcome, whole)
@@ -159,22 +159,22 @@ def _refined(
     goal, before, factor = (0.7 if finer_order else 0.5) * problem.tolerance, 0.0, 1
     windows = len(problem.windows)
     grids = _grids(problem, [first] * windows)
-    plan = _plan_of(problem, grids, rule)
+    plan = _step_plan(problem, grids, rule)
     outcome = run(replace(task, plan=plan))
-    while sum(_steps_of(plan)) <= MOST_STEPS:
-        finer = _plan_of(problem, grids, rule, 2 * factor)
+    while sum(_step_counts(plan)) <= MOST_STEPS:
+        finer = _step_plan(problem, grids, rule, 2 * factor)
         check = run(replace(task, plan=finer))
         error = _difference(problem, space, task, outcome, check)
         if finer_order and error <= ASYMPTOTIC and (left := error / 2 ** (finer_order - 1)) <= goal < error:
             edge = relative_edge(check, task)
-            return Pilot(finer, _steps_of(finer), left, edge, space, task, check)
+            return Pilot(finer, _step_counts(finer), left, edge, space, task, check)
         if error <= goal:
-            edge, mine = relative_edge(check, task), Pilot(plan, _steps_of(plan), error, 0.0, space, task, outcome)
+            edge, mine = relative_edge(check, task), Pilot(plan, _step_counts(plan), error, 0.0, space, task, outcome)
             if before > error > 0:
-                steps = 0.5 * 2 ** (math.log(before / goal) / math.log(before / error)) * sum(_steps_of(plan))
-                fewer = _plan_of(problem, _grids(problem, [math.ceil(steps / windows)] * windows), rule)
-                if steps <= sum(_steps_of(fewer)) and _cost(fewer) < _cost(plan):
-                    mine = Pilot(fewer, _steps_of(fewer), goal, 0.0, space, task)
+                steps = 0.5 * 2 ** (math.log(before / goal) / math.log(before / error)) * sum(_step_counts(plan))
+                fewer = _step_plan(problem, _grids(problem, [math.ceil(steps / windows)] * windows), rule)
+                if steps <= sum(_step_counts(fewer)) and _cost(fewer) < _cost(plan):
+                    mine = Pilot(fewer, _step_counts(fewer), goal, 0.0, space, task)
             mine = replace(mine, edge=edge)
             return mine if below is None or _cost(mine.plan) < _cost(below.plan) else below
         before, factor, plan, outcome = error, 2 * factor, finer, check
@@ -185,7 +185,7 @@ def _refined(
     )
 
 
-def _steps_of(plan: Plan) -> tuple[int, ...]:
+def _step_counts(plan: Plan) -> tuple[int, ...]:
     totals = []
     for passage in plan.passages:
         totals.append(0 if isinstance(passage, float) else passage.steps_taken)
@@ -202,7 +202,7 @@ def pilot_task(problem: Problem, space: FieldSpace) -> tuple[Task | None, bool]:
     m = problem.m_values(space)[0]
     plan = Plan(problem.windows, ())  # to be replaced
     before = problem.begins_before
-    tasks = [task for block in space.blocks(m) if (task := task_of(problem, block, plan, before)) is not None]
+    tasks = [task for block in space.blocks(m) if (task := block_task(problem, block, plan, before)) is not None]
     if not tasks:
         return None, False
     task = max(tasks, key=lambda task: float(task.weights.sum()))

@@ -52,7 +52,7 @@ class Window:
         return self.start_ps == self.stop_ps
 
 
-def channels_of(pulses: Sequence[Pulse]) -> tuple[Channel, ...]:
+def pulse_channels(pulses: Sequence[Pulse]) -> tuple[Channel, ...]:
     """Pulses grouped by the operator through which they act."""
     out: list[Channel] = []
     for pulse in pulses:
@@ -86,7 +86,7 @@ def timeline(pulses: Sequence[Pulse]) -> tuple[Window, ...]:
         end = max(end, last)
 
     windows = [piece for group in merged for piece in _cut(group, [kick.time_ps for kick in kicks])]
-    windows += [Window(kick.time_ps, kick.time_ps, channels_of([kick])) for kick in kicks]
+    windows += [Window(kick.time_ps, kick.time_ps, pulse_channels([kick])) for kick in kicks]
     return tuple(sorted(windows, key=lambda window: (window.start_ps, window.stop_ps)))
 
 
@@ -99,5 +99,5 @@ def _cut(group: Sequence[Pulse], kicks: Sequence[float]) -> list[Window]:
     for first, last in itertools.pairwise(times):
         here = [pulse for pulse in group if pulse.window_ps[0] < last and pulse.window_ps[1] > first]
         breaks = tuple(sorted(time for time in edges if first < time < last))
-        out.append(Window(first, last, channels_of(here), breaks))
+        out.append(Window(first, last, pulse_channels(here), breaks))
     return out

@@ -25,11 +25,11 @@ from rotor.assignment.growth import (
     Grown,
     Predicted,
     grown_from,
+    line_slopes,
     merged_lines,
     predict,
     prior_weight,
     quartic_prior,
-    slopes_of,
 )
 from rotor.assignment.search import DETECTED, SPREAD, Field
 
@@ -123,7 +123,7 @@ def _others(seen: Field, species: Grown, taken: Mask) -> tuple[Floats, Floats]:
     peak, first = np.unique(species.peak, return_index=True)
     slopes = np.zeros((len(peak), len(species.constants)))
     at = np.searchsorted(peak, species.peak)
-    np.add.at(slopes, at, species.share[:, None] * slopes_of(seen, species.rows, species.constants))
+    np.add.at(slopes, at, species.share[:, None] * line_slopes(seen, species.rows, species.constants))
     slopes /= np.bincount(at, species.share)[:, None]
     weight = np.where(taken[first], 0.0, species.weight[first])
     centre, sizes = quartic_prior(seen, species.constants)
@@ -142,7 +142,7 @@ def _places(
     predicted = predict(seen, species.constants, species.temperature_k)
     scales = np.where(species.ratios > LEAST_RATIO, species.scales, -np.inf)
     if all_types:
-        scales = np.maximum(scales, _scales_of_lines(seen, species, predicted))
+        scales = np.maximum(scales, _line_scales(seen, species, predicted))
     lines = merged_lines(seen, species.constants, predicted, scales)
     inside = np.flatnonzero(_largest(seen, lines.main)[:, column] >= least)
     inside = inside[np.argsort(-lines.height[inside], kind="stable")][:MOST_LINES]
@@ -153,7 +153,7 @@ def _places(
     values, vectors = np.linalg.eigh(variances)
     move = vectors[:, -1] * np.sqrt(max(float(values[-1]), 0.0))
     movement = covariance @ slopes.T @ vectors[:, -1] / np.sqrt(max(float(values[-1]), 1e-30))
-    largest = float(np.abs(slopes_of(seen, species.rows[taken], species.constants) @ movement).max())
+    largest = float(np.abs(line_slopes(seen, species.rows[taken], species.constants) @ movement).max())
     second = float(np.abs(vectors[:, -2:-1]).max(initial=0.0) * np.sqrt(max(float(values[:-1].max(initial=0.0)), 0.0)))
     if not FREE * sigma0 < largest < FARTHEST_MHZ:
         return None
@@ -191,7 +191,7 @@ def _moved(seen: Field, species: Grown, places: Places, sigma0: float) -> Grown 
     )
 
 
-def _scales_of_lines(seen: Field, species: Grown, predicted: Predicted) -> Floats:
+def _line_scales(seen: Field, species: Grown, predicted: Predicted) -> Floats:
     """ln of the intensity scales (3,) of types without evidence, from the heights of their assigned lines; -inf without lines."""
     expected = np.full(len(seen.table.upper), np.nan)
     expected[predicted.row] = predicted.expected
@@ -215,7 +215,7 @@ def _without_absent_types(seen: Field, species: Grown) -> Grown:
 def _without(seen: Field, species: Grown, constants: Floats, covariance: Floats, taken: Mask, lost: float) -> Grown:
     """The species without a group of lines, with the constants from the others, and without what these add to the evidence."""
     table, rows, peak = seen.table, species.rows[~taken], species.peak[~taken]
-    shift = slopes_of(seen, rows, species.constants) @ (constants - species.constants)
+    shift = line_slopes(seen, rows, species.constants) @ (constants - species.constants)
     at = np.unique(peak, return_inverse=True)[1]
     share = species.share[~taken]
     moved = (np.bincount(at, share * shift) / np.bincount(at, share))[at]

@@ -41,6 +41,6 @@ def with_centres(peaks: PeakList, alone: bool = False) -> tuple[PeakList, Ints]:
     total = np.where(split, height[both].sum(axis=1), height[both[:, 0]])
     doubled = replace(
         peaks, frequency_mhz=centre[order], intensity=total[order], uncertainty_mhz=error[order],
-        given_windows=peaks.windows,
+        stated_windows=peaks.windows,
     )  # fmt: skip
     return doubled, both[order]

@@ -30,7 +30,7 @@ def probability(grown: Grown) -> float:
     return float(factor * CEILING * odds / (1 + odds))
 
 
-def probability_of_isotopologue(grown: Grown) -> float:
+def isotopologue_probability(grown: Grown) -> float:
     """Probability that the constants of an isotopologue are right; its prior volume of constants is small."""
     return float(1 / (1 + np.exp(-np.clip((grown.evidence - MIDDLE_OF_ISOTOPOLOGUES) / 2.0, -50, 50))))
 

@@ -132,7 +132,7 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
     return Predicted(row[selected], f[selected], expected[selected], kind[selected], below[selected])
 
 
-def slopes_of(field: Field, rows: Ints, constants: Floats) -> Floats:
+def line_slopes(field: Field, rows: Ints, constants: Floats) -> Floats:
     """∂ν/∂c of lines (rows, 8)."""
     table = field.table
     slopes: Floats = _kernels.derivatives(table.levels, table.theta, table.upper, table.lower, rows, constants)
@@ -144,7 +144,7 @@ def grow(field: Field, start: Candidate, rounds: int = ROUNDS) -> Grown | None:
     centre, sizes = quartic_prior(field, start.constants)
     constants = np.concatenate([start.constants, centre])
     prior = prior_weight(field, constants, sizes)
-    slopes = slopes_of(field, start.family.lines, constants)
+    slopes = line_slopes(field, start.family.lines, constants)
     covariance = np.asarray(np.linalg.inv(slopes.T @ slopes / FIRST_MHZ**2 + prior), dtype=np.float64)
     return grown_from(field, constants, covariance, prior, FIRST_MHZ, start, rounds)
 
@@ -213,7 +213,7 @@ def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0
     if len(field.temperatures) == 1:
         return float(field.temperatures[0])
     lines = predict(field, constants, TEMPERATURES[-1], 4000)
-    errors = _errors(slopes_of(field, lines.row, constants), covariance, sigma0)
+    errors = _errors(line_slopes(field, lines.row, constants), covariance, sigma0)
     sharp = errors <= max(SHARP_MHZ, float(np.partition(errors, min(30, len(errors) - 1))[min(30, len(errors) - 1)]))
     strength = lines.expected[sharp] + lines.energy[sharp] / (MHZ_PER_K * TEMPERATURES[-1])
     peaks, best, temperature = field.peaks, -np.inf, TEMPERATURES[0]
@@ -259,7 +259,7 @@ def _matched(
 ) -> _Matched | None:
     """The lines matched to peaks."""
     lines = predict(field, constants, temperature_k)
-    errors = np.minimum(_errors(slopes_of(field, lines.row, constants), covariance, sigma0), 2.0)
+    errors = np.minimum(_errors(line_slopes(field, lines.row, constants), covariance, sigma0), 2.0)
     ratios, scales = _ratios(field, lines, errors, MOST_OF_TYPE)
     if not (ratios > LEAST_RATIO).any():
         return None
@@ -306,7 +306,7 @@ def merged_lines(field: Field, constants: Floats, lines: Predicted, scales: Floa
     total = np.add.reduceat(weight, starts)
     share = weight / total[blend]
     strongest = np.lexsort((-share, blend))[starts]
-    slope = np.add.reduceat(share[:, None] * slopes_of(field, row, constants), starts, axis=0)
+    slope = np.add.reduceat(share[:, None] * line_slopes(field, row, constants), starts, axis=0)
     return Merged(
         row, share, blend, np.add.reduceat(share * f, starts), np.log(total) + level.max(), row[strongest], slope
     )
@@ -362,7 +362,7 @@ def _refitted(
     energy = np.empty(len(field.jj))
     _kernels.level_energies(field.table.levels, field.table.theta, field.jj, constants, energy)
     calculated = energy[field.table.upper[matched.rows]] - energy[field.table.lower[matched.rows]]
-    slopes = slopes_of(field, matched.rows, constants)
+    slopes = line_slopes(field, matched.rows, constants)
     change = field.jj[field.table.upper[matched.rows]] - field.jj[field.table.lower[matched.rows]]
     peak, group = np.unique(matched.peak, return_inverse=True)
     total = np.bincount(group, matched.share)

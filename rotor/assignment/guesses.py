@@ -13,14 +13,14 @@ WORST = 0.03  # largest median relative error of the constants of a geometry tha
 def guess_values(guess: Any) -> tuple[float, ...]:
     """A, B, C (MHz) of one or several guesses, concatenated: numbers, or the constants of the conformers of `SMILES:...`."""
     if isinstance(guess, str) and guess.startswith(PREFIX):
-        return constants_of_smiles(guess.removeprefix(PREFIX))
+        return conformer_constants(guess.removeprefix(PREFIX))
     values = Numbers("MHz", (), "2458,490,409").read(guess)
     if len(values) % 3:
         raise ValueError(f"{guess!r}: expected three numbers for each guess, such as 2458,490,409, or SMILES:...")
     return values
 
 
-def constants_of_smiles(text: str) -> tuple[float, ...]:
+def conformer_constants(text: str) -> tuple[float, ...]:
     """A, B, C (MHz) of the conformers of a SMILES within 10 kJ/mol of the lowest, concatenated.
 
     Raises ValueError if the error of the force field exceeds 3 %, and for a molecule that is not an asymmetric top.

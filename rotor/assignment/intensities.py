@@ -52,7 +52,7 @@ class Intensities:
     def heights(self, lines: Lines) -> Floats:
         """Heights of lines in the units of the peaks; at the temperature of the lines if the peaks do not determine one."""
         temperature = self.temperature_k if np.isfinite(self.temperature_k) else lines.temperature_k
-        scale = self.log_scale[types_of(lines, np.arange(len(lines)))]
+        scale = self.log_scale[line_types(lines, np.arange(len(lines)))]
         below = lines.levels.energy_mhz[lines.lower] - lines.levels.energy_mhz.min()
         with np.errstate(divide="ignore"):
             strength = np.log(lines.strength_debye2 * lines.frequency_mhz**2)
@@ -74,7 +74,7 @@ def matched(lines: Lines, peaks: PeakList) -> tuple[Ints, Ints]:
     return rows, np.where(near, peak, -1)
 
 
-def types_of(lines: Lines, rows: Ints) -> Ints:
+def line_types(lines: Lines, rows: Ints) -> Ints:
     """0, 1, 2 for a, b, c-type by the parities of Ka and Kc; 0 for tops without these labels."""
     quanta = lines.levels.quanta
     if not {"ka", "kc"} <= set(quanta):
@@ -102,7 +102,7 @@ def fit_intensities(lines: Lines, peaks: PeakList) -> Intensities:
         For fewer than five single lines with a peak.
     """
     rows, at = matched(lines, peaks)
-    kind = types_of(lines, rows)
+    kind = line_types(lines, rows)
     absent = list[int]()
     while True:
         chosen = (at >= 0) & ~np.isin(kind, absent)

@@ -8,7 +8,7 @@ from rotor.requests.numerics import Numerics
 from rotor.requests.plan import Plan
 
 
-def plan_of_assign(request: Any) -> Plan:
+def plan_assign(request: Any) -> Plan:
     """The plan of a search for constants; its time is bounded by the seconds of the request."""
     peaks = request.peaks
     temperature = "not known, tried from 1 to 8 K" if request.temperature_k is None else f"{request.temperature_k:g} K"
@@ -33,5 +33,5 @@ def plan_of_assign(request: Any) -> Plan:
 
 ASSIGN = Numerics(
     remarks=lambda request: ("search: seeded; how sure the answer is stands with it as a probability",),
-    plan=plan_of_assign,
+    plan=plan_assign,
 )

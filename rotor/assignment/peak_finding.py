@@ -27,7 +27,7 @@ MOST_PEAKS = 20_000
 STRONGEST = 30  # strongest peaks that determine the width
 
 
-def noise_of(intensity: Floats) -> Floats:
+def local_noise(intensity: Floats) -> Floats:
     """Standard deviation of the noise at each point (n,)."""
     steps = np.abs(np.diff(intensity))
     edges = np.arange(0, max(len(steps) - WINDOW // 2, 1), WINDOW)
@@ -37,7 +37,7 @@ def noise_of(intensity: Floats) -> Floats:
     return np.interp(np.arange(len(intensity)), edges + WINDOW / 2, np.maximum(levels, floor))
 
 
-def peaks_of_spectrum(frequency_mhz: ArrayLike, intensity: ArrayLike, source: str = "") -> PeakList:
+def pick_peaks(frequency_mhz: ArrayLike, intensity: ArrayLike, source: str = "") -> PeakList:
     """Peaks of a spectrum.
 
     Raises ValueError for frequencies below 500 MHz or without equal rising steps, for lines that point down, and for more than 20,000
@@ -45,17 +45,17 @@ def peaks_of_spectrum(frequency_mhz: ArrayLike, intensity: ArrayLike, source: st
 
     >>> f = np.arange(6000.0, 6100.0, 0.02)
     >>> lines = sum(np.exp(-(((f - f0) / 0.06) ** 2)) for f0 in (6020.011, 6071.3))
-    >>> peaks = peaks_of_spectrum(f, lines + 1e-3 * np.random.default_rng(1).normal(size=len(f)))
+    >>> peaks = pick_peaks(f, lines + 1e-3 * np.random.default_rng(1).normal(size=len(f)))
     >>> [round(float(x), 3) for x in peaks.frequency_mhz]
     [6020.011, 6071.3]
     """
-    return peaks_of_pieces([(np.asarray(frequency_mhz, np.float64), np.asarray(intensity, np.float64))], source)
+    return pick_peaks_in_pieces([(np.asarray(frequency_mhz, np.float64), np.asarray(intensity, np.float64))], source)
 
 
-def peaks_of_pieces(pieces: Sequence[tuple[Floats, Floats]], source: str = "") -> PeakList:
+def pick_peaks_in_pieces(pieces: Sequence[tuple[Floats, Floats]], source: str = "") -> PeakList:
     """Peaks of a spectrum in pieces (frequencies in MHz, intensities), each with a noise, a step and a width of lines of its own.
 
-    Two pieces or more are the recorded windows of the list. Raises ValueError as peaks_of_spectrum does.
+    Two pieces or more are the recorded windows of the list. Raises ValueError as pick_peaks does.
     """
     where = f"{source}: " if source else ""
     for f, _ in pieces:
@@ -81,7 +81,7 @@ def peaks_of_pieces(pieces: Sequence[tuple[Floats, Floats]], source: str = "") -
             )
         return PeakList(frequency, height, error, band, source, recorded, tuple(pieces))
     peaks = peak_list(frequency, height, error, band_mhz=band, source=source)
-    return replace(peaks, given_windows=recorded, trace=tuple(pieces))
+    return replace(peaks, stated_windows=recorded, trace=tuple(pieces))
 
 
 class _Piece:
@@ -89,7 +89,7 @@ class _Piece:
 
     def __init__(self, f: Floats, x: Floats) -> None:
         self.f = f
-        self.noise = noise_of(x)
+        self.noise = local_noise(x)
         self.width = _width(x, self.noise)  # in steps
         reach = np.arange(-int(np.ceil(4 * self.width)), int(np.ceil(4 * self.width)) + 1)
         kernel = np.exp(-0.5 * (reach / self.width) ** 2)

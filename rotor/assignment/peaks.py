@@ -31,7 +31,7 @@ class PeakList(Table):
     uncertainty_mhz: Floats
     band_mhz: tuple[float, float]
     source: str = ""
-    given_windows: Floats | None = None
+    stated_windows: Floats | None = None
     trace: tuple[tuple[Floats, Floats], ...] = ()
 
     @property
@@ -46,8 +46,8 @@ class PeakList(Table):
     @cached_property
     def windows(self) -> Floats:
         """Recorded parts of the band (n, 2), without empty stretches in which thirty peaks would be expected."""
-        if self.given_windows is not None:
-            return self.given_windows
+        if self.stated_windows is not None:
+            return self.stated_windows
         f = np.concatenate([[self.band_mhz[0]], self.frequency_mhz, [self.band_mhz[1]]])
         steps = np.diff(f)
         empty = np.flatnonzero(steps > max(EMPTY * float(np.mean(steps)), 0.01 * (f[-1] - f[0])))
@@ -58,7 +58,7 @@ class PeakList(Table):
 
     def covers(self, frequency_mhz: Floats) -> NDArray[np.bool_]:
         """Which frequencies were recorded: those in the band, or in its parts where they are known."""
-        parts = np.array([self.band_mhz]) if self.given_windows is None else self.given_windows
+        parts = np.array([self.band_mhz]) if self.stated_windows is None else self.stated_windows
         part = np.maximum(np.searchsorted(parts[:, 0], frequency_mhz, side="right") - 1, 0)
         return np.asarray((frequency_mhz >= parts[part, 0]) & (frequency_mhz <= parts[part, 1]))
 
@@ -69,7 +69,7 @@ class PeakList(Table):
             frequency_mhz=self.frequency_mhz[mask],
             intensity=self.intensity[mask],
             uncertainty_mhz=self.uncertainty_mhz[mask],
-            given_windows=self.windows,
+            stated_windows=self.windows,
         )
 
     @cached_property
@@ -86,7 +86,7 @@ class PeakList(Table):
     def log_density(self) -> Floats:
         """ln of the density of peaks per MHz and per unit of ln intensity, at each peak (n,)."""
         per_mhz = local_density(self.frequency_mhz, self.frequency_mhz, self.band_mhz)
-        return np.log(per_mhz) + _log_density_of(self.log_intensity)
+        return np.log(per_mhz) + _log_density(self.log_intensity)
 
 
 def peak_list(
@@ -160,7 +160,7 @@ def local_density(at: Floats, frequency: Floats, band_mhz: tuple[float, float]) 
     return np.asarray((counts + 1.0) / np.maximum(last - first, 1.0))
 
 
-def _log_density_of(values: Floats) -> Floats:
+def _log_density(values: Floats) -> Floats:
     """ln of a kernel estimate of a density at the values themselves."""
     grid = np.arange(values.min() - 2, values.max() + 2, LOG_WIDTH / 4)
     counts = np.bincount(np.searchsorted(grid, values), minlength=len(grid)).astype(np.float64)

@@ -18,8 +18,8 @@ from rotor.assignment.evidence import (
     NOT_FOUND,
     UNDETERMINED,
     differs,
+    isotopologue_probability,
     probability,
-    probability_of_isotopologue,
     word,
 )
 from rotor.assignment.families import MOST, SAMPLES, Bounds, Family, families
@@ -174,7 +174,7 @@ def families_for(
     return families(rigid_table(JMAX), Bounds(pairs[:, 0], pairs[:, 1]), band_mhz, range_k, rng, samples, MOST)
 
 
-def families_of(request: AssignRequest) -> list[Family]:
+def search_families(request: AssignRequest) -> list[Family]:
     """Families for the band, bounds and temperature of a request."""
     temperature = request.temperature_k
     range_k = (COLDEST_K, HOTTEST_K) if temperature is None else (0.8 * temperature, 1.25 * temperature)
@@ -221,7 +221,7 @@ class _Search:
         self.left = ~self.spurs
         self.table = rigid_table(JMAX)
         for guess in self.request.each_guess:
-            families_of(guess)
+            search_families(guess)
         compiled(self.table)
         self.clock = Clock(self.request.seconds)
 
@@ -276,7 +276,7 @@ class _Search:
         for guess in self.request.each_guess:
             seen = self._field(peaks, guess)
             rivals += [
-                grown for grown in next_species(seen, families_of(guess), stages, self.clock) if guess.allows(grown)
+                grown for grown in next_species(seen, search_families(guess), stages, self.clock) if guess.allows(grown)
             ]
         rivals.sort(key=lambda grown: -grown.evidence)
         return rivals if rivals and word(probability(rivals[0])) != NOT_FOUND else []
@@ -287,7 +287,7 @@ class _Search:
         seen = self._field(peaks, self.request)
         best = first if isotopologue else confirmed(seen, first, all_types=self.request.guess_mhz is not None)
         twins = [other for other in rivals[1:] if other.evidence > first.evidence - 10 and differs(first, other)]
-        p = probability_of_isotopologue(best) if isotopologue else probability(best)
+        p = isotopologue_probability(best) if isotopologue else probability(best)
         p /= 1 + sum(float(np.exp(other.evidence - first.evidence)) for other in twins)
         if word(p) == NOT_FOUND:  # without the groups that have no clear place
             best, p = first, UNDETERMINED * probability(first)

@@ -101,11 +101,11 @@ class Field:
         return np.sort(self.order[:count])
 
 
-def roots_of(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
+def search_roots(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
     """Roots of a family (n, 5): hits, misses, A, B, C."""
     table = field.table
     # the line with the largest change of J first: two Q branches alone do not give ½(A+C)
-    lines = family.lines[np.argsort(-np.abs(_change_of_jj(field, family.lines)), kind="stable")]
+    lines = family.lines[np.argsort(-np.abs(_jj_change(field, family.lines)), kind="stable")]
     upper, lower = table.upper[lines], table.lower[lines]
     further, below = table.upper[family.companions], table.lower[family.companions]
     energies, kappa = field.energies, table.kappa[field.points]
@@ -125,7 +125,7 @@ def alike(constants: Floats, others: Floats, share: float) -> bool:
     return all(abs(x - y) < share * y for x, y in zip(constants.tolist(), others.tolist(), strict=True))
 
 
-def _change_of_jj(field: Field, lines: Ints) -> Floats:
+def _jj_change(field: Field, lines: Ints) -> Floats:
     return np.asarray(field.jj[field.table.upper[lines]] - field.jj[field.table.lower[lines]])
 
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.assignment import _kernels
 from rotor.assignment.families import Bounds, Family
-from rotor.assignment.growth import LEAST_RATIO, Grown, grow, predict, regrown, slopes_of
+from rotor.assignment.growth import LEAST_RATIO, Grown, grow, line_slopes, predict, regrown
 from rotor.assignment.rigid_table import RigidTable
-from rotor.assignment.search import Candidate, Field, alike, quick_ratios, ranked, roots_of
+from rotor.assignment.search import Candidate, Field, alike, quick_ratios, ranked, search_roots
 
 CLEAR = 300.0  # evidence at which a search ends at once
 FAINT = 10.0  # smallest ln likelihood ratio of a root that is grown
@@ -92,7 +92,7 @@ def next_species(
                 return _finished(seen, grown, [])
             candidates = list[Candidate]()
             for family in chosen[at : at + CHUNK]:
-                candidates += ranked(seen, family, roots_of(seen, family, seeds, need), FAINT)[:PER_FAMILY]
+                candidates += ranked(seen, family, search_roots(seen, family, seeds, need), FAINT)[:PER_FAMILY]
             grown += _grown(seen, candidates, tried, PER_CHUNK)
             chunks += 1
             best = max(grown, key=lambda species: species.evidence, default=None)
@@ -133,7 +133,7 @@ def compiled(table: RigidTable) -> bool:
     seen = Field(peaks, table, Bounds(np.array([2.0e3, 500, 400]), np.array([4.0e3, 2e3, 2e3])), np.array([2.0, 4.0]))
     low = _lowest_a_lines(seen)
     family = Family(0, low[table.quanta[table.upper[low], 0] == 5], low[:0], 0.0)
-    roots_of(seen, family, seen.seeds(5), 1)
+    search_roots(seen, family, seen.seeds(5), 1)
     candidate = Candidate(np.array([3000.0, 1050.0, 950.0]), family, 0.0, 2.0)
     quick_ratios(seen, candidate.constants[None, :], 0)
     grow(seen, candidate)
@@ -220,7 +220,7 @@ def _fitted_top(seen: Field, top: Floats, lines: Ints, frequency: Floats) -> Flo
             break
         _kernels.level_energies(seen.table.levels, seen.table.theta, seen.jj, constants, energy)
         residual = frequency - (energy[seen.table.upper[lines]] - energy[seen.table.lower[lines]])
-        constants[:3] += np.linalg.lstsq(slopes_of(seen, lines, constants)[:, :3], residual, rcond=None)[0]
+        constants[:3] += np.linalg.lstsq(line_slopes(seen, lines, constants)[:, :3], residual, rcond=None)[0]
     return constants[:3]
 
 

@@ -18,8 +18,8 @@ from rotor.classical.effect import ClassicalEffect, named_effects
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import Method, Motion, integrate
-from rotor.classical.step_errors import driven_budget, truncation_of_steps
-from rotor.classical.system import momentum_of, system_of
+from rotor.classical.step_errors import driven_budget, step_truncation
+from rotor.classical.system import flatten_system, total_momentum
 from rotor.classical.tumble import COHERENT, Three, Units
 from rotor.geometry.rotations import continuous
 from rotor.requests.budget import ErrorBudget
@@ -73,7 +73,7 @@ class DrivenRequest:
 
     def _check_step(self) -> None:
         """Refuse effects that a splitting cannot treat, and invalid steps or orders."""
-        system = system_of(self.moments, self.effects)
+        system = flatten_system(self.moments, self.effects)
         if self.step is not None and (system.needs_velocity or system.added):
             raise ValueError(
                 "step: a splitting holds no torque of the angular velocity (drag) and no rolling; leave the step out: the "
@@ -96,7 +96,7 @@ class DrivenRequest:
         if self.angular_momentum is not None:
             return np.array(self.angular_momentum)
         assert self.angular_velocity is not None  # one of the two is given
-        return np.asarray(momentum_of(self.angular_velocity, self.moments, self.effects, self.attitude))
+        return np.asarray(total_momentum(self.angular_velocity, self.moments, self.effects, self.attitude))
 
 
 @dataclass(frozen=True, repr=False)
@@ -130,16 +130,16 @@ class DrivenAnswer:
     def errors(self) -> ErrorBudget:
         """Error budget of the attitude, in rad, at the worst of the times; a short motion is repeated with finer steps for it."""
         request = self.request
-        compiled = system_of(request.moments, request.effects).compiled is not None
+        compiled = flatten_system(request.moments, request.effects).compiled is not None
         tolerance = None if request.step is not None else request.tolerance
-        return driven_budget(self.motion, truncation_of_steps(self.motion, compiled, tolerance, self._finer))
+        return driven_budget(self.motion, step_truncation(self.motion, compiled, tolerance, self._finer))
 
     def _finer(self, setting: float) -> Motion:
         """The motion with another tolerance, or with the fixed step divided by `setting`."""
         step = self.request.step
         if step is None:
-            return motion_of(replace(self.request, tolerance=setting))
-        return motion_of(replace(self.request, step=step / setting))
+            return driven_motion(replace(self.request, tolerance=setting))
+        return driven_motion(replace(self.request, step=step / setting))
 
     def facts(self) -> dict[str, Any]:
         """Facts of the answer except its table.
@@ -175,10 +175,10 @@ def answer_driven(request: DrivenRequest) -> DrivenAnswer:
     >>> round(float(answer_driven(request).table.columns["w3"][-1]), 9)  # exp(-1)
     0.367879441
     """
-    return DrivenAnswer(request, motion_of(request))
+    return DrivenAnswer(request, driven_motion(request))
 
 
-def motion_of(request: DrivenRequest) -> Motion:
+def driven_motion(request: DrivenRequest) -> Motion:
     """The motion alone."""
     method, start = request.method, request.momentum
     return integrate(method, request.moments, start, request.times, request.attitude, request.effects)

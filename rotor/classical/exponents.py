@@ -28,7 +28,7 @@ from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 
 DIFFERENCE = 6e-6  # relative step of central differences: cube root of the rounding of doubles
 PER_TIME = "1/time"
-GIVEN = "moments, torques and drives have no stated uncertainty"
+EXACT_INPUT = "moments, torques and drives have no stated uncertainty"
 STAGES = 12  # of DOP853: evaluations of a step
 CONFIDENT = 2.0  # standard errors that an accuracy allows for
 
@@ -110,12 +110,12 @@ class Exponents:
                 "a longer time",
             ),
             model=ErrorTerm(0.0, "the flow as it is given"),
-            data=ErrorTerm(None, GIVEN),
+            data=ErrorTerm(None, EXACT_INPUT),
             statistics=ErrorTerm(float(self.spread.max()), "scatter of the segments of the orbit", "a longer time"),
         )
 
 
-def exponents_of(growth: Growth, settings: Settings) -> Exponents:
+def mean_exponents(growth: Growth, settings: Settings) -> Exponents:
     """Means over segments with their errors, the largest exponent first."""
     rates = growth.rates
     spread = np.std(rates, axis=0, ddof=1) / math.sqrt(len(rates))

@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.effect import ClassicalEffect
 from rotor.classical.euler import attitude_rate, checked_momentum
-from rotor.classical.exponents import DIFFERENCE, STAGES, Exponents, Growth, Settings, exponents_of
-from rotor.classical.system import system_of
+from rotor.classical.exponents import DIFFERENCE, STAGES, Exponents, Growth, Settings, mean_exponents
+from rotor.classical.system import flatten_system
 from rotor.geometry.rotations import IDENTITY, normalised
 
 ALIGNING = 0.2  # of a segment
@@ -83,7 +83,7 @@ def body_flow(
     >>> body_flow([1.0, 2.0, 4.0], [1.0, 1.0, 0.0]).rate(0.0, np.array([[1.0, 1.0, 0.0]])).tolist()
     [[0.0, 0.0, -0.5]]
     """
-    system = system_of(moments, effects)
+    system = flatten_system(moments, effects)
     if len(system.start_moments) != 1:
         raise ValueError("a flow is that of one body: give three moments")
     momentum0 = checked_momentum(momentum0, system.start_moments[0])
@@ -165,7 +165,7 @@ def lyapunov_exponents(
     for doubled in range(DOUBLINGS + 1):
         plan = _Plan(transient, 2.0**doubled * time / segments, segments, interval, tolerance)
         grown = _along(flow, form, count, plan) if form else _side_by_side(flow, count, plan)
-        exponents = exponents_of(grown, plan.settings(together=form is not None))
+        exponents = mean_exponents(grown, plan.settings(together=form is not None))
         if accuracy is None or exponents.reached <= accuracy:
             return exponents
     raise ValueError(

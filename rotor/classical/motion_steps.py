@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.classical.system import system_of
+from rotor.classical.system import flatten_system
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BEGINNINGS = 20  # of a motion, one of which is made to count its steps, and searched where the motion is long
 SHORTEST_SHARE = 1e-6  # of the time, for a body at rest
 MOST_STEPS = 10**10  # that a motion can take, hours of compiled steps
-SOME_STEPS = 1000  # beyond those that are made one by one
+TIMED_STEPS = 1000  # beyond those that are made one by one
 MORE_COMPILED, MORE_PLAIN = 50, 2  # times as many for a second part that is timed: compiled steps are so much cheaper
 ENOUGH_STEPS, CLEARLY = (
     200,
@@ -39,16 +39,16 @@ def beginning(request: DrivenRequest, share: float, *more: float) -> DrivenReque
 
 def is_compiled(request: DrivenRequest) -> bool:
     """Whether the steps of a motion run compiled: all of its effects state a compiled form."""
-    return system_of(request.moments, request.effects).compiled is not None
+    return flatten_system(request.moments, request.effects).compiled is not None
 
 
 def timed_steps(request: DrivenRequest) -> tuple[int, int]:
     """Number of steps of the first timed part, and factor for the second."""
-    first_steps = SOME_STEPS if request.step is None or request.order > 2 else 4 * SOME_STEPS
+    first_steps = TIMED_STEPS if request.step is None or request.order > 2 else 4 * TIMED_STEPS
     return first_steps, MORE_COMPILED if is_compiled(request) else MORE_PLAIN
 
 
-def steps_of(request: DrivenRequest, share: float) -> int:
+def count_first_steps(request: DrivenRequest, share: float) -> int:
     """Steps of the first part of a motion."""
     from rotor.classical.driven import answer_driven
 
@@ -64,14 +64,14 @@ def first_share(request: DrivenRequest) -> float:
     """
     span, enough, fastest = abs(request.times[-1] - request.times[0]), 5 * ENOUGH_STEPS, _fastest_rate(request)
     share = min(1 / BEGINNINGS, 1.0 / (fastest * span) if fastest > 0.0 else SHORTEST_SHARE)
-    while share < 1 / BEGINNINGS and steps_of(request, share) < enough:
+    while share < 1 / BEGINNINGS and count_first_steps(request, share) < enough:
         share = min(4.0 * share, 1 / BEGINNINGS)
     return share
 
 
 def _fastest_rate(request: DrivenRequest) -> float:
     """The largest initial angular velocity about an axis, or relative rate of change of a component of L by a torque."""
-    system = system_of(np.array([request.moments]), request.effects)
+    system = flatten_system(np.array([request.moments]), request.effects)
     momentum, attitude, time = np.array([request.momentum]), np.array([request.attitude]), request.times[0]
     with np.errstate(over="ignore", invalid="ignore"):
         omega = system.omega(time, momentum, attitude)
@@ -86,10 +86,10 @@ def _fastest_rate(request: DrivenRequest) -> float:
 def expected_steps(request: DrivenRequest) -> int:
     """Expected number of steps of a motion: counted if few, otherwise estimated from its first part; see the head of this module."""
     part, (first_steps, more) = first_share(request), timed_steps(request)
-    whole = steps_of(request, part)
+    whole = count_first_steps(request, part)
     if whole / part < first_steps * more:
-        return steps_of(request, 1.0)
-    first = steps_of(request, part / 2)
+        return count_first_steps(request, 1.0)
+    first = count_first_steps(request, part / 2)
     second = whole - first
     if first < ENOUGH_STEPS or second < CLEARLY * first:
         return math.ceil(whole / part)

@@ -6,7 +6,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.classical.driven import answer_driven
-from rotor.classical.motion_steps import beginning, expected_steps, first_share, is_compiled, steps_of, timed_steps
+from rotor.classical.motion_steps import (
+    beginning,
+    count_first_steps,
+    expected_steps,
+    first_share,
+    is_compiled,
+    timed_steps,
+)
 from rotor.classical.step_errors import MOST_CALLED, MOST_STEPS, apart
 from rotor.classical.tolerance_search import FINER, Planned, choose_tolerance, planned_tolerance
 from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
@@ -32,7 +39,7 @@ def choose(scene: Any, request: Any, allowed: float) -> Choice:
     return Choice(request, NOTHING_CHEAPER) if free else choose_tolerance(request, allowed)
 
 
-def error_of_motion(answer: Any) -> float:
+def motion_error(answer: Any) -> float:
     """Rounding error of a free motion; 0 for a driven motion, whose step error is estimated when the step is chosen."""
     return float(answer.errors.rounding.value or 0.0) if isinstance(answer, TumbleAnswer) else 0.0
 
@@ -47,7 +54,7 @@ def choose_growth(scene: Any, request: Any, allowed: float) -> Choice:
     return Choice(request, NOTHING_CHEAPER)
 
 
-def error_of_growth(answer: Any) -> float:
+def growth_error(answer: Any) -> float:
     """Rounding of the growth rate in percent: a square root of products and quotients of seven numbers."""
     return 100 * ROUNDING
 
@@ -123,7 +130,7 @@ def step_error(request: Any, steps: int) -> LeftOut:
     return LeftOut(NAME, steps * request.tolerance, "rad", basis)
 
 
-def plan_of_motion(request: Any) -> Plan:
+def plan_motion(request: Any) -> Plan:
     """The plan of a free or driven motion with the settings of its request."""
     if not isinstance(request, TumbleRequest):
         return _driven(request)
@@ -145,7 +152,7 @@ def planned(scene: Any, request: Any, allowed: float) -> tuple[Plan, Choice | No
     """
     if isinstance(request, TumbleRequest):
         choice = choose(scene, request, allowed)
-        plan = plan_of_motion(request)
+        plan = plan_motion(request)
         return replace(plan, parts=(*plan.parts, ("accuracy", choice.how))), choice
     searched: list[Planned] = []
     search = timed(lambda: searched.append(planned_tolerance(request, allowed)), LONG_SEARCH)
@@ -172,7 +179,7 @@ def _driven(request: DrivenRequest, known_steps: int | None = None, known_error:
         good=("energy",) if all(effect.conserves_energy for effect in request.effects) else (),
         parts=(("method", _stepping(request, steps)),),
         counts={"steps": steps, "times": len(request.times)},
-        seconds=_seconds_of_steps(request, steps),
+        seconds=_step_seconds(request, steps),
         memory_mb=_memory_mb(request),
         left_out=(error,),
     )
@@ -185,14 +192,14 @@ def _stepping(request: DrivenRequest, steps: int) -> str:
     return f"Runge-Kutta of order {ORDER}, adaptive, tolerance {request.tolerance:g} of a step; {mean:.3g} a step in the mean"
 
 
-def _seconds_of_steps(request: DrivenRequest, steps: int) -> float:
+def _step_seconds(request: DrivenRequest, steps: int) -> float:
     """Processor time of a driven motion, from two timed parts: the first steps run in Python, the others compiled."""
     first_steps, more = timed_steps(request)
     if steps < more * first_steps:
-        return timed(lambda: steps_of(request, 1.0))
+        return timed(lambda: count_first_steps(request, 1.0))
     counts, seconds = [], []
     for share in (first_steps / steps, more * first_steps / steps):
-        seconds.append(timed(lambda share=share: counts.append(steps_of(request, share))))  # type: ignore[misc]
+        seconds.append(timed(lambda share=share: counts.append(count_first_steps(request, share))))  # type: ignore[misc]
     near, far = counts[0], counts[-1]
     rate = max(seconds[1] - seconds[0], 0.0) / max(far - near, 1)
     return seconds[0] + rate * max(steps - near, 0)
@@ -204,9 +211,9 @@ def _memory_mb(request: DrivenRequest) -> float:
 
 
 TUMBLE = Numerics(
-    {"rad": Goal("attitude", choose, error_of_motion), "%": Goal("growth rate", choose_growth, error_of_growth)},
+    {"rad": Goal("attitude", choose, motion_error), "%": Goal("growth rate", choose_growth, growth_error)},
     knobs=(TOLERANCE, *map(_splitting, ORDERS)),
     remarks=_remarks,
-    plan=plan_of_motion,
+    plan=plan_motion,
     planned=planned,
 )

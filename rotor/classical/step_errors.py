@@ -72,7 +72,7 @@ def apart(motion: Motion, other: Motion) -> float:
     return float(distance(motion.attitude, other.attitude).max())
 
 
-def rounding_of_steps(motion: Motion) -> float:
+def step_rounding(motion: Motion) -> float:
     """Rounding error of the attitude of a stepped motion, rad."""
     from rotor.geometry.rotations import distance
 
@@ -87,7 +87,7 @@ def driven_budget(motion: Motion, truncation: ErrorTerm) -> ErrorBudget:
     return ErrorBudget(
         of="attitude",
         unit="rad",
-        rounding=ErrorTerm(rounding_of_steps(motion), f"{motion.steps} steps"),
+        rounding=ErrorTerm(step_rounding(motion), f"{motion.steps} steps"),
         truncation=truncation,
         model=ErrorTerm(None, "a rigid body under the effects named, and no others"),
         data=ErrorTerm(None, "moments, effects and start have no stated uncertainty"),
@@ -95,7 +95,7 @@ def driven_budget(motion: Motion, truncation: ErrorTerm) -> ErrorBudget:
     )
 
 
-def truncation_of_steps(
+def step_truncation(
     motion: Motion, compiled: bool, tolerance: float | None, at: Callable[[float], Motion]
 ) -> ErrorTerm:
     """The error of the steps.

@@ -114,11 +114,11 @@ class System:
         return np.asarray(total)
 
 
-def system_of(moments: ArrayLike, effects: Sequence[ClassicalEffect] = ()) -> System:
+def flatten_system(moments: ArrayLike, effects: Sequence[ClassicalEffect] = ()) -> System:
     """The system of bodies with principal moments (..., 3), flattened to (n, 3), under a list of effects.
 
     >>> from rotor.classical.effects.gyrostat import SpinningRotor
-    >>> system = system_of([1.0, 2.0, 4.0], [SpinningRotor([0, 0, 1.0])])
+    >>> system = flatten_system([1.0, 2.0, 4.0], [SpinningRotor([0, 0, 1.0])])
     >>> system.omega(0.0, np.array([[1.0, 2.0, 3.0]]), np.array([[1.0, 0.0, 0.0, 0.0]])).tolist()
     [[1.0, 1.0, 0.5]]
     """
@@ -143,7 +143,7 @@ def system_of(moments: ArrayLike, effects: Sequence[ClassicalEffect] = ()) -> Sy
     )
 
 
-def momentum_of(
+def total_momentum(
     omega: ArrayLike,
     moments: ArrayLike,
     effects: Sequence[ClassicalEffect] = (),
@@ -173,10 +173,10 @@ def momentum_of(
     Examples
     --------
     >>> from rotor.classical.effects.gyrostat import SpinningRotor
-    >>> momentum_of([1.0, 1.0, 0.5], [1.0, 2.0, 4.0], [SpinningRotor([0, 0, 1.0])]).tolist()
+    >>> total_momentum([1.0, 1.0, 0.5], [1.0, 2.0, 4.0], [SpinningRotor([0, 0, 1.0])]).tolist()
     [1.0, 2.0, 3.0]
     """
-    system = system_of(moments, effects)
+    system = flatten_system(moments, effects)
     w, q = np.asarray(omega, dtype=np.float64), np.asarray(attitude, dtype=np.float64)
     shape = np.broadcast_shapes(w.shape[:-1], q.shape[:-1], np.shape(moments)[:-1])
     w, q = np.broadcast_to(w, (*shape, 3)).reshape(-1, 3), np.broadcast_to(q, (*shape, 4)).reshape(-1, 4)

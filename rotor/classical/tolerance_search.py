@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.classical.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
-from rotor.classical.step_errors import error_by_finer, rounding_of_steps
+from rotor.classical.step_errors import error_by_finer, step_rounding
 from rotor.requests.knob import Choice
 
 if TYPE_CHECKING:
@@ -46,22 +46,22 @@ class _Motions:
             looser = [each for each in self.computed if each < decade]
             finer = [each for each in self.computed if each > decade]
             alike = looser and finer and self.computed[max(looser)].steps == self.computed[min(finer)].steps
-            request = replace(self.request, tolerance=tolerance_of(decade))
+            request = replace(self.request, tolerance=decade_tolerance(decade))
             self.computed[decade] = self.computed[max(looser)] if alike else answer_driven(request).motion
         return self.computed[decade]
 
     def error(self, decade: int) -> float:
         """The largest error of the attitude in radians, from steps (`error_by_finer`) and rounding."""
         finer = [*range(decade + FINER, FINEST_REFERENCE, FINER), FINEST_REFERENCE]
-        decades = {tolerance_of(each): each for each in finer}
+        decades = {decade_tolerance(each): each for each in finer}
         step_error = error_by_finer(self.at(decade), list(decades), lambda tolerance: self.at(decades[tolerance]))[0]
-        return step_error + rounding_of_steps(self.at(decade))
+        return step_error + step_rounding(self.at(decade))
 
 
-def tolerance_of(decade: int) -> float:
+def decade_tolerance(decade: int) -> float:
     """The double next to a power of ten.
 
-    >>> tolerance_of(3)
+    >>> decade_tolerance(3)
     0.001
     """
     return float(f"1e-{decade}")
@@ -87,7 +87,7 @@ class Planned:
     @property
     def tolerance(self) -> float:
         """Tolerance of a step."""
-        return tolerance_of(self.decade)
+        return decade_tolerance(self.decade)
 
 
 def planned_tolerance(request: DrivenRequest, allowed: float) -> Planned:
@@ -102,14 +102,14 @@ def planned_tolerance(request: DrivenRequest, allowed: float) -> Planned:
         raise ValueError("accuracy and numerics: give one of them")
     if _is_long(request, allowed):
         _refuse_endless(request, allowed)
-        return Planned(*_decade_of_beginning(request, allowed))
+        return Planned(*_pilot_decade(request, allowed))
     motions = _Motions(request)
     decade, error = _loosest(motions, allowed)
     return Planned(decade, _words(decade), error, motions.at(decade).steps)
 
 
 def _words(decade: int) -> str:
-    return f"tolerance {tolerance_of(decade):g} of a step" + (
+    return f"tolerance {decade_tolerance(decade):g} of a step" + (
         ", nothing cheaper: the loosest there is" if decade == LOOSEST else ""
     )
 
@@ -121,7 +121,7 @@ def _is_long(request: DrivenRequest, allowed: float) -> bool:
 
 
 def _likely_steps(request: DrivenRequest, allowed: float) -> int:
-    return expected_steps(replace(request, tolerance=tolerance_of(likely_decade(allowed))))
+    return expected_steps(replace(request, tolerance=decade_tolerance(likely_decade(allowed))))
 
 
 def _refuse_endless(request: DrivenRequest, allowed: float) -> None:
@@ -134,7 +134,7 @@ def _refuse_endless(request: DrivenRequest, allowed: float) -> None:
         )
 
 
-def _decade_of_beginning(request: DrivenRequest, allowed: float) -> tuple[int, str]:
+def _pilot_decade(request: DrivenRequest, allowed: float) -> tuple[int, str]:
     """The decade determined from the first part of a motion, and a text that describes the choice."""
     from rotor.geometry.rotations import distance
 
@@ -180,8 +180,8 @@ def choose_tolerance(request: DrivenRequest, allowed: float) -> Choice:
     error, decade = motions.error(planned.decade), planned.decade
     if error > allowed and decade < FINEST:
         decade, error = _loosest(motions, allowed, misses=decade)
-        how = f"tolerance {tolerance_of(decade):g} of a step, finer than the plan's {planned.tolerance:g}, which missed"
-        return Choice(replace(request, tolerance=tolerance_of(decade)), how, error)
+        how = f"tolerance {decade_tolerance(decade):g} of a step, finer than the plan's {planned.tolerance:g}, which missed"
+        return Choice(replace(request, tolerance=decade_tolerance(decade)), how, error)
     if error > allowed:
         raise ValueError(_refusal(allowed, error))
     return Choice(replace(request, tolerance=planned.tolerance), planned.how, error)
@@ -208,6 +208,6 @@ def _loosest(motions: _Motions, allowed: float, misses: int = LOOSEST - 1) -> tu
 
 def _refusal(allowed: float, error: float) -> str:
     return (
-        f"accuracy: {allowed:g} rad cannot be given: steps to {tolerance_of(FINEST):g} still differ by {error:.2g} rad at "
+        f"accuracy: {allowed:g} rad cannot be given: steps to {decade_tolerance(FINEST):g} still differ by {error:.2g} rad at "
         "the end, the motion is chaotic or too long for double precision; choose a lower accuracy or a shorter time"
     )

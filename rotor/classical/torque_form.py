@@ -58,7 +58,7 @@ def kernels_are_compiled() -> bool:
     return os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
-def compiled_form_of(effect: Any, plain: str) -> Any:
+def compiled_form(effect: Any, plain: str) -> Any:
     """The compiled form of an effect if its class defines both this form and the plain method `plain`; otherwise None.
 
     A class that overrides only the plain method would inherit the form of another torque.
@@ -72,7 +72,7 @@ def compiled_form_of(effect: Any, plain: str) -> Any:
 def rolling_forms(added: Iterable[Any]) -> Floats | None:
     """Parameters (k, 17) of rolling contacts from effects that add inertia; None if one of them is not rolling."""
     effects = list(added)
-    forms = [(compiled_form_of(effect, "inertia"), compiled_form_of(effect, "torque")) for effect in effects]
+    forms = [(compiled_form(effect, "inertia"), compiled_form(effect, "torque")) for effect in effects]
     if any(form is None or form.code != ROLLING for pair in forms for form in pair):
         return None
     return np.array([form.parameters for form, _ in forms])
@@ -81,8 +81,8 @@ def rolling_forms(added: Iterable[Any]) -> Floats | None:
 def system_form(torques: Iterable[Any], inner: Iterable[Any]) -> SystemForm | None:
     """The combined form of torques and inner momenta; None if one of them has no compiled form."""
     forms, momenta = (
-        [compiled_form_of(t, "torque") for t in torques],
-        [compiled_form_of(h, "inner_momentum") for h in inner],
+        [compiled_form(t, "torque") for t in torques],
+        [compiled_form(h, "inner_momentum") for h in inner],
     )
     if any(form is None for form in (*forms, *momenta)):
         return None

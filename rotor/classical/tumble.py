@@ -1,7 +1,7 @@
 """Request and answer for the free rotation of a rigid body: the exact motion, its table, its stability.
 
 Moments and angular momentum are the exact data of the motion. For a given angular velocity use
-`TumbleRequest.of_angular_velocity`, for a molecule `rotor.thermodynamics.thermal_tumble`.
+`TumbleRequest.from_angular_velocity`, for a molecule `rotor.thermodynamics.thermal_tumble`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
+from rotor.checks import Renamed
 from rotor.classical.bodies import NamedBody
 from rotor.classical.euler import checked_moments, checked_momentum, energy
 from rotor.classical.free.free_motion import FreeMotion, free_motion
@@ -80,18 +81,20 @@ class TumbleRequest:
             raise ValueError("times: expected at least one finite time")
 
     @classmethod
-    def of_angular_velocity(cls, moments: ArrayLike, omega: ArrayLike, **others: Any) -> TumbleRequest:
+    def from_angular_velocity(cls, moments: ArrayLike, omega: ArrayLike, **others: Any) -> TumbleRequest:
         """The request for a body with initial angular velocity ω in rad per unit of time: L_i = I_i ω_i.
 
         others: further fields of the request; moments and ω are in one coherent set, such as kg m² and rad/s.
 
-        >>> TumbleRequest.of_angular_velocity([1.0, 2.0, 3.0], [0.0, 5.0, 0.1], units=SI).angular_momentum[1]
+        >>> TumbleRequest.from_angular_velocity([1.0, 2.0, 3.0], [0.0, 5.0, 0.1], units=SI).angular_momentum[1]
         10.0
         """
         body = np.asarray(moments, dtype=np.float64)
         a, b, c = (float(x) for x in body)
         p, q, r = (float(x) for x in body * np.asarray(omega, dtype=np.float64))
         return cls((a, b, c), (p, q, r), **others)
+
+    of_angular_velocity = Renamed("from_angular_velocity")
 
     @property
     def body(self) -> Floats:
@@ -179,13 +182,13 @@ class TumbleAnswer(TextOf):
             "angular_momentum": request.momentum * units.momentum_factor,
             "angular_momentum_size": float(math.hypot(*request.momentum)) * units.momentum_factor,
             "angular_momentum_source": request.source,
-            **self._facts_of_motion(),
+            **self._motion_facts(),
             "times_source": self.times_source,
             "invariant_drift": asdict(self.drift),
             "errors": self.errors.as_json(),
         }
 
-    def _facts_of_motion(self) -> dict[str, Any]:
+    def _motion_facts(self) -> dict[str, Any]:
         request, units, closed = self.request, self.request.units, self.stability
         distinct = len(set(request.moments)) == 3
         return {

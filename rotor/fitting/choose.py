@@ -20,12 +20,12 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.criteria import aicc, cross_validated_rms, f_test
-from rotor.fitting.first_values import beside_zero, search_of, weighted_derivatives
+from rotor.fitting.first_values import beside_zero, line_evaluator, weighted_derivatives
 from rotor.fitting.fit import Fit, FitOptions, fit_lines
-from rotor.fitting.orders import order_of
+from rotor.fitting.orders import j_order
 from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.top_constants import ConstantSet
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import LevelModel
 from rotor.statistics.least_squares import INTERRUPTED
 from rotor.table import counted
@@ -108,7 +108,7 @@ def try_constants(fit: Fit, candidates: Sequence[str], options: FitOptions | Non
     constants = with_names(fit.named, [name for name in candidates if name not in fit.parameters.names])
     out = []
     for name in candidates:
-        full_name = constants.own_name(name)
+        full_name = constants.spelling(name)
         if full_name in fit.parameters.names:
             has_prior = np.isfinite(fit.parameters.prior[fit.parameters.names.index(full_name)])
             if full_name.partition("[")[0] not in ("A", "B", "C", "E") and not has_prior:
@@ -197,8 +197,8 @@ def choose_constants(
     fit = fit_lines(lines, start, free, _patient(options))
     fixed, taken = tuple(fit.parameters.names), list[Trial]()
     extended = with_names(start, [name for name in candidates if name not in start])  # refuses unknown names
-    names = dict.fromkeys(extended.own_name(name) for name in candidates)
-    orders = {name: order_of(name, extended) for name in names if name not in fixed}
+    names = dict.fromkeys(extended.spelling(name) for name in candidates)
+    orders = {name: j_order(name, extended) for name in names if name not in fixed}
     free.with_free(extended, list(orders))  # refuses tied constants
 
     different = sorted(set(orders.values()))
@@ -274,7 +274,7 @@ def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) 
     Let x be the derivatives by a new constant, projected off those of the fit: x - J J⁺ x. The constant decreases χ² by
     (x · r)²/(x · x); a pair by b A⁻¹ b with b_i = x_i · r and A_ij = x_i · x_j. A linearly dependent constant gives 0.
     """
-    search = search_of(fit.lines, fit.named, fit.parameters, options or FitOptions(), fit.used)
+    search = line_evaluator(fit.lines, fit.named, fit.parameters, options or FitOptions(), fit.used)
     derivatives, columns = search.weighted(fit.values)[1], weighted_derivatives(fit, names, options)
     columns = np.vstack(
         [columns, np.zeros((len(derivatives) - len(columns), len(names)))]
@@ -374,7 +374,7 @@ def suggest_lines(
         )
     labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
     places = places.reshape(-1)
-    level_model = model(labels) if model else model_of(fit.named, labels)
+    level_model = model(labels) if model else label_model(fit.named, labels)
     energies, slopes = level_model.levels(fit.parameters.constants_of(fit.values))
     slopes = slopes @ fit.parameters.matrix
     up, low = places[: len(upper)], places[len(upper) :]

@@ -16,9 +16,9 @@ from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments, levels_in
 from rotor.fitting.fit import Fit, missing_level
 from rotor.fitting.parameters import Parameters, parameters, with_names
-from rotor.fitting.search import FitOptions, Search, errors_of
+from rotor.fitting.search import FitOptions, Search, line_errors
 from rotor.fitting.top_constants import ConstantSet, TopConstants
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import MissingLevelsError
 
 _STEPS = 4  # iterations to the value that shifts the lines by one error
@@ -32,11 +32,11 @@ def weighted_derivatives(fit: Fit, names: Sequence[str], options: FitOptions | N
     """
     constants = with_names(fit.named, [name for name in names if name not in fit.named])
     free = parameters(constants, names)
-    search = search_of(fit.lines, constants, free, options or FitOptions(), fit.used)
+    search = line_evaluator(fit.lines, constants, free, options or FitOptions(), fit.used)
     return search.weighted(free.start)[1]
 
 
-def search_of(
+def line_evaluator(
     lines: Assignments,
     constants: ConstantSet,
     free: Parameters,
@@ -65,12 +65,12 @@ def search_of(
         Names the first line with a level that does not exist.
     """
     labels, upper, lower = levels_in(lines)
-    left_out, sigma = errors_of(lines, options)
+    left_out, sigma = line_errors(lines, options)
     if used is None:
         used = np.ones(len(lines), dtype=bool)
         used[list(left_out)] = False
     try:
-        model = model_of(constants, labels, options.kmax)
+        model = label_model(constants, labels, options.kmax)
     except MissingLevelsError as error:
         raise missing_level(lines, error) from None
     return Search(lines, model, free, options, upper, lower, sigma, used)
@@ -107,7 +107,7 @@ def beside_zero(
 
 def _seen(constants: TopConstants, name: str, lines: Assignments, options: FitOptions) -> float:
     """The value that shifts the lines by one error; 0 if they depend on its sign, or not at all on the constant."""
-    search = search_of(lines, constants, parameters(constants, [name]), options)
+    search = line_evaluator(lines, constants, parameters(constants, [name]), options)
 
     def frequencies(value: float) -> Floats:
         return search.weighted(np.array([value]))[0]

@@ -20,10 +20,10 @@ from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, duplicates, levels_in
 from rotor.fitting.parameters import Parameters
 from rotor.fitting.search import FitOptions as FitOptions
-from rotor.fitting.search import Search, errors_of, round_off, too_few
+from rotor.fitting.search import Search, line_errors, round_off, too_few
 from rotor.fitting.strategies import with_rejection
 from rotor.fitting.top_constants import DIPOLES, ConstantSet
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.requests.budget import ROUNDING
 from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
@@ -123,7 +123,7 @@ class Fit:
     @property
     def covariance(self) -> Covariance:
         """Covariance of the constants that were fitted, from the stated errors. ValueError if one is not determined."""
-        return covariance_of(self.parameters, self.statistics)
+        return fitted_covariance(self.parameters, self.statistics)
 
     def rms_mhz(self, wavenumber: bool = False) -> float:
         """Unweighted rms of the frequencies measured in MHz, or of those measured in cm⁻¹ (in cm⁻¹); nan without any."""
@@ -132,18 +132,18 @@ class Fit:
         return float(np.sqrt(d @ d / len(d))) if len(d) else float("nan")
 
 
-def covariance_of(parameters: Parameters, statistics: Regression) -> Covariance:
+def fitted_covariance(parameters: Parameters, statistics: Regression) -> Covariance:
     """Covariance (MHz²) of the constants that depend on free parameters."""
     if not np.isfinite(statistics.errors).all():
         lost = ", ".join(combination.text for combination in statistics.undetermined)
         raise ValueError(
             f"the lines do not determine {lost}: there is no covariance; hold these parameters or give a-priori errors"
         )
-    covariance = covariance_of_determined(parameters, statistics)
+    covariance = determined_covariance(parameters, statistics)
     return covariance or Covariance((), np.zeros((0, 0)))
 
 
-def covariance_of_determined(parameters: Parameters, statistics: Regression) -> Covariance | None:
+def determined_covariance(parameters: Parameters, statistics: Regression) -> Covariance | None:
     """Covariance of the determined constants only, without the dipole; None if no constant remains."""
     open_ = ~np.isfinite(statistics.errors)
     frequencies = np.array([name not in DIPOLES for name in parameters.constant_names])
@@ -209,7 +209,7 @@ def fit_lines(
     if not len(lines):
         raise ValueError("there are no lines to fit to")
     lines, level_model, missing = _with_levels(lines, model or _model_from_labels(constants, options), options)
-    left_out, sigma = errors_of(lines, options)
+    left_out, sigma = line_errors(lines, options)
     labels, upper, lower = levels_in(lines)
     if level_model.names != parameters.constant_names:
         raise ValueError(f"parameters for {parameters.constant_names}, but the levels depend on {level_model.names}")
@@ -229,7 +229,7 @@ def _model_from_labels(constants: ConstantSet | None, options: FitOptions) -> Ca
     """A function from labels to the level model of the constants."""
     if constants is None:
         raise ValueError("either constants or a model of the levels is needed")
-    return partial(model_of, constants, kmax=options.kmax)
+    return partial(label_model, constants, kmax=options.kmax)
 
 
 def _with_levels(

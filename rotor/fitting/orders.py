@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.quantum.effects.spin_effect import parse_name
-from rotor.tops.operators import distortion_terms, powers_of_spelled
+from rotor.tops.operators import distortion_terms, spelled_powers
 
 
-def order_of(name: str, constants: ConstantSet) -> int:
+def j_order(name: str, constants: ConstantSet) -> int:
     """The highest power of J in a constant's operator: 2 for A, 4 for DeltaJ, 6 for PhiK; 1 for G_c, 0 for chi_aa.
 
     >>> from rotor.tops.constants import Constants
-    >>> order_of("PhiK", Constants(A=9.0, B=3.0, C=2.0, reduction="A"))
+    >>> j_order("PhiK", Constants(A=9.0, B=3.0, C=2.0, reduction="A"))
     6
     """
     if isinstance(constants, TopConstants) and set("[(") & set(name):
-        return _order_of_named(name, constants)
+        return _named_order(name, constants)
     if name in ("A", "B", "C"):
         return 2
-    spelled = powers_of_spelled(name)
+    spelled = spelled_powers(name)
     terms_by_name = distortion_terms(constants.kind, constants.reduction)
     if not spelled and name not in terms_by_name:
         raise ValueError(
@@ -28,11 +28,11 @@ def order_of(name: str, constants: ConstantSet) -> int:
     return max(2 * (p + q + n) for p, q, n in terms)
 
 
-def _order_of_named(name: str, constants: TopConstants) -> int:
+def _named_order(name: str, constants: TopConstants) -> int:
     """Order of a constant of a further state, of a pair of states, or of spins; spin-rotation and G have one power of N."""
     head = name.partition("[")[0]
     if "(" not in name and "," not in name:
-        return 0 if head == "E" else order_of(head, constants.top.constants)
+        return 0 if head == "E" else j_order(head, constants.top.constants)
     parts = parse_name(name)
     kind, _, letters = parts.symbol.partition("_")
     powers = {"G": 1, "F": 2, "C": 1, "eps": 1, "gamma": 1}.get(kind, 0)

@@ -202,7 +202,7 @@ def _spelled_as_in_set(name: str, constants: ConstantSet, where: str) -> str:
         raise ValueError(
             f"{where}: {name} is not in the set of constants to start from, which has {', '.join(constants.values)}"
         )
-    return constants.own_name(name)
+    return constants.spelling(name)
 
 
 def _tie(text: str, constants: ConstantSet) -> tuple[str, float, str, float]:

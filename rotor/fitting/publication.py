@@ -53,10 +53,10 @@ def _power_of_ten(value: float, error: float) -> int:
     return 0 if size >= 1e-4 else 3 * math.floor(math.log10(size) / 3 + 1)
 
 
-def unit_of(value: float, error: float | None) -> tuple[str, float]:
+def suitable_unit(value: float, error: float | None) -> tuple[str, float]:
     """A suitable unit and its size in MHz: the value is above 0.1 units and its error at most 10 units.
 
-    >>> unit_of(0.0013014, 3.7e-9), unit_of(0.0, 2e-6)
+    >>> suitable_unit(0.0013014, 3.7e-9), suitable_unit(0.0, 2e-6)
     (('kHz', 0.001), ('Hz', 1e-06))
     """
     size = max(abs(value), 0.1 * (error or 0.0))
@@ -172,7 +172,7 @@ def _tied(fit: Fit) -> dict[str, str]:
 
 def _cells(row: Row, factor: float, digits: int, form: str, with_states: bool) -> list[str]:
     error = row.error if row.error and math.isfinite(row.error) else None
-    unit, size = ("D", 1.0) if row.name in DIPOLES else unit_of(row.value, error)
+    unit, size = ("D", 1.0) if row.name in DIPOLES else suitable_unit(row.value, error)
     is_determined = row.error is not None and math.isfinite(row.error)
     text = (
         value_text(row.value / size, row.error * factor / size, digits)

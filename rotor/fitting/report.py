@@ -11,7 +11,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.fit import Fit
-from rotor.fitting.orders import order_of
+from rotor.fitting.orders import j_order
 from rotor.fitting.publication import value_text
 from rotor.fitting.top_constants import DIPOLES
 from rotor.table import counted
@@ -180,7 +180,7 @@ def quartics_not_free(fit: Fit) -> list[str]:
         return []
     named = fit.constants
     names = distortion_terms(named.kind, named.reduction)
-    return [name for name in names if order_of(name, named) == 4 and name not in fit.parameters.names]
+    return [name for name in names if j_order(name, named) == 4 and name not in fit.parameters.names]
 
 
 def decisive(fit: Fit, leverage: float = 0.9) -> list[str]:

@@ -257,7 +257,7 @@ def too_few(lines: Assignments, used: NDArray[np.bool_], parameters: Parameters)
     return f"{len(parameters.names)} free constants for {count} measured frequencies; free fewer, or add lines"
 
 
-def errors_of(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], Floats]:
+def line_errors(lines: Assignments, options: FitOptions) -> tuple[dict[int, str], Floats]:
     """Reasons why lines do not count (excluded, or without an error), by index; and the errors with the default filled in."""
     excluded = {int(i): "it is marked as excluded" for i in np.flatnonzero(lines.is_excluded)}
     zero = lines.error_mhz == 0

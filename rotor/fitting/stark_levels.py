@@ -128,10 +128,10 @@ class StarkLevels(LevelModel):
                 cosine = block.dense(dipole_derivative(top, DIPOLES.index(name), constants.effects))
                 mean = np.einsum("ln,ln->l", vectors.conj(), vectors @ cosine.T).real
                 slopes[:, i] = -MHZ_PER_DEBYE_KV_PER_CM * group.fields * mean
-        slopes[:, columns] = self._slopes_of_constants(constants, block, vectors, [self.names[i] for i in columns])
+        slopes[:, columns] = self._constant_slopes(constants, block, vectors, [self.names[i] for i in columns])
         return slopes
 
-    def _slopes_of_constants(
+    def _constant_slopes(
         self, constants: TopConstants, block: FieldBlock, vectors: Floats, names: Sequence[str]
     ) -> Floats:
         top = constants.top

@@ -25,8 +25,8 @@ from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
-from rotor.tops.spins.spin_constants import SpinConstants, spins_of
-from rotor.tops.states.state_constants import StateConstants, states_of_name
+from rotor.tops.spins.spin_constants import SpinConstants, spin_names
+from rotor.tops.states.state_constants import StateConstants, state_numbers
 from rotor.tops.top import Top
 from rotor.tops.uncertain_numbers import write_number
 
@@ -43,7 +43,7 @@ class TopConstants:
     >>> from rotor.tops.spins.spin_constants import SpinConstants
     >>> top = Top.from_constants("A=9 B=3 C=2 GHz", spin_constants=SpinConstants.parse("chi_aa(14N)=-4 MHz"))
     >>> constants = TopConstants(top, hyperfine=True)
-    >>> constants.own_name("Δ_J"), dict(constants.values)
+    >>> constants.spelling("Δ_J"), dict(constants.values)
     ('DeltaJ', {'A': 9000.0, 'B': 3000.0, 'C': 2000.0, 'chi_aa(14N)': -4.0})
     >>> constants.replace(**{"chi_ab(14N)": 1.0})["chi_ab(14N)"]
     1.0
@@ -80,7 +80,7 @@ class TopConstants:
     @cached_property
     def values(self) -> Mapping[str, float]:
         """All constants in MHz, dipole components in D."""
-        named = {self.own_name(name): value for part in self._parts for name, value in part.values.items()}
+        named = {self.spelling(name): value for part in self._parts for name, value in part.values.items()}
         return MappingProxyType(named | self._dipole)
 
     @property
@@ -97,7 +97,7 @@ class TopConstants:
     @cached_property
     def uncertainties(self) -> Mapping[str, float]:
         """One standard deviation in MHz of the constants that have one."""
-        errors = {self.own_name(name): error for part in self._parts for name, error in part.uncertainties.items()}
+        errors = {self.spelling(name): error for part in self._parts for name, error in part.uncertainties.items()}
         return MappingProxyType(errors | dict(self.dipole_errors))
 
     @property
@@ -126,15 +126,15 @@ class TopConstants:
         return self._first_levels.halves
 
     def __getitem__(self, name: str) -> float:
-        return self.values[self.own_name(name)]
+        return self.values[self.spelling(name)]
 
     def __contains__(self, name: str) -> bool:
-        return self.own_name(name) in self.values
+        return self.spelling(name) in self.values
 
-    def own_name(self, name: str) -> str:
+    def spelling(self, name: str) -> str:
         """The spelling of a name in this set; ValueError for a name of no constant.
 
-        >>> TopConstants(Top.from_constants("A=9 B=3 C=2 GHz")).own_name("G_c[1,0]")
+        >>> TopConstants(Top.from_constants("A=9 B=3 C=2 GHz")).spelling("G_c[1,0]")
         'G_c[0,1]'
         """
         if "(" in name:
@@ -144,9 +144,9 @@ class TopConstants:
         if self.top.internal_rotation is not None and is_torsional(name):
             return name
         if "[" not in name:
-            return self.top.constants.own_name(name)
-        states, head = states_of_name(name), name.partition("[")[0].strip()
-        return parse_name(name).text if len(states) == 2 else f"{self.top.constants.own_name(head)}[{states[0]}]"
+            return self.top.constants.spelling(name)
+        states, head = state_numbers(name), name.partition("[")[0].strip()
+        return parse_name(name).text if len(states) == 2 else f"{self.top.constants.spelling(head)}[{states[0]}]"
 
     def replace(self, **changes: Any) -> TopConstants:
         """A changed set: missing constants are added, those set to None removed.
@@ -155,14 +155,14 @@ class TopConstants:
         that the top does not have, and for unknown names.
         """
         uncertainties: Mapping[str, float] | None = changes.pop("uncertainties", None)
-        new = {self.own_name(name): value for name, value in changes.items()}
+        new = {self.spelling(name): value for name, value in changes.items()}
         for name in new:
             self._refuse_unknown(name)
         values = {name: value for name, value in {**self.values, **new}.items() if value is not None}
         old_errors = (
             self.uncertainties
             if uncertainties is None
-            else {self.own_name(name): error for name, error in uncertainties.items()}
+            else {self.spelling(name): error for name, error in uncertainties.items()}
         )
         errors = {
             name: error
@@ -204,7 +204,7 @@ class TopConstants:
 
     def _refuse_unknown(self, name: str) -> None:
         """Raise ValueError for a state or spin that the set does not have."""
-        states = parse_name(name).states if "(" in name else states_of_name(name) if "[" in name else None
+        states = parse_name(name).states if "(" in name else state_numbers(name) if "[" in name else None
         count = 1 if self.top.states is None else self.top.states.count
         if states and max(states) >= count:
             raise ValueError(
@@ -212,7 +212,7 @@ class TopConstants:
             )
         if "(" in name:
             spins = self.top.spin_constants.twice if self.top.spin_constants is not None and self.hyperfine else {}
-            lost = [spin for spin in spins_of(name) if spin not in spins]
+            lost = [spin for spin in spin_names(name) if spin not in spins]
             if lost:
                 raise ValueError(
                     f"{name}: there is no spin {lost[0]}; the constants to start from have {', '.join(spins) or 'none'}"

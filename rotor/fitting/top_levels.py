@@ -44,11 +44,11 @@ def top_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     if constants.hyperfine:
         return _levels_with_spins(begin, columns, labels, names)
     if "kc" in form:
-        return _levels_of_states(begin, columns, labels, names)
+        return _state_levels(begin, columns, labels, names)
     return _in_closed_form(begin, columns, labels, names)
 
 
-def model_of(constants: ConstantSet, labels: Ints, kmax: int | None = None) -> LevelModel:
+def label_model(constants: ConstantSet, labels: Ints, kmax: int | None = None) -> LevelModel:
     """The level model of named constants for labels (levels, k); `kmax` truncates the basis of a single asymmetric top."""
     if isinstance(constants, TopConstants):
         return top_levels(constants, labels)
@@ -69,9 +69,7 @@ def _text(constants: TopConstants, label: Ints) -> str:
     return " ".join(value_text(value, name in constants.halves) for name, value in pairs)
 
 
-def _levels_of_states(
-    begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]
-) -> LevelModel:
+def _state_levels(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
     labels_by_row = np.column_stack(
         [columns["j"], columns.get("v", np.zeros_like(columns["j"])), columns["ka"], columns["kc"]]
     )

@@ -26,7 +26,7 @@ from rotor.quantum.internal_rotation.nuclei import BY_ANGLE, Nuclei
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
-from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional, species_of_tops
+from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional, sigma_species
 
 MOVED = 0.01  # relative change of a torsional constant above which the torsional functions are rebuilt
 TORSIONAL = ("F", "rho", "V3", "V6")
@@ -91,13 +91,13 @@ class TorsionLevels(LevelModel):
         further = further_operators(model, name, chain)
         elements = levels.functions.elements(list(further.values())) if further else None
         if self.nuclei is None:
-            rows = _rows_of(levels.quanta, ("j", "vt", "ka", "kc"), part, part.keys)
-            values, direct = levels.energies[rows], _slopes_of_rotation(levels, levels.rows[rows], elements)
+            rows = _label_rows(levels.quanta, ("j", "vt", "ka", "kc"), part, part.keys)
+            values, direct = levels.energies[rows], _rotational_slopes(levels, levels.rows[rows], elements)
             spin_slopes: dict[str, Floats] = {}
         else:
             coupled = self._with_spins(part, levels, model, chain, named)
             names = ("n", "vt", "ka", "kc", *self.nuclei.sums)
-            rows = _rows_of(coupled.quanta, names, part, np.hstack([part.keys, part.sums]))
+            rows = _label_rows(coupled.quanta, names, part, np.hstack([part.keys, part.sums]))
             values, (direct, spins) = coupled.energies[rows], coupled.slopes(rows, elements)
             spin_slopes = {constant.name: spins[:, i] for i, constant in enumerate(coupled.nuclei.constants)}
         count = len(model.coefficients)
@@ -116,7 +116,7 @@ class TorsionLevels(LevelModel):
         vt_max = max(part.vt_max, self.constants.vt_max if self.nuclei else 0)
         by_energy = self.constants.names == "energy"
         if isinstance(model, RamModel) and not model.angle:
-            return self._blocks_of(part, model).solve(model.coefficients, vt_max, by_energy)
+            return self._species_blocks(part, model).solve(model.coefficients, vt_max, by_energy)
         return self._new_blocks(part, name, model).solve_once(model.coefficients, vt_max, by_energy)
 
     def _with_spins(
@@ -134,7 +134,7 @@ class TorsionLevels(LevelModel):
             nuclei = nuclei.with_slope_by_angle()
         return coupled_levels(levels, nuclei, model.angle, model.has_plane, part.twice_f)
 
-    def _blocks_of(self, part: LabelledSpecies, model: RamModel) -> SpeciesBlocks:
+    def _species_blocks(self, part: LabelledSpecies, model: RamModel) -> SpeciesBlocks:
         """The blocks of a species, rebuilt if the torsional constants have changed."""
         torsion = np.array([model.values.get(name, 0.0) for name in TORSIONAL])
         cached = self._blocks.get(part.name)
@@ -148,7 +148,7 @@ class TorsionLevels(LevelModel):
         return species_blocks(model, name, int(j.min()), int(j.max()), self.constants.functions, j)
 
 
-def _slopes_of_rotation(levels: SpeciesLevels, rows: Ints, further: Elements | None) -> Floats:
+def _rotational_slopes(levels: SpeciesLevels, rows: Ints, further: Elements | None) -> Floats:
     """∂E/∂c (levels, terms and further operators) of levels without spins."""
     terms = levels.slopes(rows)
     return terms if further is None else np.hstack([terms, levels.solved.slopes_of(further, rows)])
@@ -165,7 +165,7 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     columns = dict(zip(constants.quanta, labels.T, strict=True))
     keys = np.column_stack([columns[name] for name in ("j" if nuclei is None else "n", "vt", "ka", "kc")])
     sums = _doubled_sums(columns, nuclei, constants.halves)
-    numbers = {SPECIES_NUMBERS[name]: name for name in species_of_tops(internal.tops)}
+    numbers = {SPECIES_NUMBERS[name]: name for name in sigma_species(internal.tops)}
     meaning = ", ".join(f"{number} is {name}" for number, name in numbers.items())
     rules = [
         (f"species: {meaning}", np.isin(columns["species"], list(numbers))),
@@ -210,7 +210,7 @@ def _doubled_sums(columns: Mapping[str, Ints], nuclei: Nuclei | None, halves: fr
     return np.column_stack([columns[name] if name in halves else 2 * columns[name] for name in nuclei.sums])
 
 
-def _rows_of(quanta: Mapping[str, Ints], names: Sequence[str], part: LabelledSpecies, keys: Ints) -> Ints:
+def _label_rows(quanta: Mapping[str, Ints], names: Sequence[str], part: LabelledSpecies, keys: Ints) -> Ints:
     """Indices of the labelled levels among those of a species; MissingLevelsError for labels without a level."""
     rows = _rows(np.column_stack([quanta[name] for name in names]), keys)
     if (rows < 0).any():

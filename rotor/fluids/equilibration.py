@@ -18,9 +18,9 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.checks import RunStopped
 from rotor.fluids.initial_box import at_rest
-from rotor.fluids.run import Progress, dynamics_of, ns_per_day
+from rotor.fluids.run import Progress, make_dynamics, ns_per_day
 from rotor.fluids.settings import Settings
-from rotor.fluids.summary import mean_of
+from rotor.fluids.summary import series_mean
 from rotor.units import EV_PER_K
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def equilibrate(
     bath = replace(
         settings, ensemble="langevin", friction_per_ps=FRICTION_PER_PS, seed=_other_seed(settings.seed), steps=0
     )
-    dynamics = dynamics_of(atoms, bath)
+    dynamics = make_dynamics(atoms, bath)
     longest = LONGEST_PS if time_ps is None else time_ps
     rows: list[list[float]] = []
     aim = min(SHORTEST_PS, longest)
@@ -118,7 +118,7 @@ def is_stationary(rows: Floats, temperature_k: float) -> bool:
     for k, target in enumerate((None, temperature_k, temperature_k)):
         if not np.isfinite(half[:, k]).all():
             continue  # rotations of atoms
-        early, late = (mean_of("", "", part[:, k]) for part in (first, second))
+        early, late = (series_mean("", "", part[:, k]) for part in (first, second))
         if not min(early.effective_samples, late.effective_samples) >= LEAST_SAMPLES:
             return False
         spread = math.hypot(early.error, late.error)

@@ -45,8 +45,8 @@ def lattice_box(model: RigidModel, molecules: int, density_g_cm3: float, rng: np
 
     Examples
     --------
-    >>> from rotor.fluids.forces.models import model_of
-    >>> box = lattice_box(model_of("spce"), 216, 0.997, np.random.default_rng(1))
+    >>> from rotor.fluids.forces.models import find_model
+    >>> box = lattice_box(find_model("spce"), 216, 0.997, np.random.default_rng(1))
     >>> len(box), round(float(box.cell[0, 0]), 3)
     (648, 18.643)
     """
@@ -79,8 +79,8 @@ def model_labels(atoms: Atoms, models: Sequence[RigidModel]) -> NDArray[np.int64
     The longest matching model is used; ValueError if none matches.
 
     >>> from ase import Atoms
-    >>> from rotor.fluids.forces.models import model_of
-    >>> model_labels(Atoms("OH2OH2", positions=np.zeros((6, 3))), [model_of("spce")]).tolist()
+    >>> from rotor.fluids.forces.models import find_model
+    >>> model_labels(Atoms("OH2OH2", positions=np.zeros((6, 3))), [find_model("spce")]).tolist()
     [0, 0, 0, 1, 1, 1]
     """
     symbols = tuple(atoms.get_chemical_symbols())

@@ -54,7 +54,7 @@ class MotionFrames:
             self.centres, self.attitudes, self.stride = self.centres[::2], self.attitudes[::2], 2 * self.stride
 
 
-def axis_of(model: RigidModel, sites: Floats) -> Floats | None:
+def reference_axis(model: RigidModel, sites: Floats) -> Floats | None:
     """The unit vector of a model's dipole, or of its first bond without a dipole, in the axes of `sites` (atoms, 3); None for an atom.
 
     The dipole is expressed by the vectors from the first atom to the others, with coefficients that do not depend on the axes.
@@ -71,7 +71,7 @@ def axis_of(model: RigidModel, sites: Floats) -> Floats | None:
     return np.asarray(axis / np.linalg.norm(axis))
 
 
-def axes_of(bodies: Bodies, models: Sequence[RigidModel]) -> Floats | None:
+def reference_axes(bodies: Bodies, models: Sequence[RigidModel]) -> Floats | None:
     """The axes of all bodies in their principal axes (n, 3); None if a body has none."""
     axes = np.zeros((len(bodies), 3))
     for species in range(len(bodies.names)):
@@ -79,7 +79,7 @@ def axes_of(bodies: Bodies, models: Sequence[RigidModel]) -> Floats | None:
         rows = slice(bodies.starts[members[0]], bodies.starts[members[0] + 1])
         sites = bodies.sites[rows]
         model = next((model for model in models if len(model.symbols) == len(sites)), None)
-        axis = None if model is None else axis_of(model, sites)
+        axis = None if model is None else reference_axis(model, sites)
         if axis is None:
             return None
         axes[members] = axis

@@ -34,7 +34,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor import units
-from rotor.fluids.request import NewBox, answer_fluid, box_of
+from rotor.fluids.request import NewBox, answer_fluid, make_box
 from rotor.fluids.settings import ELECTROSTATICS
 from rotor.requests.knob import Choice, Knob, Measure, refuse_set
 from rotor.requests.numerics import Goal, Numerics
@@ -62,7 +62,7 @@ def with_box(request: FluidRequest) -> FluidRequest:
     """The request with its box, which is made once."""
     if not isinstance(request.box, NewBox):
         return request
-    box = box_of(request)
+    box = make_box(request)
     box.calc = None  # a new calculator is made for the chosen settings
     return replace(request, box=box, box_source=request.start)
 
@@ -137,7 +137,7 @@ def force_error(request: FluidRequest) -> float:
     """Rms error in percent of the forces in a box, relative to an Ewald sum with tolerance 1e-12 and the same cutoff."""
     settings = request.settings
     forces, reference = (
-        forces_of(request, "ewald", settings.cutoff_angstrom, tolerance)()
+        force_function(request, "ewald", settings.cutoff_angstrom, tolerance)()
         for tolerance in (settings.ewald_tolerance, REFERENCE_EWALD)
     )
     return force_difference(forces, reference)
@@ -183,7 +183,7 @@ def _moved(answer: Any, reference: Any) -> float:
     return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
 
 
-def forces_of(request: FluidRequest, electrostatics: str, cutoff: float, tolerance: float) -> Callable[[], Any]:
+def force_function(request: FluidRequest, electrostatics: str, cutoff: float, tolerance: float) -> Callable[[], Any]:
     """A function that computes the forces (n, 3) in eV/Å on the nuclei of a request whose box is made."""
     from rotor.fluids.forces.potential import RigidPotential
 
@@ -233,12 +233,14 @@ def _cutoff(electrostatics: str) -> Knob:
         lambda request: 0.99 * _most(request),
         (FORCE,),
         f"Ewald's sum to {FINEST_EWALD:g}, Lennard-Jones to {{:.3g}} Å",
-        change=lambda request, _, cutoff: forces_of(request, electrostatics, cutoff, request.settings.ewald_tolerance),
+        change=lambda request, _, cutoff: force_function(
+            request, electrostatics, cutoff, request.settings.ewald_tolerance
+        ),
         used=lambda request: request.settings.electrostatics == electrostatics,
         key=f"numerics.cutoff, {electrostatics}",
         title="cutoff of the forces (Å)",
         value=lambda request: request.settings.cutoff_angstrom,
-        reference=lambda request: forces_of(request, "ewald", 0.99 * _most(request), FINEST_EWALD),
+        reference=lambda request: force_function(request, "ewald", 0.99 * _most(request), FINEST_EWALD),
         answer=lambda forces: forces(),
     )
 
@@ -248,7 +250,7 @@ SUM = Knob(
     FINEST_EWALD,
     (FORCE,),
     "a tolerance of {:g}",
-    change=lambda request, _, tolerance: forces_of(request, "ewald", request.settings.cutoff_angstrom, tolerance),
+    change=lambda request, _, tolerance: force_function(request, "ewald", request.settings.cutoff_angstrom, tolerance),
     used=lambda request: request.settings.electrostatics == "ewald",
     key="numerics.ewald_tolerance",
     title="tolerance of Ewald's sum",
@@ -257,7 +259,7 @@ SUM = Knob(
 )
 
 
-def left_out_of_fluid(
+def neglected_in_fluid(
     bodies: Bodies, force: Floats, torque: Floats, temperature_k: float, step_fs: float
 ) -> tuple[LeftOut, ...]:
     """Effects that a box of rigid classical molecules neglects, in percent, largest first; vibration is not estimated.
@@ -282,7 +284,7 @@ def left_out_of_fluid(
     return largest_first([*neglected, LeftOut("vibration", None, "", "molecules are rigid")])
 
 
-def plan_of_fluid(request: Any) -> Plan:
+def plan_fluid(request: Any) -> Plan:
     """The plan of a fluid request."""
     from rotor.fluids.equilibration import equilibration_range
 
@@ -320,11 +322,11 @@ def plan_of_fluid(request: Any) -> Plan:
 
 def _left_out(atoms: Any, settings: Any) -> tuple[LeftOut, ...]:
     """Neglected effects, from the forces and torques of a box."""
-    from rotor.fluids.forces.models import models_of, shapes_of
+    from rotor.fluids.forces.models import find_models, model_shapes
     from rotor.fluids.motion.dynamics import RigidDynamics
 
-    dynamics = RigidDynamics(atoms, 1.0, removed=0, shapes=shapes_of(models_of(settings.model)))
-    return left_out_of_fluid(dynamics.bodies, *dynamics.wrench(), settings.temperature_k, settings.step_fs)
+    dynamics = RigidDynamics(atoms, 1.0, removed=0, shapes=model_shapes(find_models(settings.model)))
+    return neglected_in_fluid(dynamics.bodies, *dynamics.wrench(), settings.temperature_k, settings.step_fs)
 
 
 FLUID = Numerics(
@@ -336,5 +338,5 @@ FLUID = Numerics(
     knobs=(STEP, *map(_cutoff, ELECTROSTATICS), SUM),
     prepare=_swept_box,
     remarks=lambda request: ("conditions.steps: the error of a mean is in its report",),
-    plan=plan_of_fluid,
+    plan=plan_fluid,
 )

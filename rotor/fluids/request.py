@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.checks import require_one_of, require_positive, require_whole
+from rotor.checks import require_choice, require_positive, require_whole
 from rotor.fluids.engines.results import ENGINES
 from rotor.fluids.equilibration import Equilibration, equilibrate
-from rotor.fluids.forces.models import model_of, models_of, shapes_of
+from rotor.fluids.forces.models import find_model, find_models, model_shapes
 from rotor.fluids.initial_box import RELAXING_STEPS, lattice_box, relax
-from rotor.fluids.liquid_motion import MotionFrames, axes_of, motion_means
+from rotor.fluids.liquid_motion import MotionFrames, motion_means, reference_axes
 from rotor.fluids.record import FluidRecord
-from rotor.fluids.run import Outputs, Progress, bodies_and_degrees, calculator_of, progress_bar, run_fluid
+from rotor.fluids.run import Outputs, Progress, bodies_and_degrees, make_calculator, progress_bar, run_fluid
 from rotor.fluids.settings import Settings
 from rotor.fluids.summary import Mean, conserved, means
 from rotor.requests.budget import ErrorBudget
@@ -79,8 +79,8 @@ class FluidRequest:
         if self.box_equilibration_ps:
             require_positive("box_equilibration_ps", self.box_equilibration_ps, "ps")
         require_whole("threads", self.threads, 1)
-        require_one_of("engine", self.engine, ("rotor", *ENGINES))
-        models = models_of(self.settings.model)
+        require_choice("engine", self.engine, ("rotor", *ENGINES))
+        models = find_models(self.settings.model)
         if isinstance(self.box, NewBox) and len(models) > 1:
             raise ValueError(
                 f"model {self.settings.model!r}: a new box has a single model; for a mixture give the file of a box"
@@ -230,7 +230,7 @@ def answer_fluid(
     built_in = request.engine == "rotor"
     if not built_in and (outputs.checkpoint or resume):
         raise ValueError(f"engine {request.engine}: checkpoints are written by the engine rotor alone")
-    atoms = box_of(request, relaxed=not resume)
+    atoms = make_box(request, relaxed=not resume)
     settings = request.settings
     speeds = "those of the box" if atoms.get_momenta().any() else f"drawn at {settings.temperature_k:g} K"
     start = f"resumed from {outputs.checkpoint}" if resume else f"{request.start}; velocities {speeds}"
@@ -250,7 +250,7 @@ def answer_fluid(
         record = follow_engine(request.engine, atoms, settings, outputs, request.threads, on_start)
         return FluidAnswer(request, record, atoms, start, equilibration)
     if atoms.calc is None:
-        atoms.calc = calculator_of(settings, request.threads)
+        atoms.calc = make_calculator(settings, request.threads)
     frames = MotionFrames()
     record = run_fluid(atoms, settings, outputs, resume=resume, progress=progress, on_start=on_start, frames=frames)
     motion, reason = _motion(atoms, settings, frames)
@@ -261,26 +261,26 @@ def _motion(atoms: Atoms, settings: Settings, frames: MotionFrames) -> tuple[lis
     """Reorientation and diffusion of a run."""
     bodies, _, _ = bodies_and_degrees(atoms, settings)
     interval_ps = settings.every * settings.step_fs * 1e-3
-    return motion_means(frames, interval_ps, axes_of(bodies, models_of(settings.model)))
+    return motion_means(frames, interval_ps, reference_axes(bodies, find_models(settings.model)))
 
 
-def box_of(request: FluidRequest, relaxed: bool = True) -> Atoms:
+def make_box(request: FluidRequest, relaxed: bool = True) -> Atoms:
     """The box of a request; a `NewBox` is made. relaxed: False: without the quench, as for a resumed run."""
     if not isinstance(request.box, NewBox):
         return request.box
-    model, settings = model_of(request.settings.model), request.settings
+    model, settings = find_model(request.settings.model), request.settings
     rng = np.random.default_rng(settings.seed)
     atoms = lattice_box(model, request.box.molecules, request.box.density_g_cm3, rng)
-    atoms.calc = calculator_of(settings, request.threads)
+    atoms.calc = make_calculator(settings, request.threads)
     if relaxed:
-        relax(atoms, shapes=shapes_of([model]))
+        relax(atoms, shapes=model_shapes([model]))
     return atoms
 
 
 def _with_calculator(atoms: Atoms, settings: Settings, threads: int) -> Atoms:
     """A copy of a box that was read (equilibration moves it), with the built-in potential if it has no calculator."""
     copied: Atoms = atoms.copy()
-    copied.calc = atoms.calc or calculator_of(settings, threads)
+    copied.calc = atoms.calc or make_calculator(settings, threads)
     return copied
 
 

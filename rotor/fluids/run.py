@@ -30,7 +30,7 @@ from rotor.fluids.checkpoint import (
     read_rows,
     trajectory_file,
 )
-from rotor.fluids.forces.models import models_of, shapes_of
+from rotor.fluids.forces.models import find_models, model_shapes
 from rotor.fluids.initial_box import at_rest, check_apart, heat, model_labels
 from rotor.fluids.motion.state import State
 from rotor.fluids.record import FluidRecord
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 COLUMNS = tuple(field.name for field in fields(FluidRecord))
 MAY_CHANGE = ("steps",)  # settings that may differ in a resumed run
-BAR_EVERY_S = 0.2
+BAR_INTERVAL_S = 0.2
 
 Progress = Callable[[int, int, float], None]
 
@@ -121,7 +121,7 @@ def run_fluid(
         raise ValueError("to resume a run, name the checkpoint that it wrote")
     if not resume and outputs.checkpoint is not None and os.path.exists(outputs.checkpoint):
         raise ValueError(f"{outputs.checkpoint}: exists already; resume from it, or remove it to start again")
-    dynamics = dynamics_of(atoms, settings, begin=not resume)
+    dynamics = make_dynamics(atoms, settings, begin=not resume)
     run = _Run(dynamics, settings, outputs, frames)
     if resume:
         assert outputs.checkpoint is not None
@@ -133,22 +133,22 @@ def run_fluid(
     return run.record()
 
 
-def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDynamics:
+def make_dynamics(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDynamics:
     """The dynamics for the settings: model, thermostat and, for a new run, thermal momenta."""
     from ase.units import fs
 
-    from rotor.fluids.motion.bodies import bodies_of
+    from rotor.fluids.motion.bodies import rigid_bodies
     from rotor.fluids.motion.dynamics import RigidDynamics
 
-    models = models_of(settings.model)
+    models = find_models(settings.model)
     if "molecule" not in atoms.arrays:
         atoms.arrays["molecule"] = model_labels(atoms, models)
-    shapes = shapes_of(models)
-    bodies, pose = bodies_of(atoms, shapes=shapes)
+    shapes = model_shapes(models)
+    bodies, pose = rigid_bodies(atoms, shapes=shapes)
     if atoms.calc is None:
-        atoms.calc = calculator_of(settings)
+        atoms.calc = make_calculator(settings)
     velocities, noise = np.random.default_rng(settings.seed).spawn(2)
-    thermostat = thermostat_of(settings, noise)
+    thermostat = make_thermostat(settings, noise)
     if begin:
         check_apart(atoms, bodies)
         if not atoms.get_momenta().any():
@@ -163,14 +163,14 @@ def dynamics_of(atoms: Atoms, settings: Settings, begin: bool = True) -> RigidDy
 
 def bodies_and_degrees(atoms: Atoms, settings: Settings) -> tuple[Bodies, Degrees, str]:
     """Bodies of a box, the degrees of freedom that a run counts, and the thermometer that it uses."""
-    from rotor.fluids.motion.bodies import bodies_of
+    from rotor.fluids.motion.bodies import rigid_bodies
 
-    bodies, _ = bodies_of(atoms, shapes=shapes_of(models_of(settings.model)))
+    bodies, _ = rigid_bodies(atoms, shapes=model_shapes(find_models(settings.model)))
     removed = 0 if settings.ensemble == "langevin" else 3
     return bodies, bodies.degrees(removed), "mixed" if settings.ensemble == "nve" else "half"
 
 
-def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | None:
+def make_thermostat(settings: Settings, rng: np.random.Generator) -> Thermostat | None:
     """The thermostat of an ensemble; None for nve."""
     from ase.units import fs
 
@@ -183,7 +183,7 @@ def thermostat_of(settings: Settings, rng: np.random.Generator) -> Thermostat | 
     return None
 
 
-def calculator_of(settings: Settings, threads: int = 1) -> Any:
+def make_calculator(settings: Settings, threads: int = 1) -> Any:
     """The built-in potential of settings, as an ASE calculator."""
     from rotor.fluids.forces.potential import RigidPotential
 
@@ -259,7 +259,7 @@ class _Run:
                 if dynamics.nsteps % self.outputs.checkpoint_every == 0:
                     self._save()
                 now = time.perf_counter() - started
-                if now - shown > BAR_EVERY_S or dynamics.nsteps == steps:
+                if now - shown > BAR_INTERVAL_S or dynamics.nsteps == steps:
                     shown = now
                     progress(dynamics.nsteps, steps, ns_per_day(self.settings, dynamics.nsteps - first, now))
         except (ValueError, FloatingPointError) as error:

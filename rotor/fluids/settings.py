@@ -14,10 +14,10 @@ ELECTROSTATICS = ("reaction-field", "ewald", "shifted")
 
 
 def _read_model(text: Any) -> str:
-    from rotor.fluids.forces.models import model_of
+    from rotor.fluids.forces.models import find_model
 
     for name in str(text).split(","):
-        model_of(name.strip())
+        find_model(name.strip())
     return str(text)
 
 

@@ -24,11 +24,11 @@ class Mean:
     effective_samples: float
 
 
-def mean_of(quantity: str, unit: str, values: Floats) -> Mean:
+def series_mean(quantity: str, unit: str, values: Floats) -> Mean:
     """The mean of a correlated series (n,).
 
     >>> noise = np.random.default_rng(1).normal(size=4000)
-    >>> round(mean_of("x", "K", noise).error, 3)
+    >>> round(series_mean("x", "K", noise).error, 3)
     0.016
     """
     if len(values) < 2 or not np.isfinite(values).all():
@@ -45,30 +45,30 @@ def means(record: FluidRecord, molecules: int, share: float = 0.5) -> list[Mean]
     first = math.floor(len(record) * (1.0 - share))
     last = {name: column[first:] for name, column in record.columns.items()}
     per_mole = KJ_PER_MOL_EV / molecules
-    table = [mean_of("potential energy", "kJ/mol", last["potential_ev"] * per_mole)]
+    table = [series_mean("potential energy", "kJ/mol", last["potential_ev"] * per_mole)]
     for name, column in (
         ("temperature", "temperature_k"),
         ("of translation", "translation_k"),
         ("of rotation", "rotation_k"),
     ):
         if np.isfinite(last[column]).all():
-            table.append(mean_of(name, "K", last[column]))
+            table.append(series_mean(name, "K", last[column]))
     if np.isfinite(last["rotation_k"]).all() and np.all(last["translation_k"] > 0.0):
-        table.append(ratio_of("rotation over translation", last["rotation_k"], last["translation_k"]))
+        table.append(series_ratio("rotation over translation", last["rotation_k"], last["translation_k"]))
     if np.isfinite(last["pressure_bar"]).all():
-        table.append(mean_of("pressure", "bar", last["pressure_bar"]))
+        table.append(series_mean("pressure", "bar", last["pressure_bar"]))
     return table
 
 
-def ratio_of(quantity: str, above: Floats, below: Floats) -> Mean:
+def series_ratio(quantity: str, above: Floats, below: Floats) -> Mean:
     """The ratio of two means of correlated series; its error is that of above - ratio · below, over the mean of below.
 
     >>> x = np.random.default_rng(1).normal(300, 5, size=4000)
-    >>> round(ratio_of("r", x, x).error, 12)
+    >>> round(series_ratio("r", x, x).error, 12)
     0.0
     """
     ratio = float(above.mean() / below.mean())
-    return mean_of(quantity, "", ratio + (above - ratio * below) / below.mean())
+    return series_mean(quantity, "", ratio + (above - ratio * below) / below.mean())
 
 
 def conserved(record: FluidRecord) -> tuple[float, float]:

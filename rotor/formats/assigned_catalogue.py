@@ -44,7 +44,7 @@ def catalogue_lines(path: str | os.PathLike[str], names: Sequence[str]) -> tuple
         notes.append(f"{int((~ground).sum())} measured lines of other states, or with spins, are left out")
     measured, split = measured.take(ground), split[ground]
     frequency, error, upper, lower, weight = _columns(measured, width)
-    first = _first_of_each(upper, lower, frequency)
+    first = _without_repetitions(upper, lower, frequency)
     if split.all() and len(split):
         first, frequency, error = _centres(upper, lower, frequency, error, weight)
         notes.append(
@@ -67,7 +67,7 @@ def whole_catalogue_lines(path: str | os.PathLike[str], names: Sequence[str]) ->
     notes = [] if whole.all() else [f"{int((~whole).sum())} measured lines without {', '.join(names)} are left out"]
     measured = measured.take(whole)
     frequency, error, upper, lower, weight = _columns(measured, width)
-    first = _first_of_each(upper, lower, frequency)
+    first = _without_repetitions(upper, lower, frequency)
     pairs = np.stack([frequency.round(6), error.round(6)], axis=1)
     blend = np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1) if len(pairs) else np.zeros(0, dtype=np.int64)
     return assignments(
@@ -91,7 +91,7 @@ def _centres(
     return np.sort(first), means[line], least[line]
 
 
-def _first_of_each(upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+def _without_repetitions(upper: np.ndarray, lower: np.ndarray, frequency: np.ndarray) -> np.ndarray:
     """Places of lines without repetitions by K doublets, whose components have equal label and frequency."""
     keys = [(*u, *low, f) for u, low, f in zip(upper.tolist(), lower.tolist(), frequency.tolist(), strict=True)]
     seen = {key: i for i, key in reversed([*enumerate(keys)])}

@@ -60,7 +60,7 @@ def _listed(lines: Assignments) -> LineList:
     return replace(listed, frequency=ordered.frequency_mhz * unit, error=sign * ordered.error_mhz * unit)
 
 
-def note_of_lin(lines: Assignments) -> list[str]:
+def lin_notes(lines: Assignments) -> list[str]:
     """Notes on these lines in a .lin file, where neighbours of equal frequency become one blend."""
     pairs = _meetings(_in_order(lines.take(~lines.is_excluded)))
     if not pairs:

@@ -33,10 +33,10 @@ from rotor.formats.assigned_catalogue import catalogue_lines, whole_catalogue_li
 from rotor.formats.assigned_lin import as_lin, with_excluded_lines
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.lin import (
+    default_note,
     like_line_before,
-    note_of_defaults,
-    note_of_remarks,
     read_lin,
+    remark_notes,
     with_defaults,
     without_v,
     without_zeros_behind,
@@ -120,7 +120,7 @@ def names_sums(path: str | os.PathLike[str], count: int) -> bool:
     """Whether lines have sums with spins: a column F, J unlike N (.lne), or more than `count` quantum numbers for each state."""
     text = os.fspath(path).lower()
     if text.endswith(".csv"):
-        return any(name in ("f_upper", "f_lower", "n_upper", "n_lower") for name in _table_of(path)[0])
+        return any(name in ("f_upper", "f_lower", "n_upper", "n_lower") for name in _read_csv(path)[0])
     if text.endswith(".lne"):
         return any((labels[:, 0] != 2 * labels[:, 1]).any() for labels in read_line_table(path)[:2])
     if not text.endswith(".lin"):
@@ -131,7 +131,7 @@ def names_sums(path: str | os.PathLike[str], count: int) -> bool:
 
 def names_field(path: str | os.PathLike[str]) -> bool:
     """Whether the lines of a .csv file have a column for an electric field."""
-    return os.fspath(path).lower().endswith(".csv") and bool(set(_FIELD) & set(_table_of(path)[0]))
+    return os.fspath(path).lower().endswith(".csv") and bool(set(_FIELD) & set(_read_csv(path)[0]))
 
 
 def _from_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assignments, list[str]]:
@@ -140,8 +140,8 @@ def _from_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assig
     lines = with_defaults(read if {"v", "f"} & set(names) else without_v(read, len(names)), names)
     blends = lines.blends()
     used = blends >= 0
-    notes = [note_of_defaults(lines)] if lines.defaulted else []
-    notes += note_of_remarks(lines, blends)
+    notes = [default_note(lines)] if lines.defaulted else []
+    notes += remark_notes(lines, blends)
     if not used.all():
         notes.append(
             f"{counted(int((~used).sum()), 'line that gives', 'lines that give')} the width of a blend: not counted"
@@ -191,7 +191,7 @@ def _from_csv(
     path: str | os.PathLike[str], names: Sequence[str], halves: Collection[str]
 ) -> tuple[Assignments, list[str]]:
     """The lines of a .csv file."""
-    columns, rows = _table_of(path)
+    columns, rows = _read_csv(path)
     notes: list[str] = []
     if "species" in names:
         columns, rows, notes = with_species(columns, rows, names)
@@ -232,7 +232,7 @@ def _from_csv(
     )  # fmt: skip
     if "excluded" in columns:
         lines = replace(lines, excluded=np.array([_is_marked(path, i, row) for i, row in enumerate(rows, 1)]))
-    return lines, notes + ([] if named else _note_of_blends(lines))
+    return lines, notes + ([] if named else _blend_notes(lines))
 
 
 def _with_field(path: object, columns: Sequence[str], line: int, row: dict[str, str]) -> dict[str, str]:
@@ -262,7 +262,7 @@ def _equal_lines(frequency: Floats, error: Floats) -> list[int]:
     return [int(place) for place in places]
 
 
-def _note_of_blends(lines: Assignments) -> list[str]:
+def _blend_notes(lines: Assignments) -> list[str]:
     """Notes on blends that follow from equal frequencies."""
     count = int(lines.blended.sum())
     if not count:
@@ -281,7 +281,7 @@ def _is_marked(path: object, line: int, row: Mapping[str, str]) -> bool:
     return text in _YES
 
 
-def _table_of(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, str]]]:
+def _read_csv(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, str]]]:
     """Names of the columns and the rows of a .csv file, without blank lines and comments."""
     try:
         text = Path(path).read_text(encoding="utf-8-sig")

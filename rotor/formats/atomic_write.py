@@ -71,13 +71,13 @@ def naming(path: str | os.PathLike[str]) -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        code = error.errno if isinstance(error, OSError) and error.errno else _code_of_full_disk(str(error))
+        code = error.errno if isinstance(error, OSError) and error.errno else _full_disk_code(str(error))
         if code is None:
             raise
         raise OSError(code, os.strerror(code), os.fspath(path)) from error
 
 
-def _code_of_full_disk(text: str) -> int | None:
+def _full_disk_code(text: str) -> int | None:
     """The number of the system error in the text of a library's error."""
     return next((code for code in FULL if os.strerror(code) in text or f'"errno":"{code}"' in text), None)
 

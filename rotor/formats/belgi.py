@@ -105,7 +105,7 @@ def read_belgi_levels(path: str | os.PathLike[str]) -> ListedLevels:
     Raises ValueError, with the file, if it lists none.
     """
     text = Path(path).read_text(encoding="utf-8", errors="replace")
-    rows = [_row_of_columns(line) for line in text.splitlines() if line.count(",") == 5 and "=" not in line]
+    rows = [_parse_row(line) for line in text.splitlines() if line.count(",") == 5 and "=" not in line]
     if not rows:
         blocks = list(_BLOCK.finditer(text))
         ends = [*(block.start() for block in blocks[1:]), len(text)][: len(blocks)]
@@ -121,7 +121,7 @@ def read_belgi_levels(path: str | os.PathLike[str]) -> ListedLevels:
     return ListedLevels(whole[0], whole[1], whole[2], whole[3], energy)
 
 
-def _row_of_columns(line: str) -> tuple[int, int, int, int, float]:
+def _parse_row(line: str) -> tuple[int, int, int, int, float]:
     """Species, v_t, J, K, E from a line with the columns v_t, K, E, J, parity, σ."""
     v, k, energy, j, _, species = line.split(",")
     return int(species), int(v), int(j), int(k), float(energy)

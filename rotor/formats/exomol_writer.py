@@ -16,8 +16,8 @@ import numpy as np
 
 from rotor import units
 from rotor.formats.atomic_write import open_atomic
-from rotor.formats.provenance import record_of, write_beside
-from rotor.observed.partition import partition_of_top
+from rotor.formats.provenance import provenance_record, write_beside
+from rotor.observed.partition import top_partition
 from rotor.spectra.lines import Lines
 
 SUFFIX = ".states"
@@ -44,13 +44,13 @@ def write_exomol(lines: Lines, path: str | os.PathLike[str], settings: Mapping[s
             numbers = (np.searchsorted(used, rows[part]) + 1 for rows in (lines.upper, lines.lower))
             rows = zip(*(each.tolist() for each in (*numbers, a[part], wavenumber[part])), strict=True)
             handle.write(b"".join(b"%12d %12d %10.4e %15.6f\n" % row for row in rows))
-    table = partition_of_top(lines.top)
+    table = top_partition(lines.top)
     with open_atomic(target.with_name(f"{base}.pf")) as handle:
         rows = zip(table.temperature_k.tolist(), table.q.tolist(), strict=True)
         handle.write(b"".join(b"%9.3f %15.4f\n" % row for row in rows))
     with open_atomic(target) as handle:
         handle.write(_states(lines, used))
-    write_beside(target, record_of(lines, settings or {}))
+    write_beside(target, provenance_record(lines, settings or {}))
 
 
 def refuse_exomol(path: Path) -> NoReturn:

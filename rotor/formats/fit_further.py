@@ -32,7 +32,7 @@ def chosen_fit(request: FitRequest, candidates: Sequence[str], by_order: bool) -
     if request.spfit is not None:
         raise ValueError("choose: needs a line list and start constants; the free constants are the base of the model")
     assert request.constants is not None  # a list of lines has constants to start from
-    full_name = request.constants.own_name
+    full_name = request.constants.spelling
     idle = [name for name in candidates if full_name(name) in request.parameters.names]
     if idle:
         raise ValueError(
@@ -79,7 +79,7 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
     if name is None:
         return []
     error = float(np.median(fit.line_errors_mhz[fit.used]))
-    full = name if fit.constants is None else fit.constants.own_name(name)
+    full = name if fit.constants is None else fit.constants.spelling(name)
     if full not in fit.parameters.names:
         raise ValueError(f"suggest: {name} is not among the free parameters {', '.join(fit.parameters.names)}")
     if request.spfit is not None and fit.constants is None:
@@ -88,7 +88,7 @@ def _suggestions(request: FitRequest, fit: Fit, name: str | None) -> list[Sugges
         upper, lower = unmeasured_lines(request.spfit.file, fit.lines)
         return suggest_lines(fit, name, upper, lower, error_mhz=error, model=request.model)[:MOST_SUGGESTIONS]
     upper, lower = unmeasured(fit)
-    return suggest_lines(fit, fit.named.own_name(name), upper, lower, error_mhz=error)[:MOST_SUGGESTIONS]
+    return suggest_lines(fit, fit.named.spelling(name), upper, lower, error_mhz=error)[:MOST_SUGGESTIONS]
 
 
 def _bootstrap(request: FitRequest, fit: Fit, samples: int, seed: int) -> tuple[Sequence[float], int]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from rotor.formats.fit_request import answer_fit
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.left_out import left_out_of_levels
+from rotor.quantum.estimates.left_out import neglected_in_levels
 from rotor.quantum.estimates.plans import effect_texts
 from rotor.requests.knob import DECADES, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
@@ -33,7 +33,7 @@ def with_options(request: Any, **changes: Any) -> Any:
     return replace(request, options=replace(request.options, **changes))
 
 
-def error_of_constants(answer: Any) -> float:
+def constants_error(answer: Any) -> float:
     """The numerical error of the constants of a fit, in percent of their standard errors."""
     return 100.0 * float(answer.constants_errors.numerical or 0.0)
 
@@ -74,7 +74,7 @@ TOLERANCE = Knob(
 )
 
 
-def plan_of_fit(request: Any) -> Plan:
+def plan_fit(request: Any) -> Plan:
     """The plan of a fit: time from the cost of the setup and of one iteration, for the usual number of iterations."""
     lines, free = request.lines, request.parameters.names
 
@@ -108,7 +108,7 @@ def plan_of_fit(request: Any) -> Plan:
 def _absent(request: FitRequest, top: Top, j: int) -> tuple[LeftOut, ...]:
     """Neglected effects; without distortion if a free constant starts at 0, since the model then contains its order."""
     complete = not request.parameters.start.all()
-    parts = left_out_of_levels(top, j, SEMI_RIGID)
+    parts = neglected_in_levels(top, j, SEMI_RIGID)
     return tuple(part for part in parts if not (complete and part.name.startswith("centrifugal distortion")))
 
 
@@ -124,9 +124,9 @@ def _levels_text(request: FitRequest) -> str:
 FIT = Numerics(
     {
         "MHz": Goal("frequencies of the lines", knob=TOLERANCE),
-        "%": Goal("constants", error=error_of_constants, knob=TOLERANCE),
+        "%": Goal("constants", error=constants_error, knob=TOLERANCE),
     },
     knobs=(STEPS, TOLERANCE),
     remarks=lambda request: ("numerics.loss, numerics.reject_above: an accuracy does not decide which lines count",),
-    plan=plan_of_fit,
+    plan=plan_fit,
 )

@@ -18,7 +18,7 @@ from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, merged
 from rotor.fitting.budgets import constants_budget, predictions_budget
 from rotor.fitting.first_values import beside_zero
-from rotor.fitting.fit import Fit, FitOptions, covariance_of_determined, fit_lines
+from rotor.fitting.fit import Fit, FitOptions, determined_covariance, fit_lines
 from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.publication import publication_table
 from rotor.fitting.report import fit_facts, report_text
@@ -152,7 +152,7 @@ def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnsw
     return FitAnswer(request, fit)
 
 
-def fit_of_spfit(par: str, lin: str | None = None) -> FitRequest:
+def spfit_request(par: str, lin: str | None = None) -> FitRequest:
     """The request of a .par file and its lines; the file states free parameters and starting values. Raises ValueError as `read_fit`."""
     inputs = read_fit(par, lin)
     title = " ".join(inputs.file.title.split()) or Path(par).stem
@@ -169,7 +169,7 @@ def fit_of_spfit(par: str, lin: str | None = None) -> FitRequest:
     )
 
 
-def fit_of_lines(
+def lines_request(
     lines: str | os.PathLike[str] | Assignments | Sequence[Sequence[float]],
     top: Top,
     free: Sequence[str] | None = None,
@@ -289,7 +289,7 @@ def with_more_lines(request: FitRequest, path: str) -> FitRequest:
     return replace(request, lines=both, files=files, notes=(*request.notes, *notes, *remarks))
 
 
-def report_of(answer: FitAnswer) -> str:
+def fit_report(answer: FitAnswer) -> str:
     """The report of a fit with its input; for SPFIT's files with all parameters."""
     from rotor.formats.spcat.fits.fit_table import parameter_section
 
@@ -305,7 +305,7 @@ def report_of(answer: FitAnswer) -> str:
     return report_text(answer.fit, request.title, notes=request.notes, head=head, file_lines=parameter_lines)
 
 
-def table_of(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:
+def fit_table(answer: FitAnswer, form: str, *, scaled: bool = False) -> str:
     """The table of a publication; ValueError as `publication_table`."""
     from rotor.formats.spcat.fits.fit_table import publication_rows
 
@@ -336,7 +336,7 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     )
     start = request.files.start or ""
     is_toml = start.lower().endswith(".toml") and Path(start).exists()
-    file = read_molecule_file(start) if is_toml else _file_of(request, path)
+    file = read_molecule_file(start) if is_toml else _molecule_file(request, path)
     sources = {**file.sources, "constants": origin}
     named, states, spins, internal = fit.named, file.states, file.spin_constants, file.internal_rotation
     if isinstance(named, TopConstants):
@@ -352,7 +352,7 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     fitted = replace(
         file,
         constants=named,
-        covariance=covariance_of_determined(fit.parameters, fit.statistics),
+        covariance=determined_covariance(fit.parameters, fit.statistics),
         states=states,
         spin_constants=spins,
         internal_rotation=internal,
@@ -363,7 +363,7 @@ def write_fitted_toml(answer: FitAnswer, path: str | os.PathLike[str]) -> None:
     write_molecule_file(fitted, path)
 
 
-def _file_of(request: FitRequest, path: str | os.PathLike[str]) -> MoleculeFile:
+def _molecule_file(request: FitRequest, path: str | os.PathLike[str]) -> MoleculeFile:
     """A new molecule file; with states or spins also dipole and weights, which a spectrum needs."""
     from rotor.formats.molecules.molecule_file import MoleculeFile
 

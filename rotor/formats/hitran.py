@@ -182,13 +182,13 @@ def _read(line: Line, part: _Field) -> Any:
         return text
     try:
         if part.form == "iso":
-            return isotopologue_of(text)
+            return isotopologue_number(text)
         return read_whole(text) if part.form == "d" else read_decimal(text)
     except ValueError as error:
         raise line.error(part.start, f"{part.name} reads {text!r}; {error}") from None
 
 
-def isotopologue_of(text: str) -> int:
+def isotopologue_number(text: str) -> int:
     """Number of an isotopologue from its character."""
     if text not in _ISOTOPOLOGUES:
         raise ValueError("an isotopologue is a digit from 1, 0 for the tenth, or a letter from A, the eleventh")

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.atomic_write import atomic_path
-from rotor.formats.provenance import record_of, write_beside
+from rotor.formats.provenance import provenance_record, write_beside
 from rotor.formats.spcat.text.cat import format_lines, load_compiled, write_cat
-from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
+from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.spectra.lines import Lines
 
@@ -53,7 +53,7 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
         numbers["error_mhz"] = np.nan_to_num(error, nan=0.0)
     quanta, qnfmt = as_printed(lines.levels.quanta, lines.levels.halves)
     linear = lines.levels.kind == "linear"
-    return catalogue_of(numbers, quanta[lines.upper], quanta[lines.lower], qnfmt, tag, linear=linear)
+    return predicted_catalogue(numbers, quanta[lines.upper], quanta[lines.lower], qnfmt, tag, linear=linear)
 
 
 def as_printed(quanta: Mapping[str, NDArray[Any]], halves: Collection[str]) -> tuple[NDArray[np.int16], int]:
@@ -92,7 +92,7 @@ def write_catalogue(lines: Lines, path: str | os.PathLike[str], settings: Settin
         write_cat(catalogue(lines, tag), path)
     else:
         _write_in_pieces(lines, path, tag)
-    write_beside(path, record_of(lines, settings))
+    write_beside(path, provenance_record(lines, settings))
 
 
 def write_read_catalogue(lines: Catalogue, path: str | os.PathLike[str], settings: Settings) -> None:
@@ -143,7 +143,7 @@ def write_hitran_lines(lines: Lines, path: str | os.PathLike[str], settings: Set
         )
     options = {key: settings[key] for key in ("molecule", "isotopologue", "abundance") if key in settings}
     write_hitran(hitran_lines(lines, **options), path)
-    write_beside(path, record_of(lines, settings))
+    write_beside(path, provenance_record(lines, settings))
 
 
 def write_records(lines: HitranLines, path: str | os.PathLike[str], settings: Settings) -> None:

@@ -16,7 +16,7 @@ from rotor.tops.magnetic import ELEMENTS, MagneticTensors, Tensor, tensor_for
 _TENSORS = ("g", "magnetisability")
 
 
-def magnetic_of_table(table: TableReader | None, kind: str) -> MagneticTensors | None:
+def read_magnetic(table: TableReader | None, kind: str) -> MagneticTensors | None:
     """The tensors of the table, None without one; ValueError, with file, table and key, for unknown or missing entries."""
     if table is None:
         return None
@@ -50,7 +50,7 @@ def _tensor(table: TableReader, name: str, kind: str) -> Tensor | None:
 
 
 def magnetic_table(tensors: MagneticTensors | None) -> dict[str, Any]:
-    """The table that `magnetic_of_table` reads; ValueError for a g tensor that is not symmetric."""
+    """The table that `read_magnetic` reads; ValueError for a g tensor that is not symmetric."""
     if tensors is None:
         return {}
     out: dict[str, Any] = {}

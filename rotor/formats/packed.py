@@ -26,7 +26,7 @@ def load(source: str | os.PathLike[str] | bytes) -> tuple[bytes, str]:
 
     Raises ValueError for a packed file that is damaged, or grows to more than 4 GB or a hundred times its size.
     """
-    name = name_of(source)
+    name = source_name(source)
     if isinstance(source, bytes):
         text = source
     else:
@@ -35,7 +35,7 @@ def load(source: str | os.PathLike[str] | bytes) -> tuple[bytes, str]:
     return (unpacked(text, name) if text[:2] == _GZIP else text), name
 
 
-def name_of(source: str | os.PathLike[str] | bytes) -> str:
+def source_name(source: str | os.PathLike[str] | bytes) -> str:
     """Name of a file, or of bytes, in messages."""
     return "the text given" if isinstance(source, bytes) else os.fspath(source)
 

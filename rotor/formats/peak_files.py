@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.assignment.peak_finding import LEAST_POINTS, peaks_of_pieces, peaks_of_spectrum
+from rotor.assignment.peak_finding import LEAST_POINTS, pick_peaks, pick_peaks_in_pieces
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.formats.packed import first_bytes, load
 from rotor.formats.spectra.axis import AXIS_UNITS
@@ -59,16 +59,16 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
         from rotor.formats.spectra.read import read_spectrum
 
         spectrum = read_spectrum(path)
-        return _in_band(peaks_of_spectrum(spectrum.frequency_mhz, spectrum.intensity, name), band_mhz)
+        return _in_band(pick_peaks(spectrum.frequency_mhz, spectrum.intensity, name), band_mhz)
     columns = _from_npy(name) if name.lower().endswith(".npy") else _from_csv(Path(path))
-    return peaks_of_columns(columns, band_mhz, name)
+    return peaks_from_columns(columns, band_mhz, name)
 
 
-def peaks_of_columns(columns: Floats, band_mhz: tuple[float, float] | None = None, name: str = "") -> PeakList:
+def peaks_from_columns(columns: Floats, band_mhz: tuple[float, float] | None = None, name: str = "") -> PeakList:
     """The peaks of columns (n, 2 or 3): a list of them, or a spectrum on a grid, which may have gaps."""
     pieces = _pieces(columns)
     if pieces:
-        return _in_band(peaks_of_pieces(pieces, name), band_mhz)
+        return _in_band(pick_peaks_in_pieces(pieces, name), band_mhz)
     error = columns[:, 2] if columns.shape[1] > 2 else None
     try:
         return _in_band(peak_list(columns[:, 0], columns[:, 1], error, source=name), band_mhz)
@@ -118,10 +118,10 @@ def _in_band(peaks: PeakList, band_mhz: tuple[float, float] | None) -> PeakList:
         source=peaks.source,
     )  # fmt: skip
     chosen = replace(chosen, trace=peaks.trace)
-    if peaks.given_windows is None:
+    if peaks.stated_windows is None:
         return chosen
-    windows = np.clip(peaks.given_windows, *band_mhz)
-    return replace(chosen, given_windows=windows[windows[:, 1] > windows[:, 0]])
+    windows = np.clip(peaks.stated_windows, *band_mhz)
+    return replace(chosen, stated_windows=windows[windows[:, 1] > windows[:, 0]])
 
 
 def _from_npy(name: str) -> Floats:
@@ -141,13 +141,13 @@ def _from_csv(path: Path) -> Floats:
     for number, line in enumerate(lines, 1):
         cells = [cell.strip() for cell in _cells(line) if cell.strip()]
         if not cells or cells[0].startswith(COMMENTS):
-            factor = _unit_of_comment(line) or factor if not rows else factor
+            factor = _comment_unit(line) or factor if not rows else factor
             continue
         try:
             values = [float(cell) for cell in cells[:3]]
         except ValueError:
             if heading and not rows:
-                heading, factor = False, _unit_of_heading(line) or factor
+                heading, factor = False, _heading_unit(line) or factor
                 continue
             raise ValueError(
                 f"{name}, line {number}: {line.strip()[:60]!r}: expected two or three numbers, separated by commas or blanks"
@@ -171,13 +171,13 @@ def _cells(line: str) -> list[str]:
     return next(csv.reader([line]), []) if "," in line else line.split()
 
 
-def _unit_of_heading(line: str) -> float | None:
+def _heading_unit(line: str) -> float | None:
     """MHz for the first unit of frequency in a heading such as frequency_ghz,intensity or "f (GHz) T (K)"; None without a unit."""
     unit = _UNIT.search(_cells(line)[0] if set(",;") & set(line) else line)
     return AXIS_UNITS[unit[1].casefold()] if unit else None
 
 
-def _unit_of_comment(line: str) -> float | None:
+def _comment_unit(line: str) -> float | None:
     """MHz for the unit that the first name of a comment states: "# frequency_ghz ...", "# f (GHz) ...", "#xLabel: frequency [GHz]"."""
     name = _NAME_IN_COMMENT.match(line)
-    return _unit_of_heading(name[1]) if name else None
+    return _heading_unit(name[1]) if name else None

@@ -13,7 +13,7 @@ from rotor.table import Table
 from rotor.version import version
 
 
-def record_of(table: Table, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
+def provenance_record(table: Table, settings: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """The program with its version, the provenance of the table, and the settings, as values for JSON.
 
     Numbers that are not finite are None.

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.formats.packed import HARMLESS_BYTES, refuse_bomb
-from rotor.formats.registry import reader_of, writer_of
-from rotor.molecules.readers.sdf_entries import entry_of
+from rotor.formats.registry import find_reader, find_writer
+from rotor.molecules.readers.sdf_entries import parse_entry
 from rotor.tops.constants import Constants
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.top import Top
@@ -65,10 +65,10 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
         return _read_path(source, isotopes)
     if source == "-":
         return _read_standard_input(isotopes)
-    return _with_isotopes(_top_of_geometry(source), isotopes)
+    return _with_isotopes(_geometry_top(source), isotopes)
 
 
-def _top_of_geometry(source: Any) -> Top:
+def _geometry_top(source: Any) -> Top:
     from rotor.molecules.readers.read import read_molecule
 
     return Top.from_molecule(read_molecule(source))
@@ -122,18 +122,18 @@ def _looks_like_a_path(word: str) -> bool:
 
 
 def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
-    if entry_of(str(path)) is not None:
-        return _with_isotopes(_top_of_geometry(path), isotopes)
+    if parse_entry(str(path)) is not None:
+        return _with_isotopes(_geometry_top(path), isotopes)
     if not path.exists():
         raise ValueError(f"{path}: no such file")
     if path.is_dir():
         raise ValueError(f"{path}: is a folder; give a file in it")
     if path.stat().st_size == 0:
         raise ValueError(f"{path}: the file is empty")
-    reader = reader_of(path)
+    reader = find_reader(path)
     if reader is None:
         refuse_bomb(path)
-    content = reader(path) if reader else _top_of_geometry(path)
+    content = reader(path) if reader else _geometry_top(path)
     if isinstance(content, Top):
         return _with_isotopes(content, isotopes)
     if isotopes:
@@ -149,10 +149,10 @@ def read_spcat_top(path: Path, *, errors: bool = False, alone: bool = True) -> T
     Constants in cm⁻¹ (FLAGS of the .int file) become MHz. errors: of files with spins or several states, whether errors of parameters
     become uncertainties. alone: whether levels are those of the constants, with every K, which a note says where the file has fewer K.
     """
-    from rotor.formats.spcat.hamiltonian.states import has_one_state, states_of
-    from rotor.formats.spcat.model import names_what_is_not_there, top_of
+    from rotor.formats.spcat.hamiltonian.states import file_states, is_single_state
+    from rotor.formats.spcat.model import names_what_is_not_there, spcat_top
     from rotor.formats.spcat.names.named_top import named_top
-    from rotor.formats.spcat.prediction_notes import notes_of_range
+    from rotor.formats.spcat.prediction_notes import range_notes
     from rotor.formats.spcat.text.int_file import read_int
     from rotor.formats.spcat.text.par import read_par
     from rotor.formats.spcat.wavenumbers import FROM, files_in_mhz
@@ -167,9 +167,9 @@ def read_spcat_top(path: Path, *, errors: bool = False, alone: bool = True) -> T
     file, light = read_par(parameters), read_int(intensities) if intensities.exists() else None
     if light is not None and light.request.flags >= FROM:
         file, light = files_in_mhz(file, light)
-    plain = has_one_state(file) and not names_what_is_not_there(file)
-    top = top_of(file, light) if plain else named_top(file, light, errors=errors)
-    notes = notes_of_range(states_of(file), parameters.name) if alone else []
+    plain = is_single_state(file) and not names_what_is_not_there(file)
+    top = spcat_top(file, light) if plain else named_top(file, light, errors=errors)
+    notes = range_notes(file_states(file), parameters.name) if alone else []
     return replace(top, notes=(*top.notes, *notes), symmetry_checked=False)
 
 
@@ -190,7 +190,7 @@ def _read_standard_input(isotopes: Isotopes | None) -> Top:
     if any(line.strip().startswith("[constants]") for line in text.splitlines()):
         from rotor.formats.molecules.molecule_file import parse_molecule_file
 
-        return top_of_file(parse_molecule_file(text, "standard input"), isotopes)
+        return file_top(parse_molecule_file(text, "standard input"), isotopes)
     return _with_isotopes(Top.from_molecule(parse_molecule(text, "standard input")), isotopes)
 
 
@@ -207,10 +207,10 @@ def read_top_file(path: Path) -> Top:
     """The top that a molecule file in TOML describes."""
     from rotor.formats.molecules.molecule_file import read_molecule_file
 
-    return top_of_file(read_molecule_file(path))
+    return file_top(read_molecule_file(path))
 
 
-def top_of_file(file: MoleculeFile, isotopes: Isotopes | None = None) -> Top:
+def file_top(file: MoleculeFile, isotopes: Isotopes | None = None) -> Top:
     """The top of a molecule file: with its constants if it has any, else with those of its geometry."""
     return _with_isotopes(_top_as_written(file), isotopes)
 
@@ -257,4 +257,4 @@ def write(thing: Any, path: str | os.PathLike[str], *, settings: Mapping[str, An
     for. Parquet and JSON carry the provenance inside, the others in a file beside, `path` + ".provenance.json". Raises
     ValueError for a thing or a suffix that has no format.
     """
-    writer_of(thing, path)(thing, path, settings or {})
+    find_writer(thing, path)(thing, path, settings or {})

@@ -145,7 +145,7 @@ def loaded(name: str) -> Any:
     return getattr(import_module(module), attribute)
 
 
-def reader_of(path: Path) -> Callable[[Path], Any] | None:
+def find_reader(path: Path) -> Callable[[Path], Any] | None:
     """The reader for a file name; None if no format has its suffix."""
     for known_format in formats():
         fits = known_format.reader and path.name.lower().endswith(known_format.suffixes)
@@ -155,12 +155,12 @@ def reader_of(path: Path) -> Callable[[Path], Any] | None:
     return None
 
 
-def writer_of(thing: Any, path: str | os.PathLike[str]) -> Writer:
+def find_writer(thing: Any, path: str | os.PathLike[str]) -> Writer:
     """The writer of an object for a file name.
 
     Raises ValueError, with the suffixes for such objects, if no format has the suffix.
     """
-    name, types = Path(path).name.lower(), [_name_of(cls) for cls in type(thing).__mro__]
+    name, types = Path(path).name.lower(), [_class_name(cls) for cls in type(thing).__mro__]
     for known_format in formats():
         writers = [known_format.writers[cls] for cls in types if cls in known_format.writers]
         if writers and name.endswith(known_format.suffixes):
@@ -177,9 +177,9 @@ def writer_of(thing: Any, path: str | os.PathLike[str]) -> Writer:
 
 def suffixes_for(kind: type) -> list[str]:
     """The suffixes of files to which objects of a class can be written."""
-    types = {_name_of(cls) for cls in kind.__mro__}
+    types = {_class_name(cls) for cls in kind.__mro__}
     return [suffix for known_format in formats() if types & {*known_format.writers} for suffix in known_format.suffixes]
 
 
-def _name_of(cls: type) -> str:
+def _class_name(cls: type) -> str:
     return f"{cls.__module__}:{cls.__qualname__}"

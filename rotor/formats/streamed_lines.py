@@ -23,7 +23,7 @@ from rotor.formats.line_tables import as_printed
 from rotor.formats.provenance import write_beside
 from rotor.formats.sorted_pieces import engine_in, open_folder, row_count, sort_pieces
 from rotor.formats.spcat.text.cat import format_lines
-from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
+from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.tables import copy_columns, quoted, run
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.watson import SEMI_RIGID
@@ -410,4 +410,4 @@ def _catalogues(plan: _Plan, merged: Path, tag: int, memory_mb: int) -> Iterator
             (upper, qnfmt), (lower, _) = (
                 as_printed({name: part[f"{name}_{side}"] for name in names}, plan.halves) for side in ("upper", "lower")
             )
-            yield catalogue_of(part, upper, lower, qnfmt, tag, linear=plan.top.kind == "linear")
+            yield predicted_catalogue(part, upper, lower, qnfmt, tag, linear=plan.top.kind == "linear")

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.atomic_write import atomic_path, open_atomic
-from rotor.formats.provenance import record_of, write_beside
+from rotor.formats.provenance import provenance_record, write_beside
 from rotor.table import Table
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ Columns = Mapping[str, NDArray[Any]]
 
 def write_csv(table: Table, path: str | os.PathLike[str], settings: Settings) -> None:
     """Write a table as comma-separated values, names of columns first, its provenance beside it."""
-    columns, record = dict(table.columns), record_of(table, settings)
+    columns, record = dict(table.columns), provenance_record(table, settings)
     if len(table) < LONG_TABLE:
         with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
             rows = csv.writer(handle, lineterminator="\n")
@@ -47,7 +47,7 @@ def write_csv(table: Table, path: str | os.PathLike[str], settings: Settings) ->
 
 def write_parquet(table: Table, path: str | os.PathLike[str], settings: Settings) -> None:
     """Write a table as Parquet, its provenance in the metadata under that name."""
-    record = json.dumps(record_of(table, settings), ensure_ascii=False)
+    record = json.dumps(provenance_record(table, settings), ensure_ascii=False)
     with atomic_path(path) as unfinished:
         copy_columns(table.columns, unfinished, f"(FORMAT parquet, KV_METADATA {{provenance: {quoted(record)}}})")
 
@@ -69,17 +69,17 @@ def write_json(table: Table, path: str | os.PathLike[str], settings: Settings, k
     columns = dict(table.columns)
     rows = [dict(zip(columns, row, strict=True)) for row in _rows(columns)]
     with open_atomic(path, "w", encoding="utf-8") as handle:
-        json.dump({"provenance": record_of(table, settings), key: rows}, handle, indent=1, allow_nan=False)
+        json.dump({"provenance": provenance_record(table, settings), key: rows}, handle, indent=1, allow_nan=False)
         handle.write("\n")
 
 
 def write_motion(motion: Any, path: str | os.PathLike[str], settings: Settings) -> None:
     """Write the motion of one body, as an integrator made it, in the format of the suffix."""
     from rotor.classical.motion import MotionTable
-    from rotor.formats.registry import writer_of
+    from rotor.formats.registry import find_writer
 
     table = MotionTable.of(motion)
-    writer_of(table, path)(table, path, settings)
+    find_writer(table, path)(table, path, settings)
 
 
 def _rows(columns: Columns) -> Iterable[tuple[Any, ...]]:

@@ -157,7 +157,7 @@ def _spin(settings: dict[str, int], values: dict[str, float]) -> SpinConstants |
 
 def _single_top(values: dict[str, float]) -> dict[str, float]:
     """F0, delta and barriers of one top with its axis in the plane ab."""
-    constants = _constants_of_top(values, "")
+    constants = _top_constants(values, "")
     turn = constants.pop("epsilon", 0.0)
     if abs(np.sin(turn)) > 1e-6:
         raise ValueError(f"epsil = {turn:g}: the axis of the top is not in the ab plane; such a top is not computed")
@@ -168,11 +168,11 @@ def _several_tops(values: dict[str, float], tops: int) -> dict[str, float]:
     return {
         f"{name}_{top}": value
         for top in range(1, tops + 1)
-        for name, value in _constants_of_top(values, f"_{top}").items()
+        for name, value in _top_constants(values, f"_{top}").items()
     }
 
 
-def _constants_of_top(values: dict[str, float], suffix: str) -> dict[str, float]:
+def _top_constants(values: dict[str, float], suffix: str) -> dict[str, float]:
     """F0, delta, epsilon, V3 and V6 of one top, MHz and radians."""
     constants = {}
     for theirs, ours in OF_TOP.items():

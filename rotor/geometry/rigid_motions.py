@@ -133,10 +133,10 @@ class Screw:
     shift: float
 
 
-def screw_of(q: ArrayLike, position: ArrayLike) -> Screw:
+def chasles_screw(q: ArrayLike, position: ArrayLike) -> Screw:
     """The screw (Chasles) of one pose: with the twist (ω, v), axis ω/θ, shift v·ω/θ, point ω x v/θ².
 
-    >>> turn = screw_of([np.sqrt(0.5), 0, 0, np.sqrt(0.5)], [1.0, -1.0, 0.5])  # a quarter turn about the line (1, 0, z)
+    >>> turn = chasles_screw([np.sqrt(0.5), 0, 0, np.sqrt(0.5)], [1.0, -1.0, 0.5])  # a quarter turn about the line (1, 0, z)
     >>> (turn.point.round(12) + 0.0).tolist(), round(turn.shift, 12), round(np.degrees(turn.angle), 9) == 90.0
     ([1.0, 0.0, 0.0], 0.5, np.True_)
     """

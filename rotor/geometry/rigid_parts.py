@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
-from rotor.geometry.rigid_motions import Screw, compose, screw_of
+from rotor.geometry.rigid_motions import Screw, chasles_screw, compose
 from rotor.geometry.rotations import conjugate, rotate
 from rotor.geometry.superposition import superpose
 
@@ -33,7 +33,7 @@ class RigidPart:
     def screw_against(self, fixed: RigidPart) -> Screw:
         """The screw motion of this part relative to another part, in the coordinates before the motion."""
         back = conjugate(fixed.q)
-        return screw_of(*compose(back, -rotate(back, fixed.position), self.q, self.position))
+        return chasles_screw(*compose(back, -rotate(back, fixed.position), self.q, self.position))
 
 
 def rigid_parts(

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.arrays import Floats, whole_of_lower
+from rotor.arrays import Floats, symmetric_from_lower
 from rotor.molecules.molecule import Molecule
 from rotor.units import (
     ATOMIC_MASS_KG,
@@ -220,7 +220,7 @@ def _square(numbers: Floats, size: int, where: str) -> Floats:
     if len(numbers) == size * (size + 1) // 2:
         square = np.zeros((size, size))
         square[np.tril_indices(size)] = numbers
-        return whole_of_lower(square)
+        return symmetric_from_lower(square)
     raise ValueError(
         f"{where}: {len(numbers)} numbers; a Hessian of {size} coordinates has {size**2}, its lower triangle "
         f"{size * (size + 1) // 2}: the file was cut, or belongs to another molecule"

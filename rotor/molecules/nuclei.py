@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-_OWN_NAMES = {"D": ("H", 2), "T": ("H", 3)}
+_ISOTOPE_SYMBOLS = {"D": ("H", 2), "T": ("H", 3)}
 _MASS_FIRST = re.compile(r"(\d+)-?([A-Za-z]{1,2})")
 _MASS_LAST = re.compile(r"([A-Za-z]{1,2})-?(\d+)")
 
@@ -134,8 +134,8 @@ def isotope(symbol: str, mass_number: int | None = None) -> Isotope:
 def _split(name: str) -> tuple[str, int | None]:
     """Element and mass number of `"13C"`, `"C13"`, `"D"` or `"C"`; checks the element."""
     name = name.strip()
-    if name in _OWN_NAMES:
-        return _OWN_NAMES[name]
+    if name in _ISOTOPE_SYMBOLS:
+        return _ISOTOPE_SYMBOLS[name]
     if match := _MASS_FIRST.fullmatch(name):
         element, number = match[2], int(match[1])
     elif match := _MASS_LAST.fullmatch(name):
@@ -178,10 +178,10 @@ def natural_isotopes(symbol: str) -> tuple[Isotope, ...]:
     return tuple(sorted(natural, key=lambda nuclide: -nuclide.abundance))
 
 
-def isotope_of_mass(symbol: str, mass_u: float, within_u: float = 0.01) -> Isotope:
+def isotope_by_mass(symbol: str, mass_u: float, within_u: float = 0.01) -> Isotope:
     """The isotope of an element with this mass in u; ValueError if none is within `within_u`.
 
-    >>> isotope_of_mass("Cl", 36.966).label
+    >>> isotope_by_mass("Cl", 36.966).label
     '37Cl'
     """
     element, _ = _split(symbol)

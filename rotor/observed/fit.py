@@ -205,7 +205,7 @@ def fit_source(
     if len(spectrum) <= len(free):
         raise ValueError(f"{len(spectrum)} channels for {len(free)} parameters; fit fewer parameters, or more channels")
     noise = total_noise(spectrum, components, sight, choices)
-    minimum = minimum_of(spectrum, components, free, sight, noise, choices, progress)
+    minimum = find_minimum(spectrum, components, free, sight, noise, choices, progress)
     best = free.applied(components, minimum.parameters)
     seen = model(best, spectrum.frequency_mhz, sight)
     return SourceFit(
@@ -223,7 +223,7 @@ def fit_source(
     )
 
 
-def minimum_of(
+def find_minimum(
     spectrum: ObservedSpectrum,
     components: Sequence[Component],
     free: Variables,
@@ -344,7 +344,7 @@ def _without(fit: SourceFit, k: int) -> Floats:
         return np.zeros(len(fit.spectrum))
     fixed = tuple((i - (i > k), name) for i, name in fit.choices.fixed if i != k)
     free = variables(rest, fit.choices.free, fit.choices.shared, fixed)
-    minimum = minimum_of(fit.spectrum, rest, free, fit.sight, fit.noise, fit.choices)
+    minimum = find_minimum(fit.spectrum, rest, free, fit.sight, fit.noise, fit.choices)
     return model(free.applied(rest, minimum.parameters), fit.spectrum.frequency_mhz, fit.sight).brightness_k
 
 
@@ -361,10 +361,10 @@ def upper_limit(fit: SourceFit, k: int, others_k: Floats | None = None, deviatio
     component = replace(fit.components[k], excitation_k=fit.start[k].excitation_k)
     if not fit.parameters_of(k).get("velocity_km_s", {"determined": True})["determined"]:
         component = replace(component, velocity_km_s=fit.start[k].velocity_km_s, fwhm_km_s=fit.start[k].fwhm_km_s)
-    return limit_of(fit.spectrum, fit.noise * fit.scale, component, fit.sight, others_k, deviations)
+    return column_limit(fit.spectrum, fit.noise * fit.scale, component, fit.sight, others_k, deviations)
 
 
-def limit_of(
+def column_limit(
     spectrum: ObservedSpectrum,
     noise: Floats,
     component: Component,

@@ -31,7 +31,7 @@ from rotor.table import Table
 THRESHOLD = 16.0  # smallest gain of χ² of a species, in addition to 2 ln(templates)
 _TRIED = 4  # number of candidates that are fitted at each step
 _ALWAYS_REFITTED = 12  # largest number of species that are all fitted again at each step
-_REFIT_EVERY = 5
+_REFIT_INTERVAL = 5
 _UNIDENTIFIED = 5.0  # smallest peak of an unidentified line, in standard deviations
 _VISIBLE = 3.0
 _RIVAL = 0.7  # smallest gain of a rival outside the model, relative to the evidence of a species
@@ -341,7 +341,7 @@ class _Search:
     def _refit(self) -> None:
         """Fit all species with a common velocity and width, if there are few species or the last such fit is several steps ago."""
         count = len(self.components)
-        if count <= _ALWAYS_REFITTED or count % _REFIT_EVERY == 0:
+        if count <= _ALWAYS_REFITTED or count % _REFIT_INTERVAL == 0:
             self.components = list(self.fit(self.components, 15).components)
 
     def fit(self, components: Sequence[Component], iterations: int, *, alone: bool = False) -> SourceFit:

@@ -115,11 +115,11 @@ class PartitionTable(Table):
         return x, cubic, cubic.derivative()
 
 
-def partition_of_top(top: Top, temperatures_k: Sequence[float] = SUMMED_K) -> PartitionTable:
+def top_partition(top: Top, temperatures_k: Sequence[float] = SUMMED_K) -> PartitionTable:
     """Q(T) of a top, summed from its levels at the temperatures of CDMS and at others between them.
 
     >>> from rotor.tops.top import Top
-    >>> table = partition_of_top(Top.from_constants("B=57635.968 MHz"))
+    >>> table = top_partition(Top.from_constants("B=57635.968 MHz"))
     >>> round(table.at(300.0), 2)
     108.79
     """

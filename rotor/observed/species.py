@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.observed.partition import PartitionTable, partition_of_top
+from rotor.observed.partition import PartitionTable, top_partition
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ, LGINT_NM2_MHZ
 from rotor.table import Table
 
@@ -165,7 +165,7 @@ def strength_from_lgint(
     return np.asarray(scaled * np.exp(energy / temperature_k) / photon)
 
 
-def species_of_lines(lines: Lines, name: str | None = None, partition: PartitionTable | None = None) -> SpeciesLines:
+def species_from_lines(lines: Lines, name: str | None = None, partition: PartitionTable | None = None) -> SpeciesLines:
     """A computed line list as a species; Q(T) is summed from the levels unless `partition` has it."""
     labels = [[" ".join(text.split()) for text in lines.levels.labels(rows)] for rows in (lines.upper, lines.lower)]
     weight = lines.levels.weight_per_component[lines.lower]
@@ -176,7 +176,7 @@ def species_of_lines(lines: Lines, name: str | None = None, partition: Partition
         INTENSITY_NM2_MHZ * lines.frequency_mhz * lines.strength_debye2 * weight,
         lines.energy_lower_cm * units.MHZ_PER_CM / units.MHZ_PER_K,
         lines.g_upper,
-        partition or partition_of_top(lines.top),
+        partition or top_partition(lines.top),
         error_mhz=None if errors is None else np.nan_to_num(errors, nan=0.0),
         upper=np.array(labels[0], dtype=np.str_),
         lower=np.array(labels[1], dtype=np.str_),

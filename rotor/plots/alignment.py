@@ -12,7 +12,7 @@ from rotor.alignment.align import AlignmentTrace
 from rotor.alignment.pulse import RAD_PER_PS_ANGSTROM3_W_PER_CM2, RAD_PER_PS_MHZ, DipolePulse, Kick
 from rotor.alignment.request import AlignAnswer
 from rotor.arrays import Floats
-from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, name_of_top, new_figure, styled
+from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, new_figure, styled, top_title
 from rotor.plots.view import WHOLE, View, show_part
 
 SIZE_INCHES = (WIDTH_INCHES, 4.2)
@@ -50,7 +50,7 @@ def picture(
     """
     if isinstance(thing, AlignAnswer):
         classical, thing = classical or thing.classical, thing.trace
-    default = ", ".join(filter(None, (name_of_top(thing.top), thing.gas_text)))
+    default = ", ".join(filter(None, (top_title(thing.top), thing.gas_text)))
     title = (default if title is None else title) if view.title is None else view.title
     figure = alignment_figure(thing, classical=classical, title=title)
     show_part(figure.axes[1], view)  # the cosines; both panels share the times

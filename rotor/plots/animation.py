@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.free.free_motion import FreeMotion
 from rotor.geometry.rotations import rotate, to_matrix
-from rotor.plots.sphere import MOTION, View, draw_axes, draw_curve, draw_family, draw_sphere, view_of
+from rotor.plots.sphere import MOTION, View, clear_view, draw_axes, draw_curve, draw_family, draw_sphere
 from rotor.version import version
 
 Names = tuple[str, str, str]
@@ -132,7 +132,7 @@ def animate(
     to_view = _EYE @ _upright(rotate(motion.attitude0, motion.momentum0)) @ to_matrix(attitude)
 
     figure, (left, right) = _empty_stage()
-    view = view_of(motion.moments, path_of_l[0])
+    view = clear_view(motion.moments, path_of_l[0])
     _draw_still_parts(right, view, motion.moments, path_of_l, axis_names)
     figure, (left, right) = _with_backdrop(figure)
     (trail,) = right.plot([], [], color=MOTION, linewidth=2.2, alpha=0.55)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rotor.plots.names import SPACE, Peak, name_peaks
-from rotor.plots.picture import GREY, PALETTE, Picture, legend_below, name_of_top, panel, styled
+from rotor.plots.picture import GREY, PALETTE, Picture, legend_below, panel, styled, top_title
 from rotor.plots.spectrum import UNITS, thinned
 from rotor.plots.view import Limits, View, show_part
 from rotor.quantum.quanta import line_text
@@ -65,7 +65,7 @@ def emission_figure(
     mhz = UNITS[unit or "GHz"]
     first, last = range_mhz or answer.request.range_mhz
     names = [
-        name_of_top(molecule) if isinstance(molecule, Top) and molecule.name else name
+        top_title(molecule) if isinstance(molecule, Top) and molecule.name else name
         for molecule, name in zip(answer.request.molecules, answer.request.names, strict=True)
     ]
     with styled():

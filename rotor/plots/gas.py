@@ -16,10 +16,10 @@ from rotor.plots.picture import (
     SIZE_INCHES,
     WIDTH_INCHES,
     Picture,
-    name_of_top,
     name_text,
     new_figure,
     styled,
+    top_title,
 )
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.spectra.spectrum import Spectrum
@@ -68,7 +68,7 @@ def picture(
     title = title if view.title is None else view.title
     if isinstance(thing, GasAnswer):
         request = thing.request
-        title = title or f"{name_of_top(request.top)}, {request.temperature_k:g} K, {request.molecules:,} molecules"
+        title = title or f"{top_title(request.top)}, {request.temperature_k:g} K, {request.molecules:,} molecules"
         return Picture(_gas_figure(thing, title, view), title)
     title = title or ""
     if isinstance(thing, Correlations):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.plots.picture import PALETTE, SIZE_INCHES, WIDTH_INCHES, Picture, name_of_top, new_figure, styled
+from rotor.plots.picture import PALETTE, SIZE_INCHES, WIDTH_INCHES, Picture, new_figure, styled, top_title
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.thermodynamics import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer, answer_thermo
@@ -71,7 +71,7 @@ def picture(
     title = title if view.title is None else view.title
     if isinstance(thing, ThermoFunctions):
         label = "quantum" if thing.species == "equilibrium" else f"quantum, {thing.species}"
-        thing = [Panel(name_of_top(thing.top) if title is None else title, {label: thing})]
+        thing = [Panel(top_title(thing.top) if title is None else title, {label: thing})]
     curves = {panel.title: list(panel.curves) for panel in thing}
     facts = {"program": "rotor", "version": version(), "curves": curves}
     return Picture(heat_capacity_figure(thing, columns, view), title or "heat capacity", facts)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_one_of
+from rotor.checks import require_choice
 from rotor.plots.picture import (
     BLUE,
     GREEN,
@@ -21,13 +21,13 @@ from rotor.plots.picture import (
     WIDTH_INCHES,
     Picture,
     legend_below,
-    name_of_top,
     panel,
     styled,
+    top_title,
 )
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.levels import Levels
-from rotor.quantum.quanta import heading, merged_text, of_rotation
+from rotor.quantum.quanta import heading, merged_text, rotational_quanta
 from rotor.quantum.request import LevelsAnswer, SelectedLevels
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
@@ -65,7 +65,7 @@ def picture(
     table = SelectedLevels(thing, np.arange(len(thing))) if isinstance(thing, Levels) else thing
     title = title if view.title is None else view.title
     figure = levels_figure(table, top, title=title, view=view, **options)
-    return Picture(figure, title or ("" if top is None else name_of_top(top)))
+    return Picture(figure, title or ("" if top is None else top_title(top)))
 
 
 def levels_figure(
@@ -104,7 +104,7 @@ def levels_figure(
     ValueError
         For an unknown unit, and for a table without levels in the view.
     """
-    require_one_of("unit", unit, UNITS)
+    require_choice("unit", unit, UNITS)
     if not len(table):
         raise ValueError("no level to draw; widen the range of J or K, or raise the limit of energy")
     name, column = ladders(table, top)
@@ -117,7 +117,7 @@ def levels_figure(
         show_part(axes, View(vertical=view.vertical))
         axes.set_xlabel({"Ka": "$K_a$", "Kc": "$K_c$"}.get(name, f"${name}$"))
         axes.set_ylabel(f"Energy ({unit.replace('cm-1', 'cm⁻¹')})")
-        heading_text = f"{table.levels.kind} top" if top is None else name_of_top(top)
+        heading_text = f"{table.levels.kind} top" if top is None else top_title(top)
         axes.set_title(title if title is not None else heading_text, loc="left")
         if axes.get_legend_handles_labels()[0]:
             legend_below(figure, axes, ncols=3, fontsize=9)
@@ -248,6 +248,6 @@ def _widen(axes: Any, names: Sequence[Any]) -> None:
 
 def _rotational_levels(table: SelectedLevels) -> Ints:
     """Number of the rotational level for each row, shared by all its vibrational states and spin components."""
-    quanta = of_rotation(table.levels.quanta)
+    quanta = rotational_quanta(table.levels.quanta)
     numbers = np.stack([column[table.rows] for name, column in quanta.items() if name != "v"], axis=1)
     return np.asarray(np.unique(numbers, axis=0, return_inverse=True)[1]).ravel()

@@ -16,10 +16,10 @@ from rotor.plots.picture import (
     GREY,
     WIDTH_INCHES,
     checked_suffix,
-    name_of_top,
     new_figure,
     save,
     styled,
+    top_title,
     without_signs,
 )  # fmt: skip
 from rotor.plots.spectrum import thinned
@@ -46,7 +46,7 @@ def plot_over(
 ) -> None:
     """Draw peaks with the lines mirrored below them; heights (lines,) in units of the peaks."""
     checked_suffix(path)
-    title = view.title or f"{peaks.source or 'spectrum'} and {name_of_top(lines.top)}"
+    title = view.title or f"{peaks.source or 'spectrum'} and {top_title(lines.top)}"
     save(over_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
 
 
@@ -122,7 +122,7 @@ def plot_loomis_wood(
 ) -> None:
     """Draw Loomis-Wood rows of the strongest lines."""
     checked_suffix(path)
-    title = view.title or f"{peaks.source or 'spectrum'} about lines of {name_of_top(lines.top)}"
+    title = view.title or f"{peaks.source or 'spectrum'} about lines of {top_title(lines.top)}"
     save(loomis_wood_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rotor.formats.molecules.library import atoms_of, written_formula
+from rotor.formats.molecules.library import count_atoms, written_formula
 from rotor.tops.top import Top
 from rotor.version import version
 
@@ -259,18 +259,18 @@ def formula_text(formula: str) -> str:
     return re.sub(r"<(\d+)>", r"$^{\1}$", text)
 
 
-def name_of_top(top: Top) -> str:
+def top_title(top: Top) -> str:
     """Name and formula of a top for a picture's title; the formula as in the library, else in Hill order.
 
     >>> from rotor.formats.read_write import read
-    >>> name_of_top(read("HC3N")), name_of_top(Top.from_constants("B=1 GHz", name="SO2"))
+    >>> top_title(read("HC3N")), top_title(Top.from_constants("B=1 GHz", name="SO2"))
     ('cyanoacetylene, HC$_{3}$N', 'SO$_{2}$')
     """
     if top.molecule is None:
         return name_text(top.name) or f"{top.kind} top"
     formula = top.molecule.formula
     written, name = written_formula(top.name, formula), top.name.removesuffix(f" ({formula})")
-    if _COMPOSED.fullmatch(name) and atoms_of(name) == atoms_of(formula):
+    if _COMPOSED.fullmatch(name) and count_atoms(name) == count_atoms(formula):
         return name_text(name)  # the name is the formula
     return ", ".join(dict.fromkeys(filter(None, (name_text(name), formula_text(written))))) or f"{top.kind} top"
 

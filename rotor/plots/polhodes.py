@@ -12,7 +12,7 @@ from rotor.arrays import Floats
 from rotor.classical.free.free_motion import FreeMotion
 from rotor.classical.tumble import PERIODS, TumbleAnswer
 from rotor.plots.picture import WIDTH_INCHES, Picture, new_figure, styled
-from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL, draw_axes, draw_curve, draw_family, draw_sphere, view_of
+from rotor.plots.sphere import LARGE, MIDDLE, MOTION, SMALL, clear_view, draw_axes, draw_curve, draw_family, draw_sphere
 from rotor.version import version
 
 SIZE_INCHES = (WIDTH_INCHES, 3.4)
@@ -106,7 +106,7 @@ def _shown(motion: FreeMotion, times: Floats) -> tuple[tuple[float, float], bool
 
 
 def _draw_left(axes: Any, motion: FreeMotion, path: Floats, names: tuple[str, str, str]) -> None:
-    view = view_of(motion.moments, path[0])
+    view = clear_view(motion.moments, path[0])
     draw_sphere(axes)
     draw_family(axes, view, motion.moments)
     draw_curve(axes, view, path, color=MOTION, linewidth=2.2, label="this motion")

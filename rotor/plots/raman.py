@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rotor.plots.names import SPACE, Peak, name_peaks
-from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, Picture, name_of_top, panel, styled
+from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, Picture, panel, styled, top_title
 from rotor.plots.spectrum import MOST_DECADES, VISIBLE
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.quanta import state_text, without_nuclei
@@ -87,7 +87,7 @@ def _name(axes: Any, lines: RamanLines) -> None:
 
 
 def _title(lines: RamanLines) -> str:
-    return f"{name_of_top(lines.top)}, {lines.temperature_k:g} K, laser at {lines.laser_nm:g} nm"
+    return f"{top_title(lines.top)}, {lines.temperature_k:g} K, laser at {lines.laser_nm:g} nm"
 
 
 def _facts(lines: RamanLines) -> dict[str, Any]:

@@ -31,7 +31,7 @@ MODULES = {
     "torsion": ("TorsionAnswer",),
     "zeeman": ("ZeemanAnswer",),
 }  # classes by the module that draws them; a module is imported when it draws
-ONE_PANEL = ("catalogue", "emission", "levels", "raman", "spectrum")  # modules that draw on axes of the user
+SINGLE_PANEL = ("catalogue", "emission", "levels", "raman", "spectrum")  # modules that draw on axes of the user
 
 
 def plot(
@@ -76,12 +76,12 @@ def plot(
     >>> figure.axes[0].get_xlabel()
     'Frequency (GHz)'
     """
-    module = _module_of(thing)
+    module = _picture_module(thing)
     if path is not None:
         checked_suffix(path)
     if ax is not None:
-        if module not in ONE_PANEL:
-            accepted = ", ".join(sorted(kind for name in ONE_PANEL for kind in MODULES[name]))
+        if module not in SINGLE_PANEL:
+            accepted = ", ".join(sorted(kind for name in SINGLE_PANEL for kind in MODULES[name]))
             raise ValueError(
                 f"ax: the picture of a {type(thing).__name__} needs a figure of its own; ax is accepted for {accepted}"
             )
@@ -103,10 +103,10 @@ def write_picture(
     Raises ValueError for another suffix, and as `plot` does.
     """
     checked_suffix(path)
-    _draw(_module_of(thing), thing, **options).save(path, provenance)
+    _draw(_picture_module(thing), thing, **options).save(path, provenance)
 
 
-def _module_of(thing: Any) -> str:
+def _picture_module(thing: Any) -> str:
     """The module that draws an object."""
     for kind in type(thing).__mro__:
         for module, names in MODULES.items():

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_one_of
+from rotor.checks import require_choice
 from rotor.plots.names import leave_or_remove
-from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, Picture, name_of_top, panel, styled
+from rotor.plots.picture import BLUE, GREY, MOST_VECTOR_STICKS, Picture, panel, styled, top_title
 from rotor.plots.view import Limits, View, show_part
-from rotor.quantum.quanta import line_text, of_rotation
+from rotor.quantum.quanta import line_text, rotational_quanta
 from rotor.spectra.lines import Lines
 from rotor.spectra.request import SpectrumAnswer
 from rotor.spectra.spectrum import Spectrum, line_widths
@@ -96,7 +96,7 @@ def spectrum_figure(
         For a spectrum without lines or with nothing in the range, an unknown unit, a logarithmic axis from 0 or less.
     """
     if unit is not None:
-        require_one_of("unit", unit, UNITS)
+        require_choice("unit", unit, UNITS)
     lines = thing if isinstance(thing, Lines) else thing.lines
     heights = _heights(thing, lines)
     with styled():
@@ -213,7 +213,7 @@ def _is_logarithmic(heights: Floats) -> bool:
 def _only_transition(lines: Lines, rows: Ints) -> str:
     """The rotational transition that all hyperfine lines in `rows` share, or an empty text."""
     quanta = lines.levels.quanta
-    rotation = of_rotation(quanta)
+    rotation = rotational_quanta(quanta)
     if len(rows) < 2 or len(rotation) == len(quanta):
         return ""
     quanta_by_line = np.stack(
@@ -249,7 +249,7 @@ def _ordinate(spectrum: Spectrum) -> str:
 
 def _title(thing: Lines | Spectrum, lines: Lines | None) -> str:
     temperature = f"{thing.temperature_k:g} K" if thing.temperature_k else ""
-    return ", ".join(filter(None, (name_of_top(lines.top) if lines is not None else "", temperature)))
+    return ", ".join(filter(None, (top_title(lines.top) if lines is not None else "", temperature)))
 
 
 def _name_lines(

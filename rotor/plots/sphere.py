@@ -31,7 +31,7 @@ class View:
         return np.asarray(np.asarray(points) @ self.axes[2])
 
 
-def view_of(moments: Floats, start: Floats) -> View:
+def clear_view(moments: Floats, start: Floats) -> View:
     """A view that shows all three axes and has the unit vector `start` on the front, largest moment upright.
 
     The intermediate axis points at the reader more than the other two: there the separatrix crosses itself.

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, name_of_top, new_figure, styled
+from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, new_figure, styled, top_title
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.blocks import BEFORE_J
 from rotor.quantum.fields.field_map import FieldMap
@@ -68,7 +68,7 @@ def picture(
 ) -> Picture:
     """The picture of a map, of the answer that has it, or of lines in a field; options: of `stark_figure`."""
     if isinstance(thing, StarkAnswer):
-        title, thing = title or name_of_top(thing.request.top), thing.states
+        title, thing = title or top_title(thing.request.top), thing.states
     title = (title or "") if view.title is None else view.title
     if isinstance(thing, FieldLines):
         return Picture(lobes_figure(thing, title), title, thing.provenance)

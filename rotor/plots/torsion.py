@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from rotor import units
-from rotor.plots.picture import GREY, PALETTE, SIZE_INCHES, Picture, name_of_top, new_figure, styled
+from rotor.plots.picture import GREY, PALETTE, SIZE_INCHES, Picture, new_figure, styled, top_title
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.thermodynamics.torsion_request import TorsionAnswer
 from rotor.version import version
@@ -29,7 +29,7 @@ def torsion_figure(answer: TorsionAnswer, view: View = WHOLE) -> Any:
     drawn = min(len(levels), MOST_DRAWN)
     angles = np.linspace(0, 2 * np.pi, POINTS)
     potential = (torsion.potential.values(angles) - torsion.foot_mhz) / units.MHZ_PER_CM
-    waves = answer.functions_of_levels(angles)[:, :drawn]
+    waves = answer.wave_functions(angles)[:, :drawn]
     height = AMPLITUDE * _spacing(levels.energy_cm[:drawn], levels.v[:drawn]) / np.abs(waves).max()
     degrees = np.degrees(angles)
     with styled():
@@ -75,4 +75,4 @@ def _spacing(energies: Any, v: Any) -> float:
 
 
 def _title(answer: TorsionAnswer) -> str:
-    return f"{name_of_top(answer.request.top)}: rotation about the bond {answer.request.bond}"
+    return f"{top_title(answer.request.top)}: rotation about the bond {answer.request.bond}"

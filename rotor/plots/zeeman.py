@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor.plots.picture import Picture, name_of_top, new_figure, styled
+from rotor.plots.picture import Picture, new_figure, styled, top_title
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.fields.zeeman_request import ZeemanAnswer
@@ -61,7 +61,7 @@ def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0, view: Vi
 
 def picture(answer: ZeemanAnswer, *, title: str | None = None, view: View = WHOLE) -> Picture:
     """The picture of an answer."""
-    title = (title or name_of_top(answer.request.top)) if view.title is None else view.title
+    title = (title or top_title(answer.request.top)) if view.title is None else view.title
     states = answer.states
     return Picture(zeeman_figure(states, title, len(answer.request.spin_g), view), title, states.provenance)
 

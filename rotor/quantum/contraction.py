@@ -26,7 +26,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.elements import Elements
 from rotor.quantum.blocks import LinearBlocks, SolvedBlocks
 from rotor.quantum.connected import connected_parts
-from rotor.quantum.one_to_one import one_to_one
+from rotor.quantum.one_to_one import match_names
 from rotor.quantum.solvers.hermitian import eigenstates
 from rotor.quantum.spins.coupling import reduced_spin
 from rotor.quantum.wigner import nine_j, six_j
@@ -308,7 +308,7 @@ def _named_functions(space: CoupledSpace, part: Sequence[int], vectors: NDArray[
     places = np.array([(sector, rank) for sector in part for rank in range(len(space.sectors[sector]))])
     shares = np.abs(vectors) ** 2
     whole = vectors.shape[0] == vectors.shape[1]
-    return np.asarray(places[one_to_one(shares) if whole else shares.argmax(axis=0)])
+    return np.asarray(places[match_names(shares) if whole else shares.argmax(axis=0)])
 
 
 def _moved(

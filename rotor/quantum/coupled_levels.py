@@ -20,7 +20,7 @@ from rotor.quantum.basis.state_elements import StateElements, StateTerms
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.levels import Levels, SolvedBlock, levels_of_blocks, placed
-from rotor.quantum.one_to_one import one_to_one
+from rotor.quantum.one_to_one import match_names
 from rotor.quantum.states import Coupling, OperatorOfJ
 from rotor.quantum.wang.basis import Part, WangBlock, limited, names_of, parts_of, wang_blocks
 from rotor.quantum.wang.j_operators import JOperator
@@ -174,7 +174,7 @@ def names_of_states(
     """
     functions = [np.linalg.eigh(matrix[part.place, part.place]).eigenvectors.T @ vectors[part.place] for part in parts]
     overlaps = np.concatenate(functions) ** 2
-    function_of_state = one_to_one(overlaps) if len(parts) > 1 else np.arange(vectors.shape[1])
+    function_of_state = match_names(overlaps) if len(parts) > 1 else np.arange(vectors.shape[1])
     return names_of_functions(parts, representation)[function_of_state], overlaps[
         function_of_state, np.arange(vectors.shape[1])
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotor.checks import require_one_of, require_positive
+from rotor.checks import require_choice, require_positive
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Used
 
@@ -38,7 +38,7 @@ class HyperfineMethod(QuantumEffect):
     conserved: ClassVar[frozenset[str]] = frozenset()
 
     def __post_init__(self) -> None:
-        require_one_of("hyperfine", self.method, METHODS)
+        require_choice("hyperfine", self.method, METHODS)
         require_positive("tolerance_mhz", self.tolerance_mhz)
 
     def parameters(self, top: Top) -> dict[str, float]:

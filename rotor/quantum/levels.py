@@ -247,7 +247,7 @@ class Levels(Table):
         return tuple(self.quanta)
 
     @property
-    def of_named_constants(self) -> bool:
+    def has_named_constants(self) -> bool:
         """Whether the constants of the top make the levels; those of an .int file may have codes alone."""
         return all(effect.name for effect in self.effects)
 
@@ -431,13 +431,17 @@ def _rotational_weights(levels: Levels, weights: SpinWeights) -> Ints:
     if "species" in quanta and weights.rule == "none":
         return levels.weight
     if "irrep" in quanta:
-        weight_of = {name: weights.of_irrep(name) for name in np.unique(quanta["irrep"]).tolist()}
+        weight_of = {name: weights.irrep_weight(name) for name in np.unique(quanta["irrep"]).tolist()}
         return np.array([weight_of[name] for name in quanta["irrep"].tolist()], dtype=np.int64)
     if "kc" in quanta:
         return _asymmetric_weights(levels, weights)
     if "k" in quanta:
-        return weights.of_symmetric(levels.rotational, np.abs(quanta["k"]), oblate=levels.kind == "oblate")
-    return weights.of_spherical(levels.rotational) if levels.kind == "spherical" else weights.of_j(levels.rotational)
+        return weights.symmetric_weights(levels.rotational, np.abs(quanta["k"]), oblate=levels.kind == "oblate")
+    return (
+        weights.spherical_weights(levels.rotational)
+        if levels.kind == "spherical"
+        else weights.linear_weights(levels.rotational)
+    )
 
 
 def _asymmetric_weights(levels: Levels, weights: SpinWeights) -> Ints:
@@ -449,8 +453,8 @@ def _asymmetric_weights(levels: Levels, weights: SpinWeights) -> Ints:
     ka, kc = levels.quanta["ka"], levels.quanta["kc"]
     if levels.kind in ("prolate", "oblate") and weights.rule == "K":
         k, other = (kc, ka) if levels.kind == "oblate" else (ka, kc)
-        at_zero = np.array([weights.of_symmetric(j, 0) for j in (0, 1)])  # of K = 0, whose other label is J
-        both = weights.of_symmetric(levels.rotational, k, oblate=levels.kind == "oblate") // np.where(k == 0, 1, 2)
+        at_zero = np.array([weights.symmetric_weights(j, 0) for j in (0, 1)])  # of K = 0, whose other label is J
+        both = weights.symmetric_weights(levels.rotational, k, oblate=levels.kind == "oblate") // np.where(k == 0, 1, 2)
         return np.where(k % weights.modulus == 0, at_zero[other % 2], both)
-    by_parity = np.array([[weights.of_ka_kc(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)
+    by_parity = np.array([[weights.asymmetric_weight(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)
     return np.asarray(by_parity[ka % 2, kc % 2])

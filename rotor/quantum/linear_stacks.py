@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size, whole_of_lower
+from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size, symmetric_from_lower
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 _LIKE = 1.5  # sizes of blocks that stand side by side
@@ -42,7 +42,7 @@ class LinearBlock(NamedTuple):
         """The O_i of its parameters, whole: (parameters, size, size)."""
         lower = np.zeros((len(self.parameters), self.size, self.size))
         lower[:, self.rows, self.columns] = (self.factors @ self.mix).T
-        return whole_of_lower(lower)
+        return symmetric_from_lower(lower)
 
     def turned(self, functions: Floats) -> LinearBlock:
         """The block over other functions, given in rows over those of this one."""

@@ -12,10 +12,10 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 
 
-def one_to_one(overlaps: Floats) -> Ints:
+def match_names(overlaps: Floats) -> Ints:
     """Which function names each state: (n,) rows of `overlaps` (functions, states), each once, their sum largest.
 
-    >>> one_to_one(np.array([[0.9, 0.8, 0.0], [0.1, 0.2, 0.3], [0.0, 0.0, 0.7]])).tolist()
+    >>> match_names(np.array([[0.9, 0.8, 0.0], [0.1, 0.2, 0.3], [0.0, 0.0, 0.7]])).tolist()
     [0, 1, 2]
     """
     clear = overlaps.argmax(axis=0)

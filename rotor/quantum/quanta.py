@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.tops.internal_rotation import species_of_tops
+from rotor.tops.internal_rotation import sigma_species
 
 FIELD_STEP_KV_PER_CM = 1e-12  # labels are whole numbers: of a level in a field, the field in these steps
 
@@ -70,7 +70,7 @@ _HEADINGS = {
 _SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I", "i_sym": r"\Gamma_I"}
 
 SPECIES_NUMBERS = {
-    name: first + i for tops, first in ((1, 0), (2, 10), (3, 100)) for i, name in enumerate(species_of_tops(tops))
+    name: first + i for tops, first in ((1, 0), (2, 10), (3, 100)) for i, name in enumerate(sigma_species(tops))
 }  # how labels of whole numbers have species: A, E are 0, 1; AA, AE, EA, EE, EE* are 10 to 14; AAA ... are 100 to 113
 
 Quanta = Mapping[str, NDArray[Any]]
@@ -147,7 +147,7 @@ def line_text(quanta: Quanta, upper: int, lower: int, halves: Collection[str] = 
     >>> line_text(quanta, 1, 0)
     '$2_{0,2}$ – $1_{0,1}$, $F = 3 – 2$'
     """
-    rotation = of_rotation(quanta)
+    rotation = rotational_quanta(quanta)
     sums = [name for name in quanta if name not in rotation]
     text = " – ".join(state_text(rotation, row, halves) for row in (upper, lower))
     if not sums:
@@ -157,10 +157,10 @@ def line_text(quanta: Quanta, upper: int, lower: int, halves: Collection[str] = 
     return f"{text}, ${names} = {' – '.join(values)}$"
 
 
-def of_rotation(quanta: Quanta) -> dict[str, NDArray[Any]]:
+def rotational_quanta(quanta: Quanta) -> dict[str, NDArray[Any]]:
     """The quantum numbers of the rotation alone: of levels with n, those of sums with spins are left out; others have none.
 
-    >>> list(of_rotation({"n": np.array([1]), "k": np.array([0]), "f1": np.array([3]), "f": np.array([2])}))
+    >>> list(rotational_quanta({"n": np.array([1]), "k": np.array([0]), "f1": np.array([3]), "f": np.array([2])}))
     ['n', 'k']
     """
     return {name: column for name, column in quanta.items() if name in _OF_ROTATION or "n" not in quanta}
@@ -172,7 +172,7 @@ def without_nuclei(quanta: Quanta) -> dict[str, NDArray[Any]]:
     >>> list(without_nuclei({"n": np.array([1]), "j": np.array([3]), "f1": np.array([3]), "f": np.array([2])}))
     ['n', 'j']
     """
-    rotation = of_rotation(quanta)
+    rotation = rotational_quanta(quanta)
     return {name: column for name, column in quanta.items() if name in rotation or name.startswith("j")}
 
 

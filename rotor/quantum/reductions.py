@@ -32,7 +32,7 @@ import numpy as np
 from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name, rigid_operators
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
-from rotor.tops.operators import Operators, Powers, axes_of, distortion_terms
+from rotor.tops.operators import Operators, Powers, axis_order, distortion_terms
 
 # the quartic and quadratic terms by (p, q, n), and what each is in Jα⁴, JαJα JβJβ + JβJβ JαJα, Jα², for (x, y, z, xy, yz, zx)
 _TERMS: tuple[Powers, ...] = (
@@ -120,7 +120,7 @@ def _converted(
 
 def _values(operators: Operators, old: str, reduction: str, new: str) -> tuple[dict[str, float], float]:
     """The new constants by name, and the turn s, of an operator written in the axes of `old`."""
-    exchanged = _exchange_axes(operators, axes_of(old), axes_of(new))
+    exchanged = _exchange_axes(operators, axis_order(old), axis_order(new))
     s = _turn(exchanged, reduction)
     return _named(_turned(exchanged, s), reduction, new), s
 
@@ -153,7 +153,7 @@ def _refuse(constants: Constants, reduction: str | None, representation: str) ->
         raise ValueError(f"a top of kind {constants.kind!r} has neither reduction nor representation to convert")
     if reduction not in ("A", "S", None):
         raise ValueError(f"reduction {reduction!r}: Watson's reductions are 'A' and 'S'")
-    axes_of(representation)  # refuses one that does not exist
+    axis_order(representation)  # refuses one that does not exist
     quartic = [n for n, term in distortion_terms("asymmetric", constants.reduction).items() if _order(term) == 2]
     higher = [name for name in constants.values if name not in (*"ABC", *quartic)]
     if higher:
@@ -202,7 +202,7 @@ def _named(operators: Operators, reduction: str, representation: str) -> dict[st
     """A, B, C and the five quartic constants of a reduction; the sixth term is zero by construction."""
     mean, along, across = (operators[powers] for powers in ((1, 0, 0), (0, 1, 0), (0, 0, 1)))
     rigid = dict(
-        zip(axes_of(representation).upper(), (mean + 2 * across, mean - 2 * across, mean + along), strict=True)
+        zip(axis_order(representation).upper(), (mean + 2 * across, mean - 2 * across, mean + along), strict=True)
     )
     values = {name: rigid[name] for name in "ABC"}
     for name, term in distortion_terms("asymmetric", reduction).items():

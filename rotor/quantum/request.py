@@ -15,7 +15,7 @@ from rotor.checks import require_top, require_whole
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.budgets import energy_errors, levels_budget
 from rotor.quantum.estimates.convergence import warnings_of
-from rotor.quantum.estimates.limits import every_limit, limit_facts
+from rotor.quantum.estimates.limits import all_limits, limit_facts
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.quantum.levels import Levels
@@ -155,7 +155,7 @@ class LevelsAnswer(TextOf):
         tabulated = (
             request.top.level_table is not None and errors_mhz is not None and bool(np.isfinite(errors_mhz).all())
         )
-        limits = every_limit(request.top, max(request.jmax, 1), levels.effects, tabulated=tabulated)
+        limits = all_limits(request.top, max(request.jmax, 1), levels.effects, tabulated=tabulated)
         return levels_budget(request.top, levels, errors_mhz, limits)
 
     def facts(self) -> dict[str, Any]:

@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats
 from rotor.quantum.symmetric_top_elements import coupling, coupling_of_existing, sign_of
 from rotor.quantum.wang.basis import WangBlock
-from rotor.tops.operators import axes_of as axes_of
+from rotor.tops.operators import axis_order as axis_order
 
 Complexes = NDArray[np.complex128]
 
@@ -54,8 +54,8 @@ def frame_of(representation: str) -> Floats:
     >>> frame_of("Il").tolist()
     [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]]
     """
-    rows = np.eye(3)[["abc".index(axis) for axis in axes_of(representation)]]
-    if axes_of(representation) not in ("abc", "bca", "cab"):
+    rows = np.eye(3)[["abc".index(axis) for axis in axis_order(representation)]]
+    if axis_order(representation) not in ("abc", "bca", "cab"):
         rows[1] = -rows[1] + 0.0  # no -0.0
     return rows
 

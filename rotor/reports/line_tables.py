@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import Table, record_table, rows_of
+from rotor.reports.screen import Table, record_table, table_records
 
 if TYPE_CHECKING:
     from rotor.spectra.lines import Lines
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 def pattern_records(lines: Lines, resolution_mhz: float, shown: int) -> list[dict[str, Any]]:
     """The strongest patterns of lines that a resolution merges, ordered by frequency."""
-    from rotor.quantum.quanta import labels, of_rotation
+    from rotor.quantum.quanta import labels, rotational_quanta
     from rotor.spectra.intensity import largest
     from rotor.spectra.patterns import patterns
 
     groups, levels = patterns(lines, resolution_mhz), lines.levels
-    quanta = of_rotation(levels.quanta)
+    quanta = rotational_quanta(levels.quanta)
     rows = sorted(largest(groups.intensity_nm2_mhz, shown).tolist()) if shown else []
     sides = {s: labels(quanta, getattr(lines, s)[groups.strongest], levels.halves) for s in ("upper", "lower")}
     names = ("frequency_mhz", "intensity_nm2_mhz", "components", "width_mhz")
@@ -93,4 +93,6 @@ def states_text(lines: Any) -> str:
 def labelled_rows(lines: Any, states: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Rows of lines as records, with the labels of their states by name."""
     labels = (lines.levels.labels(numbers) for numbers in states.values())
-    return [row | dict(zip(states, texts, strict=True)) for row, *texts in zip(rows_of(lines), *labels, strict=True)]
+    return [
+        row | dict(zip(states, texts, strict=True)) for row, *texts in zip(table_records(lines), *labels, strict=True)
+    ]

@@ -95,7 +95,7 @@ def evenly(count: int, most: int) -> list[int]:
 def sampled(table: Columns, most: int, things: str = "rows") -> tuple[list[dict[str, Any]], str]:
     """Evenly spaced rows of a long table as records, and a text on their number for the title."""
     rows = evenly(len(table), most)
-    return rows_of(table, rows), "" if len(rows) == len(table) else f", {len(rows)} of {len(table)} {things}"
+    return table_records(table, rows), "" if len(rows) == len(table) else f", {len(rows)} of {len(table)} {things}"
 
 
 def table_text(table: Table) -> str:
@@ -165,10 +165,10 @@ def json_text(content: Mapping[str, Any]) -> str:
 
 def json_with_rows(table: Columns, key: str, content: Mapping[str, Any]) -> str:
     """JSON text of the content, with all rows of a table as records under `key`."""
-    return json_text({**content, key: rows_of(table)})
+    return json_text({**content, key: table_records(table)})
 
 
-def rows_of(table: Columns, rows: Any = slice(None)) -> list[dict[str, Any]]:
+def table_records(table: Columns, rows: Any = slice(None)) -> list[dict[str, Any]]:
     """Rows of a table, by default all, as records by column name."""
     columns = {name: column[rows].tolist() for name, column in table.columns.items()}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Facts, Part
 from rotor.reports.sources import source_facts
-from rotor.tops.facts import estimated_errors_mhz, formula_of
+from rotor.tops.facts import estimated_errors_mhz, top_formula
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -102,7 +102,7 @@ def states_facts(top: Top) -> list[tuple[str, str]]:
 
 def heading(top: Top) -> str:
     """Name, formula and kind in one line."""
-    formula = formula_of(top)
+    formula = top_formula(top)
     if formula:  # imported only here: the library takes some ms to load
         from rotor.formats.molecules.library import written_formula
 

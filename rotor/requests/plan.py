@@ -75,7 +75,7 @@ class Plan:
         return asdict(self) | {"parts": dict(self.parts), "counts": dict(self.counts)}
 
 
-def plan_of_whole(kind: str, call: Callable[[], Any], describe: Callable[[Any], Mapping[str, Any]]) -> Plan:
+def plan_complete_run(kind: str, call: Callable[[], Any], describe: Callable[[Any], Mapping[str, Any]]) -> Plan:
     """Plan from a complete run of the call; `describe` returns the other fields of the plan from its answer."""
     answers: list[Any] = []
     seconds = timed(lambda: answers.append(call()))

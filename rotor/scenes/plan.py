@@ -10,7 +10,7 @@ import msgspec
 
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
-from rotor.requests.plan import LONG_SEARCH, Plan, plan_of_whole, timed
+from rotor.requests.plan import LONG_SEARCH, Plan, plan_complete_run, timed
 from rotor.scenes.calculation import Calculation, NoResultError
 from rotor.scenes.outputs import checked_paths
 from rotor.scenes.scene import Scene
@@ -124,7 +124,7 @@ def plan_of_request(kind: str, request: Any) -> Plan:
     verb = verb_of(kind)
     if plan := verb.load_numerics().plan:
         return plan(request)
-    return plan_of_whole(
+    return plan_complete_run(
         kind, lambda: verb.compute(request), lambda answer: {"counts": {"rows": len(verb.table(answer))}}
     )
 

@@ -87,9 +87,9 @@ class SceneResult:
 
     def _repr_html_(self) -> str:
         """The rows and their errors, for notebooks."""
-        from rotor.table import html_of_errors
+        from rotor.table import errors_html
 
-        return self.table._repr_html_() + html_of_errors(self.answer)
+        return self.table._repr_html_() + errors_html(self.answer)
 
 
 @cache

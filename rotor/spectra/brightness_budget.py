@@ -22,7 +22,7 @@ import numpy as np
 
 from rotor import units
 from rotor.quantum.estimates.budgets import NO_SAMPLES, model_term
-from rotor.quantum.estimates.limits import ELECTRON_SPIN, QUADRUPOLE, every_limit, populated_j
+from rotor.quantum.estimates.limits import ELECTRON_SPIN, QUADRUPOLE, all_limits, populated_j
 from rotor.quantum.estimates.splittings import depth_lost, splitting_nuclei
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.spectra.emission import KM_PER_S, contrast_k
@@ -80,7 +80,7 @@ def _model(answer: Any, number: int, per_mhz: float, opaque: float) -> ErrorTerm
     top, source = request.molecules[number], request.sources[number]
     if isinstance(top, CatalogueLines):
         return ErrorTerm(None, "a catalogue does not state what its lines neglect")
-    limits = every_limit(top, populated_j(top, source.excitation_k), lines.effects)
+    limits = all_limits(top, populated_j(top, source.excitation_k), lines.effects)
     splittings = [limit for limit in limits if limit.name in SPLITTING and limit.size_mhz is not None]
     shifts = model_term([limit for limit in limits if limit not in splittings])
     if peak is None or not splittings:

@@ -202,13 +202,13 @@ def _top_lines(
         quanta=tuple(lines.quanta_names),
         effects=tuple(lines.levels.effects),
         hyperfine=hyperfine_facts(top, lines.levels),
-        notes=(*_notes_of_geometry(top), *lines.warnings),
+        notes=(*_geometry_notes(top), *lines.warnings),
         q_error=lines.partition.relative_error,
-        left_out_depth=WEAKEST * least_depth + depth_of_blends(*weak, source),
+        left_out_depth=WEAKEST * least_depth + blend_depth(*weak, source),
     )
 
 
-def _notes_of_geometry(top: Top) -> Iterator[str]:
+def _geometry_notes(top: Top) -> Iterator[str]:
     """Note that frequencies from a geometry are too inaccurate to find lines with a telescope."""
     if top.molecule is not None and top.molecule.uncertainty and top.source == top.molecule.source:
         yield (
@@ -217,11 +217,11 @@ def _notes_of_geometry(top: Top) -> Iterator[str]:
         )
 
 
-def depth_of_blends(frequency_mhz: Floats, depth: Floats, source: Source) -> float:
+def blend_depth(frequency_mhz: Floats, depth: Floats, source: Source) -> float:
     """Bound of the optical depth that Gaussian lines (n,) of these central depths reach together.
 
     >>> narrow = Source(1e14, 10.0, 1.0)
-    >>> round(depth_of_blends(np.array([1e5, 1e5, 2e5]), np.array([1e-7, 1e-7, 1e-7]), narrow) / 1e-7, 3)
+    >>> round(blend_depth(np.array([1e5, 1e5, 2e5]), np.array([1e-7, 1e-7, 1e-7]), narrow) / 1e-7, 3)
     2.5
     """
     if not len(depth):
@@ -256,5 +256,5 @@ def _catalogue_lines(
     )
     depth = peak_depth(all_lines, source)
     weak = depth < least_depth
-    left_out = depth_of_blends(all_lines.frequency_mhz[weak], depth[weak], source)
+    left_out = blend_depth(all_lines.frequency_mhz[weak], depth[weak], source)
     return replace(all_lines.where(np.flatnonzero(~weak)), left_out_depth=left_out)

@@ -19,7 +19,7 @@ MOST_DECADES = 12  # largest lowering of a cut
 FINER = 2  # decades between a cut and its reference
 
 
-def error_of_intensities(answer: Any) -> float:
+def intensity_error(answer: Any) -> float:
     """Error of the intensity of a line in percent, from Q and from rounding of the strengths."""
     lines = answer.lines
     return 100.0 * (
@@ -51,7 +51,7 @@ class Cut:
             chosen = replace(request, **{self.name: self.lower(cut, decades)})
             answer = self.answer(chosen)
             finer = self.answer(replace(chosen, **{self.name: self.lower(cut, decades + FINER)}))
-            missing, line_error = SPARE * self.left_out(answer, finer), error_of_intensities(answer)
+            missing, line_error = SPARE * self.left_out(answer, finer), intensity_error(answer)
             error = missing + line_error
             if error <= accuracy or line_error > accuracy:
                 break

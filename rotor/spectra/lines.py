@@ -80,9 +80,9 @@ class Lines(TransitionTable):
     temperature_k: float
     min_lgint: float
     range_mhz: tuple[float, float]
-    given_partition: PartitionFunction | None = None
+    stated_partition: PartitionFunction | None = None
     covariance: Covariance | None = None
-    given_spread: Floats | None = None
+    stated_spread: Floats | None = None
     untrusted: int = 0
 
     def __len__(self) -> int:
@@ -96,7 +96,7 @@ class Lines(TransitionTable):
     @cached_property
     def partition(self) -> PartitionFunction:
         """Q(T) of the intensities; summed on first use unless it was given."""
-        return self.given_partition or partition_function(self.top, self.temperature_k, effects=self.levels.effects)
+        return self.stated_partition or partition_function(self.top, self.temperature_k, effects=self.levels.effects)
 
     @property
     def q(self) -> float:
@@ -127,8 +127,8 @@ class Lines(TransitionTable):
     @cached_property
     def spread(self) -> Floats | None:
         """Contribution of the constants' covariance to each level (`uncertainty.level_spread`); None without a covariance."""
-        if self.given_spread is not None or self.covariance_used is None:
-            return self.given_spread
+        if self.stated_spread is not None or self.covariance_used is None:
+            return self.stated_spread
         return level_spread(self.top, self.levels, self.covariance_used)
 
     @property
@@ -165,7 +165,7 @@ class Lines(TransitionTable):
     def provenance(self) -> dict[str, Any]:
         """Origin of the lines: the top with its sources, the settings, Q."""
         origin = self.top.provenance
-        return (origin if self.levels.of_named_constants else without_constants(origin)) | {
+        return (origin if self.levels.has_named_constants else without_constants(origin)) | {
             "errors_from": self.errors_from,
             "temperature_k": self.temperature_k,
             "jmax": self.jmax,
@@ -219,8 +219,8 @@ class Lines(TransitionTable):
             strength_debye2=self.strength_debye2[chosen],
             upper=self.upper[chosen],
             lower=self.lower[chosen],
-            given_partition=self.__dict__.get("partition", self.given_partition),
-            given_spread=self.__dict__.get("spread", self.given_spread),
+            stated_partition=self.__dict__.get("partition", self.stated_partition),
+            stated_spread=self.__dict__.get("spread", self.stated_spread),
         )
 
     def sorted(self) -> Lines:
@@ -260,7 +260,7 @@ class Lines(TransitionTable):
     def _texts(self, rows: NDArray[np.int64]) -> dict[str, list[str]]:
         selected = self.where(rows)
         names = ["frequency_mhz", "strength_debye2", "energy_lower_cm", "g_upper"]
-        if selected.given_partition is not None:  # a text alone does not trigger the sum of Q
+        if selected.stated_partition is not None:  # a text alone does not trigger the sum of Q
             names.insert(1, "lgint")
         texts = {name: [f"{value:.6g}" for value in getattr(selected, name).tolist()] for name in names}
         texts["frequency_mhz"] = [f"{value:.4f}" for value in selected.frequency_mhz.tolist()]
@@ -349,9 +349,9 @@ def line_list(
     first, last = range_mhz
     if not first < last:
         raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a range that rises")
-    dipole = _dipole_of(top)
+    dipole = _top_dipole(top)
     least = -math.inf if min_lgint is None else min_lgint
-    stated = partition_of(top, temperature_k, q, vibrational_factor, vibrations, effects)
+    stated = line_partition(top, temperature_k, q, vibrational_factor, vibrations, effects)
     if stated is None and (jmax is None or math.isfinite(least)):
         stated = partition_function(top, temperature_k, effects=effects)
     if jmax is None:
@@ -374,7 +374,7 @@ def line_list(
         temperature_k=temperature_k,
         min_lgint=least,
         range_mhz=range_mhz,
-        given_partition=stated,
+        stated_partition=stated,
         covariance=covariance,
         untrusted=0 if inside is None else int(np.count_nonzero(~inside)),
     )
@@ -383,7 +383,7 @@ def line_list(
     return lines.sorted() if sort else lines
 
 
-def _dipole_of(top: Top) -> tuple[float, float, float]:
+def _top_dipole(top: Top) -> tuple[float, float, float]:
     if top.dipole_abc_debye is None:
         raise ValueError(
             f"the dipole of {top.name or 'this top'} is not known; give one, in principal axes or in the input's frame"
@@ -391,7 +391,7 @@ def _dipole_of(top: Top) -> tuple[float, float, float]:
     return top.dipole_abc_debye
 
 
-def partition_of(
+def line_partition(
     top: Top,
     temperature_k: float,
     q: float | None,

@@ -17,12 +17,12 @@ from rotor.quantum.estimates.accuracy import (
     reason_of_no_distortion_sweep,
     rounding_of,
 )
-from rotor.quantum.estimates.left_out import left_out_of_levels
+from rotor.quantum.estimates.left_out import neglected_in_levels
 from rotor.quantum.estimates.plans import SHORT_J, effect_texts, level_parts, plan_fields
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Growth, LeftOut, Plan, largest_first, plan_of_whole
-from rotor.spectra.intensity_accuracy import Cut, error_of_intensities
+from rotor.requests.plan import Growth, LeftOut, Plan, largest_first, plan_complete_run
+from rotor.spectra.intensity_accuracy import Cut, intensity_error
 from rotor.spectra.raman_request import SECTION, answer_raman, section_left_out
 from rotor.spectra.request import INTENSITY, answer_spectrum, intensity_left_out
 from rotor.spectra.widths import doppler, pressure_width
@@ -46,7 +46,7 @@ def shift_error(answer: Any, reference: Any) -> float:
     return largest(energies[reference.final] - energies[reference.initial] - reference.shift_mhz)
 
 
-def error_of_list(answer: Any) -> float:
+def list_error(answer: Any) -> float:
     """Error of line frequencies in MHz."""
     return levels_error(answer, answer.lines.top, answer.lines.levels)
 
@@ -71,7 +71,7 @@ def _knobs(of: str, lost: Measure, error: Callable[[Any, Any], float]) -> tuple[
     return highest_j(lost), distortion(frequency), hyperfine(frequency)
 
 
-def _numerics_of_lines(
+def _line_numerics(
     names: tuple[str, str],
     cut: Cut,
     knobs: tuple[Knob, ...],
@@ -82,8 +82,8 @@ def _numerics_of_lines(
     frequencies, intensities = names
     return Numerics(
         {
-            "MHz": Goal(frequencies, choose_spins, error_of_list),
-            "%": Goal(intensities, cut.choose, error_of_intensities),
+            "MHz": Goal(frequencies, choose_spins, list_error),
+            "%": Goal(intensities, cut.choose, intensity_error),
         },
         knobs=knobs,
         prepare=lambda request: replace(request, jmax=cut.answer(request).lines.jmax),
@@ -93,7 +93,7 @@ def _numerics_of_lines(
     )
 
 
-def _jmax_of_spectrum(request: Any) -> tuple[int, str]:
+def _spectrum_jmax(request: Any) -> tuple[int, str]:
     """J max of a line list, and the reason."""
     from rotor.spectra.intensity import jmax_for_cut
     from rotor.thermodynamics import partition_function
@@ -147,12 +147,12 @@ def _flipped(species: str, flip: tuple[bool, bool]) -> str:
     )
 
 
-def plan_of_spectrum(request: Any) -> Plan:
+def plan_spectrum(request: Any) -> Plan:
     """The plan of a line list."""
     from rotor.quantum.estimates.limits import populated_j
 
     top, kelvin = request.top, request.temperature_k
-    jmax, why = _jmax_of_spectrum(request)
+    jmax, why = _spectrum_jmax(request)
     j = min(populated_j(top, kelvin), max(jmax, 1))
     cost = Growth(
         lambda j: answer_spectrum(replace(request, jmax=j)),
@@ -184,7 +184,7 @@ def plan_of_spectrum(request: Any) -> Plan:
     )
 
 
-def plan_of_raman(request: Any) -> Plan:
+def plan_raman(request: Any) -> Plan:
     """The plan of Raman lines, from a complete run."""
     from rotor.quantum.estimates.limits import populated_j
 
@@ -195,10 +195,10 @@ def plan_of_raman(request: Any) -> Plan:
         described = plan_fields(top, populated_j(top, request.temperature_k), request.effects)
         return {**described, "parts": parts, "counts": {"lines": len(answer.lines)}}
 
-    return plan_of_whole("raman", lambda: answer_raman(request), describe)
+    return plan_complete_run("raman", lambda: answer_raman(request), describe)
 
 
-def _rounding_of_raman(request: Any) -> float:
+def _raman_rounding(request: Any) -> float:
     return rounding_of(request.top, int(answer_raman(request).lines.jmax))
 
 
@@ -210,27 +210,29 @@ def _lower_factor(cut: float, decades: int) -> float:
     return float(cut * 10.0**-decades)
 
 
-SPECTRUM = _numerics_of_lines(
+SPECTRUM = _line_numerics(
     ("frequencies", "intensities"),
     Cut("min_lgint", _lower_decades, intensity_left_out, answer_spectrum),
     _knobs("frequency of a line", INTENSITY, line_error),
-    plan_of_spectrum,
-    lambda request: rounding_of(request.top, _jmax_of_spectrum(request)[0]),
+    plan_spectrum,
+    lambda request: rounding_of(request.top, _spectrum_jmax(request)[0]),
 )
-RAMAN = _numerics_of_lines(
+RAMAN = _line_numerics(
     ("shifts", "cross sections"),
     Cut("min_relative", _lower_factor, section_left_out, answer_raman),
     _knobs("shift of a line", SECTION, shift_error),
-    plan_of_raman,
-    _rounding_of_raman,
+    plan_raman,
+    _raman_rounding,
 )
 
 
-def plan_of_emission(request: Any) -> Plan:
+def plan_emission(request: Any) -> Plan:
     """The plan of a source, from a complete run, which takes at most seconds."""
     from rotor.spectra.emission_request import answer_emission
 
-    return plan_of_whole("emission", lambda: answer_emission(request), lambda answer: _source_facts(request, answer))
+    return plan_complete_run(
+        "emission", lambda: answer_emission(request), lambda answer: _source_facts(request, answer)
+    )
 
 
 def _source_facts(request: Any, answer: Any) -> dict[str, Any]:
@@ -244,7 +246,7 @@ def _source_facts(request: Any, answer: Any) -> dict[str, Any]:
             continue
         j, hamiltonian = populated_j(top, source.excitation_k), lines.effects
         effects += [f"{name}: {text}" for text in effect_texts(top, j, hamiltonian)]
-        largest_effect = [part for part in left_out_of_levels(top, j, hamiltonian) if part.size is not None][:1]
+        largest_effect = [part for part in neglected_in_levels(top, j, hamiltonian) if part.size is not None][:1]
         neglected += [replace(part, name=f"{name}: {part.name}") for part in largest_effect]
     return {
         "effects": tuple(effects),
@@ -260,4 +262,4 @@ def _source_facts(request: Any, answer: Any) -> dict[str, Any]:
     }
 
 
-EMISSION = Numerics({"K": Goal("brightness")}, plan=plan_of_emission)
+EMISSION = Numerics({"K": Goal("brightness")}, plan=plan_emission)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_positive
-from rotor.quantum.quanta import of_rotation
+from rotor.quantum.quanta import rotational_quanta
 from rotor.spectra.lines import Lines
 from rotor.table import Table
 
@@ -37,7 +37,7 @@ class Patterns(Table):
         """Frequencies, intensities, counts and widths, and the rotational quantum numbers of both levels."""
         names = ("frequency_mhz", "intensity_nm2_mhz", "components", "width_mhz")
         out: dict[str, NDArray[Any]] = {name: getattr(self, name) for name in names}
-        quanta = of_rotation(self.lines.levels.quanta)
+        quanta = rotational_quanta(self.lines.levels.quanta)
         for side, rows in (("upper", self.lines.upper), ("lower", self.lines.lower)):
             out |= {f"{name}_{side}": column[rows[self.strongest]] for name, column in quanta.items()}
         return out
@@ -58,7 +58,7 @@ def patterns(lines: Lines, resolution_mhz: float) -> Patterns:
     if not len(lines):
         empty = np.zeros(0)
         return Patterns(lines, resolution_mhz, empty, empty, empty.astype(int), empty, empty.astype(int))
-    quanta = of_rotation(lines.levels.quanta).values()
+    quanta = rotational_quanta(lines.levels.quanta).values()
     names = np.stack([column[rows] for rows in (lines.upper, lines.lower) for column in quanta], axis=1)
     line_of_row = np.unique(names, axis=0, return_inverse=True)[1].ravel()
     order = np.lexsort((lines.frequency_mhz, line_of_row))

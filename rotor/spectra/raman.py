@@ -29,7 +29,7 @@ from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.levels import Levels, TransitionTable
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.intensity import JMAX_DEFAULT_LIMIT
-from rotor.spectra.lines import partition_of
+from rotor.spectra.lines import line_partition
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
 from rotor.thermodynamics import PartitionFunction, VibrationalStates, partition_function
 
@@ -203,13 +203,13 @@ def raman_lines(
     [-20.0, -12.0, 12.0, 20.0]
     """
     _refuse_nonsense(temperature_k, laser_nm, min_relative)
-    tensor, least = _tensor_of(top), min_relative or 0.0
+    tensor, least = _polarizability(top), min_relative or 0.0
     if jmax is None:
         jmax = jmax_for_raman(top, temperature_k, min_relative or DEFAULT_MIN_RELATIVE)
 
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
     transitions = raman_transitions(levels, tensor, top.spin_weights)
-    partition = partition_of(top, temperature_k, q, 1.0, vibrations, effects) or partition_function(
+    partition = line_partition(top, temperature_k, q, 1.0, vibrations, effects) or partition_function(
         top, temperature_k, effects=effects
     )
     lines = _both_ways(top, levels, transitions, temperature_k, laser_nm, least, partition)
@@ -220,7 +220,7 @@ def raman_lines(
     return lines.where(np.argsort(lines.shift_mhz, kind="stable"))
 
 
-def _tensor_of(top: Top) -> Tensor:
+def _polarizability(top: Top) -> Tensor:
     """The polarizability in Å³; zero for a spherical top without one, since its isotropic part has no rotational lines."""
     if top.polarizability_abc_angstrom3 is not None:
         return top.polarizability_abc_angstrom3
@@ -296,4 +296,4 @@ def jmax_for_raman(top: Top, temperature_k: float, min_relative: float) -> int:
 
 def anisotropy_angstrom3(top: Top) -> float:
     """γ of a top's polarizability in Å³: |α∥ - α⊥| for an axial tensor, 0 for a spherical top; ValueError if unknown."""
-    return math.sqrt(anisotropy_squared(_tensor_of(top)))
+    return math.sqrt(anisotropy_squared(_polarizability(top)))

@@ -12,7 +12,7 @@ from rotor.arrays import Ints
 from rotor.checks import require_top
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.budgets import parameter_names
-from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
+from rotor.quantum.estimates.limits import all_limits, limit_facts, populated_j
 from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, line_errors, source_of_errors
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
@@ -144,7 +144,7 @@ class RamanAnswer(TextOf):
         errors = None
         if covariance is not None:
             errors = line_errors(level_spread(top, lines.levels, covariance), lines.initial, lines.final)
-        limits = every_limit(top, populated_j(top, lines.temperature_k), effects)
+        limits = all_limits(top, populated_j(top, lines.temperature_k), effects)
         source = source_of_errors(top, parameters, None)
         return frequencies_budget(lines.levels, limits, lines.cross_section_cm2_per_sr, errors, source, "shifts")
 

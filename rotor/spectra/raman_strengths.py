@@ -30,7 +30,7 @@ from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.symmetric_top_elements import coupling
 from rotor.quantum.tensors import body_tensor
 from rotor.quantum.wang.basis import wang_blocks
-from rotor.tops.operators import AXIAL_REPRESENTATION, axes_of
+from rotor.tops.operators import AXIAL_REPRESENTATION, axis_order
 from rotor.tops.spins.spin_weights import SpinWeights
 
 NO_WEIGHTS = SpinWeights()
@@ -90,7 +90,7 @@ def raman_transitions(
 
 def _refuse_without_axis(levels: Levels, tensor: Floats) -> None:
     """Raise ValueError if a tensor connects different K, where elements of both signs of K would add up."""
-    z = "abc".index(axes_of(str(levels.representation))[2])
+    z = "abc".index(axis_order(str(levels.representation))[2])
     along = 1.5 * (tensor[z, z] - np.trace(tensor) / 3)
     if abs(anisotropy_squared(tensor) - along**2) > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
         raise ValueError(
@@ -139,7 +139,7 @@ def _linear(levels: Levels, tensor: Floats) -> RamanTransitions:
 def _symmetric(levels: Levels, tensor: Floats, spin_weights: SpinWeights) -> RamanTransitions:
     """Transitions with ΔK = 0 if the tensor has the axis of the top; otherwise (numerically symmetric tops) in Wang's basis."""
     representation = AXIAL_REPRESENTATION[levels.kind]
-    x, y, z = ("abc".index(axis) for axis in axes_of(representation))
+    x, y, z = ("abc".index(axis) for axis in axis_order(representation))
     along = (2 * tensor[z, z] - tensor[x, x] - tensor[y, y]) / np.sqrt(6)
     if anisotropy_squared(tensor) - 1.5 * along**2 > (ROUND_OFF * np.linalg.norm(tensor)) ** 2:
         if "v" in levels.quanta:
@@ -189,7 +189,7 @@ def _without_axis(levels: Levels, tensor: Floats, spin_weights: SpinWeights, rep
         first = levels.rows_of(j=np.full(len(k), low.basis.j), k=low.basis.k[k])
         second = levels.rows_of(j=np.full(len(i), up.basis.j), k=up.basis.k[i])
         inelastic = first != second
-        weight = np.full(int(inelastic.sum()), float(spin_weights.of_ka_kc(low.basis.species)))
+        weight = np.full(int(inelastic.sum()), float(spin_weights.asymmetric_weight(low.basis.species)))
         pieces.append(_ordered(levels, strength[i, k][inelastic], first[inelastic], second[inelastic], weight))
     return _summed(levels, _joined(pieces))
 

@@ -15,9 +15,9 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_one_of, require_top
+from rotor.checks import require_choice, require_top
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
+from rotor.quantum.estimates.limits import all_limits, limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget
@@ -164,7 +164,7 @@ class SpectrumRequest:
         self._check_shape()
 
     def _check_shape(self) -> None:
-        require_one_of("profile", self.shape, PROFILES)
+        require_choice("profile", self.shape, PROFILES)
         if self.shape == "sticks" and self.fwhm_mhz is not None:
             raise ValueError("fwhm_mhz: sticks have no width; leave it out or choose another profile")
         if self.shape == "sticks" and self.layer is not None:
@@ -198,7 +198,7 @@ class SpectrumAnswer(TextOf):
     def notes(self) -> tuple[str, ...]:
         """Limits of the lines, and a given partition function that is far from the sum over levels."""
         stated, lines = self.request.q, self.lines
-        if stated is None or not lines.levels.of_named_constants:
+        if stated is None or not lines.levels.has_named_constants:
             return tuple(lines.warnings)
         try:
             expected = _expected_q(lines)
@@ -245,13 +245,13 @@ class SpectrumAnswer(TextOf):
 
         first, last = self.request.range_mhz
         shape: dict[str, Any] = {"profile": self.request.shape, "fwhm_mhz": self.request.fwhm_mhz}
-        lines = self._lines_of_profile(shape)
+        lines = self._profile_lines(shape)
         grid = resolving_grid(lines, range_mhz=(first, last) if math.isfinite(last) else None, **shape)
         spectrum = replace(Spectrum.from_lines(lines, grid, **shape), lines=self.lines)
         layer = self.request.layer
         return spectrum if layer is None else optical_depth(spectrum, layer.pressure_bar, layer.path_cm)
 
-    def _lines_of_profile(self, shape: Mapping[str, Any]) -> Lines:
+    def _profile_lines(self, shape: Mapping[str, Any]) -> Lines:
         """The lines of the list, and lines outside a finite range whose wings reach into it."""
         from rotor.spectra.spectrum import reach_at
 
@@ -295,10 +295,8 @@ class SpectrumAnswer(TextOf):
     def errors(self) -> ErrorBudget:
         """Error budget of the frequencies."""
         lines = self.lines
-        named = lines.levels.of_named_constants
-        limits = (
-            every_limit(lines.top, self.typical_j, lines.levels.effects, tabulated=lines.tabulated) if named else ()
-        )
+        named = lines.levels.has_named_constants
+        limits = all_limits(lines.top, self.typical_j, lines.levels.effects, tabulated=lines.tabulated) if named else ()
         return frequencies_budget(lines.levels, limits, lines.intensity_nm2_mhz, lines.error_mhz, lines.errors_from)
 
     def facts(self) -> dict[str, Any]:
@@ -325,7 +323,7 @@ class SpectrumAnswer(TextOf):
             **limit_facts(lines.top, self.typical_j, lines.levels.effects),
             "errors": self.errors.as_json(),
         }
-        if lines.levels.of_named_constants:
+        if lines.levels.has_named_constants:
             return facts
         return without_constants(facts) | {"q": facts["q"] | {"classical": None}, "limits": []}
 

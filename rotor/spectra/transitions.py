@@ -83,25 +83,25 @@ def all_transitions(
             [piece for states, mu in dipoles.items() for piece in _closed_form(levels, states, mu, range_mhz, cut)]
         )
 
-    blocks, some_missing = _existing_blocks(levels)
+    blocks, incomplete = _existing_blocks(levels)
     solved = [block for block in blocks if isinstance(block, SolvedBlock) and block.alone]
     if cut is not None and solved and len(solved) == len(blocks) and are_whole(solved) and not moments:
         vector = body_tensor(dipoles[0, 0], 1, levels.representation)
         strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
         transitions = _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong)])
-        return _rows(transitions, levels.weight[transitions.lower] > 0) if some_missing else transitions
+        return _rows(transitions, levels.weight[transitions.lower] > 0) if incomplete else transitions
     if (
         cut is not None
         and not moments
         and (stacked := _many_f_transitions(levels, blocks, dipoles, range_mhz, cut)) is not None
     ):
-        return _rows(stacked, levels.weight[stacked.lower] > 0) if some_missing else stacked
+        return _rows(stacked, levels.weight[stacked.lower] > 0) if incomplete else stacked
     pairs, between = _connections(levels, blocks, dipoles, moments)
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
         transitions = _all_lines(pairs, between)
     else:
         transitions = _selected_lines(levels, pairs, between, range_mhz, cut)
-    return _rows(transitions, levels.weight[transitions.lower] > 0) if some_missing else transitions
+    return _rows(transitions, levels.weight[transitions.lower] > 0) if incomplete else transitions
 
 
 def _connections(
@@ -156,7 +156,7 @@ def _all_lines(pairs: list[Pair], between: Amplitudes) -> Transitions:
     sizes = [len(up.energies_mhz) * len(low.energies_mhz) for up, low in pairs]
     total = sum(sizes)
     out = Transitions(np.empty(total), np.empty(total), np.empty(total, np.int32), np.empty(total, np.int32))
-    fill = _fill_of(total)
+    fill = _choose_fill(total)
 
     at = 0
     for (up, low), size in zip(pairs, sizes, strict=True):
@@ -169,7 +169,7 @@ def _all_lines(pairs: list[Pair], between: Amplitudes) -> Transitions:
     return out
 
 
-def _fill_of(total: int) -> Callable[..., None]:
+def _choose_fill(total: int) -> Callable[..., None]:
     """The compiled loop if loading it pays, or if it is loaded already; else the plain loop. Both give the same bits."""
     if total < LONG_LIST and COMPILED not in sys.modules:
         return _fill_pair
@@ -241,7 +241,7 @@ def _group_transitions(
     places = np.flatnonzero(keep)
     above = places // low.shape[1]
     below = above // up.shape[1] * low.shape[1] + places - above * low.shape[1]
-    return _in_order_of_energy(
+    return _upward_lines(
         up.ravel()[above], low.ravel()[below], difference.ravel()[places], strength.ravel()[places], range_mhz, cut
     )
 
@@ -271,10 +271,10 @@ def _with_frequencies(
 ) -> Transitions:  # fmt: skip
     """Lines between rows of levels, in either order, that lie in the range and reach the cut."""
     difference = levels.energy_mhz[first] - levels.energy_mhz[second]
-    return _in_order_of_energy(first, second, difference, strength, range_mhz, cut)
+    return _upward_lines(first, second, difference, strength, range_mhz, cut)
 
 
-def _in_order_of_energy(
+def _upward_lines(
     first: Indices, second: Indices, difference: Floats, strength: Floats, range_mhz: tuple[float, float],
     cut: IntensityCut | None,
 ) -> Transitions:  # fmt: skip

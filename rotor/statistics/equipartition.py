@@ -250,7 +250,7 @@ def equipartition(
     used = 2.0 * math.fsum(float(values.sum()) for values in data.values()) / total if kt is None else kt
     if not used > 0.0:
         raise ValueError("every kinetic energy is zero: there is no temperature to find from them")
-    means = [_mean_of(name, 2.0 / used * values, table.counts[name]) for name, values in data.items()]
+    means = [_ratio_mean(name, 2.0 / used * values, table.counts[name]) for name, values in data.items()]
     means = [_with_deviation(mean, *_expected(means, kt is None)) for mean in means]
     degrees = tuple(_tested(mean, 2.0 / used * data[mean.name]) for mean in means)
     return _family(used, kt is not None, confidence, degrees)
@@ -297,7 +297,7 @@ def _checked(name: str, values: ArrayLike) -> Floats:
     return np.atleast_2d(array)
 
 
-def _mean_of(name: str, ratios: Floats, count: float) -> _Mean:
+def _ratio_mean(name: str, ratios: Floats, count: float) -> _Mean:
     """The mean over molecules and frames, with its expected statistical spread."""
     if len(ratios) == 1:
         return _Mean(name, count, float(ratios.sum()) / count, math.sqrt(2.0 / count), None, 1)

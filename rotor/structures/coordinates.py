@@ -18,7 +18,7 @@ from rotor.arrays import Floats
 from rotor.molecules.internal_coordinates import Coordinate, bend, stretch, torsion, wilson_b
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.operations import symmetrised
-from rotor.molecules.symmetry.point_group import symmetry_of
+from rotor.molecules.symmetry.point_group import molecule_symmetry
 
 Atoms = tuple[int, ...]  # counted from 1
 
@@ -66,7 +66,7 @@ def _function(atoms: Atoms) -> Coordinate:
 
 def permutations(molecule: Molecule) -> list[NDArray[np.int64]]:
     """The permutations of atoms under all operations of the nuclear framework; isotopes are not distinguished."""
-    symmetry = symmetry_of(_without_isotopes(molecule))
+    symmetry = molecule_symmetry(_without_isotopes(molecule))
     return [operation.permutation for operation in (*symmetry.rotations, *symmetry.improper)]
 
 
@@ -92,7 +92,9 @@ def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
         raise ValueError(
             f"{name} = {list(atoms)}: a straight angle cannot be fitted; leave it out, and it stays straight"
         )
-    images = dict.fromkeys(_one_way(tuple(int(p[atom - 1]) + 1 for atom in chosen)) for p in permutations(molecule))
+    images = dict.fromkeys(
+        _canonical_order(tuple(int(p[atom - 1]) + 1 for atom in chosen)) for p in permutations(molecule)
+    )
     if len(chosen) == 4:  # a reflection reverses the sign of a dihedral angle: such images are not equivalent
         value = coordinate.value(molecule.positions_angstrom)
         images = {
@@ -100,10 +102,10 @@ def named(molecule: Molecule, name: str, atoms: Sequence[int]) -> Named:
             for image in images
             if abs(Named("", image, (image,)).value(molecule.positions_angstrom) - value) < 1e-3
         }
-    return Named(name, chosen, tuple(dict.fromkeys((_one_way(chosen), *images))))
+    return Named(name, chosen, tuple(dict.fromkeys((_canonical_order(chosen), *images))))
 
 
-def _one_way(atoms: Atoms) -> Atoms:
+def _canonical_order(atoms: Atoms) -> Atoms:
     """The atoms in a unique order: reading them backwards gives the same coordinate."""
     return min(atoms, atoms[::-1])
 
@@ -116,7 +118,7 @@ def symmetric_geometry(molecule: Molecule) -> Molecule:
     0.0
     """
     plain = _without_isotopes(molecule)
-    symmetry, centre = symmetry_of(plain), plain.centre_of_mass_angstrom
+    symmetry, centre = molecule_symmetry(plain), plain.centre_of_mass_angstrom
     points = plain.positions_angstrom - centre
     if symmetry.linear:
         axis = symmetry.axes_abc[0]
@@ -138,7 +140,7 @@ def symmetric_displacements(molecule: Molecule) -> Floats:
     (9, 2)
     """
     plain = _without_isotopes(molecule)
-    symmetry = symmetry_of(plain)
+    symmetry = molecule_symmetry(plain)
     positions = plain.positions_angstrom - plain.centre_of_mass_angstrom
     n = len(positions)
     if symmetry.linear:
@@ -252,7 +254,7 @@ def _distinct(molecule: Molecule, candidates: Sequence[tuple[str, Atoms]]) -> li
     seen: set[Atoms] = set()
     out = []
     for name, atoms in candidates:
-        if _one_way(atoms) in seen:
+        if _canonical_order(atoms) in seen:
             continue
         try:
             coordinate = named(molecule, name, atoms)

@@ -16,7 +16,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.symmetry.point_group import symmetry_of
+from rotor.molecules.symmetry.point_group import molecule_symmetry
 from rotor.structures.coordinates import Named, bonds_and_angles
 from rotor.structures.family import PLANAR_WITHIN_ANGSTROM, Family, Species
 from rotor.structures.kraitchman import PAIRS, SHAPES, Substituted, kraitchman
@@ -191,7 +191,7 @@ def _site_projector(family: Family, ours: Floats, atom: int) -> Floats:
 
     For an atom on an axis or in a plane of symmetry, the coordinates across it are exactly 0.
     """
-    symmetry = symmetry_of(_in_frame(family.molecule, ours))
+    symmetry = molecule_symmetry(_in_frame(family.molecule, ours))
     if family.linear:  # the half turn of a centrosymmetric molecule is the last rotation
         turned = symmetry.rotations[-1].permutation
         return np.eye(3) * float(len(symmetry.rotations) == 1 or turned[atom] != atom)
@@ -236,7 +236,7 @@ def _with_equal_atoms(family: Family, atoms: list[SubstitutedAtom], ours: Floats
     for place, atom in enumerate(atoms):
         positions[atom.atom - 1] = atom.coordinates_angstrom
         moves[3 * place : 3 * place + 3, atom.atom - 1] = atom.directions
-    symmetry = symmetry_of(_in_frame(family.molecule, ours))
+    symmetry = molecule_symmetry(_in_frame(family.molecule, ours))
     for operation in (*symmetry.rotations, *symmetry.improper):
         for place, atom in enumerate(atoms):
             image = int(operation.permutation[atom.atom - 1])

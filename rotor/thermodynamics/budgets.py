@@ -52,19 +52,19 @@ def q_budget(functions: ThermoFunctions, j: int, limits: Sequence[Limit], parame
     return ErrorBudget(
         of="Q, relative",
         unit="",
-        rounding=rounding_of_q(functions),
+        rounding=q_rounding(functions),
         truncation=ErrorTerm(
             float(functions.relative_error.max()),
             "levels left out of the sums, of Q, U and C_v",
             "a smaller relative error",
         ),
-        model=model_of_q(functions, j, limits),
-        data=data_of_q(functions, parameters),
+        model=q_model_error(functions, j, limits),
+        data=q_data_error(functions, parameters),
         statistics=NO_SAMPLES,
     )
 
 
-def rounding_of_q(functions: ThermoFunctions) -> ErrorTerm:
+def q_rounding(functions: ThermoFunctions) -> ErrorTerm:
     """Bound on the rounding error of Q, from the largest energy of the highest J in each sum."""
     largest = max(functions.top.rotational_constants_mhz, key=lambda c: c if math.isfinite(c) else 0.0)
     j = np.maximum(functions.jmax, 0).astype(np.float64)
@@ -73,13 +73,13 @@ def rounding_of_q(functions: ThermoFunctions) -> ErrorTerm:
     return ErrorTerm(float((ROUNDING * (1 + energy) + EPS * terms).max()), "levels and their sums in double precision")
 
 
-def data_of_q(functions: ThermoFunctions, parameters: Sequence[str]) -> ErrorTerm:
+def q_data_error(functions: ThermoFunctions, parameters: Sequence[str]) -> ErrorTerm:
     """Standard deviation of ln Q from the uncertainties of A, B and C."""
     top = functions.top
     covariance = known_covariance(top, parameters)
     if covariance is None:
         return ErrorTerm(None, (source_of_errors(top, parameters, None) or NO_UNCERTAINTIES).removeprefix("none: "))
-    axes, rotations = _axes_of(top), 2 if top.kind == "linear" else 3
+    axes, rotations = _constant_axes(top), 2 if top.kind == "linear" else 3
     share = np.array(
         [axes[name] / (rotations * top.constants[name]) if name in axes else 0.0 for name in covariance.names]
     )
@@ -88,14 +88,14 @@ def data_of_q(functions: ThermoFunctions, parameters: Sequence[str]) -> ErrorTer
     return ErrorTerm(value, "uncertainties of A, B, C", "more precise constants")
 
 
-def _axes_of(top: Top) -> dict[str, int]:
+def _constant_axes(top: Top) -> dict[str, int]:
     """The number of axes that each rotational constant belongs to."""
     if top.kind in ("linear", "spherical"):
         return {"B": 2 if top.kind == "linear" else 3}
     return {"asymmetric": {"A": 1, "B": 1, "C": 1}, "prolate": {"A": 1, "B": 2}, "oblate": {"B": 2, "C": 1}}[top.kind]
 
 
-def model_of_q(functions: ThermoFunctions, j: int, limits: Sequence[Limit]) -> ErrorTerm:
+def q_model_error(functions: ThermoFunctions, j: int, limits: Sequence[Limit]) -> ErrorTerm:
     """Relative size of neglected effects, level shifts over kT; not estimated if vibration is neglected.
 
     Splittings by spins (`SPIN_LIMITS`) matter most at the lowest temperature; other effects at the highest, with high J populated.

@@ -108,7 +108,7 @@ class GasAnswer(TextOf):
     @cached_property
     def probes(self) -> Probes:
         """The vector and tensor of the correlation functions."""
-        return probes_of(self.request.top)
+        return top_probes(self.request.top)
 
     @property
     def short_time(self) -> ShortTime:
@@ -164,12 +164,12 @@ class GasAnswer(TextOf):
             "ks_p": test.ks_p,
             "failing": list(test.failing),
             "degrees": [asdict(d) | {"energy_cm": half_kt * d.mean, "expected_cm": half_kt} for d in test.degrees],
-            **self._facts_of_correlations(),
+            **self._correlation_facts(),
             "left_out": self.left_out,
             "errors": self.errors.as_json(),
         }
 
-    def _facts_of_correlations(self) -> dict[str, Any]:
+    def _correlation_facts(self) -> dict[str, Any]:
         names = ("vector_abc", "vector_source", "tensor_source", "short_time_per_ps2", "c1_plateau")
         if self.correlations is None:
             return dict.fromkeys(names)
@@ -208,7 +208,7 @@ def _correlations(
     """C1 and C2, with times in ps, from a separate sample of molecules (another stream of the same seed)."""
     if request.times_ps is None:
         return None
-    probes, times = probes_of(request.top), np.array(request.times_ps)
+    probes, times = top_probes(request.top), np.array(request.times_ps)
     curves = free_gas_correlations(
         request.top.moments_u_angstrom2,
         request.kt,
@@ -223,7 +223,7 @@ def _correlations(
     return replace(curves, times=times)
 
 
-def probes_of(top: Top) -> Probes:
+def top_probes(top: Top) -> Probes:
     """The dipole and the polarizability of a top if they are known and anisotropic; otherwise its figure axis."""
     axis = 2 if top.kind == "oblate" else 0
     vector, vector_source = np.eye(3)[axis], f"axis {'abc'[axis]}, as there is no dipole that is known"
@@ -241,7 +241,7 @@ def probes_of(top: Top) -> Probes:
 
 def settling_times_ps(top: Top, temperature_k: float) -> tuple[float, ...]:
     """Times in ps until the correlation functions of a free gas have settled: 12 rad of rms rotation."""
-    probes = probes_of(top)
+    probes = top_probes(top)
     start = short_time(top.moments_u_angstrom2, units.EV_PER_K * temperature_k, probes.vector, probes.tensor)
     last = SETTLED / math.sqrt(max(start.m2, start.n2 / 3)) * units.ASE_TIME_PS
     return tuple(np.linspace(0.0, last, DEFAULT_TIMES).tolist())

@@ -194,7 +194,7 @@ def _shares(top: Top, by_state: list[SpinWeights], mean: float) -> tuple[tuple[f
     volume = math.prod(first["ABC".index(name)] for name in names)
     shares = [(by_state[0].mean / mean, 0.0)]
     for v in range(1, top.states.count):
-        constants = top.states.of_state(v)
+        constants = top.states.for_state(v)
         axes = [constants.get(name, constants["B"]) for name in names]
         shares.append(
             (by_state[v].mean / mean * math.sqrt(volume / math.prod(axes)), constants.get("E", 0.0) / units.MHZ_PER_K)

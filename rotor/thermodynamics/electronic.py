@@ -94,7 +94,7 @@ class ElectronicStates:
         return np.log(q), first, second - first**2
 
 
-def electronic_states_of(molecule: Molecule | None) -> ElectronicStates:
+def electronic_states(molecule: Molecule | None) -> ElectronicStates:
     """The spin degeneracy of a molecule: its multiplicity if known, otherwise 2 for an odd number of electrons and 1 for an even."""
     if molecule is None:
         return ElectronicStates()

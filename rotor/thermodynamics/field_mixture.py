@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
-from rotor.checks import require_between, require_one_of, require_positive
+from rotor.checks import require_between, require_choice, require_positive
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.stark import checked_direction, stark_map
 from rotor.quantum.effects.watson import SEMI_RIGID
@@ -186,7 +186,7 @@ def field_mixture(
     """
     require_positive("temperature_k", temperature_k, "K")
     require_between("left_out", left_out, 1e-9, 0.5)
-    require_one_of("populations", populations, POPULATIONS)
+    require_choice("populations", populations, POPULATIONS)
     checked_direction(direction)
     j, q, ground = _followed_j(top, temperature_k, left_out)
     states = stark_map(

@@ -32,7 +32,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.table import Table
 from rotor.thermodynamics.classical_limit import classical_limit
-from rotor.thermodynamics.electronic import ElectronicStates, electronic_states_of
+from rotor.thermodynamics.electronic import ElectronicStates, electronic_states
 from rotor.thermodynamics.level_sums import LevelSums, Progress, checked_temperatures, level_sums, lowest_level_k
 from rotor.thermodynamics.species import implied_symmetry_number, spin_species
 from rotor.thermodynamics.vibration import VibrationalStates, vibrational_functions
@@ -170,7 +170,7 @@ def thermodynamic_functions(
         "ortho", or a class of the spin weights such as "E"; see `species_names`.
     vibrations : vibrational states; none: vibration is left out.
     pressure_bar : pressure of an ideal gas, whose functions are then computed too; the top must have a mass.
-    electronic : electronic states of the ideal gas. Default: the spin functions of the molecule (`electronic_states_of`), or none if
+    electronic : electronic states of the ideal gas. Default: the spin functions of the molecule (`electronic_states`), or none if
         the effects contain the electron spin, because Q then counts its functions.
     relative_error : largest error of Q, U and C_v. It can be exceeded, up to 10 %, if levels beyond the range of the distortion
         constants are populated; `ThermoFunctions.relative_error` is the error reached.
@@ -204,7 +204,7 @@ def thermodynamic_functions(
     if pressure_bar is None:
         return _with_vibration(rotation, vibrations)
     if electronic is None:
-        electronic = ElectronicStates() if _has_electrons(top, effects) else electronic_states_of(top.molecule)
+        electronic = ElectronicStates() if _has_electrons(top, effects) else electronic_states(top.molecule)
     return _with_gas(_with_vibration(rotation, vibrations), pressure_bar, electronic)
 
 
@@ -230,7 +230,7 @@ def _tunnelling_components(top: Top) -> int:
     return len(top.states.weights) if top.states is not None and 0 in top.states.weights else 1
 
 
-def refuse_species_of_totals(top: Top, species: str, effects: Sequence[QuantumEffect]) -> None:
+def refuse_species_with_totals(top: Top, species: str, effects: Sequence[QuantumEffect]) -> None:
     """Raise ValueError for a single species or a frozen mixture if nuclei are coupled to a total spin."""
     if species != "equilibrium" and any(spin.total for effect in effects for spin in effect.spins(top)):
         raise ValueError(
@@ -265,7 +265,7 @@ def _with_spins(
     from rotor.thermodynamics.spin_factor import spin_functions
     from rotor.thermodynamics.spin_sums import spin_sums
 
-    refuse_species_of_totals(top, species, effects)
+    refuse_species_with_totals(top, species, effects)
     spin_result = spin_sums(top, list(parts.values()), temperatures, relative_error, effects, progress)
     counted = spin_result.split.any()
     method = next((effect.method for effect in effects if isinstance(effect, HyperfineMethod)), EXACT)

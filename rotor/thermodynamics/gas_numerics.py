@@ -48,7 +48,7 @@ def quantile(confidence: float) -> float:
     return NormalDist().inv_cdf(0.5 + 0.5 * confidence)
 
 
-def degrees_of(request: GasRequest) -> int:
+def count_degrees_per_molecule(request: GasRequest) -> int:
     """Degrees of freedom of one molecule; bare constants have no mass and hence no translation."""
     from rotor.statistics.degrees_of_freedom import count_degrees
 
@@ -84,7 +84,7 @@ def _spread(request: GasRequest, allowed: float, unit: str) -> float:
     """Standard error times √N, in the unit of the accuracy."""
     if unit:
         scale = request.temperature_k if unit == "K" else 100.0
-        return scale * relative_spread(unit, degrees_of(request))
+        return scale * relative_spread(unit, count_degrees_per_molecule(request))
     if request.times_ps is None:
         raise ValueError(
             f"accuracy: {allowed:g}: an accuracy without a unit is one of correlation functions; give observables.times, or the unit K or %"
@@ -104,14 +104,14 @@ def _largest_error(answer: GasAnswer) -> float:
     return max(float(error.max()) for error in (curves.c1_error, curves.c2_error) if error is not None)
 
 
-def error_of_gas(unit: str, answer: GasAnswer) -> float:
+def gas_error(unit: str, answer: GasAnswer) -> float:
     """Half-width of the confidence interval of the result at the requested confidence."""
     request = answer.request
     z = quantile(request.confidence)
     if not unit:
         return z * _largest_error(answer)
     scale = request.temperature_k if unit == "K" else 100.0
-    return z * scale * relative_spread(unit, degrees_of(request)) / math.sqrt(request.molecules)
+    return z * scale * relative_spread(unit, count_degrees_per_molecule(request)) / math.sqrt(request.molecules)
 
 
 def _mean_square(errors: list[float]) -> float:
@@ -190,7 +190,7 @@ CURVES = _molecules(
 )
 
 
-def left_out_of_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
+def neglected_in_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
     """Effects that a classical gas of rigid molecules neglects, in percent of Q, largest first."""
     from rotor.thermodynamics.classical_limit import classical_limit
 
@@ -204,7 +204,7 @@ def left_out_of_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
     )
 
 
-def plan_of_gas(request: Any) -> Plan:
+def plan_gas(request: Any) -> Plan:
     """The plan of a classical gas."""
     from rotor.classical.gas.ensembles import PIECE
     from rotor.thermodynamics.classical_gas import answer_gas
@@ -220,13 +220,13 @@ def plan_of_gas(request: Any) -> Plan:
         counts={"molecules": request.molecules, "times": len(request.times_ps or ())},
         seconds=cost.seconds,
         memory_mb=replace(cost, size=together).memory_mb + rest,
-        left_out=left_out_of_gas(request.top, request.temperature_k),
+        left_out=neglected_in_gas(request.top, request.temperature_k),
     )
 
 
 def _goal(quantity: str, unit: str) -> Goal:
     return Goal(
-        quantity, lambda _, request, allowed: choose_molecules(unit, request, allowed), partial(error_of_gas, unit)
+        quantity, lambda _, request, allowed: choose_molecules(unit, request, allowed), partial(gas_error, unit)
     )
 
 
@@ -235,5 +235,5 @@ GAS = Numerics(
     percent=lambda scene: "%" if scene.observables.times is None else "",  # C1 and C2 are 1 at first
     knobs=(KINETIC, CURVES),
     remarks=lambda request: (f"the motion of each molecule: {NOTHING_CHEAPER}; theta functions, round-off alone",),
-    plan=plan_of_gas,
+    plan=plan_gas,
 )

@@ -73,7 +73,7 @@ class HinderedRotorFunctions(Table):
             "cv_over_r": self.cv_over_r,
         }
 
-    def of_method(self, name: str) -> HinderedRotorFunctions:
+    def for_method(self, name: str) -> HinderedRotorFunctions:
         """The rows of a method."""
         rows = self.method == name
         return HinderedRotorFunctions(**{key: getattr(self, key)[rows] for key in self.__dataclass_fields__})
@@ -112,7 +112,7 @@ def hindered_rotor_functions(
     >>> from rotor.quantum.bond_torsion import FourierSeries, no_terms
     >>> methyl = BondTorsion(FourierSeries(160e3, *no_terms()), FourierSeries(0.0, *no_terms()), 3)
     >>> functions = hindered_rotor_functions(methyl, [1000.0], 3)
-    >>> functions.of_method("levels").cv_over_r.round(6).tolist()  # 1/2 of a free rotor
+    >>> functions.for_method("levels").cv_over_r.round(6).tolist()  # 1/2 of a free rotor
     [0.5]
     """
     t = np.atleast_1d(np.asarray(temperatures_k, dtype=float))

@@ -8,10 +8,10 @@ from typing import Any
 from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.estimates.plans import plan_fields
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import LeftOut, Plan, peak_mb, plan_of_whole, timed
+from rotor.requests.plan import LeftOut, Plan, peak_mb, plan_complete_run, timed
 
 
-def plan_of_thermo(request: Any) -> Plan:
+def plan_thermo(request: Any) -> Plan:
     """The plan of thermodynamic functions; levels and seconds refer to the highest temperature."""
     from rotor.thermodynamics.request import answer_thermo
 
@@ -34,7 +34,7 @@ def plan_of_thermo(request: Any) -> Plan:
     )
 
 
-def plan_of_torsion(request: Any) -> Plan:
+def plan_torsion(request: Any) -> Plan:
     """The plan of a torsion."""
     from rotor.thermodynamics.torsion_request import answer_torsion
 
@@ -49,7 +49,7 @@ def plan_of_torsion(request: Any) -> Plan:
             "left_out": (LeftOut("coupling with other vibrations and the whole rotation", None, "", "not estimated"),),
         }
 
-    return plan_of_whole("torsion", lambda: answer_torsion(request), describe)
+    return plan_complete_run("torsion", lambda: answer_torsion(request), describe)
 
 
 def _remark_on_basis(request: Any) -> tuple[str, ...]:
@@ -63,6 +63,6 @@ def _remark_on_basis(request: Any) -> tuple[str, ...]:
 THERMO = Numerics(
     {"": Goal("Q, U and C_v")},
     remarks=lambda request: ("vibration: its states are summed in closed form",) if request.vibrations else (),
-    plan=plan_of_thermo,
+    plan=plan_thermo,
 )
-TORSION = Numerics({"MHz": Goal("levels")}, remarks=_remark_on_basis, plan=plan_of_torsion)
+TORSION = Numerics({"MHz": Goal("levels")}, remarks=_remark_on_basis, plan=plan_torsion)

@@ -11,7 +11,7 @@ from rotor.checks import require_positive, require_top
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.limits import every_limit, limit_facts, populated_j
+from rotor.quantum.estimates.limits import all_limits, limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
@@ -24,7 +24,7 @@ from rotor.thermodynamics.electronic import ElectronicStates
 from rotor.thermodynamics.functions import (
     ThermoFunctions,
     refuse_electrons_twice,
-    refuse_species_of_totals,
+    refuse_species_with_totals,
     species_names,
     thermodynamic_functions,
 )
@@ -115,7 +115,7 @@ class ThermoRequest:
         if self.species not in names:
             only = "; its levels are all of one nuclear-spin species" if len(names) == 1 else ""
             raise ValueError(f"species: {self.species!r}: {self.top.name or 'this top'} has {', '.join(names)}{only}")
-        refuse_species_of_totals(self.top, self.species, self.effects)
+        refuse_species_with_totals(self.top, self.species, self.effects)
         if self.electronic is not None and self.pressure_bar is None:
             raise ValueError("electronic: counts in the ideal gas; give --gas, or its pressure")
         if self.pressure_bar is not None:
@@ -152,7 +152,7 @@ class ThermoAnswer(TextOf):
         top, effects = self.functions.top, self.effects
         j = populated_j(top, float(self.functions.temperature_k.max()))
         parameters = dict.fromkeys(name for effect in effects for name in effect.parameters(top))
-        return q_budget(self.functions, j, every_limit(top, j, effects), tuple(parameters))
+        return q_budget(self.functions, j, all_limits(top, j, effects), tuple(parameters))
 
     @property
     def notes(self) -> tuple[str, ...]:

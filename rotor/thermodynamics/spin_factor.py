@@ -66,15 +66,15 @@ def rotational_sum(top: Top, effects: Sequence[QuantumEffect]) -> RotationalSum:
     functions = prod(spin.twice + 1 for spin in spins.values() if not (three and spin.total))
     if not three:
         return RotationalSum(rest, functions)
-    weights, common = weights_of_three(coupled[0].twice)
+    weights, common = three_spin_weights(coupled[0].twice)
     return RotationalSum(rest, functions * common, weights)
 
 
-def weights_of_three(twice_i: int) -> tuple[SpinWeights, int]:
+def three_spin_weights(twice_i: int) -> tuple[SpinWeights, int]:
     """Spin weights by K modulo 3 of three equivalent nuclei of spin I, reduced, and their common divisor.
 
-    >>> weights, common = weights_of_three(2)
-    >>> weights.to_mapping(), common, weights_of_three(1)[1]
+    >>> weights, common = three_spin_weights(2)
+    >>> weights.to_mapping(), common, three_spin_weights(1)[1]
     ({'0': 11, '1': 8, '2': 8}, 1, 2)
     """
     n = twice_i + 1

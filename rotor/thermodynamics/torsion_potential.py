@@ -75,7 +75,7 @@ def _named_terms(potential: TorsionalPotential | str, rotation: BondRotation) ->
     """The given Fourier terms, or those of the table, and their source."""
     if potential == TABLE:
         return table_barrier(rotation)
-    return (terms_of_text(potential, rotation) if isinstance(potential, str) else potential), "given"
+    return (parse_potential(potential, rotation) if isinstance(potential, str) else potential), "given"
 
 
 def _rigid_kinetic(rotation: BondRotation, points: int) -> FourierSeries:
@@ -99,7 +99,7 @@ def _series(terms: TorsionalPotential) -> FourierSeries:
     return FourierSeries(-float(cosines.sum()), n, cosines, sines)
 
 
-def terms_of_text(text: str, rotation: BondRotation) -> TorsionalPotential:
+def parse_potential(text: str, rotation: BondRotation) -> TorsionalPotential:
     """Parse a potential such as "V3=400 V6=-10 cm-1": ½ V_n (1 - cos nα), ½ W_n sin nα; cm⁻¹ by default.
 
     Raises ValueError for other texts, repeated terms, and terms that the symmetry of the group excludes.

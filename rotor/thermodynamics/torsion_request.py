@@ -27,9 +27,9 @@ from rotor.thermodynamics.torsion_potential import (
     TABLE,
     Progress,
     is_scan,
+    parse_potential,
     potential_and_kinetic,
     table_barrier,
-    terms_of_text,
 )
 from rotor.tops.facts import top_facts
 
@@ -111,7 +111,7 @@ class TorsionRequest:
             require_positive("temperatures_k", temperature, "K")
         rotation = self.rotation
         if isinstance(self.potential, str) and "=" in self.potential:
-            terms_of_text(self.potential, rotation)
+            parse_potential(self.potential, rotation)
         elif self.potential == TABLE:
             table_barrier(rotation)
         if self.classical_k is not None:
@@ -209,7 +209,7 @@ class TorsionAnswer(TextOf):
             np.arange(count), np.zeros(count, dtype=np.int64), single, energies[:count] / units.MHZ_PER_CM, splitting
         )
 
-    def functions_of_levels(self, angles: Floats) -> Floats:
+    def wave_functions(self, angles: Floats) -> Floats:
         """Real wave functions (angles, levels) in the order of `levels`; for a pair ±σ the combination of even phase."""
         by_species = []
         for species in range(self.torsion.fold // 2 + 1):

@@ -14,9 +14,16 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from rotor.checks import first_names
-from rotor.tops.kind_of_constants import KNOWN, RIGID, kind_of, reduction_of, representation_of, vocabulary
-from rotor.tops.operators import Powers, powers_of_spelled, published_name, spelled_term
+from rotor.checks import Renamed, first_names
+from rotor.tops.kind_of_constants import (
+    KNOWN,
+    RIGID,
+    resolve_kind,
+    resolve_reduction,
+    resolve_representation,
+    vocabulary,
+)
+from rotor.tops.operators import Powers, published_name, spelled_powers, spelled_term
 from rotor.tops.uncertain_numbers import parse_named, write_number
 from rotor.units import parse_quantity
 
@@ -85,7 +92,7 @@ class Constants:
         named = _renamed([*values_mhz.items(), *_spelled(terms).items()], _published_name)
         _refuse_unknown(named)
         numbers = {name: _finite(name, value) for name, value in named.items()}
-        kind = kind_of(numbers, kind)
+        kind = resolve_kind(numbers, kind)
         values = _renamed(numbers.items(), lambda name: _name_in(kind, name))
 
         errors = _renamed((uncertainties or {}).items(), lambda name: _name_in(kind, _published_name(name)))
@@ -93,14 +100,14 @@ class Constants:
         _refuse_strays("uncertainties", errors, values)
         _refuse_strays("sources", origins, values)
 
-        reduction = reduction_of(kind, values, reduction)
+        reduction = resolve_reduction(kind, values, reduction)
         _refuse_misplaced(kind, reduction, dict(zip(values, (*values_mhz, *values), strict=False)))
         _refuse_disorder(kind, values)
 
         content = {
             "values": MappingProxyType(values),
             "reduction": reduction,
-            "representation": representation_of(kind, values, representation),
+            "representation": resolve_representation(kind, values, representation),
             "kind": kind,
             "uncertainties": MappingProxyType({name: _spread(name, errors[name]) for name in values if name in errors}),
             "sources": MappingProxyType(origins),
@@ -132,13 +139,15 @@ class Constants:
         """The constant of this name in MHz, or `default` if it is missing."""
         return self.values.get(_name_in(self.kind, _published_name(name)), default)
 
-    def own_name(self, name: str) -> str:
+    def spelling(self, name: str) -> str:
         """The spelling of a name in this set: Greek letters written out, no underscores, D for DJ of a linear molecule.
 
-        >>> Constants(B=5.0).own_name("D_J")
+        >>> Constants(B=5.0).spelling("D_J")
         'D'
         """
         return _name_in(self.kind, _published_name(name))
+
+    own_name = Renamed("spelling")
 
     @property
     def rigid(self) -> tuple[float, float, float]:
@@ -161,7 +170,7 @@ class Constants:
         >>> Constants(A=9.0, B=3.0, C=2.0, terms={(1, 0, 4): 1e-9}).terms
         {(1, 0, 4): 1e-09}
         """
-        return {powers: value for name, value in self.values.items() if (powers := powers_of_spelled(name))}
+        return {powers: value for name, value in self.values.items() if (powers := spelled_powers(name))}
 
     def replace(self, **changes: Any) -> Constants:
         """A changed copy. A constant set to None is removed; kind, reduction or representation None is inferred again.
@@ -252,7 +261,7 @@ def _published_name(name: str) -> str:
     """The name with Greek letters spelled out and without underscores: `Δ_JK` is `DeltaJK`; unknown names are unchanged."""
     plain = name.replace("_", "")
     plain = _GREEK.get(plain[:1], plain[:1]) + plain[1:]
-    return plain if plain in KNOWN or powers_of_spelled(plain) else name
+    return plain if plain in KNOWN or spelled_powers(plain) else name
 
 
 def _name_in(kind: str, name: str) -> str:
@@ -280,7 +289,7 @@ class UnknownConstantError(ValueError):
 
 def _refuse_unknown(names: Iterable[str]) -> None:
     for name in names:
-        if name not in KNOWN and not powers_of_spelled(name):
+        if name not in KNOWN and not spelled_powers(name):
             near = [candidate for candidate in KNOWN if candidate.casefold() == name.casefold()]
             near = near or difflib.get_close_matches(name.replace("_", ""), KNOWN, n=3)
             hint = f"did you mean {' or '.join(near)}? " if near else ""
@@ -304,7 +313,7 @@ def _refuse_misplaced(kind: str, reduction: str | None, typed: Mapping[str, str]
     """Raise ValueError for a name that this kind of top does not have. typed: names as typed, by published name."""
     allowed = vocabulary(kind, reduction)
     for name in typed:
-        if powers := powers_of_spelled(name):
+        if powers := spelled_powers(name):
             _refuse_named_term(kind, reduction, name, powers)
         elif name not in allowed:
             near = _counterpart(name, allowed)

@@ -21,7 +21,7 @@ from rotor.arrays import Floats
 from rotor.molecules.force_field import ForceField
 from rotor.tops.constants import Constants
 from rotor.tops.inertial_defect import inertia_by_modes, inertial_defect_u_angstrom2, is_planar
-from rotor.tops.operators import axes_of
+from rotor.tops.operators import axis_order
 from rotor.tops.top import Top
 from rotor.units import ELEMENTARY_CHARGE_C, PLANCK_J_S, ROTATIONAL_MHZ_U_ANGSTROM2
 
@@ -184,7 +184,7 @@ def distortion_constants(field: ForceField, *, reduction: str = "S", representat
 
 def _asymmetric(rigid: Constants, tensor: Floats, reduction: str, representation: str) -> Constants:
     rigid = rigid.replace(representation=representation)
-    x, y, z = ("abc".index(letter) for letter in axes_of(representation))
+    x, y, z = ("abc".index(letter) for letter in axis_order(representation))
     quartic = reduced(tensor, np.array(rigid.rigid), (x, y, z), reduction)
     if reduction == "S":
         return rigid.replace(DJ=-quartic.jj, DJK=-quartic.jz, DK=-quartic.zz, d1=quartic.ju / 2, d2=quartic.four)

@@ -25,7 +25,7 @@ def top_facts(top: Top) -> dict[str, Any]:
     frame, near = top.frame, top.symmetry.near if top.symmetry else None
     return {
         "name": top.name or None,
-        "formula": formula_of(top),
+        "formula": top_formula(top),
         "mass_u": top.mass_u,
         "kind": top.kind,
         "kind_decision": _decision(top.kind_of_top) if top.kind_of_top else None,
@@ -115,7 +115,7 @@ def _states(top: Top) -> dict[str, Any] | None:
     }
 
 
-def formula_of(top: Top) -> str | None:
+def top_formula(top: Top) -> str | None:
     """The formula of the molecule of a top; None for constants alone."""
     return top.molecule.formula if top.molecule is not None else None
 

@@ -52,12 +52,12 @@ DEFAULT_FUNCTIONS = {
 MOST_FUNCTIONS = {1: 20, 2: 81, 3: 100}
 
 
-def species_of_tops(count: int) -> dict[str, tuple[int, ...]]:
+def sigma_species(count: int) -> dict[str, tuple[int, ...]]:
     """σ of each top by the name of the species; each stands for the opposite σ too, so that the first that is not 0 is 1.
 
-    >>> species_of_tops(2)
+    >>> sigma_species(2)
     {'AA': (0, 0), 'AE': (0, 1), 'EA': (1, 0), 'EE': (1, 1), 'EE*': (1, -1)}
-    >>> len(species_of_tops(3)), species_of_tops(3)["EE*A"]
+    >>> len(sigma_species(3)), sigma_species(3)["EE*A"]
     (14, (1, -1, 0))
     """
     letters = {0: "A", 1: "E", -1: "E*"}

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from rotor.tops import operators as published
-from rotor.tops.operators import KINDS, axes_of
+from rotor.tops.operators import KINDS, axis_order
 
 RIGID = ("A", "B", "C")
 LINEAR, SPHERICAL, SYMMETRIC = tuple(published.LINEAR), tuple(published.SPHERICAL), tuple(published.SYMMETRIC)
@@ -43,7 +43,7 @@ def vocabulary(kind: str, reduction: str | None = None) -> tuple[str, ...]:
     return (("B",) if kind == "linear" else RIGID) + DISTORTION[kind]
 
 
-def kind_of(values: Mapping[str, float], kind: str | None) -> str:
+def resolve_kind(values: Mapping[str, float], kind: str | None) -> str:
     """The given kind if the constants fit it, else the kind by the rule of `Constants`; ValueError if they do not fit."""
     rigid = "".join(name for name in RIGID if name in values)
     if kind is None:
@@ -88,7 +88,7 @@ def _by_rule(rigid: str, values: Mapping[str, float]) -> str:
     return "asymmetric"
 
 
-def reduction_of(kind: str, names: Mapping[str, float], reduction: str | None) -> str | None:
+def resolve_reduction(kind: str, names: Mapping[str, float], reduction: str | None) -> str | None:
     """The given reduction, or the one that the names imply; None for rigid asymmetric tops and all other kinds."""
     if reduction not in (None, "A", "S"):
         raise ValueError(f"reduction {reduction!r}: Watson's reductions are 'A' and 'S'")
@@ -112,10 +112,10 @@ def reduction_of(kind: str, names: Mapping[str, float], reduction: str | None) -
     return reduction or implied
 
 
-def representation_of(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:
+def resolve_representation(kind: str, values: Mapping[str, float], representation: str | None) -> str | None:
     """The given representation, or Ir for κ <= 0 and IIIl for κ > 0; None for all kinds but asymmetric tops."""
     if representation is not None:
-        axes_of(representation)  # raises for an unknown representation
+        axis_order(representation)  # raises for an unknown representation
     if kind != "asymmetric":
         if representation:
             raise ValueError(f"representation {representation!r} belongs to asymmetric tops; kind is {kind!r}")

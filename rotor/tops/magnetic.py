@@ -25,7 +25,7 @@ class MagneticTensors:
 
     g need not be symmetric. Raises ValueError for non-finite numbers and an asymmetric magnetisability.
 
-    >>> MagneticTensors(tensor_of((0.7, 0.3, 0.2))).g[0]
+    >>> MagneticTensors(make_tensor((0.7, 0.3, 0.2))).g[0]
     (0.7, 0.0, 0.0)
     """
 
@@ -44,10 +44,10 @@ class MagneticTensors:
             raise ValueError(f"magnetisability: a symmetric tensor is expected; got {self.magnetisability}")
 
 
-def tensor_of(numbers: ArrayLike) -> Tensor:
+def make_tensor(numbers: ArrayLike) -> Tensor:
     """A tensor from its diagonal (3,), or from aa, bb, cc, ab, ac, bc (6,).
 
-    >>> tensor_of([1, 2, 3, 0, 0, 0.5])[1]
+    >>> make_tensor([1, 2, 3, 0, 0, 0.5])[1]
     (0.0, 2.0, 0.5)
     """
     values = np.asarray(numbers, dtype=float).ravel().tolist()
@@ -68,14 +68,14 @@ def tensor_for(kind: str, numbers: Sequence[float]) -> Tensor:
     if not np.isfinite(numbers).all():
         raise ValueError(f"{', '.join(f'{x:g}' for x in numbers)}: expected finite numbers")
     if len(numbers) == 1 and kind == "linear":
-        return tensor_of([0.0, numbers[0], numbers[0]])
+        return make_tensor([0.0, numbers[0], numbers[0]])
     if len(numbers) == 1 and kind == "spherical":
-        return tensor_of([numbers[0]] * 3)
+        return make_tensor([numbers[0]] * 3)
     if len(numbers) == 2 and kind in ("linear", "prolate", "oblate"):
         along, across = numbers
-        return tensor_of([across, across, along] if kind == "oblate" else [along, across, across])
+        return make_tensor([across, across, along] if kind == "oblate" else [along, across, across])
     if len(numbers) in (3, 6):
-        return tensor_of(numbers)
+        return make_tensor(numbers)
     raise ValueError(
         f"{len(numbers)} numbers for a top of the kind {kind}: expected aa,bb,cc or aa,bb,cc,ab,ac,bc; parallel,perpendicular "
         "of a linear or symmetric top; or the element across the axis of a linear top"

@@ -17,12 +17,14 @@ from rotor.tops.states.state_constants import StateConstants
 from rotor.units import parse_quantity
 
 
-def constants_of_names(values: Mapping[str, float | str], spins: str | None = None) -> tuple[Constants, dict[str, Any]]:
+def constants_from_names(
+    values: Mapping[str, float | str], spins: str | None = None
+) -> tuple[Constants, dict[str, Any]]:
     """The rotational constants of a mapping, and `spin_constants` and `states`, if present, as fields of a top.
 
     spins: sizes of spins not named after isotopes, and spins that are coupled first, such as "S=1/2".
 
-    >>> rotational, others = constants_of_names({"A": 9400, "B": 3100, "C": 2500, "chi_aa(14N)": "-4.2 MHz"})
+    >>> rotational, others = constants_from_names({"A": 9400, "B": 3100, "C": 2500, "chi_aa(14N)": "-4.2 MHz"})
     >>> rotational["A"], dict(others["spin_constants"].values)
     (9400.0, {'chi_aa(14N)': -4.2})
     """
@@ -38,10 +40,10 @@ def constants_of_names(values: Mapping[str, float | str], spins: str | None = No
     return Constants(**fields), others
 
 
-def fields_of_texts(fields: Mapping[str, Any], spins: str | None = None) -> dict[str, Any]:
+def parse_fields(fields: Mapping[str, Any], spins: str | None = None) -> dict[str, Any]:
     """Fields of a top, where `spin_constants` and `states` may be texts, or mappings by name in MHz.
 
-    >>> fields_of_texts({"spin_constants": "chi_aa(14N)=-4.2 MHz"})["spin_constants"].of("14N")
+    >>> parse_fields({"spin_constants": "chi_aa(14N)=-4.2 MHz"})["spin_constants"].of("14N")
     {'chi_aa': -4.2}
     """
     read = dict(fields)

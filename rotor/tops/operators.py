@@ -35,12 +35,12 @@ AXIAL_REPRESENTATION = {
 }  # representation with the figure axis as z
 
 
-def axes_of(representation: str) -> str:
+def axis_order(representation: str) -> str:
     """The principal axes at x, y, z of a representation.
 
     Raises ValueError for an unknown representation.
 
-    >>> axes_of("IIIl")
+    >>> axis_order("IIIl")
     'bac'
     """
     if representation not in REPRESENTATIONS:
@@ -128,10 +128,10 @@ def spelled_term(p: int, q: int, n: int) -> str:
     return "".join(f"{letter}{2 * power}" for letter, power in (("J", p), ("Jz", q), ("Jpm", n)) if power)
 
 
-def powers_of_spelled(name: str) -> Powers | None:
+def spelled_powers(name: str) -> Powers | None:
     """The powers (p, q, n) of a spelled-out name; None for other names.
 
-    >>> powers_of_spelled("J4Jz2Jpm6"), powers_of_spelled("DJK")
+    >>> spelled_powers("J4Jz2Jpm6"), spelled_powers("DJK")
     ((2, 1, 3), None)
     """
     match = _SPELLED.fullmatch(name)

@@ -30,7 +30,7 @@ from rotor.tops.covariance import Covariance
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.magnetic import MagneticTensors
-from rotor.tops.named_values import constants_of_names, fields_of_texts
+from rotor.tops.named_values import constants_from_names, parse_fields
 from rotor.tops.operators import KINDS
 from rotor.tops.quadrupole import computed_couplings
 from rotor.tops.spins.spin_constants import SpinConstants
@@ -196,13 +196,13 @@ class Top:
         if isinstance(constants, str):
             constants = Constants.parse(constants)
         if not isinstance(constants, Constants):
-            constants, coupled = constants_of_names(constants, spins)
+            constants, coupled = constants_from_names(constants, spins)
             if twice := ", ".join(coupled.keys() & others.keys()):
                 raise ValueError(f"{twice}: given among the constants and again; give each once")
             others |= coupled
         if not isinstance(spin_weights, SpinWeights):
             spin_weights = SpinWeights.from_mapping(spin_weights) if spin_weights else SpinWeights()
-        return cls(constants, dipole_vector(dipole_abc_debye), spin_weights, **fields_of_texts(others, spins))
+        return cls(constants, dipole_vector(dipole_abc_debye), spin_weights, **parse_fields(others, spins))
 
     @classmethod
     def from_molecule(
@@ -256,18 +256,18 @@ class Top:
             raise ValueError(
                 f"{molecule.name or 'the input'} is a single atom: it has no rotation; give 2 atoms or more"
             )
-        from rotor.molecules.symmetry.point_group import symmetry_of
+        from rotor.molecules.symmetry.point_group import molecule_symmetry
         from rotor.tops.spins.spin_statistics import spin_weights
 
         body = point_masses(molecule.masses_u, molecule.positions_angstrom)
         frame = principal_frame(body, molecule.masses_u, molecule.positions_angstrom, equal_within)
         kind = kind_from_moments(frame.moments, linear_below=linear_below, equal_within=equal_within)
-        symmetry = symmetry_of(molecule, symmetry_within)
+        symmetry = molecule_symmetry(molecule, symmetry_within)
         kind = kind_with_symmetry(kind, symmetry)
         dipole, tensor = molecule.dipole_debye, molecule.polarizability_angstrom3
         weights = spin_weights(symmetry, [nucleus.spin for nucleus in molecule.nuclei], molecule.electronic)
         return cls(
-            constants=constants_of_moments(frame.moments, kind.kind),
+            constants=constants_from_moments(frame.moments, kind.kind),
             dipole_abc_debye=None if dipole is None else in_frame(frame, allowed_dipole(dipole, symmetry)),
             spin_weights=weights,
             name=molecule.name,
@@ -292,7 +292,7 @@ class Top:
         """A top from a body of point masses, plates or solids, in u and Å."""
         frame = principal_frame(body)
         kind = kind_from_moments(frame.moments)
-        constants = constants_of_moments(frame.moments, kind.kind)
+        constants = constants_from_moments(frame.moments, kind.kind)
         return cls(constants, frame=frame, kind_of_top=kind, mass_u=body.mass, **others)
 
     @property
@@ -402,7 +402,7 @@ def _electrons(molecule: Molecule, weights: SpinWeights) -> str:
     return f", electrons assumed to form a closed shell{odd}"
 
 
-def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
+def constants_from_moments(moments: ArrayLike, kind: str) -> Constants:
     """Rigid constants for a kind of top, from moments in u Å²; degenerate moments are averaged."""
     if kind not in KINDS:
         raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
@@ -419,11 +419,11 @@ def constants_of_moments(moments: ArrayLike, kind: str) -> Constants:
     return Constants(A=f / ia, B=f / ib, C=f / ic, kind=kind)
 
 
-def one_state(top: Top, what: str) -> Top:
+def require_single_state(top: Top, what: str) -> Top:
     """The top if it has one vibrational state; ValueError, naming the calculation, if it has more.
 
     >>> from rotor.tops.top import Top
-    >>> one_state(Top.from_constants("B=5 MHz"), "levels in a field").kind
+    >>> require_single_state(Top.from_constants("B=5 MHz"), "levels in a field").kind
     'linear'
     """
     without_internal_rotation(top, what)

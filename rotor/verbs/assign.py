@@ -72,14 +72,14 @@ class SpectrumFile(SubjectKind):
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read the peaks and the geometry."""
         from rotor.formats import read
-        from rotor.formats.peak_files import peaks_of_columns, read_peaks
+        from rotor.formats.peak_files import peaks_from_columns, read_peaks
 
         inputs = read_instance(SpectrumInput, entries)
         if inputs.source is None:
             raise ValueError("no spectrum: expected a file with a list of peaks or a spectrum, such as peaks.csv")
         is_file = isinstance(inputs.source, str)
         spectrum = Path(place.folder) / inputs.source if is_file else inputs.source
-        values: dict[str, Any] = {"peaks": (read_peaks if is_file else peaks_of_columns)(spectrum, inputs.range_mhz)}
+        values: dict[str, Any] = {"peaks": (read_peaks if is_file else peaks_from_columns)(spectrum, inputs.range_mhz)}
         if inputs.molecule is not None:
             path = Path(place.folder) / inputs.molecule
             top = read(path if path.is_file() else inputs.molecule)

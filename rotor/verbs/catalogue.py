@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.progress import rewritten_line
-from rotor.reports.screen import Part, Table, record_table, rows_of
+from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
@@ -111,7 +111,7 @@ class Listed:
         names = ("name", "formula", "tag", "database", "lines", "source", "date")
         columns = {name: f"{{{name}}}" for name in names}
         yield [("catalogue", self.catalogue), ("lines", str(self.count)), ("species", str(len(self.table)))]
-        yield record_table("species, by name", columns, rows_of(self.table), {*names} - {"tag", "lines"})
+        yield record_table("species, by name", columns, table_records(self.table), {*names} - {"tag", "lines"})
 
 
 def list_species(request: CatalogueRequest, work: Work) -> Listed:
@@ -146,7 +146,7 @@ class LinesInRange:
         """A record for each line."""
         return {
             "catalogue": self.request.catalogue,
-            "lines": rows_of(self.table),
+            "lines": table_records(self.table),
             "errors": self.errors.as_json(),
         }
 
@@ -214,7 +214,7 @@ def _table(lines: StoredLines, shown: int) -> Table:
     }
     strongest = np.sort(np.argsort(-lines.columns["log_intensity_300k"], kind="stable")[:shown])
     title = "all lines" if len(strongest) == len(lines) else f"the {len(strongest)} strongest of {len(lines)} lines"
-    return record_table(f"{title}, in order of frequency", columns, rows_of(lines, strongest), {"species"})
+    return record_table(f"{title}, in order of frequency", columns, table_records(lines, strongest), {"species"})
 
 
 def check(request: CatalogueRequest, outputs: Any, _: Any) -> None:

@@ -103,12 +103,12 @@ def top_with_errors(source: str, note: Note = silent) -> Top:
         return top_of_word(source, note)
 
     from rotor.formats.read_write import read_spcat_top
-    from rotor.formats.spcat.hamiltonian.codes import constants_of
-    from rotor.formats.spcat.hamiltonian.states import has_one_state
+    from rotor.formats.spcat.hamiltonian.codes import file_constants
+    from rotor.formats.spcat.hamiltonian.states import is_single_state
     from rotor.formats.spcat.text.par import read_par
 
     file, top = read_par(path), read_spcat_top(path, errors=True)
-    return replace(top, constants=constants_of(file, errors=True)) if has_one_state(file) else top
+    return replace(top, constants=file_constants(file, errors=True)) if is_single_state(file) else top
 
 
 def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Callable[[Path], None]:
@@ -171,11 +171,11 @@ def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
     """Raise ValueError if reading the .toml would fail, as for dipoles or couplings that the spin weights forbid."""
     from rotor.formats.molecules.molecule_file import parse_molecule_file
     from rotor.formats.molecules.molecule_writer import molecule_file_text
-    from rotor.formats.read_write import top_of_file
+    from rotor.formats.read_write import file_top
     from rotor.quantum.effects.of_top import effects_of
 
     try:
-        top = top_of_file(parse_molecule_file(molecule_file_text(file), "TARGET"))
+        top = file_top(parse_molecule_file(molecule_file_text(file), "TARGET"))
         refuse_weights_of_another_kind(top)
         if top.spin_constants is not None:
             effects_of(top, True)  # fails if the spin weights count a total spin of the file twice

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from msgspec import NODEFAULT
 
 from rotor.reports.line_tables import first_rows_title
-from rotor.reports.screen import Part, Table, record_table, rows_of
+from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
 from rotor.reports.top_facts import error_facts, left_out_facts, with_command
@@ -277,7 +277,9 @@ def _table(answer: EmissionAnswer, shown: int) -> Table:
         "∫T_B dv (K km/s)": "{integrated_k_km_s:.4g}",
     }
     title = first_rows_title(len(rows), len(lines), "brightest line")
-    return record_table(f"{title}, in order of frequency; each alone", columns, rows_of(lines, rows), {"molecule"})
+    return record_table(
+        f"{title}, in order of frequency; each alone", columns, table_records(lines, rows), {"molecule"}
+    )
 
 
 def results(answer: Any) -> dict[str, Any]:

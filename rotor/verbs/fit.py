@@ -15,9 +15,9 @@ from rotor.formats.fit_request import (
     FitAnswer,
     FitRequest,
     answer_fit,
+    fit_report,
+    fit_table,
     fitted_par,
-    report_of,
-    table_of,
     write_fitted_par,
     write_fitted_toml,
 )
@@ -117,9 +117,9 @@ def answer(request: FitRequest, work: Work) -> FitAnswer:
         fit_answer = answer_fit(request, _show_iteration if work.progress and sys.stderr.isatty() else None)
     fit_answer = with_further(fit_answer, further.try_constants, further.suggest, further.bootstrap, further.seed)
     if any(path.suffix.lower() == ".lin" for path in work.files.get("save_lines", ())):
-        from rotor.formats.assigned_lin import note_of_lin
+        from rotor.formats.assigned_lin import lin_notes
 
-        for text in note_of_lin(fit_answer.fit.marked_lines):
+        for text in lin_notes(fit_answer.fit.marked_lines):
             work.note(text)
     return fit_answer
 
@@ -174,7 +174,7 @@ def _text(path: Path, text: str) -> None:
 
 def write_table(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the table for a publication."""
-    _text(path, table_of(answer, FORMS[path.suffix.lower()], scaled=report.shown.table_errors == "scatter"))
+    _text(path, fit_table(answer, FORMS[path.suffix.lower()], scaled=report.shown.table_errors == "scatter"))
 
 
 def write_lines(answer: FitAnswer, path: Path, report: Report) -> None:
@@ -347,7 +347,7 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the fitted parameters", "fit"),
-        Output("report", (".fit",), "Write the full report", lambda answer, path, _: _text(path, report_of(answer)), "out.fit"),
+        Output("report", (".fit",), "Write the full report", lambda answer, path, _: _text(path, fit_report(answer)), "out.fit"),
         Output("toml", (".toml",), "Write a molecule file with the constants, errors and correlations",
                lambda answer, path, _: write_fitted_toml(answer, path), "out.toml"),
         Output("par", (".par",), "Write the parameters for SPFIT",

@@ -156,7 +156,7 @@ def _read(path: str) -> Atoms:
 
 
 def _new_box(inputs: BoxInput, settings: Settings) -> NewBox:
-    from rotor.fluids.forces.models import MODELS, model_of
+    from rotor.fluids.forces.models import MODELS, find_model
 
     source = str(inputs.source)
     if source != settings.model and source in MODELS:
@@ -166,7 +166,7 @@ def _new_box(inputs: BoxInput, settings: Settings) -> NewBox:
             f"{source!r}: a box is made of one model, whose name stands twice: 'rotor fluid trappe-n2 --model trappe-n2'; "
             f"models are {', '.join(sorted(MODELS))}"
         )
-    model = model_of(settings.model)
+    model = find_model(settings.model)
     if source == "water" and model.symbols != ("O", "H", "H"):
         raise ValueError(f"{source!r}: --model {model.name} is not a model of water; write {model.name!r}")
     density = WATER_G_CM3 if inputs.density is None else inputs.density
@@ -266,17 +266,17 @@ def _centres(answer: FluidAnswer, frames: str | None) -> Floats:
     import numpy as np
     from ase.io import read
 
-    from rotor.fluids.forces.models import models_of, shapes_of
+    from rotor.fluids.forces.models import find_models, model_shapes
     from rotor.fluids.initial_box import model_labels
-    from rotor.fluids.motion.bodies import bodies_of
+    from rotor.fluids.motion.bodies import rigid_bodies
 
-    models = models_of(answer.request.settings.model)
-    shapes = shapes_of(models)
+    models = find_models(answer.request.settings.model)
+    shapes = model_shapes(models)
     images = read(frames, ":") if frames is not None else [answer.atoms]
     for atoms in images:
         if "molecule" not in atoms.arrays:
             atoms.arrays["molecule"] = model_labels(atoms, models)
-    return np.array([bodies_of(atoms, shapes=shapes)[1].centres for atoms in images[len(images) // 2 :]])
+    return np.array([rigid_bodies(atoms, shapes=shapes)[1].centres for atoms in images[len(images) // 2 :]])
 
 
 def draw(answer: FluidAnswer, path: Path, report: Report) -> None:

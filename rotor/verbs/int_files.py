@@ -127,24 +127,24 @@ def answer_of(request: PredictedRequest) -> SpectrumAnswer:
 
 def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """Write the catalogue as SPCAT does: with its weights, its zero of energy, and K doublets as two lines."""
-    from rotor.formats.provenance import record_of, write_beside
+    from rotor.formats.provenance import provenance_record, write_beside
     from rotor.formats.spcat.text.cat import write_cat
 
     prediction = _prediction(answer)
     write_cat(prediction.catalogue, path)
-    record = record_of(prediction.lines, dict(report.provenance))
+    record = provenance_record(prediction.lines, dict(report.provenance))
     write_beside(path, record | {"q": prediction.q, "lines": len(prediction.catalogue)})
 
 
 def write_levels(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """Write the levels as SPCAT lists them."""
-    from rotor.formats.provenance import record_of, write_beside
+    from rotor.formats.provenance import provenance_record, write_beside
     from rotor.formats.spcat.text.egy import write_egy
 
     prediction = _prediction(answer)
     levels = prediction.levels
     write_egy(levels, path)
-    record = record_of(prediction.lines, dict(report.provenance))
+    record = provenance_record(prediction.lines, dict(report.provenance))
     write_beside(path, record | {"levels": len(levels)})
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from rotor.quantum.request import LevelsAnswer, LevelsRequest, answer_levels
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title
-from rotor.reports.screen import Part, Table, record_table, rows_of
+from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Text, Whole, whole_range
@@ -108,7 +108,7 @@ def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
     energy = getattr(table, name)[rows].tolist()
     records = [
         record | {"state": label, "energy": value}
-        for record, label, value in zip(rows_of(table, rows), labels, energy, strict=True)
+        for record, label, value in zip(table_records(table, rows), labels, energy, strict=True)
     ]
     columns = {
         quanta.headings(table.levels.quanta_names): "{state}",

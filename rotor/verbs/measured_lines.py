@@ -216,16 +216,16 @@ def _start(entries: Entries) -> MoleculeInput:
 
 def build(verb: Verb, entries: Entries, subject: Subject) -> FitRequest:
     """The request of the fit."""
-    from rotor.formats.fit_request import fit_of_lines, fit_of_spfit, with_more_lines
+    from rotor.formats.fit_request import lines_request, spfit_request, with_more_lines
 
     inputs, paths = subject.values["inputs"], subject.values["paths"]
     if subject.top is None:
-        request = fit_of_spfit(paths["source"], paths["lin"])
+        request = spfit_request(paths["source"], paths["lin"])
     else:
         names = {"tie": verb.fields["parameters.ties"].called(entries.style)}
         names["priors_mhz"] = verb.fields["parameters.priors"].called(entries.style)
         with renaming(names):
-            request = fit_of_lines(
+            request = lines_request(
                 paths["source"],
                 subject.top,
                 inputs.free,

@@ -86,9 +86,9 @@ def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
 
     file = read_molecule_file(path, listed=not symmetry)
     if symmetry or file.constants is None:
-        from rotor.formats.read_write import top_of_file
+        from rotor.formats.read_write import file_top
 
-        top = top_of_file(file)
+        top = file_top(file)
     else:
         top = _top_of_constants(file)
     return {

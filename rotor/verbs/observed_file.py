@@ -153,12 +153,12 @@ def _species_of_word(word: str, range_mhz: tuple[float, float], partition: str |
         if not Path(word).is_file():
             raise ValueError(f"{word}: no such file")
         return read_cat_with(Path(word), partition)
-    from rotor.observed.species import species_of_lines
+    from rotor.observed.species import species_from_lines
     from rotor.spectra.lines import line_list
 
     top = top_of_word(word, note, prepare=with_some_dipole)
     lines = line_list(top, temperature_k=300.0, min_lgint=-12.0, range_mhz=range_mhz)
-    return species_of_lines(lines, top.name or word)
+    return species_from_lines(lines, top.name or word)
 
 
 def padded(spectrum: ObservedSpectrum, redshift: float = 0.0, km_s: float = 300.0) -> tuple[float, float]:

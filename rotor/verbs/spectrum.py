@@ -189,12 +189,12 @@ def show(answer: SpectrumAnswer, report: Report) -> Iterable[Part | None]:
     if not len(lines):
         part = f"no lines: {_why_none(answer, report.entries)}\n"
     elif record["patterns"] is not None:
-        from rotor.quantum.quanta import headings, of_rotation
+        from rotor.quantum.quanta import headings, rotational_quanta
 
-        part = patterns_table(record["patterns"], headings(of_rotation(lines.levels.quanta)))
+        part = patterns_table(record["patterns"], headings(rotational_quanta(lines.levels.quanta)))
     else:
         part = lines_table(lines, record["strongest"], record["optical_depth"])
-    title = "" if lines.levels.of_named_constants else f"{lines.top.name}: levels of the file's own parameters"
+    title = "" if lines.levels.has_named_constants else f"{lines.top.name}: levels of the file's own parameters"
     sources = ("constants", "dipole", "spin weights")
     return top_facts.top_parts(lines.top, _facts(answer, record), (part,), sources, report, title)
 
@@ -208,7 +208,7 @@ def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str,
     lines, top = answer.lines, answer.lines.top
     cut = "none: every allowed line" if record["min_lgint"] is None else f"lgint above {record['min_lgint']:g}"
     spin_weights = record["spin_weights"]
-    named = lines.levels.of_named_constants
+    named = lines.levels.has_named_constants
     return [
         ("constants", top_facts.constants_text(top) if named else "those of the file, which have no names here"),
         ("dipole", top_facts.dipole_text(top) if named else "the moments of the file"),
@@ -237,7 +237,7 @@ def _error_column(answer: SpectrumAnswer) -> list[tuple[str, str]]:
         return []
     if lines.top.level_table is not None:
         return [("column error", "from the table of energies; effects left out are not in it")]
-    exact = ", ".join(lines.exact_constants if lines.levels.of_named_constants else ())
+    exact = ", ".join(lines.exact_constants if lines.levels.has_named_constants else ())
     without = f", with {exact} as exact" if exact else ""
     return [("column error", f"from errors of the constants alone{without}; effects left out are not in it")]
 

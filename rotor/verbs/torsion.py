@@ -11,7 +11,7 @@ from rotor import units
 from rotor.formats import write
 from rotor.reports import top_facts
 from rotor.reports.progress import progress_bar
-from rotor.reports.screen import Part, Table, record_table, rows_of
+from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
 from rotor.verbs.subjects import OneMolecule
@@ -41,7 +41,7 @@ def answer(request: TorsionRequest, work: Work) -> TorsionAnswer:
 
 def content(answer: TorsionAnswer, shown: Shown) -> Mapping[str, Any]:
     """The thermodynamic functions of all methods, for the JSON."""
-    return {"functions": rows_of(answer.functions)}
+    return {"functions": table_records(answer.functions)}
 
 
 def show(answer: TorsionAnswer, report: Report) -> Iterable[Part | None]:
@@ -130,19 +130,19 @@ def _level_table(answer: TorsionAnswer) -> Table:
         "splitting (MHz)": splitting,
     }
     title = "levels; E above the foot of the potential; splitting from σ = 0 of the same v, or of a tunnelling pair"
-    return record_table(title, columns, rows_of(answer.levels, slice(SHOWN)))
+    return record_table(title, columns, table_records(answer.levels, slice(SHOWN)))
 
 
 def _thermo_table(answer: TorsionAnswer) -> Table:
     functions = answer.functions
-    exact = functions.of_method("levels")
+    exact = functions.for_method("levels")
     columns: dict[str, Any] = {
         "T (K)": lambda row: f"{exact.temperature_k[row]:g}",
         "Q": lambda row: f"{math.exp(exact.ln_q[row]):.5g}",
         "S (J/mol K)": lambda row: f"{exact.entropy_j_per_mol_k[row]:.5g}",
     }
     for method in dict.fromkeys(functions.method.tolist()):
-        heat = functions.of_method(method).cv_over_r
+        heat = functions.for_method(method).cv_over_r
         columns[method] = lambda row, heat=heat: f"{heat[row]:.5f}"
     title = "thermodynamics: Q from the foot of the potential and S by the levels; C_v/R by the levels and by approximations"
     return record_table(title, columns, range(len(exact.temperature_k)))
@@ -151,7 +151,7 @@ def _thermo_table(answer: TorsionAnswer) -> Table:
 def results(answer: Any) -> dict[str, Any]:
     """The barrier, the zero-point energy, and C_v by the levels at the last temperature, for a sweep."""
     facts = answer.facts()
-    exact = answer.functions.of_method("levels")
+    exact = answer.functions.for_method("levels")
     names = ("barrier_cm", "zero_point_cm", "reduced_moment_u_angstrom2")
     return {name: facts[name] for name in names} | {"cv_over_r": exact.cv_over_r[-1]}
 

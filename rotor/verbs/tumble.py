@@ -102,10 +102,10 @@ def _heading(request: TumbleRequest | DrivenRequest) -> str:
 
 
 def _picture_title(request: TumbleRequest) -> str:
-    from rotor.plots.picture import name_of_top
+    from rotor.plots.picture import top_title
 
     top = getattr(request, "top", None)
-    return _heading(request) if top is None else f"{name_of_top(top)}: {top_facts.KINDS[top.kind]}"
+    return _heading(request) if top is None else f"{top_title(top)}: {top_facts.KINDS[top.kind]}"
 
 
 def show(answer: TumbleAnswer | DrivenAnswer, report: Report) -> Iterable[Part | None]:

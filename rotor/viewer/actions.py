@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 
 from rotor.viewer.line_actions import assign, assign_series, edit, reject, remove
-from rotor.viewer.loomis_wood import centres_of
-from rotor.viewer.messages import Action, Change, Context, Message, number_of, species_of
+from rotor.viewer.loomis_wood import row_centres
+from rotor.viewer.messages import Action, Change, Context, Message, read_number, read_species
 from rotor.viewer.records import Series, Settings, State
 from rotor.viewer.species_actions import add_species, constants, free, refit, remove_species, species
 
@@ -27,9 +27,9 @@ def series(state: State, message: Message, context: Context) -> Change:
             raise ValueError(f"series: {error}") from None
         predicted = None
         if chosen.species is not None:
-            _, record = species_of(state, {"species": chosen.species})
+            _, record = read_species(state, {"species": chosen.species})
             predicted = context.predictions.lines(record)
-        centres_of(chosen, context.predictions.band_mhz, predicted)
+        row_centres(chosen, context.predictions.band_mhz, predicted)
     return "choose a series", {"settings": msgspec.structs.replace(state.settings, series=chosen)}
 
 
@@ -40,7 +40,7 @@ def settings(state: State, message: Message, context: Context) -> Change:
     }
     for key in ("background_k", "default_error_mhz", "least_error_mhz"):
         if key in message:
-            values[key] = number_of(message, key, above=0)
+            values[key] = read_number(message, key, above=0)
     if not values:
         raise ValueError(f"settings: expected one of {', '.join(Settings.__struct_fields__[1:])}")
     return f"change {', '.join(values)}", {"settings": msgspec.structs.replace(state.settings, **values)}

@@ -84,7 +84,7 @@ def _packed(values: Floats, plain: bool = False) -> dict[str, Any]:
     return {"base64": text} if plain else {"start": 0.0, "scale": 1.0, "base64": text}
 
 
-def data_of_page(text: str) -> dict[str, Any]:
+def read_page(text: str) -> dict[str, Any]:
     """The data inside an exported page."""
     start = text.index(">", text.index('id="rotor-data"')) + 1
     data: dict[str, Any] = json.loads(text[start : text.index("</script>", start)])

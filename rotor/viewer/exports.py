@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rotor.viewer.fits import assignments_of, fit_of
+from rotor.viewer.fits import fit_assignments, fit_species
 from rotor.viewer.prediction import Model
 from rotor.viewer.records import Line
 
@@ -30,18 +30,18 @@ def _lines_as(suffix: str) -> Callable[[Model, Mapping[int, Line], str], str]:
     def text(model: Model, lines: Mapping[int, Line], stem: str) -> str:
         from rotor.formats.assigned_lines import write_assigned_lines
 
-        return _written(f"{stem}.{suffix}", lambda path: write_assigned_lines(assignments_of(model, lines), path))
+        return _written(f"{stem}.{suffix}", lambda path: write_assigned_lines(fit_assignments(model, lines), path))
 
     return text
 
 
-def answer_of(model: Model, lines: Mapping[int, Line], stem: str) -> FitAnswer:
+def fit_answer(model: Model, lines: Mapping[int, Line], stem: str) -> FitAnswer:
     """The fit with its request, as the writers of fits take it."""
     from rotor.fitting.fit import FitOptions
     from rotor.fitting.parameters import parameters, with_names
     from rotor.formats.fit_request import FitAnswer, FitFiles, FitRequest
 
-    fit, free = fit_of(model, lines), list(model.record.free)
+    fit, free = fit_species(model, lines), list(model.record.free)
     begin = with_names(model.constants, free)
     files = FitFiles(f"{stem}.csv", start=model.file or None)
     request = FitRequest(fit.lines, begin, parameters(begin, free), FitOptions(), model.record.name, files)
@@ -52,7 +52,7 @@ def _par(variances: bool) -> Callable[[Model, Mapping[int, Line], str], str]:
     def text(model: Model, lines: Mapping[int, Line], stem: str) -> str:
         from rotor.formats.fit_request import write_fitted_par
 
-        answer = answer_of(model, lines, stem)
+        answer = fit_answer(model, lines, stem)
         return _written(f"{stem}.par", lambda path: write_fitted_par(answer, path, variances=variances))
 
     return text
@@ -66,7 +66,7 @@ def _toml(model: Model, lines: Mapping[int, Line], stem: str) -> str:
     from rotor.formats.molecules.molecule_writer import write_molecule_file
 
     if lines and model.record.fit is not None:
-        answer = answer_of(model, lines, stem)
+        answer = fit_answer(model, lines, stem)
         return _written(f"{stem}.toml", lambda path: write_fitted_toml(answer, path))
     top, named = model.top, model.constants
     file = MoleculeFile(
@@ -99,17 +99,17 @@ def _scene(model: Model, lines: Mapping[int, Line], stem: str) -> str:
 
 def _table(form: str) -> Callable[[Model, Mapping[int, Line], str], str]:
     def text(model: Model, lines: Mapping[int, Line], stem: str) -> str:
-        from rotor.formats.fit_request import table_of
+        from rotor.formats.fit_request import fit_table
 
-        return table_of(answer_of(model, lines, stem), form)
+        return fit_table(fit_answer(model, lines, stem), form)
 
     return text
 
 
 def _report(model: Model, lines: Mapping[int, Line], stem: str) -> str:
-    from rotor.formats.fit_request import report_of
+    from rotor.formats.fit_request import fit_report
 
-    return report_of(answer_of(model, lines, stem))
+    return fit_report(fit_answer(model, lines, stem))
 
 
 def _written(name: str, write: Callable[[Path], object]) -> str:

@@ -26,7 +26,7 @@ BETTER = 0.3  # fraction of the weighted rms that remains without a wrong line, 
 TRIED = 3  # measured frequencies that are left out, one at a time
 
 
-def assignments_of(model: Model, lines: Mapping[int, Line]) -> Assignments:
+def fit_assignments(model: Model, lines: Mapping[int, Line]) -> Assignments:
     """Lines of a species for a fit, with rejected lines excluded; ValueError for labels of a wrong length."""
     names = model.quanta
     for number, line in lines.items():
@@ -73,7 +73,7 @@ def lines_from(assigned: Assignments, species: int, blend_from: int, default_err
     ]
 
 
-def fit_of(model: Model, lines: Mapping[int, Line]) -> Fit:
+def fit_species(model: Model, lines: Mapping[int, Line]) -> Fit:
     """The fit of a species to its lines, from its constants, with its free constants.
 
     Raises ValueError without lines or free constants, for more constants than lines, and for labels without a level.
@@ -89,7 +89,7 @@ def fit_problem(model: Model, lines: Mapping[int, Line]) -> tuple[Assignments, F
         raise ValueError(f"{name}: no line is assigned to it; assign lines first")
     if not free:
         raise ValueError(f"{name}: no constant is free; mark those that the lines should determine")
-    assigned = assignments_of(model, lines)
+    assigned = fit_assignments(model, lines)
     start, _ = beside_zero(with_names(model.constants, free), free, assigned)
     varied, options = parameters(start, free), FitOptions(poor_rms=POOR_RMS)
     return assigned, lambda chosen: fit_lines(chosen, start, varied, options)
@@ -152,21 +152,21 @@ def refitted(model: Model, lines: Mapping[int, Line]) -> Species:
     return msgspec.structs.replace(record, constants=dict(fit.named.values), errors=errors, fit=summary)
 
 
-def levels_of(model: Model, lines: Mapping[int, Line], levels: Any) -> dict[str, Any]:
+def assigned_levels(model: Model, lines: Mapping[int, Line], levels: Any) -> dict[str, Any]:
     """Energies of the levels of assigned lines, and combination differences.
 
     Two lines with a common upper level measure the difference of their lower levels: ν₁ - ν₂ = E₂ - E₁. levels: solved levels,
     energies in MHz.
     """
     from rotor.units import MHZ_PER_CM
-    from rotor.viewer.loomis_wood import rows_of_labels
+    from rotor.viewer.loomis_wood import label_rows
 
     if not lines:
         return {"levels": [], "differences": []}
-    assigned = assignments_of(model, lines)
+    assigned = fit_assignments(model, lines)
     labels, places = np.unique(np.concatenate([assigned.upper, assigned.lower]), axis=0, return_inverse=True)
     places = places.reshape(-1)
-    rows = rows_of_labels(model, levels, labels)
+    rows = label_rows(model, levels, labels)
     energy = np.where(rows >= 0, levels.energy_mhz[rows] - levels.ground_mhz, np.nan)
     counts = np.bincount(places, minlength=len(labels))
     table = [

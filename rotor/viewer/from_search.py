@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rotor.assignment.peak_finding import peaks_of_spectrum
+from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.viewer.fits import lines_from
 from rotor.viewer.line_actions import free_blend
-from rotor.viewer.messages import number_of
+from rotor.viewer.messages import read_number
 from rotor.viewer.records import COLOURS, Record, Species, State, line_key, species_key
 
 MOST_SPECIES = 5
@@ -20,17 +20,17 @@ USUAL_SECONDS, MOST_SECONDS = 20.0, 600.0
 
 def search(spectrum: ObservedSpectrum, message: Mapping[str, Any], peaks: PeakList | None = None) -> Any:
     """Run `rotor assign` on the peaks of a spectrum. The message has species (1 to 5), seconds, temperature_k."""
-    count = int(number_of(message, "species", above=0, default=1))
-    seconds = min(number_of(message, "seconds", above=0, default=USUAL_SECONDS), MOST_SECONDS)
-    temperature = number_of(message, "temperature_k", above=0) if message.get("temperature_k") is not None else None
+    count = int(read_number(message, "species", above=0, default=1))
+    seconds = min(read_number(message, "seconds", above=0, default=USUAL_SECONDS), MOST_SECONDS)
+    temperature = read_number(message, "temperature_k", above=0) if message.get("temperature_k") is not None else None
     if peaks is None:
-        peaks = peaks_of_spectrum(spectrum.frequency_mhz, spectrum.intensity, spectrum.source)
+        peaks = pick_peaks(spectrum.frequency_mhz, spectrum.intensity, spectrum.source)
     return answer_assign(
         AssignRequest(peaks, species=min(count, MOST_SPECIES), seconds=seconds, temperature_k=temperature)
     )
 
 
-def records_of(answer: Any, state: State) -> tuple[str, dict[str, Record | None], list[str]]:
+def search_records(answer: Any, state: State) -> tuple[str, dict[str, Record | None], list[str]]:
     """Label, records and remarks from an answer of `rotor assign`; ValueError for an answer without species."""
     if not answer.species:
         raise ValueError("rotor assign: no species is significant in this spectrum; nothing is assigned")

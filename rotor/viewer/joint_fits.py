@@ -26,9 +26,9 @@ from rotor.fitting.first_values import beside_zero
 from rotor.fitting.fit import Fit, FitOptions, fit_lines
 from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.top_constants import ConstantSet
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
-from rotor.viewer.fits import POOR_RMS, WrongLines, assignments_of, probably_wrong, refitted
+from rotor.viewer.fits import POOR_RMS, WrongLines, fit_assignments, probably_wrong, refitted
 from rotor.viewer.prediction import Model
 from rotor.viewer.records import FitSummary, Line, Species, State
 
@@ -94,7 +94,7 @@ class JointLevels(LevelModel):
         self.models = list[LevelModel]()
         for part, rows in zip(parts, self.rows, strict=True):
             try:
-                self.models.append(model_of(part.begin, labels[rows, : part.labels]))
+                self.models.append(label_model(part.begin, labels[rows, : part.labels]))
             except MissingLevelsError as error:
                 raise MissingLevelsError(f"{part.model.record.name}: {error}", rows[error.places]) from None
         self.ends = np.cumsum([len(model.names) for model in self.models]).tolist()
@@ -153,7 +153,7 @@ def _part(number: int, model: Model, lines: Mapping[int, Line]) -> Part:
         none, values = np.zeros(0), begin.values
         held = Parameters((), none, none, tuple(values), np.array(list(values.values())), np.zeros((len(values), 0)))
         return Part(number, model, lines, begin, held)
-    begin, _ = beside_zero(begin, free, assignments_of(model, lines))
+    begin, _ = beside_zero(begin, free, fit_assignments(model, lines))
     return Part(number, model, lines, begin, parameters(begin, free))
 
 
@@ -247,7 +247,7 @@ def _rms(values: Floats) -> float | None:
     return float(np.sqrt(values @ values / len(values))) if len(values) else None
 
 
-def residuals_of(models: Mapping[int, Model], state: State) -> dict[int, dict[str, Any]]:
+def line_residuals(models: Mapping[int, Model], state: State) -> dict[int, dict[str, Any]]:
     """Label, calculated frequency (MHz; the mean for a blend) and observed minus calculated for each line of a session.
 
     A rejected line is compared with its calculated frequency alone and does not enter the mean of a blend.
@@ -257,7 +257,7 @@ def residuals_of(models: Mapping[int, Model], state: State) -> dict[int, dict[st
     for number, model in models.items():
         lines = state.lines_of(number)
         if lines:
-            assigned = assignments_of(model, lines)
+            assigned = fit_assignments(model, lines)
             labels |= {n: assigned.text(i) for i, n in enumerate(lines)}
             calculated |= zip(lines, model.calculated_mhz(assigned.upper, assigned.lower).tolist(), strict=True)
     means = {n: calculated[n] for n in labels}

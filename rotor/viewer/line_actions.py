@@ -9,16 +9,16 @@ import numpy as np
 
 from rotor.table import counted
 from rotor.viewer.fits import lines_from
-from rotor.viewer.loomis_wood import centres_of
+from rotor.viewer.loomis_wood import row_centres
 from rotor.viewer.messages import (
     Change,
     Context,
     Message,
-    comment_of,
-    label_of,
-    lines_of_message,
-    number_of,
-    species_of,
+    read_comment,
+    read_label,
+    read_lines,
+    read_number,
+    read_species,
 )
 from rotor.viewer.peak_fit import Peak, fit_peak
 from rotor.viewer.prediction import Model, with_hyperfine
@@ -31,12 +31,12 @@ MOST_LINES = 100_000
 
 def assign(state: State, message: Message, context: Context) -> Change:
     """Assign lines to a measured frequency; several lines make a blend."""
-    frequency = number_of(message, "frequency_mhz", above=0)
+    frequency = read_number(message, "frequency_mhz", above=0)
     error = max(
-        number_of(message, "error_mhz", above=0, default=state.settings.default_error_mhz),
+        read_number(message, "error_mhz", above=0, default=state.settings.default_error_mhz),
         state.settings.least_error_mhz,
     )
-    width = number_of(message, "width_mhz", above=0) if message.get("width_mhz") is not None else None
+    width = read_number(message, "width_mhz", above=0) if message.get("width_mhz") is not None else None
     targets = message.get("to")
     if not isinstance(targets, list) or not targets or not all(isinstance(target, dict) for target in targets):
         raise ValueError("to: expected a list of lines, each with species, upper and lower")
@@ -45,9 +45,9 @@ def assign(state: State, message: Message, context: Context) -> Change:
     changes: dict[str, Record | None] = {}
     texts = []
     for place, target in enumerate(targets):
-        number, species = species_of(state, target)
+        number, species = read_species(state, target)
         model = context.predictions.model(species)
-        upper, lower = (label_of(target.get(side), side) for side in ("upper", "lower"))
+        upper, lower = (read_label(target.get(side), side) for side in ("upper", "lower"))
         _refuse_label(model, upper, lower)
         line = Line(
             species=number,
@@ -56,9 +56,9 @@ def assign(state: State, message: Message, context: Context) -> Change:
             frequency_mhz=frequency,
             error_mhz=error,
             blend=blend,
-            weight=number_of(target, "weight", above=0, default=1.0),
+            weight=read_number(target, "weight", above=0, default=1.0),
             width_mhz=width,
-            comment=comment_of(message),
+            comment=read_comment(message),
         )
         changes |= dict.fromkeys(_assigned_before(state, line))
         changes[line_key(first + place)] = line
@@ -116,9 +116,9 @@ def assign_series(state: State, message: Message, context: Context) -> Change:
         raise ValueError(
             "assign by series: choose a series of a species first; extrapolated rows have no quantum numbers"
         )
-    reach = number_of(message, "tolerance_mhz", above=0)
+    reach = read_number(message, "tolerance_mhz", above=0)
     predictions = context.predictions
-    rows = centres_of(series, predictions.band_mhz, predictions.lines(state.species[series.species]))
+    rows = row_centres(series, predictions.band_mhz, predictions.lines(state.species[series.species]))
     changes: dict[str, Record | None] = {}
     number, blend, count = state.free_number("line"), free_blend(state), 0
     for upper, lower, centre in zip(rows.upper.tolist(), rows.lower.tolist(), rows.frequency_mhz.tolist(), strict=True):
@@ -156,7 +156,7 @@ def _clear_peak(context: Context, centre_mhz: float, reach_mhz: float) -> Peak |
 
 def remove(state: State, message: Message, context: Context) -> Change:
     """Remove assignments."""
-    lines = lines_of_message(state, message)
+    lines = read_lines(state, message)
     return f"remove {len(lines)} assignments", {line_key(number): None for number in lines}
 
 
@@ -165,7 +165,7 @@ def reject(state: State, message: Message, context: Context) -> Change:
     rejected = message.get("rejected")
     if not isinstance(rejected, bool):
         raise ValueError(f"rejected: {rejected!r}: expected true or false")
-    lines = lines_of_message(state, message)
+    lines = read_lines(state, message)
     verb = "reject" if rejected else "accept"
     return f"{verb} {len(lines)} lines", {
         line_key(number): msgspec.structs.replace(line, rejected=rejected) for number, line in lines.items()
@@ -175,13 +175,13 @@ def reject(state: State, message: Message, context: Context) -> Change:
 def edit(state: State, message: Message, context: Context) -> Change:
     """Change error, weight, frequency or comment of lines."""
     values: dict[str, Any] = {
-        key: number_of(message, key, above=0) for key in ("error_mhz", "weight", "frequency_mhz") if key in message
+        key: read_number(message, key, above=0) for key in ("error_mhz", "weight", "frequency_mhz") if key in message
     }
     if "comment" in message:
-        values["comment"] = comment_of(message)
+        values["comment"] = read_comment(message)
     if not values:
         raise ValueError("edit: expected error_mhz, weight, frequency_mhz or comment")
-    lines = lines_of_message(state, message)
+    lines = read_lines(state, message)
     return f"change {', '.join(values)} of {len(lines)} lines", {
         line_key(number): msgspec.structs.replace(line, **values) for number, line in lines.items()
     }

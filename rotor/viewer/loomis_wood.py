@@ -33,7 +33,7 @@ class Centres:
         return Centres(self.number[chosen], self.frequency_mhz[chosen], self.upper[chosen], self.lower[chosen])
 
 
-def centres_of(series: Series, band_mhz: tuple[float, float], predicted: Predicted | None) -> Centres:
+def row_centres(series: Series, band_mhz: tuple[float, float], predicted: Predicted | None) -> Centres:
     """The rows of a series in a band, in order of their numbers.
 
     Raises ValueError for a series without a step, with labels that do not fit, and of fewer than two frequencies.
@@ -79,14 +79,14 @@ def _modelled(series: Series, predicted: Predicted) -> Centres:
     steps = number[:, None] * np.array(series.step)
     upper, lower = np.array(series.upper) + steps, np.array(series.lower) + steps
     levels = predicted.lines.levels
-    rows = [rows_of_labels(model, levels, side) for side in (upper, lower)]
+    rows = [label_rows(model, levels, side) for side in (upper, lower)]
     exists = (rows[0] >= 0) & (rows[1] >= 0)
     energy = levels.energy_mhz
     frequency = np.where(exists, energy[rows[0]] - energy[rows[1]], np.nan)
     return Centres(number[exists], frequency[exists], upper[exists], lower[exists])
 
 
-def rows_of_labels(model: Model, levels: object, labels: Ints) -> Ints:
+def label_rows(model: Model, levels: object, labels: Ints) -> Ints:
     """Rows of levels by their labels; -1 for labels without a level."""
     from rotor.quantum.quanta import SPECIES_NUMBERS
 
@@ -98,7 +98,7 @@ def rows_of_labels(model: Model, levels: object, labels: Ints) -> Ints:
     return np.asarray(levels.rows_of(**columns))  # type: ignore[attr-defined]
 
 
-def rows_of(centres: Centres, spectrum: Pyramid, half_width_mhz: float, pixels: int) -> list[tuple[Floats, Floats]]:
+def row_points(centres: Centres, spectrum: Pyramid, half_width_mhz: float, pixels: int) -> list[tuple[Floats, Floats]]:
     """Points to draw for each row: distance from the centre (MHz) and intensity."""
     if not half_width_mhz > 0:
         raise ValueError(f"half width of the rows: {half_width_mhz:g} MHz; expected more than 0")

@@ -30,7 +30,7 @@ class Context:
 Action = Callable[[State, Message, Context], Change]
 
 
-def number_of(message: Message, key: str, *, above: float | None = None, default: float | None = None) -> float:
+def read_number(message: Message, key: str, *, above: float | None = None, default: float | None = None) -> float:
     """A finite number of a message; ValueError with its name for any other value."""
     value = message.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
@@ -40,7 +40,7 @@ def number_of(message: Message, key: str, *, above: float | None = None, default
     return float(value)
 
 
-def species_of(state: State, message: Message) -> tuple[int, Species]:
+def read_species(state: State, message: Message) -> tuple[int, Species]:
     """The species that a message names by its number."""
     number = message.get("species")
     if not isinstance(number, int) or number not in state.species:
@@ -50,7 +50,7 @@ def species_of(state: State, message: Message) -> tuple[int, Species]:
     return number, state.species[number]
 
 
-def lines_of_message(state: State, message: Message) -> dict[int, Line]:
+def read_lines(state: State, message: Message) -> dict[int, Line]:
     """The lines that a message names by their numbers."""
     numbers = message.get("lines")
     lines = state.lines
@@ -62,7 +62,7 @@ def lines_of_message(state: State, message: Message) -> dict[int, Line]:
     return {number: lines[number] for number in numbers}
 
 
-def label_of(values: Any, key: str) -> tuple[int, ...]:
+def read_label(values: Any, key: str) -> tuple[int, ...]:
     """The quantum numbers of a level."""
     whole = isinstance(values, list) and all(type(value) is int for value in values)
     if not whole or not 0 < len(values) <= MOST_QUANTA:
@@ -70,14 +70,14 @@ def label_of(values: Any, key: str) -> tuple[int, ...]:
     return tuple(values)
 
 
-def constants_of(message: Message) -> dict[str, float]:
+def read_constants(message: Message) -> dict[str, float]:
     """The constants of a message by name, MHz."""
     values = message.get("constants")
     if not isinstance(values, dict) or not values:
         raise ValueError("constants: expected a table of names and numbers (MHz)")
-    return {str(name): number_of(values, name) for name in values}
+    return {str(name): read_number(values, name) for name in values}
 
 
-def comment_of(message: Message) -> str:
+def read_comment(message: Message) -> str:
     """The comment of a message, cut at 200 characters."""
     return str(message.get("comment", ""))[:200]

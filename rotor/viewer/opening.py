@@ -45,7 +45,7 @@ def open_spectrum(path: Path, reading: SpectrumFile | None = None) -> ObservedSp
     return read_spectrum(path, choices)
 
 
-def peaks_of_list(path: Path, spectrum: ObservedSpectrum) -> PeakList | None:
+def read_peak_list(path: Path, spectrum: ObservedSpectrum) -> PeakList | None:
     """The peaks of a list of peaks; None for a spectrum, whose neighbouring steps are mostly alike."""
     steps = np.diff(spectrum.frequency_mhz)
     alike = np.abs(np.diff(steps)) <= ALIKE * steps[1:]
@@ -119,7 +119,7 @@ def open_session(
         )
         spectrum = open_spectrum(where, stated)
         _bind(opened, stated, where, file.parent, len(spectrum), resumed)
-        service = Service(opened, spectrum, peaks_of_list(where, spectrum))
+        service = Service(opened, spectrum, read_peak_list(where, spectrum))
         _fill(service, molecules, lines, temperature_k, note)
         service.facts()  # every molecule of the session can be read
         opened.save()

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.fitting.parameters import with_names
 from rotor.fitting.top_constants import ConstantSet, TopConstants
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.formats.assigned_lines import QUANTA
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.labelled import MissingLevelsError
@@ -63,7 +63,7 @@ def without_isotopes(source: str) -> tuple[str, str]:
     return source[: match.start()], match[1].strip(" ,")
 
 
-def top_of_source(source: str) -> Top:
+def source_top(source: str) -> Top:
     """The top of a name, a file, SMILES:..., constants such as "B=6081 MHz", or an isotopologue such as "OCS, S=34S".
 
     Raises ValueError for what is no molecule.
@@ -96,8 +96,8 @@ def with_assumed_dipole(top: Top) -> tuple[Top, str]:
         )
 
 
-def species_of_source(
-    source: str, colour: int, temperature_k: float, base: Callable[[str], Top] = top_of_source
+def species_record(
+    source: str, colour: int, temperature_k: float, base: Callable[[str], Top] = source_top
 ) -> tuple[Species, str]:
     """The record of a molecule, and a remark on its dipole."""
     top, remark = with_assumed_dipole(base(source))
@@ -117,7 +117,7 @@ def species_of_source(
     return record, remark
 
 
-def with_hyperfine(record: Species, on: bool, base: Callable[[str], Top] = top_of_source) -> Species:
+def with_hyperfine(record: Species, on: bool, base: Callable[[str], Top] = source_top) -> Species:
     """The record with or without its spin constants; ValueError for a source without spin constants."""
     if on == record.hyperfine:
         return record
@@ -165,7 +165,7 @@ class Model:
         exists = np.ones(len(labels), dtype=bool)
         while exists.any():
             try:
-                levels = model_of(self.constants, labels[exists])
+                levels = label_model(self.constants, labels[exists])
             except MissingLevelsError as error:
                 exists[np.flatnonzero(exists)[error.places]] = False
                 continue
@@ -183,7 +183,7 @@ class Model:
         ).astype(np.int64)  # fmt: skip
 
 
-def model_of_species(record: Species, base: Callable[[str], Top] = top_of_source) -> Model:
+def species_model(record: Species, base: Callable[[str], Top] = source_top) -> Model:
     """The model of a record. base: gives the top of a source."""
     if not record.source:
         settings: dict[str, Any] = {
@@ -246,7 +246,7 @@ class Predictions:
     def top(self, source: str) -> Top:
         """The top of a source, read once."""
         if source not in self._tops:
-            self._tops[source] = top_of_source(self.located(source))
+            self._tops[source] = source_top(self.located(source))
         return self._tops[source]
 
     def stored(self, source: str) -> str:
@@ -270,7 +270,7 @@ class Predictions:
         return known if known.record == record else replace(known, record=record)
 
     def _model(self, record: Species) -> Model:
-        return replace(model_of_species(record, self.top), file=self.located(record.source) if record.source else "")
+        return replace(species_model(record, self.top), file=self.located(record.source) if record.source else "")
 
     def lines(self, record: Species) -> Predicted:
         """The predicted lines of a record in the band.
@@ -299,11 +299,11 @@ class Predictions:
 
     def emitter(self, record: Species) -> SpeciesLines:
         """The lines of a record for emission models, with Q(T)."""
-        from rotor.observed.species import species_of_lines
+        from rotor.observed.species import species_from_lines
 
         key = _key(record)
         if key not in self._emitters:
-            self._emitters[key] = species_of_lines(self.lines(record).lines, record.name)
+            self._emitters[key] = species_from_lines(self.lines(record).lines, record.name)
         return self._emitters[key]
 
 

@@ -20,11 +20,11 @@ from rotor.observed.spectrum import ObservedSpectrum
 from rotor.version import version
 from rotor.viewer.actions import ACTIONS, REFITTED_AFTER
 from rotor.viewer.exports import exported
-from rotor.viewer.fits import levels_of
-from rotor.viewer.joint_fits import lines_alone, refits, residuals_of, shared_blends
+from rotor.viewer.fits import assigned_levels
+from rotor.viewer.joint_fits import line_residuals, lines_alone, refits, shared_blends
 from rotor.viewer.line_actions import import_lines, peak_in
-from rotor.viewer.loomis_wood import centres_of, rows_of, rows_of_labels
-from rotor.viewer.messages import Context, constants_of, number_of, species_of
+from rotor.viewer.loomis_wood import label_rows, row_centres, row_points
+from rotor.viewer.messages import Context, read_constants, read_number, read_species
 from rotor.viewer.prediction import Model, Predicted, Predictions, changed
 from rotor.viewer.pyramid import pyramid
 from rotor.viewer.records import Line, Record, Species, species_key
@@ -81,11 +81,11 @@ class Service:
 
     def _search(self, message: Mapping[str, Any]) -> Answer:
         """Add species and lines by `rotor assign`; other messages are answered during the search."""
-        from rotor.viewer.from_search import records_of, search
+        from rotor.viewer.from_search import search, search_records
 
         answer = search(self.spectrum, message, self.peaks)
         with self._lock:
-            label, changes, remarks = records_of(answer, self.session.state)
+            label, changes, remarks = search_records(answer, self.session.state)
             self.session.apply(label, changes)
         return {"ok": {"label": label}, "notes": remarks}
 
@@ -144,7 +144,7 @@ class Service:
     def _line_facts(self) -> dict[int, dict[str, Any]]:
         """Residuals of all lines, computed once for each revision."""
         if self._residuals is None or self._residuals[0] != self.session.revision:
-            self._residuals = (self.session.revision, residuals_of(self._models(), self.session.state))
+            self._residuals = (self.session.revision, line_residuals(self._models(), self.session.state))
         return self._residuals[1]
 
     def _models(self) -> dict[int, Model]:
@@ -176,24 +176,24 @@ class Service:
         preview = message.get("preview")
         if preview is None:
             return species
-        number, record = species_of(self.session.state, preview)
+        number, record = read_species(self.session.state, preview)
         if "temperature_k" in preview:
-            record = msgspec.structs.replace(record, temperature_k=number_of(preview, "temperature_k", above=0))
+            record = msgspec.structs.replace(record, temperature_k=read_number(preview, "temperature_k", above=0))
         if "constants" in preview:
-            record = changed(record, constants_of(preview))
+            record = changed(record, read_constants(preview))
         if "dipole_abc_debye" in preview:
             a, b, c = (float(x) for x in preview["dipole_abc_debye"])
             record = msgspec.structs.replace(record, dipole_abc_debye=(a, b, c))
         if "scale" in preview:
-            record = msgspec.structs.replace(record, scale=number_of(preview, "scale", above=0))
+            record = msgspec.structs.replace(record, scale=read_number(preview, "scale", above=0))
         return {**species, number: record}
 
     def _window(self, message: Mapping[str, Any]) -> Answer:
         """Points of the spectrum in a range; frequencies, heights (strongest line: 1) and labels of each species."""
-        first, last = number_of(message, "first_mhz"), number_of(message, "last_mhz")
+        first, last = read_number(message, "first_mhz"), read_number(message, "last_mhz")
         if not first < last:
             raise ValueError(f"window: {first:g} to {last:g} MHz: expected a range that rises")
-        pixels = min(int(number_of(message, "pixels", above=0)), MOST_PIXELS)
+        pixels = min(int(read_number(message, "pixels", above=0)), MOST_PIXELS)
         x, y = self.pyramid.window(first, last, pixels)
         species = {n: record for n, record in self._previewed(message).items() if record.visible}
         answer: Answer = {"x": _numbers(x, 10), "y": _numbers(y), "sticks": {}}
@@ -242,11 +242,11 @@ class Service:
         species = self._previewed(message)
         record = species.get(series.species) if series.species is not None else None
         predicted = None if record is None else self.predictions.lines(record)
-        centres = centres_of(series, self.band_mhz, predicted)
+        centres = row_centres(series, self.band_mhz, predicted)
         first, count = int(message.get("first_row", 0)), int(message.get("rows", 50))
         chosen = centres.where(np.arange(len(centres.number))[max(first, 0) : max(first, 0) + max(count, 1)])
-        half = number_of(message, "half_width_mhz", above=0)
-        points = rows_of(chosen, self.pyramid, half, min(int(number_of(message, "pixels", above=0)), MOST_PIXELS))
+        half = read_number(message, "half_width_mhz", above=0)
+        points = row_points(chosen, self.pyramid, half, min(int(read_number(message, "pixels", above=0)), MOST_PIXELS))
         assigned = {
             (line.upper, line.lower): (number, line)
             for number, line in self.session.state.lines_of(series.species or -1).items()
@@ -272,7 +272,7 @@ class Service:
 
     def _peak(self, message: Mapping[str, Any]) -> Answer:
         """The peak in a range, and the predicted lines in and near the range, strongest first."""
-        first, last = number_of(message, "first_mhz"), number_of(message, "last_mhz")
+        first, last = read_number(message, "first_mhz"), read_number(message, "last_mhz")
         if not first < last:
             raise ValueError(f"peak: {first:g} to {last:g} MHz: expected a range that rises")
         answer: Answer = {"peak": None, "why": None, "candidates": []}
@@ -282,7 +282,7 @@ class Service:
             centre = peak.frequency_mhz
         except ValueError as error:
             answer["why"], centre = str(error), (first + last) / 2
-        reach = max(number_of(message, "reach_mhz", default=0.0), last - first)
+        reach = max(read_number(message, "reach_mhz", default=0.0), last - first)
         for number, record in self.session.state.species.items():
             if not record.visible:
                 continue
@@ -314,14 +314,14 @@ class Service:
 
     def _pick(self, message: Mapping[str, Any]) -> Answer:
         """The allowed lines of a level in the band, strongest first."""
-        number, record = species_of(self.session.state, message)
+        number, record = read_species(self.session.state, message)
         label = message.get("level")
         predicted = self.predictions.lines(record)
         model = predicted.model
         names = ", ".join(model.quanta)
         if not isinstance(label, list) or len(label) != len(model.quanta) or not all(type(q) is int for q in label):
             raise ValueError(f"level: {label!r}: expected {len(model.quanta)} whole numbers: {names}")
-        row = int(rows_of_labels(model, predicted.lines.levels, np.array([label]))[0])
+        row = int(label_rows(model, predicted.lines.levels, np.array([label]))[0])
         if row < 0:
             raise ValueError(
                 f"level {' '.join(map(str, label))}: there is no such level ({names}) up to J = {predicted.lines.jmax}"
@@ -331,16 +331,16 @@ class Service:
         return {"candidates": self._candidates(number, predicted, rows, 0.0)}
 
     def _levels(self, message: Mapping[str, Any]) -> Answer:
-        number, record = species_of(self.session.state, message)
+        number, record = read_species(self.session.state, message)
         predicted, shared = self.predictions.lines(record), shared_blends(self.session.state)
         lines = {
             n: msgspec.structs.replace(line, rejected=line.rejected or line.blend in shared)  # measures no difference
             for n, line in self.session.state.lines_of(number).items()
         }
-        return levels_of(predicted.model, lines, predicted.lines.levels)
+        return assigned_levels(predicted.model, lines, predicted.lines.levels)
 
     def _export(self, message: Mapping[str, Any]) -> Answer:
-        number, record = species_of(self.session.state, message)
+        number, record = read_species(self.session.state, message)
         lines = lines_alone(number, self._models(), self.session.state)
         name, text = exported(str(message.get("what")), self.predictions.model(record), lines)
         return {"name": name, "text": text}

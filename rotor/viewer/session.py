@@ -38,7 +38,7 @@ class SessionFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     undone: list[Step] = []
 
 
-def sha256_of(path: str | os.PathLike[str]) -> str:
+def file_sha256(path: str | os.PathLike[str]) -> str:
     """The hash of a file's content."""
     with open(path, "rb") as handle:
         return hashlib.file_digest(handle, "sha256").hexdigest()
@@ -119,7 +119,7 @@ def spectrum_file(path: Path, points: int, folder: Path, stated: SpectrumFile | 
     where, base = path.resolve(), folder.resolve()
     shown = where.relative_to(base) if where.is_relative_to(base) else where
     begin = stated or SpectrumFile("", "", 0)
-    return msgspec.structs.replace(begin, path=shown.as_posix(), sha256=sha256_of(path), points=points)
+    return msgspec.structs.replace(begin, path=shown.as_posix(), sha256=file_sha256(path), points=points)
 
 
 def is_session(path: str | os.PathLike[str]) -> bool:

@@ -8,8 +8,8 @@ import msgspec
 
 from rotor.table import counted
 from rotor.viewer.joint_fits import refits
-from rotor.viewer.messages import Change, Context, Message, constants_of, number_of, species_of
-from rotor.viewer.prediction import MOST_J, changed, species_of_source, with_hyperfine
+from rotor.viewer.messages import Change, Context, Message, read_constants, read_number, read_species
+from rotor.viewer.prediction import MOST_J, changed, species_record, with_hyperfine
 from rotor.viewer.records import COLOURS, Record, Species, State, line_key, species_key
 
 MOST_SPECIES = 30
@@ -19,21 +19,21 @@ NUMBERS = {"temperature_k": 0.0, "scale": 0.0, "column_per_cm2": 0.0, "fwhm_km_s
 
 def constants(state: State, message: Message, context: Context) -> Change:
     """Set constants (MHz); the last fit is no longer that of the constants."""
-    number, species = species_of(state, message)
-    record = changed(species, constants_of(message))
+    number, species = read_species(state, message)
+    record = changed(species, read_constants(message))
     context.predictions.model(record)  # refuses an impossible set
-    names = ", ".join(constants_of(message))
+    names = ", ".join(read_constants(message))
     return f"set {names} of {species.name}", {species_key(number): msgspec.structs.replace(record, fit=None)}
 
 
 def free(state: State, message: Message, context: Context) -> Change:
     """Choose the constants that a refit varies; a constant that the species lacks is added with the value 0."""
-    number, species = species_of(state, message)
+    number, species = read_species(state, message)
     names = message.get("free")
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise ValueError("free: expected a list of names of constants")
     model = context.predictions.model(species)
-    chosen = list(dict.fromkeys(model.constants.own_name(name) for name in names))
+    chosen = list(dict.fromkeys(model.constants.spelling(name) for name in names))
     added = {name: 0.0 for name in chosen if name not in species.constants}
     record = msgspec.structs.replace(species, constants={**species.constants, **added}, free=tuple(chosen))
     context.predictions.model(record)  # refuses an unknown name
@@ -42,8 +42,8 @@ def free(state: State, message: Message, context: Context) -> Change:
 
 def species(state: State, message: Message, context: Context) -> Change:
     """Change temperature, dipole, scale, colour, name, visibility or nuclear spins of a species."""
-    number, record = species_of(state, message)
-    values = _values_of(message, record.name)
+    number, record = read_species(state, message)
+    values = _changed_fields(message, record.name)
     if not values and "hyperfine" not in message:
         raise ValueError(
             f"species: expected {', '.join(NUMBERS)}, visible, colour, name, hyperfine or dipole_abc_debye"
@@ -57,15 +57,15 @@ def species(state: State, message: Message, context: Context) -> Change:
     return f"change {', '.join(values)} of {record.name}", {species_key(number): after}
 
 
-def _values_of(message: Message, name: str) -> dict[str, Any]:
+def _changed_fields(message: Message, name: str) -> dict[str, Any]:
     """The fields of a species that a message changes. name: of the species before."""
     values: dict[str, Any] = {
-        key: number_of(message, key, above=bound) for key, bound in NUMBERS.items() if key in message
+        key: read_number(message, key, above=bound) for key, bound in NUMBERS.items() if key in message
     }
     if "visible" in message:
         values["visible"] = bool(message["visible"])
     if "colour" in message:
-        values["colour"] = int(number_of(message, "colour")) % COLOURS
+        values["colour"] = int(read_number(message, "colour")) % COLOURS
     if "name" in message:
         values["name"] = " ".join(str(message["name"]).split())[:80] or name
     if "dipole_abc_debye" in message:
@@ -73,7 +73,7 @@ def _values_of(message: Message, name: str) -> dict[str, Any]:
         if not isinstance(dipole, list) or len(dipole) != 3:
             raise ValueError(f"dipole_abc_debye: {dipole!r}: expected three numbers")
         key = "dipole_abc_debye"
-        values[key] = tuple(number_of({key: component}, key) for component in dipole)
+        values[key] = tuple(read_number({key: component}, key) for component in dipole)
     return values
 
 
@@ -95,9 +95,9 @@ def add_species(state: State, message: Message, context: Context) -> Change:
         raise ValueError("source: expected a molecule: a name, a file, or SMILES:...")
     if len(state.species) >= MOST_SPECIES:
         raise ValueError(f"a session has at most {MOST_SPECIES} species; remove one first")
-    temperature = number_of(message, "temperature_k", above=0, default=300.0)
+    temperature = read_number(message, "temperature_k", above=0, default=300.0)
     number = state.free_number("species")
-    record, remark = species_of_source(
+    record, remark = species_record(
         context.predictions.stored(source.strip()), (number - 1) % COLOURS, temperature, context.predictions.top
     )
     reached = context.predictions.lines(record).lines.jmax
@@ -112,7 +112,7 @@ def add_species(state: State, message: Message, context: Context) -> Change:
 
 def remove_species(state: State, message: Message, context: Context) -> Change:
     """Remove a species and its lines."""
-    number, record = species_of(state, message)
+    number, record = read_species(state, message)
     changes: dict[str, Record | None] = {line_key(n): None for n in state.lines_of(number)}
     changes[species_key(number)] = None
     series = state.settings.series
@@ -124,7 +124,7 @@ def remove_species(state: State, message: Message, context: Context) -> Change:
 def refit(state: State, message: Message, context: Context) -> Change:
     """Fit the constants of a species, or of all species with lines; species that share a blend are fitted together."""
     if "species" in message:
-        numbers = {species_of(state, message)[0]}
+        numbers = {read_species(state, message)[0]}
     else:
         numbers = {line.species for line in state.lines.values()}
     if not numbers:

@@ -110,7 +110,7 @@ def test_a_kick_has_its_closed_form(shared):
     """Mean and extremes over a revival of exp(iP cos²θ)|00⟩; the file's grid has 20001 points in it."""
     times = np.linspace(1e-9, revival_period_ps(OCS), 20001)
     for p, mean, highest, _, lowest in table(shared, "deltakick_J0")[::6]:
-        trace = align(OCS, Kick.of_strength(p, 4.04), times, state=GROUND, tolerance=1e-8)
+        trace = align(OCS, Kick.from_strength(p, 4.04), times, state=GROUND, tolerance=1e-8)
         assert trace.permanent["cos2theta"] == pytest.approx(mean, abs=1e-8)
         assert trace.cosines["cos2theta"].max() == pytest.approx(
             highest, abs=1e-6
@@ -121,7 +121,7 @@ def test_a_kick_has_its_closed_form(shared):
 def test_the_best_single_kick():
     """0.92217 at P = 55, the limit of one pulse (fields.md)."""
     times = np.linspace(1e-9, revival_period_ps(OCS), 40001)
-    trace = align(OCS, Kick.of_strength(55.0, 4.04), times, state=GROUND)
+    trace = align(OCS, Kick.from_strength(55.0, 4.04), times, state=GROUND)
     assert trace.cosines["cos2theta"].max() == pytest.approx(0.92217, abs=2e-5)  # digits given
 
 
@@ -146,7 +146,7 @@ def test_revivals(b_cm, period):
     assert revival_period_ps(top) == pytest.approx(period, rel=2e-5)  # digits given
     times = np.linspace(0.01, 0.2 * revival_period_ps(top), 50)
     trace = align(
-        top, Kick.of_strength(3.0, 1.0), np.concatenate([times, times + revival_period_ps(top)]), temperature_k=5
+        top, Kick.from_strength(3.0, 1.0), np.concatenate([times, times + revival_period_ps(top)]), temperature_k=5
     )
     assert np.allclose(
         trace.cosines["cos2theta"][:50], trace.cosines["cos2theta"][50:], atol=1e-9
@@ -159,7 +159,7 @@ def test_spin_weights_halve_or_quarter_the_revivals():
     for weights in ({"even": 1, "odd": 1}, {"even": 1, "odd": 0}, {"even": 2, "odd": 1}):
         top = Top.from_constants("B=0.39 cm-1", spin_weights=weights).with_polarizability(np.diag([2.0, 0, 0]), "test")
         quarter = revival_period_ps(top) / 4
-        trace = align(top, Kick.of_strength(2.0, 2.0), np.linspace(quarter - 3, quarter + 3, 601), temperature_k=60)
+        trace = align(top, Kick.from_strength(2.0, 2.0), np.linspace(quarter - 3, quarter + 3, 601), temperature_k=60)
         results[tuple(weights.values())] = float(np.ptp(trace.cosines["cos2theta"]))
     assert results[1, 0] > 0.05
     assert results[1, 1] < 0.1 * results[1, 0]
@@ -215,7 +215,7 @@ def test_orders_of_the_methods(rule, order):
     operator = propagate.Decomposed(operator.values, operator.vectors, across.at(operator.values))
 
     def end(steps: int, name: str) -> np.ndarray:
-        grid = propagate.grid_of(window, 0.1 / steps, np.zeros(0))
+        grid = propagate.step_grid(window, 0.1 / steps, np.zeros(0))
         if name == "magnus":
             return propagate.magnus_through(window, grid, energies, [matrix], start, edge)[0]
         plan = propagate.kick_plan(window, grid, propagate.splitting(name))
@@ -259,7 +259,7 @@ def test_tolerance_is_kept_by_sequences_and_crossed_pulses():
         [GaussianPulse(5e12, 0.05), GaussianPulse(8e12, 0.1, 40.0)],
         [GaussianPulse(5e12, 0.05), GaussianPulse(3e12, 0.05, 0.02, axis=(1, 0, 0))],
         [SwitchedPulse(3e11, 10.0, 5.0, 0.0)],
-        [TabulatedPulse([0.0, 0.3, 0.5, 1.0], [0.0, 2e12, 1e12, 0.0]), Kick.of_strength(1.0, 4.04, 0.4)],
+        [TabulatedPulse([0.0, 0.3, 0.5, 1.0], [0.0, 2e12, 1e12, 0.0]), Kick.from_strength(1.0, 4.04, 0.4)],
     ]
     times = np.linspace(-1, 60, 123)
     for pulses in sequences:
@@ -314,7 +314,7 @@ def test_a_long_pulse_obeys_a_signal():
     block = field_space(OCS, 110, [contraction]).blocks(0)[0]
     window = timeline([SwitchedPulse(2e12, 0.3, 0.2, 0.1)])[0]
     operator = propagate.decompose(block.matrix(contraction))
-    grid = propagate.grid_of(window, 5e-5, np.zeros(0))
+    grid = propagate.step_grid(window, 5e-5, np.zeros(0))
     plan = propagate.kick_plan(window, grid, propagate.splitting("nystrom 4"))
     start, edge = np.eye(len(block), 300, dtype=complex), block.j > 108
     assert len(plan.which) * len(block) ** 2 * 300 > 2e10

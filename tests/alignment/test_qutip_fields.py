@@ -9,9 +9,9 @@ import pytest
 import qutip
 
 from rotor.alignment.align import align
-from rotor.alignment.classical import classical_trace, moments_of
+from rotor.alignment.classical import classical_trace, scaled_moments
 from rotor.alignment.pulse import DipolePulse, GaussianPulse, Kick
-from rotor.alignment.qutip_objects import block_objects, chain_of, linear_objects, solve_windows
+from rotor.alignment.qutip_objects import block_objects, cosine_chain, linear_objects, solve_windows
 from rotor.tops.top import Top
 
 OCS = Top.from_constants("B=6081.492 MHz", dipole_abc_debye=(0.71519, 0, 0)).with_polarizability(
@@ -61,7 +61,7 @@ def test_the_step_over_a_pulse_is_seen_with_their_defaults_and_not_with_ours():
 
 def test_kicks_and_fields_on_the_dipole():
     times = np.linspace(-2, 60, 101)
-    pulses = [Kick.of_strength(2.0, 4.04), DipolePulse(300.0, 1.0, 0.2, centre_ps=10.0)]
+    pulses = [Kick.from_strength(2.0, 4.04), DipolePulse(300.0, 1.0, 0.2, centre_ps=10.0)]
     objects = block_objects(OCS, pulses, jmax=26, cosines=("costheta", "cos2theta"))
     theirs = solve_windows(objects, objects.state("0"), times)
     ours = align(OCS, pulses, times, state={"j": 0}, tolerance=1e-9, jmax=26, observables=("costheta", "cos2theta"))
@@ -81,7 +81,7 @@ def test_operators_of_all_states():
     assert np.abs(np.diag(total.full())[inside] - 1).max() < 1e-14  # Σ_p |D_p0|² = 1 where J + 1 is there
     assert np.trace(objects.thermal(10.0).full()).real == pytest.approx(1.0)
     places = np.array([j * j + j for j in range(7)])
-    assert np.abs(chain_of(6, 0, 0).full() - objects.cosine.full()[np.ix_(places, places)]).max() < 1e-15
+    assert np.abs(cosine_chain(6, 0, 0).full() - objects.cosine.full()[np.ix_(places, places)]).max() < 1e-15
 
 
 def test_collisions_destroy_alignment():
@@ -121,8 +121,8 @@ def test_wrong_requests_are_refused():
 
 def test_units_of_the_classical_gas():
     """I = 1/(2B): the rate of rotation of L = 1 (ħ) is 2B."""
-    assert 1 / moments_of(OCS)[1] == pytest.approx(2 * 2 * math.pi * 6081.492e-6)
-    assert moments_of(OCS)[0] == 0.0
+    assert 1 / scaled_moments(OCS)[1] == pytest.approx(2 * 2 * math.pi * 6081.492e-6)
+    assert scaled_moments(OCS)[0] == 0.0
 
 
 def test_classical_and_quantum_gas_agree_while_both_dephase():
@@ -140,7 +140,7 @@ def test_classical_and_quantum_gas_agree_while_both_dephase():
 
 def test_a_classical_kick_turns_by_its_torque():
     """At 0 K a kick gives θ' = -(P/I) sin2θ ħ: ⟨cos²θ⟩ follows from one dimension."""
-    kick, times = Kick.of_strength(1.0, 4.04), np.linspace(1e-6, 3.0, 30)
+    kick, times = Kick.from_strength(1.0, 4.04), np.linspace(1e-6, 3.0, 30)
     computed = classical_trace(OCS, [kick], times, temperature_k=0.0, molecules=20_000, rng=np.random.default_rng(1))[
         "cos2theta"
     ]

@@ -301,7 +301,7 @@ def test_spurs_are_multiples_of_a_clock() -> None:
 def test_a_gap_in_the_band_is_seen() -> None:
     peaks = spectrum()
     cut = peaks.where((peaks.frequency_mhz < 11000) | (peaks.frequency_mhz > 14000))
-    cut = replace(cut, given_windows=None)
+    cut = replace(cut, stated_windows=None)
     assert len(cut.windows) == 2
     assert cut.windows[0, 1] == pytest.approx(11000, abs=200)
     assert is_right(answer_assign(AssignRequest(cut, seconds=120)), 0, TRUTH)

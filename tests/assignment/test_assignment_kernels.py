@@ -22,7 +22,7 @@ from rotor.assignment.search import (
     SPREAD,
     Field,
     quick_ratios,
-    roots_of,
+    search_roots,
 )
 from rotor.units import MHZ_PER_K
 
@@ -112,7 +112,7 @@ def test_roots_are_those_of_a_plain_loop() -> None:
                 *range(0, len(field.peaks), 25),
             ]
         )
-        computed = roots_of(field, family, seeds, 2)
+        computed = search_roots(field, family, seeds, 2)
         change = field.jj[field.table.upper[family.lines]] - field.jj[field.table.lower[family.lines]]
         lines = family.lines[np.argsort(-np.abs(change), kind="stable")]
         expected = plain_roots(field, lines, family.companions, seeds, 2)

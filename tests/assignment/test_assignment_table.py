@@ -11,7 +11,7 @@ import rotor
 from rotor.assignment import _kernels
 from rotor.assignment.evidence import probability, word
 from rotor.assignment.families import Bounds, families, sample_tops
-from rotor.assignment.growth import FEWEST_MOVED, Grown, predict, slopes_of
+from rotor.assignment.growth import FEWEST_MOVED, Grown, line_slopes, predict
 from rotor.assignment.peaks import peak_list
 from rotor.assignment.rigid_table import JMAX, PARAMETERS, rigid_table
 from rotor.assignment.search import Field
@@ -60,7 +60,7 @@ def test_lines_are_those_of_line_list(values: tuple[float, ...]) -> None:
 def test_derivatives_are_differences() -> None:
     seen, values = field_of(), np.array(TOPS[0])
     lines = predict(seen, values, 2.0, 40)
-    slopes = slopes_of(seen, lines.row, values)
+    slopes = line_slopes(seen, lines.row, values)
     energy, moved = np.empty(len(seen.jj)), np.empty(len(seen.jj))
     table = seen.table
     for q, step in enumerate((0.01, 0.01, 0.01, 1e-6, 1e-6, 1e-6, 1e-6, 1e-6)):

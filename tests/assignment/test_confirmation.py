@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from assignment_cases import BAND, SECOND, lines_of
 
-from rotor.assignment.confirmation import _scales_of_lines, confirmed
+from rotor.assignment.confirmation import _line_scales, confirmed
 from rotor.assignment.evidence import differs
 from rotor.assignment.families import Bounds, Family
-from rotor.assignment.growth import Grown, grow, predict, prior_weight, quartic_sizes, slopes_of
+from rotor.assignment.growth import Grown, grow, line_slopes, predict, prior_weight, quartic_sizes
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.assignment.rigid_table import JMAX, PARAMETERS, rigid_table
 from rotor.assignment.search import Candidate, Field
@@ -55,7 +55,7 @@ def largest_ka(rows: np.ndarray) -> np.ndarray:
 
 def refitted(seen: Field, grown: Grown) -> Grown:
     """Least squares with all lines of a species and the a-priori errors of its constants."""
-    slopes = slopes_of(seen, grown.rows, grown.constants)
+    slopes = line_slopes(seen, grown.rows, grown.constants)
     weight = grown.weight * grown.share
     prior = prior_weight(seen, grown.constants, quartic_sizes(grown.constants))
     covariance = np.linalg.inv(slopes.T @ (weight[:, None] * slopes) + prior)
@@ -138,7 +138,7 @@ def test_lines_of_a_type_without_evidence_determine_nothing(right: tuple[Field, 
     seen, grown = right
     absent = np.array([False, False, True])
     hidden = replace(grown, ratios=np.where(absent, 0.0, grown.ratios), scales=np.where(absent, -np.inf, grown.scales))
-    scales = _scales_of_lines(seen, hidden, predict(seen, hidden.constants, hidden.temperature_k))
+    scales = _line_scales(seen, hidden, predict(seen, hidden.constants, hidden.temperature_k))
     assert scales[2] == pytest.approx(grown.scales[2], abs=0.3)
     assert np.isneginf(scales[:2]).all()
     checked = confirmed(seen, hidden, all_types=True)

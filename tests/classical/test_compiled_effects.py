@@ -20,7 +20,7 @@ from rotor.classical.integrators.driven_batch import propagate_driven
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import integrate
 from rotor.classical.integrators.splitting import SymmetricTopSplitting
-from rotor.classical.system import system_of
+from rotor.classical.system import flatten_system
 from rotor.geometry.rotations import uniform
 
 MOMENTS, MOMENTUM = np.array([1.0, 1.4, 2.0]), np.array([0.6, -0.3, 0.8])
@@ -64,7 +64,7 @@ def both(method, effects, monkeypatch, attitude=(1.0, 0, 0, 0), moments=MOMENTS,
 
 @pytest.mark.parametrize("name", ALL_EFFECTS)
 def test_the_compiled_torque_is_the_plain_one(name):
-    form = system_of(MOMENTS, [ALL_EFFECTS[name]]).compiled
+    form = flatten_system(MOMENTS, [ALL_EFFECTS[name]]).compiled
     rng = np.random.default_rng(3)
     for attitude, omega, time in zip(uniform(5, rng=rng), rng.normal(size=(5, 3)), rng.uniform(0, 9, 5), strict=True):
         plain = ALL_EFFECTS[name].torque(time, attitude[None], omega[None])[0]
@@ -121,8 +121,8 @@ def test_a_change_of_the_inertia_alone_is_not_compiled():
             return 2.0 * super().inertia(time, attitude)
 
     like = (1.1, [0.9, 0.6, 0.4], [0.0, 0.3, -5.0])
-    assert system_of(MOMENTS, [RollingEllipsoid(*like)]).compiled is not None
-    assert system_of(MOMENTS, [Heavier(*like)]).compiled is None
+    assert flatten_system(MOMENTS, [RollingEllipsoid(*like)]).compiled is not None
+    assert flatten_system(MOMENTS, [Heavier(*like)]).compiled is None
 
 
 def test_a_linear_rotor_in_a_field_is_compiled_too(monkeypatch):
@@ -146,7 +146,7 @@ def test_going_over_to_the_compiled_form_within_an_interval(monkeypatch):
 
 def test_what_is_called_at_every_step_is_not_compiled(monkeypatch):
     """A user's effect, a change of the plain form, moments that change: none is bypassed."""
-    compiled = lambda *effects: system_of(MOMENTS, effects).compiled  # noqa: E731
+    compiled = lambda *effects: flatten_system(MOMENTS, effects).compiled  # noqa: E731
     assert compiled(ConstantTorque([0.1, 0, 0])) is not None
     assert compiled(ConstantTorque([0.1, 0, 0]), Doubled([0.1, 0, 0])) is None
     assert compiled(TimedTorque(lambda t: [t, 0, 0])) is None
@@ -161,10 +161,10 @@ def test_what_is_called_at_every_step_is_not_compiled(monkeypatch):
 
 def test_few_steps_do_not_load_the_compiled_form(monkeypatch):
     effects = [ALL_EFFECTS["dipole"]]
-    method, system = SymmetricTopSplitting(0.1), system_of(MOMENTS, effects)
+    method, system = SymmetricTopSplitting(0.1), flatten_system(MOMENTS, effects)
     path = np.zeros((2, 1, 7))
     assert not method.follow_compiled(system, np.array([0.0, 1.0]), np.array([10]), path)
-    assert not method.follow_compiled(system_of(MOMENTS), np.array([0.0, 1.0]), np.array([10**6]), path)
+    assert not method.follow_compiled(flatten_system(MOMENTS), np.array([0.0, 1.0]), np.array([10**6]), path)
 
 
 def test_blocks_of_bodies_in_a_field_move_as_each_alone():
@@ -220,9 +220,9 @@ def test_refusals_of_blocks(make, message):
 @pytest.mark.parametrize("angle", [1e-9, 1e-4, 0.1, 0.5, 0.999999, 1.000001, 3.0])
 def test_the_series_of_a_turn(angle):
     """Cosine, sine and (1 - (θ/2) cot(θ/2))/θ² on both sides of the angle below which they are summed, in extended precision."""
-    from rotor.classical.integrators._attitude_kernels import turn_of
+    from rotor.classical.integrators._attitude_kernels import half_angle_terms
 
-    cosine, half_sinc, factor = turn_of.py_func((0.6 * angle, 0.0, 0.8 * angle))
+    cosine, half_sinc, factor = half_angle_terms.py_func((0.6 * angle, 0.0, 0.8 * angle))
     half = np.longdouble(angle) / 2
     assert cosine == pytest.approx(float(np.cos(half)), rel=1e-15, abs=3e-16)  # round-off, and that of |u|
     assert half_sinc == pytest.approx(float(np.sin(half) / (2 * half)), rel=1e-15)

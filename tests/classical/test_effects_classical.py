@@ -18,7 +18,7 @@ from rotor.classical.integrators.exact_drift import ExactDrift
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import integrate
 from rotor.classical.integrators.splitting import RotationSplitting, SymmetricTopSplitting
-from rotor.classical.system import momentum_of, system_of
+from rotor.classical.system import flatten_system, total_momentum
 from rotor.geometry.rotations import (
     conjugate,
     distance,
@@ -79,7 +79,7 @@ def test_torque_is_minus_the_gradient_of_the_energy(name):
 def test_against_plain_equations_with_a_rotation_matrix(name):
     """An independent route: 12 equations for L in space and the matrix R, R' = R [ω], by scipy."""
     effect = EVERY[name]
-    system = system_of(MOMENTS, [effect])
+    system = flatten_system(MOMENTS, [effect])
 
     def rates(t, y):
         matrix = y[3:].reshape(3, 3)
@@ -171,7 +171,7 @@ def test_spin_up_by_a_space_torque_keeps_its_direction():
 
 def test_effects_add_up():
     both = [EVERY["dipole"], EVERY["pivot"], SpinningRotor([0.1, 0, 0]), SpinningRotor([0, 0.2, 0])]
-    system = system_of(MOMENTS, both)
+    system = flatten_system(MOMENTS, both)
     attitude = uniform(3, rng=np.random.default_rng(1))
     total = system.torque(0.0, attitude, np.zeros((3, 3)))
     parts = [effect.torque(0.0, attitude, np.zeros((3, 3))) for effect in both[:2]]
@@ -208,7 +208,7 @@ def test_exact_drift_with_a_weak_torque_takes_long_steps():
         (lambda: GravityAboutPivot(0.0, [0, 0, 1], [0, 0, 1]), "positive"),
         (lambda: ChangingInertia([1, 2, 3]), "function of time"),
         (lambda: ChangingInertia(lambda t: [0.0, 1.0, 1.0]).moments(0.0), "positive"),
-        (lambda: system_of(MOMENTS, [EVERY["inertia"], EVERY["inertia"]]), "2 effects set the moments"),
+        (lambda: flatten_system(MOMENTS, [EVERY["inertia"], EVERY["inertia"]]), "2 effects set the moments"),
     ],
 )
 def test_refusals(make, message):
@@ -221,7 +221,7 @@ def test_a_ball_rolls_steadily_and_as_the_closed_form_says():
     moments = 0.4 * mass * radius**2 * np.ones(3)
     ball = RollingEllipsoid(mass, [radius] * 3, gravity=[0.0, 0.0, -9.8])
     spin = np.array([3.0, -1.0, 2.0])
-    start = momentum_of(spin, moments, [ball])
+    start = total_momentum(spin, moments, [ball])
     assert np.allclose(start, [1.4 / 0.4, 1.4 / 0.4, 1.0] * moments * spin, rtol=1e-15)  # 7/5 m r² about the contact
     motion = integrate(LieRungeKutta(1e-11), moments, start, np.linspace(0, 3, 7), effects=[ball])
     in_space = rotate(motion.attitude, motion.omega)
@@ -232,7 +232,7 @@ def test_a_ball_rolls_steadily_and_as_the_closed_form_says():
 def test_an_egg_keeps_its_energy_while_it_rolls():
     q = exp([0.4, -0.3, 0.2])
     egg = RollingEllipsoid(1.3, [1.0, 0.7, 0.8], [0.0, 0.0, -9.8], centre=[0.05, -0.1, 0.02], axes=exp([0.1, 0.2, 0.3]))
-    start = momentum_of([0.3, 1.1, -0.4], [0.3, 0.4, 0.5], [egg], q)
+    start = total_momentum([0.3, 1.1, -0.4], [0.3, 0.4, 0.5], [egg], q)
     motion = integrate(LieRungeKutta(1e-11), [0.3, 0.4, 0.5], start, np.linspace(0, 5, 41), q, [egg])
     assert np.ptp(motion.energy) < 1e-8 * np.mean(motion.energy)  # tolerance x some hundred steps
     assert np.ptp([egg.potential_energy(0.0, attitude) for attitude in motion.attitude]) > 0.05  # and it does rock
@@ -267,7 +267,7 @@ def test_rolling_is_that_of_kane_and_levinson():
     attitude = multiply(from_matrix([across, np.cross(mu, across), mu]), conjugate(turn))
     celt = RollingEllipsoid(1.0, np.sqrt(squares), [0.0, 0.0, g], rotate(turn, [0.0, 0.0, -height]), turn)
     effects = [celt, LinearDrag([0.3, 0.3, 0.3])]
-    start = momentum_of(rotate(turn, omega), moments, effects, attitude)
+    start = total_momentum(rotate(turn, omega), moments, effects, attitude)
     motion = integrate(TIGHT, moments, start, [0.0, 2.0], attitude, effects)
     back = conjugate(turn)
     assert np.allclose(rotate(back, motion.omega[-1]), plain[3:], atol=1e-9)  # both tolerances 1e-12 a step

@@ -22,7 +22,7 @@ from rotor.geometry.rotations import IDENTITY
 from rotor.plots.animation import Atoms, animate, box_edges
 from rotor.plots.polhodes import polhode_figure
 from rotor.plots.show import write_picture
-from rotor.plots.sphere import view_of
+from rotor.plots.sphere import clear_view
 
 moments_of_a_body = st.permutations((0, 1, 2)).flatmap(
     lambda order: st.tuples(*(st.floats(0.5, 2.0) for _ in range(3))).map(lambda m: np.array(m)[list(order)])
@@ -160,7 +160,7 @@ def test_every_kind_of_body_has_a_picture(moments, momentum):
     path = right.lines[0].get_xydata()
     assert path[0, 1] == pytest.approx(momentum[0] / np.linalg.norm(momentum), abs=1e-12)  # round-off
     assert path[-1, 0] <= 12.0 + 1e-12  # linspace ends where asked
-    view = view_of(np.array(moments), np.array(momentum))
+    view = clear_view(np.array(moments), np.array(momentum))
     assert np.allclose(view.axes @ view.axes.T, np.eye(3), atol=1e-15)
     assert view.depth(momentum) > 0  # the start is on the front
     assert np.linalg.det(view.axes) == pytest.approx(1.0)  # not mirrored
@@ -174,7 +174,7 @@ def test_a_body_with_two_equal_moments_rests_at_right_angles_to_its_axis(moments
     start = np.array([0.0, 0.4, -0.9]) if 0.0 in moments else np.array([1.8, 0.4, -0.9])
     left = polhode_figure(free_motion(moments, start), [0.0, 12.0]).axes[0]
     (dotted,) = (line for line in left.lines if line.get_label() == "points at rest")
-    view = view_of(np.array(moments), start / np.linalg.norm(start))
+    view = clear_view(np.array(moments), start / np.linalg.norm(start))
     x, y = dotted.get_xydata().T
     z = np.sqrt(np.maximum(1.0 - x**2 - y**2, 0.0))  # of the front
     along = np.stack([x, y, z], axis=-1) @ view.axes[:, axis]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from assignment_cases import BAND, TRUTH, is_right, lines_of, spectrum
 
-from rotor.assignment.peak_finding import peaks_of_spectrum
+from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.formats.peak_files import read_peaks
 
@@ -113,7 +113,7 @@ def test_noise_alone_has_no_species(call: Call) -> None:
     """10⁶ points of noise: none is above six times the noise but by a chance of 1e-3; the answer is "not found"."""
     noise = np.random.default_rng(7).normal(size=1_000_000)
     grid = 6000 + 0.01 * np.arange(1_000_000)
-    assert len(peaks_of_spectrum(grid, noise)) == 0
+    assert len(pick_peaks(grid, noise)) == 0
     np.save("noise.npy", np.column_stack([grid, noise]))
     code, out, _ = call("assign", "noise.npy", "--csv", "peaks.csv", "--plot", "noise.png", "--json", "noise.json")
     assert code == 0
@@ -127,7 +127,7 @@ def test_noise_alone_has_no_species(call: Call) -> None:
 def test_a_grid_in_ghz_and_an_inverted_one(factor: float, sign: float, message: str) -> None:
     grid, x = gridded()
     with pytest.raises(ValueError, match=message):
-        peaks_of_spectrum(factor * grid, sign * x)
+        pick_peaks(factor * grid, sign * x)
 
 
 @pytest.mark.parametrize("array", [np.ones((5, 4)), np.ones(6), np.ones((2, 3, 2)), np.array([["a", "b"]] * 3)])

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.formats.spcat.model import top_of
+from rotor.formats.spcat.model import spcat_top
 from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.level_list import level_list
@@ -21,7 +21,7 @@ from rotor.plots.show import write_picture
 from rotor.plots.view import View
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.request import LevelsRequest, answer_levels
-from rotor.reports.screen import plain, rows_of
+from rotor.reports.screen import plain, table_records
 
 KEYS = {
     "jmin", "jmax", "kmin", "kmax", "max_energy_mhz", "quantum_numbers", "level_count", "ground_mhz", "hyperfine", "levels", "files",
@@ -34,7 +34,7 @@ def test_the_same_request_gives_the_same_answer(call):
     content = json.loads(call("levels", "H2CO", *arguments)[1])
     request = LevelsRequest(rotor.read("H2CO"), jmin=1, jmax=6, kmin=1, kmax=2, max_energy_mhz=200 * 29979.2458)
     answer = answer_levels(request)
-    facts = plain({**answer.facts(), "levels": rows_of(answer.table)})
+    facts = plain({**answer.facts(), "levels": table_records(answer.table)})
     assert {key: content[key] for key in facts} == facts
     assert len(content["levels"]) == content["level_count"] > 10
 
@@ -136,7 +136,7 @@ def test_blocks_and_energies_are_those_of_spcat(shared: Path, case):
     """Every level of the reference's list with the same block, rank, degeneracy and energy."""
     folder = shared / "reference" / "spcat" / case
     reference = read_egy(gzip.decompress((folder / f"{case}.egy.gz").read_bytes()))
-    top = top_of(read_par(folder / f"{case}.var"), read_int(folder / f"{case}.int"))
+    top = spcat_top(read_par(folder / f"{case}.var"), read_int(folder / f"{case}.int"))
     ours = level_list(answer_levels(LevelsRequest(top, jmax=20)).table)
     places = {tuple(row): i for i, row in enumerate(ours.quanta.tolist())}
     rows = [i for i in range(len(reference)) if reference.quanta[i, 0] <= 20]

@@ -11,8 +11,8 @@ import pytest
 from assignment_cases import BAND, TRUTH, lines_of, spectrum
 
 import rotor
-from rotor.assignment.intensities import fit_intensities, matched, types_of
-from rotor.assignment.peak_finding import peaks_of_spectrum
+from rotor.assignment.intensities import fit_intensities, line_types, matched
+from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.peaks import peak_list
 from rotor.plots.over import loomis_wood_figure, over_figure
 from rotor.spectra.lines import Lines
@@ -62,7 +62,7 @@ def test_components_that_were_given_count() -> None:
 def test_a_type_with_peaks_by_chance_is_absent() -> None:
     """A strong peak at one line of a-type, as of another molecule, does not make the type present."""
     peaks, lines = spectrum(), known_lines()
-    a_type = np.flatnonzero(types_of(lines, np.arange(len(lines))) == 0)
+    a_type = np.flatnonzero(line_types(lines, np.arange(len(lines))) == 0)
     strongest = a_type[np.argsort(-lines.intensity_nm2_mhz[a_type])[:40]]
     rows = [row for row in strongest.tolist() if np.abs(peaks.frequency_mhz - lines.frequency_mhz[row]).min() > 1.0][:2]
     f = np.append(peaks.frequency_mhz, lines.frequency_mhz[rows])
@@ -156,7 +156,7 @@ def test_a_spectrum_on_a_grid_is_drawn_as_a_curve() -> None:
     frequency = np.arange(6000.0, 6100.0, 0.02)
     noise = 1e-3 * np.random.default_rng(1).normal(size=len(frequency))
     height = np.exp(-(((frequency - 6020.0) / 0.06) ** 2)) + np.exp(-(((frequency - 6071.3) / 0.06) ** 2)) + noise
-    peaks = peaks_of_spectrum(frequency, height)
+    peaks = pick_peaks(frequency, height)
     lines = known_lines()
     axes = over_figure(lines, lines.intensity_nm2_mhz, peaks, "").axes[0]
     curve = next(line for line in axes.lines if line.get_label() == "spectrum")

@@ -11,7 +11,7 @@ from places import ORACLES
 
 import rotor
 from rotor.formats import read
-from rotor.reports.screen import plain, rows_of
+from rotor.reports.screen import plain, table_records
 from rotor.thermodynamics.torsion_request import TorsionRequest, answer_torsion
 
 ETHANE = ("torsion", "C2H6", "--bond", "1-2", "--potential", "V3=1013 cm-1")
@@ -22,7 +22,7 @@ def test_the_command_gives_what_python_gives(call):
     assert code == 0, err
     command = json.loads(out)
     answer = answer_torsion(TorsionRequest(read("C2H6"), "1-2", "V3=1013 cm-1", vmax=1, temperatures_k=(100.0, 300.0)))
-    facts = {**answer.facts(), "levels": rows_of(answer.levels), "functions": rows_of(answer.functions)}
+    facts = {**answer.facts(), "levels": table_records(answer.levels), "functions": table_records(answer.functions)}
     for key, value in plain(facts).items():
         assert command[key] == value, key
     assert command["levels"][1]["degeneracy"] == 2

@@ -12,7 +12,7 @@ import pytest
 from places import ORACLES
 
 import rotor
-from rotor.classical.motion_steps import expected_steps, first_share, steps_of
+from rotor.classical.motion_steps import count_first_steps, expected_steps, first_share
 from rotor.scenes.scene_file import parse_scene
 
 TUMBLE = """schema = 1
@@ -114,7 +114,7 @@ def test_steps_are_expected_by_a_short_part(moments):
     request = Calculation(scene).request()
     assert 0.0 < first_share(request) <= 0.05
     np.testing.assert_allclose(
-        expected_steps(request), steps_of(request, 1.0), rtol=0.3
+        expected_steps(request), count_first_steps(request, 1.0), rtol=0.3
     )  # of a motion not quite regular
 
 

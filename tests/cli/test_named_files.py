@@ -12,7 +12,7 @@ from places import ORACLES
 
 import rotor
 from rotor.cli import run
-from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.model import intensity_file
 from rotor.formats.spcat.names.named_parameters import named_parameter_file
 from rotor.formats.spcat.names.named_top import named_top
@@ -56,7 +56,7 @@ def _repeated(levels, chosen) -> np.ndarray:
 
 def coded_energies(file: ParameterFile, light: IntensityFile, twice_f: int) -> np.ndarray:
     """The same from the codes."""
-    levels = [group.levels((0, twice_f)) for group in groups_of(file, light)]
+    levels = [group.levels((0, twice_f)) for group in connected_groups(file, light)]
     return np.sort(np.concatenate([_repeated(level, np.ones(len(level), dtype=bool)) for level in levels]))
 
 

@@ -15,14 +15,14 @@ import pytest
 
 import rotor
 from rotor.fitting.assignment import Assignments, assignments
-from rotor.fitting.fit import Fit, covariance_of_determined, fit_lines
+from rotor.fitting.fit import Fit, determined_covariance, fit_lines
 from rotor.fitting.parameters import Parameters, parameters
 from rotor.fitting.publication import publication_table
 from rotor.fitting.resampling import bootstrap
 from rotor.fitting.top_constants import TopConstants
 from rotor.fitting.top_levels import top_levels
 from rotor.formats.assigned_lines import write_assigned_lines
-from rotor.formats.fit_request import answer_fit, fit_of_lines, write_fitted_toml
+from rotor.formats.fit_request import answer_fit, lines_request, write_fitted_toml
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.hamiltonian.codes import FIXED
@@ -96,12 +96,12 @@ def test_an_a_priori_value_of_0_stays(folder):
     write_assigned_lines(nitrogen_lines(TopConstants(NITROGEN, True)), "lines.csv")
     top = replace(NITROGEN, spin_constants=SpinConstants.parse("chi_aa(14N)=-4 chi_bb-cc(14N)=1.2 chi_ab(14N)=0"))
     free = ["A", "B", "C", "chi_aa(14N)", "chi_bb-cc(14N)", "chi_ab(14N)"]
-    known = fit_of_lines("lines.csv", top, free, priors_mhz={"chi_ab(14N)": 0.05})
+    known = lines_request("lines.csv", top, free, priors_mhz={"chi_ab(14N)": 0.05})
     assert known.parameters.start[-1] == known.parameters.expected[-1] == 0.0
     fit = answer_fit(replace(known, options=replace(known.options, poor_rms=1e9))).fit
     assert abs(fit.values[-1]) < 1e-6
     assert fit.errors[-1] == pytest.approx(0.05, rel=1e-3)  # derivatives at 1e-30 MHz are round-off
-    unknown = fit_of_lines("lines.csv", top, free)
+    unknown = lines_request("lines.csv", top, free)
     assert unknown.parameters.start[-1] != 0.0
     answer = answer_fit(unknown).fit
     assert abs(abs(answer.values[-1]) - 15) < 4 * answer.errors[-1]
@@ -198,10 +198,10 @@ def test_the_table_tells_held_from_not_determined():
 
 def test_the_covariance_of_the_others_is_written(folder):
     fit, held = symmetric_fit("A B DJ DJK"), symmetric_fit("B DJ DJK")
-    computed = covariance_of_determined(fit.parameters, fit.statistics)
+    computed = determined_covariance(fit.parameters, fit.statistics)
     assert computed.matrix_mhz2 == pytest.approx(held.covariance.matrix_mhz2, rel=1e-6)
     write_assigned_lines(symmetric_lines(), "lines.csv")
-    answer = answer_fit(fit_of_lines("lines.csv", Top.from_constants(SYMMETRIC), ["A", "B", "DJ", "DJK"]))
+    answer = answer_fit(lines_request("lines.csv", Top.from_constants(SYMMETRIC), ["A", "B", "DJ", "DJK"]))
     write_fitted_toml(answer, "fitted.toml")
     content = tomllib.loads((folder / "fitted.toml").read_text())
     assert content["covariance"]["names"] == ["B", "DJ", "DJK"]

@@ -10,7 +10,7 @@ import pytest
 
 from rotor.fitting.stark_levels import stark_levels
 from rotor.fitting.top_constants import TopConstants
-from rotor.formats.fit_request import answer_fit, fit_of_lines
+from rotor.formats.fit_request import answer_fit, lines_request
 from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM
 from rotor.spectra.fields.lines import field_lines
 from rotor.tops.states.state_constants import StateConstants
@@ -110,7 +110,7 @@ def lines_file(path, top, fields, noise, unit="field_kv_per_cm", scale=1.0, only
 def test_a_dipole_is_fitted_with_the_constants(tmp_path):
     path = lines_file(tmp_path / "lines.csv", OCS, [0.0, 1.0, 3.0], 0.002, "field_v_per_cm", 1e3)
     start = Top.from_constants("B=6081 D=0.0013 MHz", dipole_abc_debye=(0.6, 0, 0))
-    fit = answer_fit(fit_of_lines(path, start, ["B", "D", "mu_a"])).fit
+    fit = answer_fit(lines_request(path, start, ["B", "D", "mu_a"])).fit
     assert fit.converged
     off = (fit.values - [6081.492475, 0.00130143, 0.71519]) / fit.errors
     assert np.abs(off).max() < 4.0  # standard errors
@@ -124,14 +124,14 @@ def test_two_components_of_an_asymmetric_top_from_a_wrong_start(tmp_path):
     top = Top.from_constants("A=10000 B=6000 C=4000 MHz", dipole_abc_debye=(1.0, 0.7, 0.0))
     path = lines_file(tmp_path / "lines.csv", top, [0.0, 0.3, 0.6], 0.001)
     start = Top.from_constants("A=10000.5 B=6000.1 C=4000.2 MHz", dipole_abc_debye=(0.9, 0.8, 0.0))
-    fit = answer_fit(fit_of_lines(path, start, ["A", "B", "C", "mu_a", "mu_b"])).fit
+    fit = answer_fit(lines_request(path, start, ["A", "B", "C", "mu_a", "mu_b"])).fit
     assert fit.converged
     assert np.abs((fit.values - [10000.0, 6000.0, 4000.0, 1.0, 0.7]) / fit.errors).max() < 4.5  # standard errors
 
 
 def test_an_unknown_dipole_starts_beside_zero(tmp_path):
     path = lines_file(tmp_path / "lines.csv", OCS, [0.0, 2.0], 0.002)
-    request = fit_of_lines(path, Top.from_constants("B=6081.49 D=0.0013 MHz"), ["B", "mu_a"])
+    request = lines_request(path, Top.from_constants("B=6081.49 D=0.0013 MHz"), ["B", "mu_a"])
     assert any("mu_a at" in note and note.endswith("D") for note in request.notes)
     fit = answer_fit(request).fit
     assert abs(fit.values[1]) == pytest.approx(0.71519, abs=4 * fit.errors[1])
@@ -169,7 +169,7 @@ def test_wrong_lines_are_refused(tmp_path, text, free, message):
     path = tmp_path / "lines.csv"
     path.write_text(text)
     with pytest.raises(ValueError, match=message):
-        fit_of_lines(str(path), OCS, free)
+        lines_request(str(path), OCS, free)
 
 
 def test_a_level_that_is_none_is_named(tmp_path):
@@ -178,4 +178,4 @@ def test_a_level_that_is_none_is_named(tmp_path):
         "j_upper,m_upper,j_lower,m_lower,field_kv_per_cm,frequency_mhz,error_mhz\n1,2,0,0,1,12163,0.1\n1,0,0,0,1,12163,0.1\n"
     )
     with pytest.raises(ValueError, match=r"line 1, .*there is no level with j = 1, m = 2, field = 1 kV/cm"):
-        answer_fit(fit_of_lines(str(path), OCS, ["B"]))
+        answer_fit(lines_request(str(path), OCS, ["B"]))

@@ -9,7 +9,7 @@ from rotor.fitting.assignment import assignments, levels_in
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import MissingLevelsError
 from rotor.tops.internal_rotation import InternalRotationConstants
 
@@ -62,7 +62,7 @@ def test_butynoic_acid_comes_out_as_westerfit_has_it():
 def test_derivatives_by_every_constant_are_those_of_finite_differences():
     constants, lines = butynoic_acid()
     labels, _, _ = levels_in(lines)
-    model = model_of(constants, labels)
+    model = label_model(constants, labels)
     values = np.array(list(constants.values.values()))
     _, slopes = model.levels(values)
     for i, (name, value) in enumerate(constants.values.items()):
@@ -106,7 +106,7 @@ def test_a_label_that_no_level_has_is_named():
         ([2, 1, 2, 0, 8], "vt = 8: v_t is at most 7"),
     ):
         with pytest.raises(MissingLevelsError, match=text):
-            model_of(constants, np.vstack([labels, [label]]))
+            label_model(constants, np.vstack([labels, [label]]))
 
 
 def principal_axes(**changes):
@@ -131,7 +131,7 @@ def lines_of(top, jmax):
 def test_derivatives_by_constants_of_principal_axes_are_those_of_finite_differences():
     constants = TopConstants(principal_axes())
     labels, _, _ = levels_in(lines_of(constants.top, 4))
-    model = model_of(constants, labels)
+    model = label_model(constants, labels)
     values = np.array(list(constants.values.values()))
     _, slopes = model.levels(values)
     for i, (name, value) in enumerate(constants.values.items()):

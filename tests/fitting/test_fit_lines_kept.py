@@ -16,7 +16,7 @@ from rotor.cli import run
 from rotor.fitting.publication import name_text
 from rotor.fitting.report import dfbetas, influence, report_text, statistics_text
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
-from rotor.formats.fit_request import answer_fit, fit_of_lines
+from rotor.formats.fit_request import answer_fit, lines_request
 from rotor.plots.fit import fit_figure
 from rotor.spectra.lines import line_list
 from rotor.tops.constants import Constants
@@ -65,7 +65,7 @@ def folder(tmp_path: Path, monkeypatch) -> Path:
 
 def _fit(path: str, reject: float | None = None):
     top = Top.from_constants(TRUE.replace(A=9401.0, C=2500.2))
-    request = fit_of_lines(path, top, ["A", "B", "C"])
+    request = lines_request(path, top, ["A", "B", "C"])
     return answer_fit(replace(request, options=replace(request.options, reject_above=reject)))
 
 
@@ -210,7 +210,7 @@ def chloride(folder: Path) -> Path:
 
 def test_half_integers_are_printed_as_such(chloride: Path):
     """9/2 in the report, in the saved list and on the axis of the picture."""
-    answer = answer_fit(fit_of_lines("cl.csv", rotor.read("start.toml"), FREE))
+    answer = answer_fit(lines_request("cl.csv", rotor.read("start.toml"), FREE))
     fit = answer.fit
     row = int(np.flatnonzero(fit.lines.upper[:, 3] == 9)[0])
     text = fit.lines.text(row)
@@ -235,7 +235,7 @@ def test_a_level_that_does_not_exist_is_named_with_its_row(chloride: Path):
     lines[3] = "3,2,1,17/2,2,2,0,15/2," + ",".join(lines[3].split(",")[8:])
     (chloride / "cl.csv").write_text("\n".join(lines) + "\n")
     with pytest.raises(ValueError, match=r"cl.csv: line 3, 3 2 1 17/2 - 2 2 0 15/2 at .* MHz: there is no level"):
-        answer_fit(fit_of_lines("cl.csv", rotor.read("start.toml"), FREE))
+        answer_fit(lines_request("cl.csv", rotor.read("start.toml"), FREE))
 
 
 def test_mass_numbers_are_raised_in_latex(chloride: Path):

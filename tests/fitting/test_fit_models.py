@@ -18,7 +18,7 @@ from rotor.fitting.parameters import parameters, with_names
 from rotor.fitting.report import report_text
 from rotor.fitting.resampling import bootstrap
 from rotor.fitting.top_constants import TopConstants
-from rotor.formats.assigned_lin import as_lin, note_of_lin
+from rotor.formats.assigned_lin import as_lin, lin_notes
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
 from rotor.plots.fit import fit_figure
 from rotor.spectra.lines import line_list
@@ -192,16 +192,16 @@ def test_lines_of_one_frequency_that_are_no_blend_are_none_in_a_lin(tmp_path):
     ]
     assert sorted(map(len, groups)) == [1, 1, 1, 1, 1, 1, 2]
     assert {(6, 0, 6), (7, 0, 7)} in groups
-    assert not note_of_lin(seen)
+    assert not lin_notes(seen)
 
 
 def test_lines_that_nothing_parts_are_named():
     seen = assignments(("j",), [[1], [2], [3]], [[0], [1], [2]], [100.0, 100.0, 300.0], 0.1)
-    assert not note_of_lin(seen)
+    assert not lin_notes(seen)
     last = assignments(("j",), [[1], [2], [3], [4]], [[0], [1], [2], [3]], [200.0, 300.0, 100.0, 100.0], 0.1)
-    assert not note_of_lin(last)  # nothing stands behind them that parts them, but before
+    assert not lin_notes(last)  # nothing stands behind them that parts them, but before
     assert as_lin(last).frequency.tolist() == [100.0, 200.0, 300.0, 100.0]
-    assert note_of_lin(seen.take(np.array([0, 1])))[0].startswith("1 line of the same frequency as the line before")
+    assert lin_notes(seen.take(np.array([0, 1])))[0].startswith("1 line of the same frequency as the line before")
 
 
 def test_the_command_line_says_so(call, folder):

@@ -17,12 +17,12 @@ import rotor
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.first_values import beside_zero
 from rotor.fitting.fit import fit_lines
-from rotor.fitting.orders import order_of
+from rotor.fitting.orders import j_order
 from rotor.fitting.parameters import parameters, with_names
 from rotor.fitting.top_constants import TopConstants
 from rotor.fitting.top_levels import top_levels
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
-from rotor.formats.fit_request import answer_fit, fit_of_lines
+from rotor.formats.fit_request import answer_fit, lines_request
 from rotor.formats.spcat.fits.fit_input import spfit_input
 from rotor.formats.spcat.fits.fit_states import groups_for_fit, levels_in_blocks
 from rotor.formats.spcat.fits.named_fit import named_file
@@ -162,7 +162,7 @@ def test_the_codes_of_names_make_the_same_levels(kind):
 
 
 def test_the_same_fit_as_from_spfits_files(case):
-    answer = answer_fit(fit_of_lines("lines.csv", rotor.read("start.toml"), names(FREE)))
+    answer = answer_fit(lines_request("lines.csv", rotor.read("start.toml"), names(FREE)))
     fit = answer.fit
     assert fit.converged
     assert 0.7 < fit.weighted_rms < 1.3  # of 88 degrees of freedom: three standard deviations are 0.23
@@ -183,7 +183,7 @@ def test_the_same_fit_as_from_spfits_files(case):
 
 
 def test_the_file_of_a_fit_gives_its_lines_their_errors(case):
-    answer = answer_fit(fit_of_lines("lines.csv", rotor.read("start.toml"), names(FREE), start="start.toml"))
+    answer = answer_fit(lines_request("lines.csv", rotor.read("start.toml"), names(FREE), start="start.toml"))
     rotor.formats.fit_request.write_fitted_toml(answer, "fitted.toml")
     content = tomllib.loads((case / "fitted.toml").read_text())
     assert content["covariance"]["names"] == names(FREE)
@@ -209,7 +209,7 @@ def test_the_file_of_a_fit_gives_its_lines_their_errors(case):
 def test_a_coupling_that_starts_at_zero_is_found(case):
     start = TWO_STATES.replace('"G_c[0,1]" = 20.0\n', "")
     (case / "zero.toml").write_text(start)
-    request = fit_of_lines("lines.csv", rotor.read("zero.toml"), names(FREE))
+    request = lines_request("lines.csv", rotor.read("zero.toml"), names(FREE))
     assert "only the square of these" in request.notes[-1]
     fit = answer_fit(request).fit
     assert abs(abs(fit.named["G_c[0,1]"]) - 20.0) < 4 * fit.named.uncertainties["G_c[0,1]"]
@@ -250,7 +250,7 @@ def test_orders_of_constants():
         "W_pm2_J[0,1]": 4,
     }
     orders |= {"chi_aa(14N)": 0, "chi_bb-cc_J(14N)": 2, "C_aa(14N)": 1, "B": 2}
-    assert {name: order_of(name, constants) for name in orders} == orders
+    assert {name: j_order(name, constants) for name in orders} == orders
 
 
 def test_ties_of_names_with_brackets():
@@ -350,4 +350,4 @@ def test_wrong_files_are_one_line(case, call, old, new, said):
 def test_lines_by_other_labels_than_those_of_the_start_are_refused():
     lines = Assignments.from_rows(("j",), [[1, 0, 12000.0, 0.01], [2, 1, 24000.0, 0.01]])
     with pytest.raises(ValueError, match="labels j: expected j, ka, kc, those of the start"):
-        fit_of_lines(lines, Top.from_constants("A=9 B=6 C=5 GHz"), ["B"])
+        lines_request(lines, Top.from_constants("A=9 B=6 C=5 GHz"), ["B"])

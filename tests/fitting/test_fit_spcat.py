@@ -14,9 +14,9 @@ from places import ORACLES
 
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.resampling import bootstrap
-from rotor.formats.spcat.file_quanta import format_of
+from rotor.formats.spcat.file_quanta import quanta_format
 from rotor.formats.spcat.fits.fit_input import error_factor, fitted_file, read_fit, spfit_input
-from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit, names_of_quanta
+from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit, quanta_names
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.int_file import read_int
@@ -163,8 +163,8 @@ def test_the_linear_blocks_are_the_cores_levels_and_derivatives():
     """Two states with a Coriolis term and a quadrupole nucleus: energies as the core has them, slopes by differences."""
     file = read_par(TWO_STATES)
     groups = groups_for_fit(file)
-    form = format_of(file, groups)
-    assert names_of_quanta(form) == ("n", "ka", "kc", "v", "f")
+    form = quanta_format(file, groups)
+    assert quanta_names(form) == ("n", "ka", "kc", "v", "f")
     labels = np.array(
         [[2, 1, 1, 0, 3], [2, 1, 1, 0, 1], [3, 0, 3, 1, 3], [3, 2, 2, 0, 2], [1, 1, 0, 1, 1], [4, 2, 3, 1, 4]]
     )
@@ -172,10 +172,12 @@ def test_the_linear_blocks_are_the_cores_levels_and_derivatives():
     values = np.array([p.value for p in file.parameters])
     energies, slopes = model.levels(values)
 
-    from rotor.formats.spcat.file_quanta import quanta_of
+    from rotor.formats.spcat.file_quanta import listed_quanta
 
     levels = groups[0].levels((0, 12))
-    printed = {tuple(q): e for q, e in zip(quanta_of(groups[0], levels, form).tolist(), levels.energy_mhz, strict=True)}
+    printed = {
+        tuple(q): e for q, e in zip(listed_quanta(groups[0], levels, form).tolist(), levels.energy_mhz, strict=True)
+    }
     assert energies == pytest.approx([printed[tuple(label)] for label in labels.tolist()], rel=1e-12)  # round-off
     for i in range(len(values)):
         step = 1e-3 * max(abs(values[i]), 1e-2)
@@ -257,7 +259,7 @@ def test_fits_of_a_triplet_and_of_a_bent_state_come_out_as_spfit_has_them(tmp_pa
             replace(p, value=p.value * factor, error=1e-19 if fixed else 1e-37 if p.constrained else 1e36)
         )
     start = replace(theirs, parameters=tuple(parameters), rest="")
-    lines = read_lin(folder / f"{name}.lin", len(names_of_quanta(format_of(start, groups_for_fit(start)))))
+    lines = read_lin(folder / f"{name}.lin", len(quanta_names(quanta_format(start, groups_for_fit(start)))))
     fit_input, fit = fitted(start, lines)
     assert fit.converged, fit.reason
     assert fit.used.all()

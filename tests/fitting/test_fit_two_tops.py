@@ -9,7 +9,7 @@ from rotor.fitting.assignment import assignments, levels_in
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.quantum.quanta import SPECIES_NUMBERS
 from rotor.tops.internal_rotation import InternalRotationConstants
 
@@ -51,7 +51,7 @@ def test_derivatives_by_constants_of_several_tops_are_those_of_finite_difference
     values = DIFFERENT | further
     constants = TopConstants(two_tops(values | {"V12s": -2 * CM}))
     labels = levels_in(lines_of(two_tops(values), 1 if "F0_3" in values else 2))[0]
-    model = model_of(constants, labels)
+    model = label_model(constants, labels)
     point = np.array(list(constants.values.values()))
     slopes = model.levels(point)[1]
     for i, (name, value) in enumerate(constants.values.items()):

@@ -15,7 +15,7 @@ from rotor.fitting.parameters import parameters
 from rotor.fitting.report import dfbetas, influential
 from rotor.fitting.resampling import bootstrap
 from rotor.formats import fit_further
-from rotor.formats.fit_request import answer_fit, fit_of_lines
+from rotor.formats.fit_request import answer_fit, lines_request
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import read_par
@@ -238,7 +238,7 @@ a    1    1    0   20    0    1    1    1    0    -1   1
 
 
 def test_the_table_of_several_states_has_every_parameter_with_its_state(seen, tmp_path):
-    from rotor.formats.fit_request import answer_fit, fit_of_spfit, report_of, table_of
+    from rotor.formats.fit_request import answer_fit, fit_report, fit_table, spfit_request
 
     (tmp_path / "two.par").write_text(TWO_STATES)
     rows = []
@@ -249,17 +249,17 @@ def test_the_table_of_several_states_has_every_parameter_with_its_state(seen, tm
     (tmp_path / "two.lin").write_text("".join(rows))
     header = TWO_STATES.replace("   8   30", f"   8 {len(rows):4d}")
     (tmp_path / "two.par").write_text(header)
-    answer = answer_fit(fit_of_spfit(str(tmp_path / "two.par")))
+    answer = answer_fit(spfit_request(str(tmp_path / "two.par")))
     assert answer.fit.converged
     assert answer.fit.parameters.names == ("A", "B (20000)", "B (20011)", "C", "-DJ", "-dJ")
-    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table_of(answer, "markdown").splitlines()]
+    cells = [[cell.strip() for cell in line.split("|")[1:-1]] for line in fit_table(answer, "markdown").splitlines()]
     by_name = {(row[0], row[1]): row[3] for row in cells if len(row) == 4}
     assert by_name["δK", "all"] == "0.93 (held)"  # kHz, with the sign of the publication
     assert by_name["δJ", "1"].startswith("-1")
     assert by_name["δJ", "1"].endswith("(follows -dJ)")
     assert float(by_name["B", "1"].partition("(")[0]) == pytest.approx(1890.0, abs=3e-4)  # four standard errors
     assert by_name["B", "0"].startswith("1897.22")
-    section = report_of(answer).split("PARAMETERS OF THE FILE")[1].splitlines()
+    section = fit_report(answer).split("PARAMETERS OF THE FILE")[1].splitlines()
     assert len(section[1 : section.index("")]) == 8
     assert section[8].split()[1:3] == ["-40111", "-dJ"]
 
@@ -363,7 +363,7 @@ def test_an_interrupt_beside_a_fit_leaves_what_is_done(step, name, monkeypatch):
         raise KeyboardInterrupt
 
     rows = [[j + 1, j, 2 * 6000.0 * (j + 1) + 0.01 * (-1) ** j, 0.01] for j in range(6)]
-    answer = answer_fit(fit_of_lines(rows, rotor.Top.from_constants("B=6000 MHz"), ["B"]))
+    answer = answer_fit(lines_request(rows, rotor.Top.from_constants("B=6000 MHz"), ["B"]))
     monkeypatch.setattr(fit_further, step, interrupted)
     further = fit_further.with_further(answer, ["D"], "B", 10, 0)
     assert further.interrupted == f"{name} is not complete"
@@ -376,7 +376,7 @@ def test_influential_lines_are_named_the_worst_first():
         [j + 1, j, 2 * 6000.0 * (j + 1) + 0.01 * error, 0.01]
         for j, error in enumerate((1, -1, 2, 0, -3, 1, 0, 2, -1, 4))
     ]
-    fit = answer_fit(fit_of_lines(rows, rotor.Top.from_constants("B=6000 MHz"), ["B"])).fit
+    fit = answer_fit(lines_request(rows, rotor.Top.from_constants("B=6000 MHz"), ["B"])).fit
     moved = np.abs(dfbetas(fit)).max(axis=1)
     named = [int(text.split(",")[0].removeprefix("line ")) - 1 for text in influential(fit, 0.0)]
     assert named == np.argsort(-moved, kind="stable")[:5].tolist()

@@ -9,7 +9,7 @@ from rotor.fitting.assignment import assignments
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.formats.assigned_lines import write_assigned_lines
 from rotor.tops.internal_rotation import InternalRotationConstants
 
@@ -167,7 +167,7 @@ def test_derivatives_with_spins_are_those_of_finite_differences(frame, second):
     few = np.random.default_rng(3).permutation(len(levels))[:60]
     quanta = {n: np.where(c == "E", 1, 0) if n == "species" else c for n, c in levels.quanta.items()}
     labels = np.column_stack([quanta[name][few] for name in constants.quanta])
-    model = model_of(constants, labels)
+    model = label_model(constants, labels)
     values = np.array(list(constants.values.values()))
     energies, slopes = model.levels(values)
     assert np.abs(energies - levels.energy_mhz[few]).max() < 1e-6  # MHz: the levels of the prediction

@@ -5,7 +5,7 @@ from places import ORACLES
 
 import rotor
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = rotor.units.MHZ_PER_CM
@@ -44,7 +44,7 @@ def test_splittings_by_a_nucleus_are_the_measured_ones():
         columns = dict(zip(("species", "f", "n", "ka", "kc"), rows[:, first : first + 5].astype(int).T, strict=True))
         columns["vt"] = np.zeros(len(rows), dtype=int)
         labels.append(np.column_stack([columns[name] for name in constants.quanta]))
-    energies = model_of(constants, np.vstack(labels)).levels(np.array(list(constants.values.values())))[0]
+    energies = label_model(constants, np.vstack(labels)).levels(np.array(list(constants.values.values())))[0]
     difference = rows[:, 0] - (energies[: len(rows)] - energies[len(rows) :])
     _, line = np.unique(rows[:, [1, 3, 4, 5, 8, 9, 10]], axis=0, return_inverse=True)
     centred = difference - np.array([difference[line == i].mean() for i in line.ravel()])

@@ -13,7 +13,7 @@ import rotor
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.molecules.molecule_file import parse_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
-from rotor.formats.read_write import top_of_file
+from rotor.formats.read_write import file_top
 from rotor.formats.spcat.fits.fit_states import groups_for_fit, levels_in_blocks
 from rotor.formats.spcat.names.named_parameters import named_parameter_file, named_parameters
 from rotor.formats.spcat.names.named_top import named_top
@@ -75,7 +75,7 @@ def test_a_total_of_two_makes_the_levels_of_the_plain_coupling():
 
 def test_q_of_ortho_and_para_is_that_without_spins():
     text = PROTONS.partition("[spins")[0].replace("oe = 0, oo = 0", "oe = 3, oo = 3")
-    tops = [top_of_file(parse_molecule_file(file)) for file in (PROTONS, text)]
+    tops = [file_top(parse_molecule_file(file)) for file in (PROTONS, text)]
     q = [partition_function(top, 20.0, effects=effects_of(top, top is tops[0])).q for top in tops]
     assert q[0] == pytest.approx(q[1], rel=1e-6)  # the tail of either sum
 
@@ -83,7 +83,7 @@ def test_q_of_ortho_and_para_is_that_without_spins():
 def test_components_of_ortho_and_para_add_up_to_the_lines_without_spins():
     """Weights 1, 1, 0, 0 of even I make 1, 1, 3, 3 without spins: for each rotational line the sum over its components."""
     text = PROTONS.partition("[spins")[0].replace("oe = 0, oo = 0", "oe = 3, oo = 3")
-    tops = [top_of_file(parse_molecule_file(file)) for file in (PROTONS, text)]
+    tops = [file_top(parse_molecule_file(file)) for file in (PROTONS, text)]
     lines = [
         line_list(top, jmax=2, min_lgint=None, q=1.0, range_mhz=(0, 3e5), effects=effects_of(top, top is tops[0]))
         for top in tops
@@ -127,7 +127,7 @@ def test_the_codes_make_the_same_levels(kind):
 
 @pytest.mark.parametrize("kind", [*TOPS, "protons"])
 def test_a_total_goes_to_codes_and_comes_back(kind):
-    top = top_of_file(parse_molecule_file(PROTONS)) if kind == "protons" else TOPS[kind]
+    top = file_top(parse_molecule_file(PROTONS)) if kind == "protons" else TOPS[kind]
     back = named_top(read_par(format_par(named_parameter_file(top, 20))))
     assert len(back.spin_constants.totals) == len(top.spin_constants.totals)
     assert back.spin_weights == top.spin_weights

@@ -8,7 +8,7 @@ import pytest
 from ase import Atoms
 
 from rotor.fluids.forces.assembly import assemble, list_centre, spreading_weights
-from rotor.fluids.forces.models import MODELS, RigidModel, Site, model_of, models_of
+from rotor.fluids.forces.models import MODELS, RigidModel, Site, find_model, find_models
 from rotor.fluids.forces.potential import RigidPotential
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
@@ -18,27 +18,29 @@ QUADRUPOLES = {"trappe-n2": -1.394, "trappe-co2": -4.278}  # D Å, measured: C. 
 
 @pytest.mark.parametrize("name", DIPOLES)
 def test_dipoles_of_the_waters(name: str) -> None:
-    model = model_of(name)
+    model = find_model(name)
     dipole = sum(site.charge_e * np.array(site.position_angstrom) for site in model.sites) * DEBYE_PER_E_ANGSTROM
     assert np.linalg.norm(dipole) == pytest.approx(DIPOLES[name], abs=2e-3)  # as printed, rounded
 
 
 @pytest.mark.parametrize("name", QUADRUPOLES)
 def test_quadrupoles_of_the_linear_models(name: str) -> None:
-    model = model_of(name)
+    model = find_model(name)
     moment = sum(site.charge_e * site.position_angstrom[2] ** 2 for site in model.sites) * DEBYE_PER_E_ANGSTROM
     assert moment == pytest.approx(QUADRUPOLES[name], rel=0.07)  # effective charges; a wrong sign or length is worse
 
 
 def test_water_of_jorgensen_in_his_other_units() -> None:
     """The paper's Table I prints A = 582000 and 600000 kcal Å¹²/mol, C = 595 and 610; common tables σ = 3.1506 and 3.1536 Å."""
-    sizes = [(model_of(name).sites[0].sigma_angstrom, model_of(name).sites[0].epsilon_k) for name in ("tip3p", "tip4p")]
+    sizes = [
+        (find_model(name).sites[0].sigma_angstrom, find_model(name).sites[0].epsilon_k) for name in ("tip3p", "tip4p")
+    ]
     assert np.array(sizes) == pytest.approx(np.array([(3.1506, 76.53), (3.1536, 78.02)]), abs=6e-3)  # as rounded
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_forces_on_sites_keep_total_and_torque_on_atoms(name: str) -> None:
-    model, rng = model_of(name), np.random.default_rng(1)
+    model, rng = find_model(name), np.random.default_rng(1)
     weights, places, forces = spreading_weights(model), model.positions_angstrom, rng.normal(size=(len(model.sites), 3))
     atoms, on_atoms = places[: len(model.symbols)], weights.T @ forces
     assert weights @ atoms == pytest.approx(places, abs=1e-14)  # round-off of Å
@@ -59,7 +61,7 @@ def test_a_massless_site_off_the_line_is_refused() -> None:
 
 def test_labels_and_symbols_find_the_same_molecules() -> None:
     atoms = plain.box_of({"spce": 3, "trappe-n2": 2, "argon": 2}, 25.0)
-    models = models_of("argon, trappe-n2,spce")
+    models = find_models("argon, trappe-n2,spce")
     by_symbols = assemble(atoms, models)
     atoms.set_array("molecule", np.repeat([5, 3, 9, 0, 1, 7, 8], [3, 3, 3, 2, 2, 1, 1]))
     by_labels = assemble(atoms, models)
@@ -70,7 +72,7 @@ def test_labels_and_symbols_find_the_same_molecules() -> None:
 
 
 def test_atoms_that_do_not_match_are_named() -> None:
-    models = models_of("spce")
+    models = find_models("spce")
     with pytest.raises(
         ValueError, match=r"no molecule begins with atom 3 \(H-O-H\.\.\.\); the models are spce \(O-H-H\)"
     ):
@@ -83,7 +85,7 @@ def test_atoms_that_do_not_match_are_named() -> None:
     with pytest.raises(ValueError, match="are not consecutive"):
         assemble(atoms, models)
     with pytest.raises(ValueError, match="have the same atoms: spce"):
-        assemble(atoms, models_of(["spce", "tip3p"]))
+        assemble(atoms, find_models(["spce", "tip3p"]))
     with pytest.raises(ValueError, match="without atoms"):
         assemble(Atoms(), models)
 

@@ -14,7 +14,7 @@ from rotor.fluids.analysis import (
     pair_distribution,
     yeh_hummer_correction,
 )
-from rotor.fluids.summary import mean_of
+from rotor.fluids.summary import series_mean
 
 
 def test_an_ideal_gas_has_g_of_one_for_any_number() -> None:
@@ -105,7 +105,7 @@ def test_errors_of_correlated_noise_by_blocks_and_by_inefficiency() -> None:
     levels = block_errors(x)
     assert levels[0] < 0.3 * exact  # neighbours taken for independent
     assert np.max(levels[6:9]) == pytest.approx(exact, rel=0.2)  # 64 to 512 in a block, 64 blocks: an error of 9 %
-    assert mean_of("x", "", x).error == pytest.approx(exact, rel=0.15)  # n/19 = 1700 samples, window 45
+    assert series_mean("x", "", x).error == pytest.approx(exact, rel=0.15)  # n/19 = 1700 samples, window 45
 
 
 def test_drift_is_the_slope_and_white_noise_has_its_textbook_error() -> None:

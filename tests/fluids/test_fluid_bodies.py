@@ -7,9 +7,9 @@ from ase.build import molecule
 from ase.constraints import FixAtoms
 from fluid_boxes import MIXED, box_of
 
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.fluids.initial_box import check_apart, lattice_box, model_labels
-from rotor.fluids.motion.bodies import Pose, bodies_of
+from rotor.fluids.motion.bodies import Pose, rigid_bodies
 from rotor.geometry import rotations
 from rotor.molecules.nuclei import masses
 
@@ -22,7 +22,7 @@ def random_motion(bodies, seed=3):
 
 def test_a_mixed_box_has_the_right_bodies_and_is_laid_back_where_it_was():
     box = box_of(*MIXED)
-    bodies, pose = bodies_of(box)
+    bodies, pose = rigid_bodies(box)
     assert bodies.names == ("OH2", "N2", "Ar", "CO2", "CH4", "NH3")
     assert bodies.species.tolist() == [0, 1, 2, 3, 4, 5, 0, 2]
     assert (bodies.moments > 0).sum(axis=1).tolist() == [3, 2, 0, 2, 3, 3, 3, 0]
@@ -37,7 +37,7 @@ def test_a_mixed_box_has_the_right_bodies_and_is_laid_back_where_it_was():
 def test_masses_of_the_user_hold():
     box = molecule("H2O")
     box.set_masses([16.0, 2.0, 2.0])
-    bodies, _ = bodies_of(box)
+    bodies, _ = rigid_bodies(box)
     assert bodies.mass.tolist() == [20.0]
 
 
@@ -50,7 +50,7 @@ def test_molecules_cut_by_the_edge_are_put_together(labelled):
     if not labelled:
         del cut.arrays["molecule"]
     assert abs(cut.positions - whole.positions).max() > 5.0  # something was cut
-    bodies, pose = bodies_of(cut)
+    bodies, pose = rigid_bodies(cut)
     placed = bodies.positions(pose)
     shift = (placed - whole.positions) @ np.linalg.inv(cut.cell.array)
     assert abs(shift - np.round(shift)).max() < 1e-12  # the same but for whole cells, round-off
@@ -64,7 +64,7 @@ def test_a_chain_longer_than_half_the_cell_is_followed_along_its_bonds():
     cut = chain.copy()
     cut.translate([5.0, 0.0, 0.0])
     cut.wrap()
-    placed = (lambda computed: computed[0].positions(computed[1]))(bodies_of(cut))
+    placed = (lambda computed: computed[0].positions(computed[1]))(rigid_bodies(cut))
     assert np.linalg.norm(placed[5] - placed[0]) == pytest.approx(5 * np.hypot(1.2, 0.1), rel=1e-12)  # round-off
 
 
@@ -74,7 +74,7 @@ def test_a_triclinic_cell():
     water.pbc = True
     cut = water.copy()
     cut.wrap()
-    bodies, pose = bodies_of(cut)
+    bodies, pose = rigid_bodies(cut)
     placed = bodies.positions(pose)
     assert np.linalg.norm(placed[1] - placed[2]) == pytest.approx(water.get_distance(1, 2), rel=1e-12)  # round-off
 
@@ -82,26 +82,26 @@ def test_a_triclinic_cell():
 def test_atoms_of_molecules_may_stand_in_any_order():
     box = box_of("H2O", "H2O", "N2")
     mixed = box[[0, 3, 6, 1, 4, 7, 2, 5]]
-    body, _pose = bodies_of(box)
-    other, other_pose = bodies_of(mixed)
+    body, _pose = rigid_bodies(box)
+    other, other_pose = rigid_bodies(mixed)
     assert np.allclose(other.moments, body.moments, rtol=1e-12)  # round-off
     assert abs(other.positions(other_pose) - mixed.positions).max() < 1e-12  # round-off, Å
-    lists, _ = bodies_of(mixed, molecules=[[0, 3, 6], [1, 4, 7], [2, 5]])
+    lists, _ = rigid_bodies(mixed, molecules=[[0, 3, 6], [1, 4, 7], [2, 5]])
     assert lists.order.tolist() == other.order.tolist()
 
 
 def test_bonds_find_the_molecules_that_labels_name():
     box = box_of(*MIXED, spacing=4.0)
-    labelled, _ = bodies_of(box)
+    labelled, _ = rigid_bodies(box)
     del box.arrays["molecule"]
-    computed, _ = bodies_of(box)
+    computed, _ = rigid_bodies(box)
     assert computed.order.tolist() == labelled.order.tolist()
     assert computed.starts.tolist() == labelled.starts.tolist()
 
 
 def test_forces_become_force_and_torque_that_do_the_same_work():
     box = box_of(*MIXED)
-    bodies, pose = bodies_of(box)
+    bodies, pose = rigid_bodies(box)
     momentum, angular = random_motion(bodies)
     velocities = bodies.momenta(momentum, angular, pose.attitude) / bodies.masses[:, None]
     forces = np.random.default_rng(4).normal(size=velocities.shape)
@@ -116,7 +116,7 @@ def test_forces_become_force_and_torque_that_do_the_same_work():
 
 def test_momenta_of_atoms_and_bodies_are_one_motion():
     box = box_of(*MIXED)
-    bodies, pose = bodies_of(box)
+    bodies, pose = rigid_bodies(box)
     momentum, angular = random_motion(bodies)
     box.set_masses(bodies.masses)
     box.set_momenta(bodies.momenta(momentum, angular, pose.attitude))
@@ -130,7 +130,7 @@ def test_momenta_of_atoms_and_bodies_are_one_motion():
 def test_a_site_without_mass_turns_with_its_body_and_counts_no_degree():
     box = Atoms("OHHX", positions=[[0, 0, 0], [0.8, 0, 0.6], [-0.8, 0, 0.6], [0, 0, 0.15]])
     box.set_masses([16.0, 1.0, 1.0, 0.0])
-    bodies, pose = bodies_of(box, molecules=[0, 0, 0, 0])
+    bodies, pose = rigid_bodies(box, molecules=[0, 0, 0, 0])
     assert bodies.degrees().total == 6
     forces = np.zeros((4, 3))
     forces[3] = [0.0, 1.0, 0.0]
@@ -142,7 +142,7 @@ def test_a_site_without_mass_turns_with_its_body_and_counts_no_degree():
 
 def test_nearly_linear_molecules_are_told_of():
     bent = Atoms("OCO", positions=[[-1.16, 0, 0], [0, 1e-3, 0], [1.16, 0, 0]])
-    bodies, _ = bodies_of(bent)
+    bodies, _ = rigid_bodies(bent)
     count = bodies.degrees()
     assert count.rotation == 2
     assert count.notes[0].startswith("O2C: I_a/I_c = 2.")
@@ -154,40 +154,40 @@ def test_wrong_boxes_are_refused_by_name():
     box = box_of("H2O", "H2O")
     box.positions[4] += [0.2, 0, 0]
     with pytest.raises(ValueError, match=r"molecule 1 \(OH2, atoms 3 to 5\).*off its place"):
-        bodies_of(box)
+        rigid_bodies(box)
     hand = Atoms("CHFClBr", positions=[[0, 0, 0], [0, 0, 1.1], [1.3, 0, -0.4], [-0.8, 1.5, -0.5], [-0.9, -1.6, -0.6]])
     mirrored = hand.copy()
     mirrored.positions[:, 1] *= -1
     mirrored.translate([8, 0, 0])
     with pytest.raises(ValueError, match="molecule 1"):
-        bodies_of(hand + mirrored, molecules=[0] * 5 + [1] * 5)
+        rigid_bodies(hand + mirrored, molecules=[0] * 5 + [1] * 5)
     with pytest.raises(ValueError, match="atom 1 is in none"):
-        bodies_of(molecule("N2"), molecules=[[0]])
+        rigid_bodies(molecule("N2"), molecules=[[0]])
     with pytest.raises(ValueError, match="twice"):
-        bodies_of(molecule("N2"), molecules=[[0, 1], [1]])
+        rigid_bodies(molecule("N2"), molecules=[[0, 1], [1]])
     with pytest.raises(ValueError, match="2 labels"):
-        bodies_of(molecule("H2O"), molecules=[0, 0])
+        rigid_bodies(molecule("H2O"), molecules=[0, 0])
     with pytest.raises(ValueError, match="no atoms"):
-        bodies_of(Atoms())
+        rigid_bodies(Atoms())
     held = molecule("H2O")
     held.set_constraint(FixAtoms([0]))
     with pytest.raises(ValueError, match="constraints"):
-        bodies_of(held)
+        rigid_bodies(held)
     lost = molecule("H2O")
     lost.positions[1, 0] = np.nan
     with pytest.raises(ValueError, match="atom 1 is not finite"):
-        bodies_of(lost)
+        rigid_bodies(lost)
     weightless = molecule("N2")
     weightless.set_masses([0.0, 0.0])
     with pytest.raises(ValueError, match="without mass"):
-        bodies_of(weightless)
+        rigid_bodies(weightless)
 
 
 def test_the_shape_of_a_model_is_used():
-    model = model_of("spce")
+    model = find_model("spce")
     box = lattice_box(model, 8, 0.5, np.random.default_rng(1))
     box.positions += np.random.default_rng(2).normal(scale=1e-4, size=(24, 3))
-    bodies, pose = bodies_of(box, shapes={model.symbols: model.positions_angstrom[:3]})
+    bodies, pose = rigid_bodies(box, shapes={model.symbols: model.positions_angstrom[:3]})
     placed = bodies.positions(pose)
     assert np.linalg.norm(placed[0::3] - placed[1::3], axis=1) == pytest.approx(1.0, rel=1e-13)  # O-H of SPC/E
     assert bodies.moments[0].round(3).tolist() == [
@@ -198,8 +198,8 @@ def test_the_shape_of_a_model_is_used():
 
 
 def test_a_lattice_of_water_has_its_density_and_no_overlap():
-    box = lattice_box(model_of("spce"), 100, 0.997, np.random.default_rng(5))
-    bodies, _ = bodies_of(box)
+    box = lattice_box(find_model("spce"), 100, 0.997, np.random.default_rng(5))
+    bodies, _ = rigid_bodies(box)
     grams = bodies.mass.sum() * 1.66053906892e-24
     assert grams / (box.get_volume() * 1e-24) == pytest.approx(0.997, rel=1e-12)  # its definition
     check_apart(box, bodies)
@@ -209,7 +209,7 @@ def test_a_lattice_of_water_has_its_density_and_no_overlap():
 
 
 def test_models_find_their_molecules_in_order():
-    water = model_of("spce")
+    water = find_model("spce")
     assert model_labels(Atoms("OH2OH2", positions=np.zeros((6, 3))), [water]).tolist() == [0, 0, 0, 1, 1, 1]
     with pytest.raises(ValueError, match=r"atom 3 \(H\) does not begin a molecule"):
         model_labels(Atoms("OH2HOH", positions=np.zeros((6, 3))), [water])
@@ -217,7 +217,7 @@ def test_models_find_their_molecules_in_order():
 
 def test_a_pose_is_found_again_after_a_move():
     box = box_of(*MIXED)
-    bodies, pose = bodies_of(box)
+    bodies, pose = rigid_bodies(box)
     turn = rotations.uniform(len(bodies), rng=np.random.default_rng(6))
     moved = Pose(pose.centres + 0.3, rotations.multiply(turn, pose.attitude))
     box.positions = bodies.positions(moved)

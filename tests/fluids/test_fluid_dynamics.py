@@ -15,7 +15,7 @@ from fluid_boxes import MIXED, Free, SoftSites, Springs, box_of
 
 from rotor.classical.free.free_motion import free_motion
 from rotor.fluids.initial_box import at_rest, heat, relax
-from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.motion.bodies import rigid_bodies
 from rotor.fluids.motion.dynamics import RigidDynamics
 from rotor.fluids.motion.thermometers import THERMOMETERS, kinetic_energy
 from rotor.geometry.rotations import distance
@@ -23,7 +23,7 @@ from rotor.geometry.rotations import distance
 
 def warm(box, calculator, temperature_k=300.0, seed=2):
     """The box with a calculator and thermal momenta."""
-    bodies, pose = bodies_of(box)
+    bodies, pose = rigid_bodies(box)
     box.calc = calculator
     heat(box, bodies, pose.attitude, temperature_k, np.random.default_rng(seed))
     return box
@@ -56,7 +56,7 @@ def test_time_runs_back():
 
 def test_totals_shapes_and_lengths_are_kept():
     box = warm(box_of(*MIXED), SoftSites())
-    bodies, pose = bodies_of(box)
+    bodies, pose = rigid_bodies(box)
     distances = box.get_all_distances()
     inside = box.arrays["molecule"][:, None] == box.arrays["molecule"][None]
     dynamics = RigidDynamics(box, 2.0 * fs)
@@ -104,8 +104,8 @@ def test_free_water_turns_with_an_error_of_order_two():
 def test_bodies_of_any_mass_turn(scale):
     """Masses times s with times √s is the same motion: no threshold stops small moments (as LAMMPS' once did)."""
     box = box_of("H2O", "N2")
-    box.set_masses(bodies_of(box)[0].masses * scale)
-    bodies, pose = bodies_of(box)
+    box.set_masses(rigid_bodies(box)[0].masses * scale)
+    bodies, pose = rigid_bodies(box)
     heat(box, bodies, pose.attitude, 300.0, np.random.default_rng(1))
     box.calc = Free(box)
     dynamics = RigidDynamics(box, math.sqrt(scale) * fs)
@@ -126,7 +126,7 @@ def harmonic(kind, step):
     """A harmonic motion of a molecule on springs: dynamics, its coordinate and momentum, frequency Ω from the springs."""
     box = molecule("N2") if kind == "libration" else Atoms("Ar")
     box.translate([0.1, 0.2, 0.3])
-    mass = bodies_of(box)[0].mass[0] / len(box)
+    mass = rigid_bodies(box)[0].mass[0] / len(box)
     box.calc = Springs(box.positions, mass)  # Ω = 1 for the centre and, two equal masses on equal springs, for the turn
     dynamics = RigidDynamics(box, step, removed=0)
     size = 1e-4
@@ -266,7 +266,7 @@ def test_a_force_that_is_no_number_is_told_by_molecule_and_step():
     box = molecule("H2O") + molecule("N2")
     box.positions[3:] += 5.0
     box.positions[:3] -= box.positions[0]
-    box.set_momenta(np.array([[1.0, 0, 0]] * 5) * bodies_of(box)[0].masses[:, None])
+    box.set_momenta(np.array([[1.0, 0, 0]] * 5) * rigid_bodies(box)[0].masses[:, None])
     box.calc = Broken()
     dynamics = RigidDynamics(box, 0.01, removed=0)
     with pytest.raises(ValueError, match=r"force on molecule 1 \(N2, atoms 3, 4\) is not finite in step 20"):
@@ -287,7 +287,7 @@ def test_a_count_that_cannot_hold_is_refused():
     with pytest.raises(ValueError, match=r"forces add to .* removed=0"):
         RigidDynamics(box, fs).run(1)
     assert RigidDynamics(box, fs, removed=0).run(1)
-    bodies, _ = bodies_of(box)
+    bodies, _ = rigid_bodies(box)
     assert abs(at_rest(bodies, np.ones((3, 3))).sum(axis=0)).max() < 1e-15  # round-off
     with pytest.raises(ValueError, match="timestep"):
         RigidDynamics(box, 0.0)

@@ -14,18 +14,18 @@ from ase import Atoms
 
 from rotor import units
 from rotor.fluids.engines import lammps, openmm
-from rotor.fluids.engines.engine_input import EngineInput, Frame, engine_input_of, point_velocities, rigid_motion
+from rotor.fluids.engines.engine_input import EngineInput, Frame, make_engine_input, point_velocities, rigid_motion
 from rotor.fluids.engines.equimomental import equimomental_points
 from rotor.fluids.engines.lammps_input import data_file, ensemble_commands, input_file, table_file
 from rotor.fluids.engines.pair_tables import Form, pair_energy
-from rotor.fluids.engines.results import engine_frames, record_of, run_engine
+from rotor.fluids.engines.results import engine_frames, frame_record, run_engine
 from rotor.fluids.forces import models
-from rotor.fluids.forces.models import RigidModel, Site, model_of
+from rotor.fluids.forces.models import RigidModel, Site, find_model
 from rotor.fluids.forces.potential import RigidPotential
 from rotor.fluids.initial_box import lattice_box
 from rotor.fluids.run import run_fluid
 from rotor.fluids.settings import Settings
-from rotor.fluids.summary import mean_of
+from rotor.fluids.summary import series_mean
 from rotor.geometry.inertia import point_masses
 
 HAS = {
@@ -59,7 +59,7 @@ def _own_models(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def box(name: str, molecules: int, density: float, seed: int = 5) -> Atoms:
     rng = np.random.default_rng(seed)
-    atoms = lattice_box(model_of(name), molecules, density, rng)
+    atoms = lattice_box(find_model(name), molecules, density, rng)
     atoms.positions += np.repeat(rng.uniform(-0.3, 0.3, (molecules, 3)), len(atoms) // molecules, axis=0)
     return atoms
 
@@ -73,7 +73,7 @@ WATER = box("spce", 64, 0.9)
 
 @pytest.mark.parametrize("name", ["spce", "tip4p", "trappe-n2", "trappe-co2", "argon", "methane", "ring", "bent"])
 def test_carriers_have_the_mass_the_moments_and_independent_constraints(name: str) -> None:
-    model = model_of(name)
+    model = find_model(name)
     masses = np.random.default_rng(1).uniform(1, 20, len(model.symbols))
     if name != "bent":  # equal atoms have equal masses
         masses = np.array([{"O": 16.0, "H": 1.0, "N": 14.0, "C": 12.0, "Ar": 40.0}[s] for s in model.symbols])
@@ -97,18 +97,18 @@ def test_carriers_have_the_mass_the_moments_and_independent_constraints(name: st
 
 
 def test_own_atoms_carry_water_and_no_collinear_molecule() -> None:
-    assert equimomental_points(model_of("spce"), np.array([16.0, 1, 1])).are_atoms
-    assert equimomental_points(model_of("tip4p"), np.array([16.0, 1, 1])).are_atoms
-    assert not equimomental_points(model_of("trappe-co2"), np.array([12.0, 16, 16])).are_atoms
+    assert equimomental_points(find_model("spce"), np.array([16.0, 1, 1])).are_atoms
+    assert equimomental_points(find_model("tip4p"), np.array([16.0, 1, 1])).are_atoms
+    assert not equimomental_points(find_model("trappe-co2"), np.array([12.0, 16, 16])).are_atoms
     assert not equimomental_points(
-        model_of("spce"), np.array([16.0, 1, 2])
+        find_model("spce"), np.array([16.0, 1, 2])
     ).are_atoms  # HDO: no isosceles triangle of masses
 
 
 def test_rigid_motion_and_velocities_are_inverse_and_kicks_give_the_half_step_energies() -> None:
-    engine_input = engine_input_of(box("trappe-co2", 20, 0.8), settings_for("trappe-co2"))
+    engine_input = make_engine_input(box("trappe-co2", 20, 0.8), settings_for("trappe-co2"))
     rng = np.random.default_rng(2)
-    owners, masses, places = engine_input.molecule_of_site, engine_input.site_masses, engine_input.site_positions
+    owners, masses, places = engine_input.site_molecule, engine_input.site_masses, engine_input.site_positions
     forces = rng.normal(size=places.shape)
     motion = rigid_motion(owners, masses, places, engine_input.site_velocities, forces)
     back = point_velocities(motion, owners, masses, places)
@@ -128,7 +128,7 @@ def test_a_scene_has_whole_molecules_isotopologues_and_momentum_at_rest() -> Non
     masses[3:6] = [15.9949, 2.0141, 2.0141]
     atoms.set_masses(masses)
     atoms.wrap()
-    engine_input = engine_input_of(atoms, settings_for("spce"))
+    engine_input = make_engine_input(atoms, settings_for("spce"))
     assert [len(component.masses) for component in engine_input.species] == [3, 3]
     assert np.bincount(engine_input.kinds).tolist() == [63, 1]
     lengths = np.linalg.norm(np.diff(engine_input.site_positions.reshape(64, 3, 3)[:, [1, 0, 2]], axis=1), axis=-1)
@@ -136,7 +136,7 @@ def test_a_scene_has_whole_molecules_isotopologues_and_momentum_at_rest() -> Non
     total = masses @ engine_input.site_velocities
     assert np.abs(total).max() < 1e-10  # sums of 192 terms of size 1
     assert engine_input.degrees.total == 6 * 64 - 3
-    assert engine_input_of(atoms, settings_for("spce", ensemble="langevin")).degrees.total == 6 * 64
+    assert make_engine_input(atoms, settings_for("spce", ensemble="langevin")).degrees.total == 6 * 64
 
 
 @pytest.mark.parametrize(("edit", "message"), [
@@ -148,12 +148,12 @@ def test_boxes_that_engines_do_not_take(edit, message: str) -> None:
     atoms = WATER.copy()
     edit(atoms)
     with pytest.raises(ValueError, match=message):
-        engine_input_of(atoms, settings_for("spce"))
+        make_engine_input(atoms, settings_for("spce"))
 
 
 @pytest.mark.parametrize("electrostatics", ["reaction-field", "shifted"])
 def test_table_of_pairs_has_forces_that_are_slopes_and_ends_at_zero(electrostatics: str) -> None:
-    settings, sites = settings_for("spce", electrostatics=electrostatics), model_of("spce").sites
+    settings, sites = settings_for("spce", electrostatics=electrostatics), find_model("spce").sites
     r, d = np.linspace(2.2, 5.999, 400), 1e-5
     for pair in ((sites[0], sites[0]), (sites[0], sites[1]), (sites[1], sites[2])):
         ahead, back = (pair_energy(r + s * d, pair, settings, Form())[0] for s in (1, -1))
@@ -166,14 +166,14 @@ def test_table_of_pairs_has_forces_that_are_slopes_and_ends_at_zero(electrostati
 
 def test_files_for_lammps_hold_the_scene() -> None:
     settings = settings_for("tip4p", ensemble="langevin", temperature_k=300.0, friction_per_ps=4.0, seed=9)
-    engine_input = engine_input_of(box("tip4p", 64, 0.9), settings)
+    engine_input = make_engine_input(box("tip4p", 64, 0.9), settings)
     text = data_file(engine_input)
     head, rest = text.split("Masses", 1)
     assert all(count in head for count in ("256 atoms", "3 atom types", "192 bonds"))
     rows = [line.split() for line in rest.split("Atoms # full")[1].split("Velocities")[0].splitlines() if line.strip()]
     table = np.array(rows, dtype=float)
     assert np.array_equal(table[:, 4:], engine_input.site_positions)  # 17 digits give the double back
-    assert np.array_equal(table[:4, 3], [site.charge_e for site in model_of("tip4p").sites])
+    assert np.array_equal(table[:4, 3], [site.charge_e for site in find_model("tip4p").sites])
     speeds = np.array(
         [line.split()[1:] for line in rest.split("Velocities")[1].split("Bonds")[0].split("\n")[2:-2]], float
     )
@@ -187,7 +187,7 @@ def test_files_for_lammps_hold_the_scene() -> None:
 def test_lammps_commands_for_mixtures() -> None:
     water, argon = WATER.copy(), Atoms("Ar", [[0.2, 0.2, 0.2]])
     settings = settings_for("spce,argon")
-    engine_input = engine_input_of(water + argon, settings)
+    engine_input = make_engine_input(water + argon, settings)
     assert ensemble_commands(engine_input, settings) == [
         "group bodies type 1 2",
         "fix move bodies rigid/nve/small molecule",
@@ -202,18 +202,18 @@ def test_lammps_commands_for_mixtures() -> None:
 
 def test_a_record_counts_degrees_and_mixes_thermometers() -> None:
     settings = settings_for("trappe-n2", step_fs=4.0, steps=4)
-    engine_input = engine_input_of(box("trappe-n2", 50, 0.5), settings)
+    engine_input = make_engine_input(box("trappe-n2", 50, 0.5), settings)
     zero = np.zeros_like(engine_input.site_positions)
     forces = np.random.default_rng(3).normal(size=zero.shape)
     motion = rigid_motion(
-        engine_input.molecule_of_site,
+        engine_input.site_molecule,
         engine_input.site_masses,
         engine_input.site_positions,
         engine_input.site_velocities,
         forces,
     )
     frames = [Frame(0, zero, motion, -1.0), Frame(4, zero, motion, -1.0, half=True)]
-    record = record_of(frames, engine_input, settings)
+    record = frame_record(frames, engine_input, settings)
     h = 4e-3 / units.ASE_TIME_PS
     full = motion.kinetic()
     extra = motion.correction(h).times(1 / 12)
@@ -258,7 +258,7 @@ def ours(atoms: Atoms, settings: Settings, engine_input: EngineInput, form: Form
     forces = np.zeros_like(engine_input.site_positions)
     forces[engine_input.real] = placed.get_forces()
     motion = rigid_motion(
-        engine_input.molecule_of_site,
+        engine_input.site_molecule,
         engine_input.site_masses,
         engine_input.site_positions,
         engine_input.site_velocities,
@@ -298,7 +298,7 @@ def test_openmm_has_our_energy_force_and_torque(
 ) -> None:
     atoms = box(name, n, density)
     settings = settings_for(name, electrostatics=electrostatics)
-    engine_input = engine_input_of(atoms, settings)
+    engine_input = make_engine_input(atoms, settings)
     energy, terms, motion = ours(atoms, settings, engine_input, form)
     frame = next(openmm.frames(engine_input, settings, form, accuracy=1e-7, platform="Reference"))
     # double precision; places are held to 1e-7 by constraints, PME and our sum are asked for 1e-7
@@ -314,7 +314,7 @@ def test_lammps_has_our_energy_force_and_torque(
 ) -> None:
     atoms = box(name, n, density)
     settings = settings_for(name, electrostatics=electrostatics)
-    engine_input = engine_input_of(atoms, settings)
+    engine_input = make_engine_input(atoms, settings)
     energy, terms, motion = ours(atoms, settings, engine_input, form)
     frame = next(iter(list(lammps.frames(engine_input, settings, form, accuracy=1e-8, kspace="ewald"))))
     # its constants have 8 digits, its table is a spline through 20000 points, its sum is asked for 1e-8, ours for 1e-7
@@ -324,7 +324,7 @@ def test_lammps_has_our_energy_force_and_torque(
 @HAS["lammps"]
 def test_lammps_has_our_shifted_charges() -> None:
     settings = settings_for("spce", electrostatics="shifted")
-    engine_input = engine_input_of(WATER, settings)
+    engine_input = make_engine_input(WATER, settings)
     energy, terms, motion = ours(WATER, settings, engine_input, Form())
     frame = next(iter(list(lammps.frames(engine_input, settings))))
     assert_same(energy, terms, motion, frame, 1e-6)  # constants of 8 digits, a spline
@@ -384,7 +384,7 @@ def test_langevin_in_an_engine_heats_translations_and_rotations_alike(engine: st
     settings = settings_for(name, ensemble="langevin", friction_per_ps=20.0, step_fs=2.0, steps=4000, every=50)
     record = run_engine(engine, box(name, 64, 0.2), settings).record
     for series in (record.translation_k[10:], record.rotation_k[10:]):
-        mean = mean_of("temperature", "K", series)
+        mean = series_mean("temperature", "K", series)
         assert abs(mean.mean - 298.15) < 4 * max(mean.error, 1.0)  # four standard errors, one in 16,000
         assert mean.error < 5.0  # enough to tell 5 degrees from 6
 
@@ -393,7 +393,7 @@ def test_langevin_in_an_engine_heats_translations_and_rotations_alike(engine: st
 @HAS["lammps"]
 def test_lammps_runs_on_two_cores_and_tells_its_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     settings = settings_for("spce", steps=4, every=2)
-    engine_input = engine_input_of(WATER, settings)
+    engine_input = make_engine_input(WATER, settings)
     first, two = (list(engine_frames("lammps", engine_input, settings, cores=cores)) for cores in (1, 2))
     for a, b in zip(first, two, strict=True):
         assert a.potential_ev == pytest.approx(b.potential_ev, rel=1e-10)  # sums in another order
@@ -409,7 +409,7 @@ def test_lammps_runs_on_two_cores_and_tells_its_errors(monkeypatch: pytest.Monke
 def test_reference_boxes_have_one_energy(engine: str, number: int, shared: Path) -> None:
     atoms = nist(shared / "reference" / "nist_spce" / f"spce_sample_config_periodic{number}.txt.gz")
     settings = replace(Settings(), electrostatics="ewald", steps=0)
-    engine_input = engine_input_of(atoms, settings)
+    engine_input = make_engine_input(atoms, settings)
     energy, terms, motion = ours(atoms, settings, engine_input, Form())
     options = {"accuracy": 1e-7} | ({"platform": "Reference"} if engine == "openmm" else {"kspace": "ewald"})
     frame = next(iter(list(engine_frames(engine, engine_input, settings, **options))))
@@ -419,13 +419,13 @@ def test_reference_boxes_have_one_energy(engine: str, number: int, shared: Path)
 def test_a_cutoff_beyond_half_the_cell_is_refused() -> None:
     atoms = box("spce", 64, 0.9)
     half = 0.5 * float(np.diag(atoms.cell).min())
-    assert engine_input_of(atoms, settings_for("spce", cutoff_angstrom=half)).edges.min() == 2 * half
+    assert make_engine_input(atoms, settings_for("spce", cutoff_angstrom=half)).edges.min() == 2 * half
     with pytest.raises(ValueError, match="expected at most half of the cell"):
-        engine_input_of(atoms, settings_for("spce", cutoff_angstrom=1.001 * half))
+        make_engine_input(atoms, settings_for("spce", cutoff_angstrom=1.001 * half))
 
 
 def test_an_input_of_molecules_on_top_of_each_other_is_refused() -> None:
     atoms = box("spce", 64, 0.9)
     atoms.positions[3:6] = atoms.positions[:3] + 0.05
     with pytest.raises(ValueError, match=r"molecule 0 .* and molecule 1 .* on top of each other"):
-        engine_input_of(atoms, settings_for("spce"))
+        make_engine_input(atoms, settings_for("spce"))

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from rotor.fluids.equilibration import is_stationary
-from rotor.fluids.forces.models import model_of
-from rotor.fluids.liquid_motion import MotionFrames, axis_of, correlation_time, motion_means, reorientation
+from rotor.fluids.forces.models import find_model
+from rotor.fluids.liquid_motion import MotionFrames, correlation_time, motion_means, reference_axis, reorientation
 from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
 from rotor.fluids.settings import Settings
-from rotor.fluids.summary import ratio_of
+from rotor.fluids.summary import series_ratio
 
 
 def correlated(rng, n, columns, memory=0.8):
@@ -66,7 +66,7 @@ def _means(answer):
 def test_the_error_of_a_ratio_counts_both_series():
     rng = np.random.default_rng(2)
     spread = [
-        ratio_of("r", 300 + 20 * rng.standard_normal(400), 300 + 20 * rng.standard_normal(400)) for _ in range(200)
+        series_ratio("r", 300 + 20 * rng.standard_normal(400), 300 + 20 * rng.standard_normal(400)) for _ in range(200)
     ]
     scatter = np.std([estimate.mean for estimate in spread])
     assert np.mean([estimate.error for estimate in spread]) == pytest.approx(scatter, rel=0.15)  # 5 % from 200 draws
@@ -98,14 +98,14 @@ def test_reorientation_of_steady_rotors_is_a_cosine():
 
 @pytest.mark.parametrize(("name", "along"), [("spce", (0, 0, 1)), ("tip4p-2005", (0, 0, 1)), ("trappe-n2", None)])
 def test_axes_of_models(name, along):
-    model = model_of(name)
+    model = find_model(name)
     sites = model.positions_angstrom[: len(model.symbols)]
     turn = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     bond = sites[1] - sites[0]
     expected = np.array(along, dtype=float) if along else bond / np.linalg.norm(bond)
-    axis = axis_of(model, (sites - sites.mean(axis=0)) @ turn.T)
+    axis = reference_axis(model, (sites - sites.mean(axis=0)) @ turn.T)
     assert abs(axis @ (turn @ expected)) == pytest.approx(1.0, abs=1e-9)
-    assert axis_of(model_of("argon"), np.zeros((1, 3))) is None
+    assert reference_axis(find_model("argon"), np.zeros((1, 3))) is None
 
 
 def test_motion_of_a_run_from_its_frames():

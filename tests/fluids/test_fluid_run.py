@@ -18,10 +18,10 @@ from places import PROJECT
 
 from rotor.checks import RunStopped
 from rotor.fluids.checkpoint import AseTrajectory, TextFile, read_checkpoint
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.fluids.initial_box import lattice_box
 from rotor.fluids.record import FluidRecord
-from rotor.fluids.run import Outputs, calculator_of, dynamics_of, pressure_bar, run_fluid
+from rotor.fluids.run import Outputs, make_calculator, make_dynamics, pressure_bar, run_fluid
 
 ENSEMBLES = ("nve", "langevin", "nose-hoover")
 
@@ -49,7 +49,7 @@ def lines(path):
 
 @pytest.mark.parametrize("ensemble", ENSEMBLES)
 def test_a_run_cut_anywhere_and_resumed_is_the_uninterrupted_one(folder, monkeypatch, ensemble):
-    monkeypatch.setattr("rotor.fluids.run.BAR_EVERY_S", -1.0)
+    monkeypatch.setattr("rotor.fluids.run.BAR_INTERVAL_S", -1.0)
     settings = replace(SETTINGS, ensemble=ensemble)
     (folder / "a").mkdir()
     os.chdir("a")
@@ -181,7 +181,7 @@ class BrokenLater:
     """A force that is no number, from a call on."""
 
     def __init__(self, calls):
-        self.left, self.inner = calls, calculator_of(SETTINGS)
+        self.left, self.inner = calls, make_calculator(SETTINGS)
 
     def __getattr__(self, name):
         return getattr(self.inner, name)
@@ -229,7 +229,7 @@ def test_a_box_wrapped_into_its_cell_runs_as_the_whole_one(folder):
 def test_a_run_that_ended_between_checkpoints_continues_bit_for_bit(folder, ensemble):
     """40 steps, then 90, with an interval of 70: one run of 90. A checkpoint at step 40, off the interval, made 1e-14 of difference."""
     settings = replace(SETTINGS, steps=90, every=1, ensemble=ensemble, step_fs=2.0, cutoff_angstrom=4.0)
-    whole, first, parts = (lattice_box(model_of("spce"), 27, 0.9, np.random.default_rng(3)) for _ in range(3))
+    whole, first, parts = (lattice_box(find_model("spce"), 27, 0.9, np.random.default_rng(3)) for _ in range(3))
     record = run_fluid(whole, settings, Outputs(checkpoint="whole.npz", checkpoint_every=70))
     files = Outputs(csv="run.csv", trajectories=("run.xyz",), checkpoint="run.npz", checkpoint_every=70)
     run_fluid(first, replace(settings, steps=40), files)
@@ -284,12 +284,12 @@ def test_the_pressure_is_that_of_centres_of_mass():
     """P = (2 K_trans - 3V dU/dV)/3V, the derivative by moving centres and cell, molecules as they are."""
     from fluid_boxes import SoftSites
 
-    for calculator, edge in ((calculator_of(SETTINGS), None), (SoftSites(), 9.0)):
+    for calculator, edge in ((make_calculator(SETTINGS), None), (SoftSites(), 9.0)):
         atoms = box(8)
         if edge is not None:
             atoms.set_cell([edge] * 3)
         atoms.calc = calculator
-        dynamics = dynamics_of(atoms, SETTINGS)
+        dynamics = make_dynamics(atoms, SETTINGS)
         volume, centres = atoms.get_volume(), dynamics.state.centres.copy()
 
         def potential(scale, atoms=atoms, dynamics=dynamics, centres=centres):

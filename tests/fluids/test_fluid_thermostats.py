@@ -11,7 +11,7 @@ from fluid_boxes import MIXED, Free, SoftSites, Springs, box_of
 
 from rotor import units
 from rotor.fluids.initial_box import heat, thermal_momenta
-from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.motion.bodies import rigid_bodies
 from rotor.fluids.motion.dynamics import RigidDynamics
 from rotor.fluids.motion.thermostats import Langevin, NoseHoover
 from rotor.geometry import rotations
@@ -80,7 +80,7 @@ def test_noise_in_the_wrong_frame_is_caught():
 def test_langevin_in_the_middle_has_exact_half_steps_on_springs():
     """⟨p²/m⟩ = kT (1 - (Ωh)²/4) at full steps and kT at half steps, for oscillations and librations alike."""
     box = gas("N2", 1500)
-    mass = bodies_of(box)[0].mass[0] / 2
+    mass = rigid_bodies(box)[0].mass[0] / 2
     box.calc = Springs(box.positions, mass)  # Ω = 1 in all five degrees, librations as far as they are small
     h = 0.6
     cold = 1e-4  # eV of kT in these units of time: amplitudes of 4e-3 Å, so that librations are harmonic
@@ -118,7 +118,7 @@ def mean_temperature(thermostat, steps=2500):
     """Mean and error of the temperature of a small box by its own count."""
     box = box_of("H2O", "N2", "CO2")
     box.calc = SoftSites()
-    bodies, pose = bodies_of(box)
+    bodies, pose = rigid_bodies(box)
     heat(box, bodies, pose.attitude, 300.0, np.random.default_rng(4))
     dynamics = RigidDynamics(box, 2.0 * fs, thermostat=thermostat)
     seen = []
@@ -145,7 +145,7 @@ def test_the_conserved_energy_is_conserved_to_order_two():
     def spread(thermostat, step):
         box = box_of(*MIXED)
         box.calc = SoftSites()
-        bodies, pose = bodies_of(box)
+        bodies, pose = rigid_bodies(box)
         heat(box, bodies, pose.attitude, 300.0, np.random.default_rng(4))
         dynamics = RigidDynamics(box, step * fs, thermostat=thermostat)
         seen = []
@@ -163,7 +163,7 @@ def test_the_conserved_energy_is_conserved_to_order_two():
 
 def test_thermal_momenta_are_canonical_with_three_degrees_fewer():
     box = box_of("H2O", "N2", "Ar", "CH4")
-    bodies, _ = bodies_of(box)
+    bodies, _ = rigid_bodies(box)
     rng = np.random.default_rng(11)
     drawn = [thermal_momenta(bodies, 300.0, rng, removed=3) for _ in range(4000)]
     momentum, angular = np.array([p for p, _ in drawn]), np.array([angular for _, angular in drawn])

@@ -7,26 +7,26 @@ import pytest
 from ase.units import fs
 
 from rotor import units
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.fluids.initial_box import heat, lattice_box, relax
-from rotor.fluids.motion.bodies import bodies_of
+from rotor.fluids.motion.bodies import rigid_bodies
 from rotor.fluids.motion.dynamics import RigidDynamics
 from rotor.fluids.motion.thermometers import kinetic_energy, step_correction
 from rotor.fluids.motion.thermostats import Langevin
-from rotor.fluids.run import calculator_of, dynamics_of, run_fluid
+from rotor.fluids.run import make_calculator, make_dynamics, run_fluid
 from rotor.fluids.settings import Settings
 from rotor.statistics.equipartition import KineticDegrees, equipartition, kinetic_degrees
 
 
 def fluid(name, density_g_cm3, temperature_k, molecules=64, cutoff_angstrom=6.0):
     """A box brought to temperature by friction and noise: atoms and shapes."""
-    model = model_of(name)
+    model = find_model(name)
     settings = Settings(
         model=name, ensemble="langevin", friction_per_ps=10.0, steps=500, every=500, cutoff_angstrom=cutoff_angstrom,
         temperature_k=temperature_k,
     )  # fmt: skip
     atoms = lattice_box(model, molecules, density_g_cm3, np.random.default_rng(1))
-    atoms.calc = calculator_of(settings)
+    atoms.calc = make_calculator(settings)
     shapes = {model.symbols: model.positions_angstrom[: len(model.symbols)]}
     relax(atoms, 200, shapes=shapes)
     run_fluid(atoms, settings)
@@ -41,8 +41,8 @@ def water():
 def at_constant_energy(water, step_fs, seed=4):
     atoms, shapes = water
     box = atoms.copy()
-    box.calc = calculator_of(Settings(cutoff_angstrom=6.0))
-    bodies, pose = bodies_of(box, shapes=shapes)
+    box.calc = make_calculator(Settings(cutoff_angstrom=6.0))
+    bodies, pose = rigid_bodies(box, shapes=shapes)
     heat(box, bodies, pose.attitude, 298.15, np.random.default_rng(seed))
     return RigidDynamics(box, step_fs * fs, shapes=shapes)
 
@@ -134,8 +134,8 @@ def test_four_fluids_are_in_equipartition_as_one_family():
 
 def test_a_step_of_water_counts_and_weighs_as_it_should():
     """The whole of a run's beginning: 64 waters, 381 degrees, 298 K drawn, total momentum removed."""
-    atoms = lattice_box(model_of("spce"), 64, 0.3, np.random.default_rng(2))
-    dynamics = dynamics_of(atoms, Settings(cutoff_angstrom=6.0))
+    atoms = lattice_box(find_model("spce"), 64, 0.3, np.random.default_rng(2))
+    dynamics = make_dynamics(atoms, Settings(cutoff_angstrom=6.0))
     assert dynamics.degrees.total == 6 * 64 - 3
     assert dynamics.temperatures("full").all_k == pytest.approx(
         298.15, abs=4 * 298.15 * math.sqrt(2 / 381)

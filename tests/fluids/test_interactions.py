@@ -9,14 +9,14 @@ import pytest
 from scipy.integrate import quad
 
 from rotor.fluids.forces.interactions import pair_tables, reaction_field, screened, switched, tail
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.units import EV_PER_K
 
 
 def test_tail_of_a_hard_cut_is_the_textbook_s() -> None:
     """8/3 π N ρ ε σ³ [⅓(σ/r)⁹ - (σ/r)³] and 16/3 π ρ² ε σ³ [⅔(σ/r)⁹ - (σ/r)³]."""
     n, volume, r, sigma, epsilon = 500, 3.0e4, 9.0, 3.405, 119.8 * EV_PER_K
-    energy, pressure = tail((model_of("argon"),), np.array([n]), r, 0.0)
+    energy, pressure = tail((find_model("argon"),), np.array([n]), r, 0.0)
     third, ninth = (sigma / r) ** 3, (sigma / r) ** 9
     scale = math.pi * n / volume * epsilon * sigma**3
     assert energy / volume == pytest.approx(8 / 3 * scale * n * (ninth / 3 - third), rel=1e-12)  # formula
@@ -27,7 +27,7 @@ def test_tail_of_a_hard_cut_is_the_textbook_s() -> None:
 
 def test_tail_of_a_switched_mixture_by_quadrature() -> None:
     """Energy and pressure of what is missing, each from its own integral (the pressure from the slope)."""
-    models, numbers, r, width = (model_of("argon"), model_of("trappe-co2")), np.array([30, 50]), 8.0, 1.5
+    models, numbers, r, width = (find_model("argon"), find_model("trappe-co2")), np.array([30, 50]), 8.0, 1.5
     energy = pressure = 0.0
     for first, n in zip(models, numbers, strict=True):
         for second, m in zip(models, numbers, strict=True):
@@ -74,7 +74,7 @@ def test_open_space_has_no_cut() -> None:
 
 
 def test_pairs_of_sites_without_anything_between_them_are_left_out() -> None:
-    tables = pair_tables((model_of("tip4p"), model_of("argon")))
+    tables = pair_tables((find_model("tip4p"), find_model("argon")))
     assert np.diff(tables.starts).tolist() == [10, 1, 1, 1]  # O-O and nine of H, H, M; argon sees O alone
     assert tables.numbers[tables.starts[1], 0] == 0
     assert (tables.numbers[:10, 1] > 0).sum() == 1

@@ -11,7 +11,7 @@ import pytest
 from ase import Atoms
 
 from rotor.fluids.forces.assembly import assemble
-from rotor.fluids.forces.models import models_of
+from rotor.fluids.forces.models import find_models
 from rotor.fluids.forces.neighbours import Neighbours
 from rotor.fluids.forces.potential import RigidPotential
 
@@ -35,7 +35,7 @@ def brute(lists: Neighbours) -> set[tuple[int, ...]]:
     [((12.0, 12.5, 40.0), 6.0, 1.0), ((30.0, 18.0, 25.0), 4.0, 0.3), ((9.0, 9.0, 9.0), 4.5, 4.0)],
 )
 def test_every_pair_stands_once(pbc: tuple, edges: tuple, cutoff: float, skin: float) -> None:
-    rng, models = np.random.default_rng(5), models_of("argon,trappe-n2")
+    rng, models = np.random.default_rng(5), find_models("argon,trappe-n2")
     places = rng.uniform(-5, 45, size=(60, 3))
     atoms = Atoms("Ar20", positions=places[:20])
     for place in places[20:]:
@@ -103,6 +103,6 @@ def test_molecules_end_to_end_that_overlap_are_refused() -> None:
 
 
 def test_pairs_before_an_update_are_refused() -> None:
-    lists = Neighbours(assemble(Atoms("Ar"), models_of("argon")), np.zeros(3), 5.0, 1.0)
+    lists = Neighbours(assemble(Atoms("Ar"), find_models("argon")), np.zeros(3), 5.0, 1.0)
     with pytest.raises(ValueError, match="not called yet"):
         lists.pairs()

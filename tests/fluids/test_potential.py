@@ -15,7 +15,7 @@ from ase.calculators.calculator import PropertyNotImplementedError
 
 from rotor import units
 from rotor.fluids.forces.ewald import EwaldParameters
-from rotor.fluids.forces.models import MODELS, RigidModel, Site, model_of
+from rotor.fluids.forces.models import MODELS, RigidModel, Site, find_model
 from rotor.fluids.forces.potential import RigidPotential
 
 METHODS = {"reaction-field": math.inf, "shifted": 0.2, "ewald": 0.4}
@@ -36,7 +36,7 @@ def potential(models: str, method: str, cutoff: float = 7.0, **more) -> RigidPot
 def mixture() -> tuple[Atoms, list[RigidModel]]:
     """36 molecules of four kinds in a cube of 15 Å."""
     atoms = plain.box_of(MIXTURE, 15.0, seed=3)
-    return atoms, [model_of(name) for name, n in MIXTURE.items() for _ in range(n)]
+    return atoms, [find_model(name) for name, n in MIXTURE.items() for _ in range(n)]
 
 
 # the plain form
@@ -127,7 +127,7 @@ def test_pressure_is_minus_the_slope_with_volume(name: str, method: str) -> None
     atoms = plain.box_of({name: 64}, 16.0, seed=6)
     calc = potential(name, method, cutoff=6.0)
     atoms.calc = calc
-    stress, size = atoms.get_stress(), len(model_of(name).symbols)
+    stress, size = atoms.get_stress(), len(find_model(name).symbols)
     molecules = atoms.positions.reshape(-1, size, 3)
     centres = np.average(molecules, axis=1, weights=atoms.get_masses()[:size])
     h = 1e-5
@@ -196,7 +196,7 @@ def test_a_cluster_feels_no_net_force_or_torque_and_may_be_turned_and_moved() ->
 def test_an_open_pair_has_coulomb_and_lennard_jones_and_nothing_else() -> None:
     atoms = plain.box_of({"spce": 2}, 6.0, seed=4)
     atoms.pbc = False
-    model = model_of("spce")
+    model = find_model("spce")
     sites = plain.sites_of(atoms, [model, model])
     d = np.linalg.norm(sites.places[:3, None] - sites.places[None, 3:], axis=-1)
     qq = plain.COULOMB_EV_ANGSTROM * sites.charge[:3, None] * sites.charge[None, 3:]

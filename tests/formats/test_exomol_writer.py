@@ -8,7 +8,7 @@ import pytest
 from rotor.formats import write
 from rotor.formats.catalogue.exomol import exomol_species, read_states
 from rotor.formats.read_write import read
-from rotor.observed.species import species_of_lines
+from rotor.observed.species import species_from_lines
 from rotor.quantum.effects.of_top import effects_of
 from rotor.spectra.lines import line_list
 from rotor.tops.top import Top
@@ -27,7 +27,7 @@ def test_written_and_read_again(tmp_path: Path, kind: str) -> None:
     write(lines, path)
     states = read_states(path)
     (species,) = exomol_species(path, states)
-    exact = species_of_lines(lines)
+    exact = species_from_lines(lines)
     order, same = (np.lexsort((each.energy_lower_k.round(4), each.frequency_mhz.round(0))) for each in (species, exact))
     step_mhz = 0.5e-6 * 2 * 29979.2458  # two energies of six decimals in 1/cm
     assert np.abs(species.frequency_mhz[order] - exact.frequency_mhz[same]).max() < 1.01 * step_mhz

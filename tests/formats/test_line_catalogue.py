@@ -15,7 +15,7 @@ from rotor.formats.catalogue.database import LineCatalogue
 from rotor.formats.catalogue.names import hill_formula
 from rotor.formats.hitran import hitran_lines, write_hitran
 from rotor.observed.partition import PartitionTable
-from rotor.observed.species import species_of_lines
+from rotor.observed.species import species_from_lines
 from rotor.spectra.lines import line_list
 from rotor.tops.top import Top
 
@@ -151,7 +151,7 @@ def test_hitran_records(tmp_path: Path) -> None:
     assert report.fault is None
     with LineCatalogue(tmp_path / "a.rotorcat") as catalogue:
         (species,) = catalogue.species_between(0.0, 1e9)
-    exact = species_of_lines(lines, partition=PartitionTable([296.0], [lines.q]))
+    exact = species_from_lines(lines, partition=PartitionTable([296.0], [lines.q]))
     assert species.name == "HITRAN 5, isotopologue 1"
     assert np.allclose(
         species.intensity_nm2_mhz(296.0), exact.intensity_nm2_mhz(296.0), rtol=2e-3

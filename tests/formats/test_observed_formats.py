@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.formats.spectra.axis import ReadChoices, frequency_of_velocity, intensity_unit
+from rotor.formats.spectra.axis import ReadChoices, intensity_unit, velocity_to_frequency
 from rotor.formats.spectra.read import read_spectrum
 
 fits = pytest.importorskip("astropy.io.fits")
@@ -217,7 +217,7 @@ def test_units_and_conventions() -> None:
     assert intensity_unit("K (Ta*)", "a") == ("K", 1.0)
     assert intensity_unit("Jy beam-1", "a") == ("Jy/beam", 1.0)
     with pytest.raises(ValueError, match="known are radio"):
-        frequency_of_velocity(1.0, 1.0, "sideways")
+        velocity_to_frequency(1.0, 1.0, "sideways")
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ import pytest
 import rotor
 from rotor.formats import packed, tables
 from rotor.formats.line_tables import as_printed
-from rotor.formats.provenance import record_of
+from rotor.formats.provenance import provenance_record
 from rotor.formats.registry import FORMATS, loaded, suffixes_for
 from rotor.formats.spcat.file_quanta import Format
 from rotor.formats.spcat.text.catalogue import Catalogue
@@ -114,7 +114,7 @@ def test_parquet_and_json_hold_what_the_table_has(tmp_path):
 
 def test_a_record_is_what_the_table_knows_and_what_is_said_besides():
     lines = rotor.api.line_list(rotor.read("CO"), jmax=3, min_lgint=None)
-    record = record_of(lines, {"command": "by hand"})
+    record = provenance_record(lines, {"command": "by hand"})
     assert (record["program"], record["version"], record["command"]) == ("rotor", rotor.__version__, "by hand")
     assert (record["min_lgint"], record["range_mhz"], record["lines"]) == (None, [0.0, None], 3)
     assert record["constants"] == rotor.read("CO").provenance["constants"]

@@ -8,7 +8,7 @@ from places import SHARED
 
 import rotor
 from rotor.fitting.assignment import levels_in
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 from rotor.formats.assigned_lines import read_assigned_lines
 from rotor.formats.fit_request import constants_for
 
@@ -81,7 +81,7 @@ def test_hyperfine_lines_of_a_low_barrier_are_those_that_westerfit_prints(files)
     constants = constants_for(path, top, ())
     lines, _ = read_assigned_lines(path, constants.quanta, constants.halves)
     labels, up, low = levels_in(lines)
-    energies, _ = model_of(constants, labels).levels(np.array(list(constants.values.values())))
+    energies, _ = label_model(constants, labels).levels(np.array(list(constants.values.values())))
     theirs = np.array([float(line.split("#")[1]) for line in LINES.splitlines() if line])
     assert np.abs(energies[up] - energies[low] - theirs).max() < 2e-5  # MHz: five decimals are printed
 
@@ -122,7 +122,7 @@ def test_the_input_of_2_butynoic_acid_has_the_constants_of_its_fit(tmp_path):
     constants = constants_for(path, top, ())
     lines, _ = read_assigned_lines(path, constants.quanta, constants.halves)
     labels, up, low = levels_in(lines)
-    energies, _ = model_of(constants, labels).levels(np.array(list(constants.values.values())))
+    energies, _ = label_model(constants, labels).levels(np.array(list(constants.values.values())))
     difference = energies[up] - energies[low] - lines.frequency_mhz
     assert len(difference) == 89
     assert np.sqrt(np.mean(difference**2)) == pytest.approx(1.4236, abs=1e-3)  # MHz: "Initial RMS" of 2ba.out

@@ -8,7 +8,7 @@ from places import ORACLES
 
 import rotor
 from rotor.fitting.top_constants import TopConstants
-from rotor.fitting.top_levels import model_of
+from rotor.fitting.top_levels import label_model
 
 # constants of kncrabtree/blackchirp @71a1a6e, tests/testdata/test_aprint32_small.xi (MTBE), its layout
 INPUT = """mtbe
@@ -138,7 +138,7 @@ def test_quadrupole_constants_give_the_components_that_xiam_calculates(tmp_path)
         n, ka, kc, f, species = rows[:, [3 * side, 3 * side + 1, 3 * side + 2, 6 + side, 8]].astype(int).T
         columns = {"n": n, "ka": ka, "kc": kc, "species": species, "vt": 0 * n, "f": f}
         labels.append(np.column_stack([columns[name] for name in constants.quanta]))
-    energies = model_of(constants, np.vstack(labels)).levels(np.array(list(constants.values.values())))[0]
+    energies = label_model(constants, np.vstack(labels)).levels(np.array(list(constants.values.values())))[0]
     difference = energies[: len(rows)] - energies[len(rows) :] - rows[:, 9]
     _, line = np.unique(rows[:, [0, 1, 2, 3, 4, 5, 8]], axis=0, return_inverse=True)
     counts = np.bincount(line.ravel())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rotor.geometry.base_pair_steps import mean_rotation, persistence_steps, step_parameters, step_pose
-from rotor.geometry.rigid_motions import bracket, compose, screw_of, twist_exp, twist_log
+from rotor.geometry.rigid_motions import bracket, chasles_screw, compose, twist_exp, twist_log
 from rotor.geometry.rigid_parts import rigid_parts
 from rotor.geometry.rotations import conjugate, exp, rotate, to_matrix, uniform
 
@@ -12,15 +12,15 @@ from rotor.geometry.rotations import conjugate, exp, rotate, to_matrix, uniform
 def test_a_screw_leaves_its_line_where_it_is_but_for_the_shift():
     rng = np.random.default_rng(4)
     for q, position in zip(uniform(20, rng=rng), rng.normal(size=(20, 3)), strict=True):
-        screw = screw_of(q, position)
+        screw = chasles_screw(q, position)
         for along in (0.0, 1.7):
             point = screw.point + along * screw.axis
             assert np.allclose(rotate(q, point) + position, point + screw.shift * screw.axis, atol=1e-12)  # round-off
         assert screw.point @ screw.axis == pytest.approx(0.0, abs=1e-12)
         assert np.allclose(exp(screw.angle * screw.axis) @ q, np.sign(q[0]), atol=1e-12)
-    moved = screw_of([1, 0, 0, 0], [0.0, 3.0, 4.0])
+    moved = chasles_screw([1, 0, 0, 0], [0.0, 3.0, 4.0])
     assert (moved.angle, moved.shift, moved.axis.tolist()) == (0.0, 5.0, [0.0, 0.6, 0.8])
-    at_rest = screw_of([1, 0, 0, 0], [0.0, 0.0, 0.0])
+    at_rest = chasles_screw([1, 0, 0, 0], [0.0, 0.0, 0.0])
     assert (at_rest.angle, at_rest.shift, at_rest.axis.tolist()) == (0.0, 0.0, [0.0, 0.0, 1.0])
     assert moved.point.tolist() == at_rest.point.tolist() == [0.0, 0.0, 0.0]
 

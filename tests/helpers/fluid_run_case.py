@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rotor.fluids.forces.models import model_of
+from rotor.fluids.forces.models import find_model
 from rotor.fluids.initial_box import lattice_box
 from rotor.fluids.run import Outputs
 from rotor.fluids.settings import Settings
@@ -14,4 +14,4 @@ FILES = Outputs(csv="run.csv", trajectories=("run.traj", "run.xyz"), checkpoint=
 
 def box(molecules=27, seed=3):
     """A thin vapour of SPC/E water that needs no relaxing."""
-    return lattice_box(model_of("spce"), molecules, 0.3, np.random.default_rng(seed))
+    return lattice_box(find_model("spce"), molecules, 0.3, np.random.default_rng(seed))

@@ -10,7 +10,7 @@ from ase import Atoms
 from scipy.special import erf, erfc
 
 from rotor.fluids.forces.ewald import COULOMB_EV_ANGSTROM
-from rotor.fluids.forces.models import RigidModel, model_of
+from rotor.fluids.forces.models import RigidModel, find_model
 
 
 def box_of(counts: dict[str, int], edge: float, seed: int = 1, spread: float = 0.1) -> Atoms:
@@ -22,7 +22,7 @@ def box_of(counts: dict[str, int], edge: float, seed: int = 1, spread: float = 0
     places = (lattice[rng.permutation(len(lattice))[: len(names)]] + 0.5) * edge / side
     atoms = Atoms(cell=[edge] * 3, pbc=True)
     for name, place in zip(names, places, strict=True):
-        model = model_of(name)
+        model = find_model(name)
         turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
         turn *= np.sign(np.linalg.det(turn))
         real = model.positions_angstrom[: len(model.symbols)] @ turn.T

@@ -50,7 +50,7 @@ def random_top(rng: np.random.Generator, linear: float = 0.25, **more) -> Top:
 
 def driven(seed: int) -> Case:
     """Attitude of a heavy body with drag, against steps to 1e-14."""
-    from rotor.classical.driven import DrivenRequest, answer_driven, motion_of
+    from rotor.classical.driven import DrivenRequest, answer_driven, driven_motion
     from rotor.classical.effects.drag import LinearDrag
     from rotor.classical.effects.gravity import GravityAboutPivot
     from rotor.classical.step_errors import apart
@@ -69,7 +69,7 @@ def driven(seed: int) -> Case:
     body = tuple(rng.permutation(moments).tolist())
     request = DrivenRequest(body, tuple(times.tolist()), effects, angular_velocity=omega, **settings)
     answer = answer_driven(request)
-    reference = motion_of(replace(request, step=None, tolerance=1e-14))
+    reference = driven_motion(replace(request, step=None, tolerance=1e-14))
     assert answer.errors.numerical is not None
     return Case(answer.errors.numerical, apart(answer.motion, reference), answer.errors.rounding.value)
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from places import SHARED
 
-from rotor.molecules.nuclei import _isotopes, _lines, data_folder, element_symbol, isotope, isotope_of_mass, masses
+from rotor.molecules.nuclei import _isotopes, _lines, data_folder, element_symbol, isotope, isotope_by_mass, masses
 
 NUCLEI = [item for element in _lines() for item in _isotopes(element).values()]
 
@@ -71,14 +71,14 @@ def test_unknown_names_are_refused_with_what_is_near(name, number, message):
 @given(st.sampled_from(NUCLEI))
 def test_a_label_and_a_mass_name_their_isotope(item):
     assert isotope(item.label) is item
-    assert isotope_of_mass(item.symbol, item.mass_u) is item
+    assert isotope_by_mass(item.symbol, item.mass_u) is item
     assert element_symbol(item.element_number) == item.symbol
 
 
 def test_a_mass_of_zero_or_of_the_natural_mixture_is_no_isotope():
     for mass in (0.0, 35.453, float("nan")):
         with pytest.raises(ValueError, match="not that of an isotope of Cl"):
-            isotope_of_mass("Cl", mass)
+            isotope_by_mass("Cl", mass)
 
 
 def test_an_element_number_that_is_none():

@@ -9,7 +9,7 @@ from output_tables import NUMBERS, TURN, table
 
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.readers.ground_state import dipole_lines, is_excited, printed_dipole
-from rotor.molecules.readers.programs import Output, program_of
+from rotor.molecules.readers.programs import Output, detect_program
 from rotor.molecules.readers.quantum_chemistry import read_output
 from rotor.molecules.readers.read import read_molecule
 from rotor.units import BOHR_RADIUS_ANGSTROM, DEBYE_PER_E_ANGSTROM, MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
@@ -374,7 +374,7 @@ def test_the_dipole_of_an_excited_density_is_not_taken(tmp_path):
 )
 def test_orca_says_which_method_a_dipole_is_of(block, excited):
     text = f"   O   R   C   A\n{block}\nTotal Dipole Moment    :   0.1  0.2  0.3\n"
-    output = Output("x.out", tuple(text.splitlines()), program_of(text))
+    output = Output("x.out", tuple(text.splitlines()), detect_program(text))
     (start,) = dipole_lines(output)
     assert is_excited(output, start) is excited
     assert printed_dipole(output, start) == pytest.approx(

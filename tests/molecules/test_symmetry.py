@@ -17,7 +17,7 @@ from scipy.linalg import expm
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import masses
 from rotor.molecules.symmetry.operations import best_turn, closed_group, find_operations, shortest_distance
-from rotor.molecules.symmetry.point_group import Symmetry, find_symmetry, symmetry_of
+from rotor.molecules.symmetry.point_group import Symmetry, find_symmetry, molecule_symmetry
 
 # Point groups of ASE's g2 collection (geometries: L. A. Curtiss et al., J. Chem. Phys. 106, 1063 (1997)), typed from
 # chemistry. Radicals are distorted there as theory has them: CH3O and CH3S are Cs, H2COH is C1. Acetamide (pyramidal
@@ -208,7 +208,7 @@ def test_near_symmetry_is_said_and_not_used(shape, group, near, displacement):
 
 def test_isotopes_break_symmetry_and_are_not_near():
     symbols = g2["C6H6"].get_chemical_symbols()
-    computed = symmetry_of(Molecule(("13C", *symbols[1:]), g2["C6H6"].positions))
+    computed = molecule_symmetry(Molecule(("13C", *symbols[1:]), g2["C6H6"].positions))
     assert (computed.point_group, computed.symmetry_number, computed.near) == ("C2v", 2, None)
 
 

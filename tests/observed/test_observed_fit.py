@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from observed_cases import artificial, injected, rigid
 
-from rotor.observed.fit import FitChoices, contributions, fit_source, limit_of
+from rotor.observed.fit import FitChoices, column_limit, contributions, fit_source
 from rotor.observed.model import Component, Sight, model
 from rotor.observed.partition import PartitionTable
 from rotor.observed.spectrum import observed_spectrum
@@ -82,7 +82,7 @@ def test_upper_limit_of_noise_is_three_standard_deviations() -> None:
     silent = observed_spectrum(GRID, np.zeros(len(GRID)), noise=0.02)
     template = model([component], GRID).brightness_k / 1e10
     exact = 3 * 0.02 / np.linalg.norm(template)
-    assert limit_of(silent, silent.noise, component) == pytest.approx(exact, rel=1e-2)  # τ of 0.01
+    assert column_limit(silent, silent.noise, component) == pytest.approx(exact, rel=1e-2)  # τ of 0.01
 
 
 def test_source_size_is_fitted_where_lines_are_thick() -> None:

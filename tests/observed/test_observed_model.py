@@ -8,9 +8,9 @@ from observed_cases import rigid
 
 from rotor import units
 from rotor.observed.model import KM_PER_S, PARAMETERS, Component, Dust, Sight, escape, model, planck_slope
-from rotor.observed.partition import PartitionTable, partition_of_top
+from rotor.observed.partition import PartitionTable, top_partition
 from rotor.observed.species import (
-    species_of_lines,
+    species_from_lines,
     strength_from_einstein,
     strength_from_lgint,
 )
@@ -29,8 +29,8 @@ def at_centre(component: Component, sight: Sight | None = None, frequency: float
 
 def test_strength_from_einstein_and_from_lgint_agree() -> None:
     lines = line_list(CO, temperature_k=300.0, jmax=20)
-    table = partition_of_top(CO)
-    species = species_of_lines(lines, partition=PartitionTable([300.0], [lines.q]))
+    table = top_partition(CO)
+    species = species_from_lines(lines, partition=PartitionTable([300.0], [lines.q]))
     from_a = strength_from_einstein(lines.einstein_a_per_s, lines.frequency_mhz, lines.g_upper)
     lower_k = lines.energy_lower_cm * units.MHZ_PER_CM / units.MHZ_PER_K
     from_lgint = strength_from_lgint(lines.lgint, lines.frequency_mhz, lower_k, lines.q)
@@ -86,7 +86,7 @@ def test_one_line_between_thin_and_thick() -> None:
 
 def test_the_same_as_the_emission_of_a_line_list() -> None:
     lines = line_list(CO, temperature_k=20.0, jmax=30)
-    species = species_of_lines(lines, partition=PartitionTable([20.0], [lines.q]))
+    species = species_from_lines(lines, partition=PartitionTable([20.0], [lines.q]))
     grid = np.linspace(REST - 5, REST + 5, 4001)
     source = Source(1e17, 20.0, 1.2, velocity_km_s=3.0, filling=1.0)
     mine = model([Component(species, 1e17, 20.0, 3.0, 1.2)], grid)
@@ -97,7 +97,7 @@ def test_the_same_as_the_emission_of_a_line_list() -> None:
 
 def test_redshift_and_velocity_are_those_of_the_emission_verb() -> None:
     lines = line_list(CO, temperature_k=20.0, jmax=10)
-    species = species_of_lines(lines, partition=PartitionTable([20.0], [lines.q]))
+    species = species_from_lines(lines, partition=PartitionTable([20.0], [lines.q]))
     source = Source(1e17, 20.0, 40.0, velocity_km_s=9000.0, redshift=1.5)
     grid = REST * source.frequency_ratio * (1 + np.linspace(-2e-4, 2e-4, 101))
     mine = model([Component(species, 1e17, 20.0, 9000.0, 40.0)], grid, Sight(redshift=1.5))

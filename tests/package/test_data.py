@@ -16,10 +16,10 @@ import rotor
 from rotor.formats.molecules.library import folders, library_molecule
 from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file
 from rotor.formats.spcat.text.cat import read_cat
-from rotor.molecules.symmetry.point_group import symmetry_of
+from rotor.molecules.symmetry.point_group import molecule_symmetry
 from rotor.quantum.solve import solve_levels
 from rotor.tops.covariance import Covariance
-from rotor.tops.spins.spin_statistics import weights_of
+from rotor.tops.spins.spin_statistics import statistical_weights
 from rotor.tops.top import SYMMETRIC_WITHIN, Top
 from rotor.units import MHZ_PER_CM, ROTATIONAL_MHZ_U_ANGSTROM2
 
@@ -124,7 +124,7 @@ def test_dipole_lies_on_the_symmetry_axis(axis, stem):
 
 @every_molecule
 def test_every_operation_of_the_point_group_leaves_the_dipole_alike(molecule):
-    symmetry, dipole = symmetry_of(molecule.molecule, SYMMETRIC_WITHIN), molecule.molecule.dipole_debye
+    symmetry, dipole = molecule_symmetry(molecule.molecule, SYMMETRIC_WITHIN), molecule.molecule.dipole_debye
     for operation in (*symmetry.rotations, *symmetry.improper):
         assert operation.matrix @ dipole == pytest.approx(dipole, abs=1e-5)  # coordinates have six decimals
     if symmetry.linear:
@@ -134,7 +134,7 @@ def test_every_operation_of_the_point_group_leaves_the_dipole_alike(molecule):
 @every_molecule
 def test_spin_weights_are_those_of_the_geometry(molecule):
     electronic = "odd" if molecule.name == "oxygen" else "even"  # 3Σg- changes sign under a half turn
-    assert weights_of(molecule.molecule, SYMMETRIC_WITHIN, electronic) == molecule.spin_weights
+    assert statistical_weights(molecule.molecule, SYMMETRIC_WITHIN, electronic) == molecule.spin_weights
 
 
 def test_spin_weights_are_those_of_the_textbook():

@@ -75,10 +75,10 @@ def test_codes_without_names_are_refused(code, what):
 def test_codes_without_an_operator_are_refused_with_their_meaning(fields, what):
     """Another operator would be computed in their place."""
     from rotor.formats.spcat.hamiltonian.code_table import Digits
-    from rotor.formats.spcat.hamiltonian.operators import operator_of
+    from rotor.formats.spcat.hamiltonian.operators import code_operator
 
     with pytest.raises(ValueError, match=f"{what}.* is read but not computed yet"):
-        operator_of(Digits(**{**dict.fromkeys(Digits._fields, 0), **fields}), "bca")
+        code_operator(Digits(**{**dict.fromkeys(Digits._fields, 0), **fields}), "bca")
 
 
 def test_a_solver_that_does_not_converge_raises(monkeypatch):
@@ -300,7 +300,7 @@ def box(monkeypatch):
 
     degrees = SimpleNamespace(translation=3, rotation=3)
     dynamics = SimpleNamespace(nsteps=0, degrees=degrees, wrench=lambda: None)
-    monkeypatch.setattr(equilibration, "dynamics_of", lambda atoms, bath: dynamics)
+    monkeypatch.setattr(equilibration, "make_dynamics", lambda atoms, bath: dynamics)
     monkeypatch.setattr(equilibration, "_advance", advance)
     monkeypatch.setattr(equilibration, "is_stationary", lambda rows, kelvin: False)
     return times
@@ -375,7 +375,7 @@ def test_the_steps_are_chosen_by_the_block_with_the_largest_population(monkeypat
         name: None if w is None else SimpleNamespace(name=name, weights=np.array(w), columns=np.arange(len(w)))
         for name, w in weights.items()
     }
-    monkeypatch.setattr(steps, "task_of", lambda problem, block, plan, before: tasks[block])
+    monkeypatch.setattr(steps, "block_task", lambda problem, block, plan, before: tasks[block])
     monkeypatch.setattr(steps, "Plan", lambda windows, passages: None)
     problem = SimpleNamespace(m_values=lambda space: [0, 1], windows=(), begins_before=True)
     space = SimpleNamespace(blocks=lambda m: list(weights) if m == 0 else [])

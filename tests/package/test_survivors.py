@@ -12,7 +12,7 @@ import rotor
 from rotor.classical.driven import DrivenRequest
 from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.classical.lyapunov import Flow, lyapunov_exponents
-from rotor.fitting.publication import unit_of, value_text
+from rotor.fitting.publication import suitable_unit, value_text
 from rotor.formats.spcat.hamiltonian.labels import Functions, _by_k2
 from rotor.plots.show import write_picture
 from rotor.plots.view import View
@@ -128,19 +128,19 @@ def test_weights_that_cannot_be(weights):
 
 
 def test_weights_beyond_exact_sums_are_refused_and_the_largest_is_served():
-    assert SpinWeights("J", ("even", "odd"), (MOST_WEIGHT, 1)).of_j([0, 1]).tolist() == [MOST_WEIGHT, 1]
+    assert SpinWeights("J", ("even", "odd"), (MOST_WEIGHT, 1)).linear_weights([0, 1]).tolist() == [MOST_WEIGHT, 1]
     with pytest.raises(ValueError, match="digits, too many to add up exactly"):
-        SpinWeights("J", ("even", "odd"), (MOST_WEIGHT + 1, 1)).of_j([0])
+        SpinWeights("J", ("even", "odd"), (MOST_WEIGHT + 1, 1)).linear_weights([0])
 
 
 @pytest.mark.parametrize(
     ("weights", "use"),
     [
-        ({"even": 1, "odd": 3}, lambda w: w.of_ka_kc("ee")),
-        ({"even": 1, "odd": 3}, lambda w: w.of_symmetric(1, 1)),
-        ({"ee": 1, "eo": 3, "oe": 3, "oo": 1}, lambda w: w.of_j(1)),
-        ({"even": 1, "odd": 3}, lambda w: w.of_spherical(1)),
-        ({"even": 1, "odd": 3}, lambda w: w.of_irrep("A1")),
+        ({"even": 1, "odd": 3}, lambda w: w.asymmetric_weight("ee")),
+        ({"even": 1, "odd": 3}, lambda w: w.symmetric_weights(1, 1)),
+        ({"ee": 1, "eo": 3, "oe": 3, "oo": 1}, lambda w: w.linear_weights(1)),
+        ({"even": 1, "odd": 3}, lambda w: w.spherical_weights(1)),
+        ({"even": 1, "odd": 3}, lambda w: w.irrep_weight("A1")),
         ({"even": 1, "odd": 3}, lambda w: w.modulus),
     ],
 )
@@ -152,11 +152,11 @@ def test_weights_of_another_rule_are_refused(weights, use):
 def test_irreps_that_there_are_not():
     tetrahedral = SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3})
     with pytest.raises(ValueError, match="irrep 'G': known are"):
-        tetrahedral.of_irrep("G")
+        tetrahedral.irrep_weight("G")
     icosahedral = SpinWeights.from_mapping({"A": 1, "F1": 2, "F2": 3, "G": 4, "H": 5})
     with pytest.raises(ValueError, match="icosahedral"):
-        icosahedral.of_irrep("A1")
-    assert SpinWeights().of_irrep("F1") == 3
+        icosahedral.irrep_weight("A1")
+    assert SpinWeights().irrep_weight("F1") == 3
 
 
 # Tables of publications
@@ -182,7 +182,7 @@ def test_numbers_with_errors_at_the_edges(value, error, text):
     ],
 )  # fmt: skip
 def test_units_at_their_edges(value, error, unit):
-    assert unit_of(value, error)[0] == unit
+    assert suitable_unit(value, error)[0] == unit
 
 
 # Raman lines

@@ -23,7 +23,7 @@ from rotor.spectra.lines import line_list
 from rotor.thermodynamics import partition_function, thermodynamic_functions
 from rotor.tops.isotopes.isotopologues import isotopologue
 from rotor.tops.spins.spin_constants import SpinConstants
-from rotor.tops.spins.spin_statistics import weights_of
+from rotor.tops.spins.spin_statistics import statistical_weights
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants
 from rotor.tops.states.state_texts import with_state_texts
@@ -90,7 +90,7 @@ def test_levels_that_exist():
 
 def test_weights_are_those_of_the_permutations():
     for v, inversion in enumerate(("symmetric", "antisymmetric")):
-        assert weights_of(AMMONIA.molecule, inversion=inversion) == AMMONIA.states.weights[v]
+        assert statistical_weights(AMMONIA.molecule, inversion=inversion) == AMMONIA.states.weights[v]
 
 
 @pytest.mark.parametrize("temperature_k", JPL_LOG_Q)
@@ -236,7 +236,7 @@ def test_nd3_has_both_halves_of_every_doublet():
     """The second line of 1(0)-0(0) from the others; both exist, 10 : 1 by weight (CDMS 020501: A1, A2, E as 10 : 1 : 8, E of both K)."""
     heavy = isotopologue(AMMONIA, {"H": "2H"}).top.molecule
     for weights, inversion in zip(ND3_WEIGHTS, ("symmetric", "antisymmetric"), strict=True):
-        assert weights_of(heavy, inversion=inversion).to_mapping() == weights
+        assert statistical_weights(heavy, inversion=inversion).to_mapping() == weights
     top = _nd3()
     assert top.states.values["E[1]"] == pytest.approx(1591.6, abs=0.1)  # CDMS 020501; quartic terms left out here
     lines = line_list(top, jmax=1, min_lgint=None)
@@ -275,9 +275,9 @@ def test_nd3_of_the_library_meets_measured_lines():
     assert np.sqrt(np.mean(off[inversion] ** 2)) < 0.4  # 0.29 in the fit; digits of the file
     assert np.sqrt(np.mean(off[~inversion] ** 2)) < 1.45  # 1.37
     assert np.abs(off).max() < 4.5  # 6(4)-5(4), 4.4 errors; the list's own fit is 4.2 off there
-    assert weights_of(HEAVY.molecule, inversion="symmetric") == HEAVY.states.weights[0]
-    assert weights_of(HEAVY.molecule, inversion="antisymmetric") == HEAVY.states.weights[1]
-    assert weights_of(HEAVY.molecule) == HEAVY.spin_weights
+    assert statistical_weights(HEAVY.molecule, inversion="symmetric") == HEAVY.states.weights[0]
+    assert statistical_weights(HEAVY.molecule, inversion="antisymmetric") == HEAVY.states.weights[1]
+    assert statistical_weights(HEAVY.molecule) == HEAVY.spin_weights
 
 
 def test_k_3_of_nd3_lies_between_its_halves():

@@ -142,7 +142,7 @@ def test_symmetric_top_with_distortion_is_its_formula():
 def test_spherical_weights_add_up_to_all_spin_states():
     """CH4: over J the weights of A, E, F levels make 16 spin states per component on average; J = 0 to 3 by hand."""
     weights = SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3})
-    assert weights.of_spherical(np.arange(4)).tolist() == [5, 3, 5, 11]  # A; F; E+F; A+2F
+    assert weights.spherical_weights(np.arange(4)).tolist() == [5, 3, 5, 11]  # A; F; E+F; A+2F
     assert weights.mean == pytest.approx(16 / 12)
 
 

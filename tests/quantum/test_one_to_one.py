@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rotor.quantum.one_to_one import one_to_one
+from rotor.quantum.one_to_one import match_names
 
 
 @pytest.mark.parametrize("kind", ["vectors", "numbers", "ties"])
@@ -18,7 +18,7 @@ def test_the_sum_of_the_overlaps_is_that_of_scipy(kind):
         mixed = np.linalg.qr(rng.normal(size=(size, size)) + 2 * np.eye(size)[rng.permutation(size)])[0] ** 2
         overlaps = {"vectors": mixed, "numbers": rng.random((size, size)) ** 3, "ties": np.round(mixed, 1)}[kind]
         conflicts += len(set(overlaps.argmax(axis=0).tolist())) < size
-        computed = one_to_one(overlaps)
+        computed = match_names(overlaps)
         assert sorted(computed.tolist()) == list(range(size))
         rows, columns = linear_sum_assignment(overlaps, maximize=True)
         best = overlaps[rows, columns].sum()

@@ -20,7 +20,7 @@ from rotor.quantum.symmetric_top_elements import coupling, symmetric_top_element
 from rotor.quantum.tensors import (
     BodyTensor,
     acting_on,
-    axes_of,
+    axis_order,
     bands_between,
     block_elements,
     body_tensor,
@@ -172,7 +172,7 @@ def test_frames_are_right_handed(representation):
     turn = frame_of(representation)
     assert np.linalg.det(turn) == pytest.approx(1.0, abs=1e-15)
     assert ["abc"[np.argmax(np.abs(row))] for row in turn] == list(AXES[representation])
-    assert axes_of(representation) == AXES[representation]
+    assert axis_order(representation) == AXES[representation]
 
 
 @pytest.mark.parametrize("rank", [0, 1, 2])
@@ -462,7 +462,7 @@ def test_acting_on_columns_is_the_matrix():
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: axes_of("IV"), "representation 'IV': known are Ir, Il"),
+        (lambda: axis_order("IV"), "representation 'IV': known are Ir, Il"),
         (lambda: spherical_components([1, 2, 3], 2, "Ir"), r"rank 2 of an array \(3,\)"),
         (lambda: spherical_components(np.eye(3), 3, "Ir"), r"rank 3 of an array \(3, 3\)"),
         (lambda: BodyTensor(1, (1, 0, 0)), "real Cartesian components has T_-q"),

@@ -14,7 +14,7 @@ from rotor.classical.tumble import SI, TumbleRequest, answer_tumble
 from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
 from rotor.fluids.settings import Settings
 from rotor.quantum.request import LevelsRequest, answer_levels
-from rotor.reports.screen import plain, rows_of
+from rotor.reports.screen import plain, table_records
 from rotor.requests.readers import Whole
 from rotor.spectra.raman_request import RamanRequest, answer_raman
 from rotor.spectra.request import GasLayer, SpectrumRequest, answer_spectrum
@@ -50,7 +50,7 @@ def test_spectrum(call):
         vibrations=VibrationalStates.parse("859,520x2,2062", harmonic=True), layer=GasLayer(2e-3, 100.0),
     )  # fmt: skip
     answer = answer_spectrum(request)
-    assert_same(command, {**answer.facts(), "lines": rows_of(answer.lines)})
+    assert_same(command, {**answer.facts(), "lines": table_records(answer.lines)})
     assert command["profile"] == "gaussian"
     assert command["strongest"] == answer.strongest(20).tolist()
     assert len(command["lines"]) == len(answer.lines) > 20
@@ -71,13 +71,13 @@ def test_spectrum_of_constants_with_a_given_q(call):
     top = rotor.Top.from_constants("A=9.2 B=3 C=2.5 GHz", dipole_abc_debye=(1, 0, 2), source="given (--constants)",
                                    dipole_source="given in principal axes (--dipole-abc)")  # fmt: skip
     answer = answer_spectrum(SpectrumRequest(top, q=1000, vibrational_factor=1.5, min_lgint=None, jmax=5))
-    assert_same(command, {**answer.facts(), "lines": rows_of(answer.lines)})
+    assert_same(command, {**answer.facts(), "lines": table_records(answer.lines)})
 
 
 def test_raman(call):
     command = answer_of(call, "raman", "CO2", "--laser", "488", "--temperature", "500K", "--min-relative", "1e-3")
     answer = answer_raman(RamanRequest(rotor.read("CO2"), temperature_k=500, laser_nm=488, min_relative=1e-3))
-    assert_same(command, {**answer.facts(), "lines": rows_of(answer.lines)})
+    assert_same(command, {**answer.facts(), "lines": table_records(answer.lines)})
 
 
 def test_thermo(call):
@@ -91,14 +91,14 @@ def test_thermo(call):
             vibrations=VibrationalStates.parse("1595,3657,3756", harmonic=True),
         )
     )  # fmt: skip
-    assert_same(command, {**answer.facts(), "functions": rows_of(answer.functions)})
+    assert_same(command, {**answer.facts(), "functions": table_records(answer.functions)})
 
 
 def test_tumble_of_a_molecule(call):
     command = answer_of(call, "tumble", "water", "--temperature", "100", "--times", "0:2ps:21")
     request = thermal_tumble(rotor.read("water"), temperature_k=100, times_ps=np.linspace(0, 2, 21))
     answer = answer_tumble(request)
-    facts = {**answer.facts(), "motion": rows_of(answer.table)}
+    facts = {**answer.facts(), "motion": table_records(answer.table)}
     top_keys = {key for key in command if key not in facts} - COMMAND_KEYS
     assert_same({k: v for k, v in command.items() if k not in top_keys}, facts)
     assert command["temperature_k"] == 100
@@ -109,7 +109,7 @@ def test_tumble_of_a_body(call):
     answer = answer_tumble(TumbleRequest((0.6, 0.8, 1.0), (1.8, 0.4, -0.9), source="given (--angular-momentum)"))
     facts = {
         **answer.facts(),
-        "motion": rows_of(answer.table),
+        "motion": table_records(answer.table),
         "kind": answer.request.kind,
         "notes": [],
         "temperature_k": None,
@@ -123,7 +123,7 @@ def test_gas(call):
     )
     request = GasRequest(rotor.read("OCS"), 2000, 200.0, seed=5, times_ps=tuple(np.linspace(0, 1, 6).tolist()))
     answer = answer_gas(request)
-    assert_same(command, {**answer.facts(), "correlation": rows_of(answer.correlations)})
+    assert_same(command, {**answer.facts(), "correlation": table_records(answer.correlations)})
     assert len(settling_times_ps(request.top, 200.0)) == 101
 
 
@@ -134,7 +134,7 @@ def test_fluid(call):
     )  # fmt: skip
     settings = Settings(ensemble="langevin", steps=20, cutoff_angstrom=5.0, seed=3, temperature_k=320.0)
     answer = answer_fluid(FluidRequest(NewBox(27, 0.5), settings))
-    assert_same(command, {**answer.facts(), "record": rows_of(answer.record)})
+    assert_same(command, {**answer.facts(), "record": table_records(answer.record)})
 
 
 def test_levels_of_every_kind_of_top():
@@ -147,10 +147,10 @@ def test_levels_of_every_kind_of_top():
     table = answer_levels(LevelsRequest(top, jmax=4)).table
     chosen = [
         (row["j"], row["ka"], row["kc"], row["energy_mhz"])
-        for row in rows_of(table)
+        for row in table_records(table)
         if row["j"] >= 1 and 1 <= row["ka"] <= 2
     ]
-    assert [(row["j"], row["ka"], row["kc"], row["energy_mhz"]) for row in rows_of(levels)] == chosen
+    assert [(row["j"], row["ka"], row["kc"], row["energy_mhz"]) for row in table_records(levels)] == chosen
     low = answer_levels(LevelsRequest(top, jmax=4, max_energy_mhz=50.0)).table
     assert low.energy_mhz.tolist() == [e for e in table.energy_mhz.tolist() if e <= 50.0]
 
@@ -203,7 +203,7 @@ def test_a_request_is_checked_where_it_is_made(make, said):
 
 def test_a_body_with_an_angular_velocity():
     """L = I ω: a uniform box 1 x 2 x 3 m of 12 kg has moments 13, 10 and 5 kg m²."""
-    request = TumbleRequest.of_angular_velocity((13.0, 10.0, 5.0), (0.1, 2.0, 0.0), units=SI)
+    request = TumbleRequest.from_angular_velocity((13.0, 10.0, 5.0), (0.1, 2.0, 0.0), units=SI)
     answer = answer_tumble(request)
     assert request.angular_momentum == pytest.approx((1.3, 20.0, 0.0), rel=1e-15)  # one product each
     assert answer.facts()["energy"] == pytest.approx(0.5 * (13 * 0.01 + 10 * 4), rel=1e-15)  # a few roundings

@@ -9,12 +9,12 @@ import pytest
 
 import rotor
 from rotor import units
-from rotor.alignment.budgets import model_of_cosines
+from rotor.alignment.budgets import cosine_model_error
 from rotor.classical.tumble import TumbleRequest, answer_tumble
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.budgets import model_term
-from rotor.quantum.estimates.limits import every_limit, populated_j
+from rotor.quantum.estimates.limits import all_limits, populated_j
 from rotor.quantum.estimates.splittings import line_components
 from rotor.quantum.request import LevelsRequest, answer_levels
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
@@ -220,7 +220,7 @@ def test_the_model_of_q_is_the_error_of_the_geometry():
     top = rotor.read("SMILES:CC(Cl)C#N")
     relative = top.molecule.uncertainty
     with_vibration = answer_thermo(ThermoRequest(top, (300.0,), vibrations=VibrationalStates.parse("200")))
-    limits = {limit.name: limit.size_mhz for limit in every_limit(top, populated_j(top, 300.0), with_vibration.effects)}
+    limits = {limit.name: limit.size_mhz for limit in all_limits(top, populated_j(top, 300.0), with_vibration.effects)}
     share = limits["error of the geometry"] / sum(size for size in limits.values() if size)
     assert with_vibration.errors.model.value * share == pytest.approx(1.5 * relative, rel=0.5)
     assert answer_thermo(ThermoRequest(top, (300.0,))).errors.model.source == "vibration is left out"
@@ -254,7 +254,7 @@ def test_the_errors_of_cosines_are_bounds():
         assert actual <= answer.errors.numerical <= 3 * tolerance
     shifted = np.abs(cosines(6000.6).trace.cosines["cos2theta"] - exact.trace.cosines["cos2theta"]).max()
     j = max(exact.trace.ensemble.jmax, 1)
-    left_out = model_of_cosines(exact.trace, [Limit("error of B", 0.6 * 2 * (j + 1), "")])
+    left_out = cosine_model_error(exact.trace, [Limit("error of B", 0.6 * 2 * (j + 1), "")])
     assert shifted / 3 <= left_out.value <= 3 * shifted
 
 
@@ -484,7 +484,7 @@ def test_steps_that_are_not_made_a_second_time_are_not_estimated(monkeypatch):
 
 def test_fixed_steps_longer_than_the_times_are_apart_have_an_error():
     """A quarter of such a step makes the same motion: shorter ones are compared."""
-    from rotor.classical.driven import DrivenRequest, answer_driven, motion_of
+    from rotor.classical.driven import DrivenRequest, answer_driven, driven_motion
     from rotor.classical.effects.gravity import GravityAboutPivot
     from rotor.classical.step_errors import apart
 
@@ -492,5 +492,5 @@ def test_fixed_steps_longer_than_the_times_are_apart_have_an_error():
     times = tuple(np.linspace(0.0, 3.0, 61).tolist())
     request = DrivenRequest((1.0, 1.5, 2.0), times, (weight,), angular_velocity=(2.0, 1.0, -1.0), step=0.3)
     answer = answer_driven(request)
-    actual = apart(answer.motion, motion_of(replace(request, step=None, tolerance=1e-14)))
+    actual = apart(answer.motion, driven_motion(replace(request, step=None, tolerance=1e-14)))
     assert 1e-12 < actual <= answer.errors.truncation.value < 3 * actual

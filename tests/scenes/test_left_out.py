@@ -18,8 +18,8 @@ from rotor.classical.driven import DrivenRequest, answer_driven
 from rotor.classical.effects.gravity import GravityAboutPivot
 from rotor.classical.numerics import step_error
 from rotor.fluids.analysis import Diffusion, yeh_hummer_correction
-from rotor.fluids.motion.bodies import bodies_of
-from rotor.fluids.numerics import left_out_of_fluid
+from rotor.fluids.motion.bodies import rigid_bodies
+from rotor.fluids.numerics import neglected_in_fluid
 from rotor.geometry.rotations import distance
 from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.estimates.left_out import stray_field
@@ -105,12 +105,12 @@ def normal(count: int) -> np.ndarray:
 def test_the_quantum_correction_is_that_of_oscillators(u):
     """u = ħΩ/kT: the free energy of an oscillator is ln[sinh(u/2)/(u/2)] kT above the classical one."""
     kelvin, count = 50.0, 50
-    bodies, _ = bodies_of(
+    bodies, _ = rigid_bodies(
         Atoms("Ar" * count, positions=10.0 * np.arange(count)[:, None] * [1.0, 0, 0]), np.arange(count)
     )
     omega = u * units.EV_PER_K * kelvin / units.HBAR_CLASSICAL
     force = -np.sqrt(bodies.mass[:, None] * units.EV_PER_K * kelvin) * omega * normal(count)  # -mΩ²x
-    computed = {omission.name: omission for omission in left_out_of_fluid(bodies, force, 0 * force, kelvin, 2.0)}
+    computed = {omission.name: omission for omission in neglected_in_fluid(bodies, force, 0 * force, kelvin, 2.0)}
     exact = 3 * np.log(np.sinh(u / 2) / (u / 2))
     tolerance = (
         0.05 + u**2 / 50
@@ -125,7 +125,7 @@ def test_the_step_error_is_that_of_librators():
     dimers = [molecule("N2") for _ in range(count)]
     for number, dimer in enumerate(dimers):
         dimer.translate([10.0 * number, 0, 0])
-    bodies, _ = bodies_of(sum(dimers[1:], dimers[0]), np.arange(2 * count) // 2)
+    bodies, _ = rigid_bodies(sum(dimers[1:], dimers[0]), np.arange(2 * count) // 2)
     step, rng = step_fs * 1e-3 / units.ASE_TIME_PS, np.random.default_rng(4)
     omega = 0.5 / step
     angles = rng.normal(size=(count, 3)) * (bodies.inverse_moments > 0)
@@ -133,7 +133,7 @@ def test_the_step_error_is_that_of_librators():
         bodies.inverse_moments > 0, 1 / np.where(bodies.inverse_moments > 0, bodies.inverse_moments, 1), 0
     )
     torque = -np.sqrt(moments * units.EV_PER_K * kelvin) * omega * angles
-    computed = {omission.name: omission for omission in left_out_of_fluid(bodies, 0 * torque, torque, kelvin, step_fs)}
+    computed = {omission.name: omission for omission in neglected_in_fluid(bodies, 0 * torque, torque, kelvin, step_fs)}
     s = 0.25
     assert computed["finite step"].size / 100 == pytest.approx(
         1 - s * np.sqrt(1 - s**2) / np.arcsin(s), rel=0.1
@@ -145,8 +145,8 @@ def test_the_box_slows_diffusion_as_yeh_and_hummer_have_it(count):
     """With a viscosity of 0.9 mPa s and a diffusion of 2.3e-9 m²/s, about those of water at 298 K, 1 g/cm³."""
     edge = (count * 18.015 * units.ATOMIC_MASS_KG / 997.0) ** (1 / 3) * 1e10
     slowed = yeh_hummer_correction(Diffusion(0.0, 0.0), 298.0, 0.9e-3, edge).corrected / 2.3e-9
-    bodies, _ = bodies_of(Atoms("Ar2", positions=[[0, 0, 0], [9, 0, 0]]), np.arange(2))
-    share = left_out_of_fluid(bodies, np.zeros((2, 3)), np.zeros((2, 3)), 298.0, 1.0)
+    bodies, _ = rigid_bodies(Atoms("Ar2", positions=[[0, 0, 0], [9, 0, 0]]), np.arange(2))
+    share = neglected_in_fluid(bodies, np.zeros((2, 3)), np.zeros((2, 3)), 298.0, 1.0)
     size = next(omission.size for omission in share if omission.name == "finite box") * (2 / count) ** (
         1 / 3
     )  # of two: N^(-1/3)
@@ -168,21 +168,21 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
     """Forces and torques after 50 steps from a lattice, against those after two picoseconds; rotation at full steps is colder."""
     from rotor.fluids.motion.dynamics import RigidDynamics
     from rotor.fluids.motion.thermostats import Langevin
-    from rotor.fluids.request import box_of
+    from rotor.fluids.request import make_box
     from rotor.scenes.calculation import Calculation
 
     box = FluidConditions(molecules=64, ensemble="langevin", friction=5.0, steps=100)
     scene = FluidScene(conditions=box, numerics=FluidNumerics(cutoff="6 Å"))
     planned = {neglected.name: neglected.size for neglected in plan_of(scene).left_out}
     request = Calculation(scene).request()
-    atoms, kelvin, step_fs = box_of(request), 298.15, 2.0
+    atoms, kelvin, step_fs = make_box(request), 298.15, 2.0
     thermostat = Langevin(kelvin, 5e-3 / ase_units.fs, np.random.default_rng(1))
     dynamics = RigidDynamics(atoms, step_fs * ase_units.fs, thermostat=thermostat)
     dynamics.run(1000)
     sizes = []
     for _ in range(20):
         dynamics.run(10)
-        computed = left_out_of_fluid(dynamics.bodies, *dynamics.wrench(), kelvin, step_fs)
+        computed = neglected_in_fluid(dynamics.bodies, *dynamics.wrench(), kelvin, step_fs)
         sizes.append({entry.name: entry.size for entry in computed if entry.size is not None})
     for name in ("quantum mechanics of nuclei", "finite step"):
         assert 1 / 3 < planned[name] / np.mean([size[name] for size in sizes]) < 3

@@ -13,7 +13,7 @@ import rotor
 from rotor.quantum.effects.of_top import spin_effects
 from rotor.quantum.effects.watson import SEMI_RIGID, operators_by_name
 from rotor.quantum.estimates.beyond import next_order
-from rotor.quantum.estimates.left_out import left_out_of_levels, stray_field
+from rotor.quantum.estimates.left_out import neglected_in_levels, stray_field
 from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.scenes.plan import plan_of
@@ -25,7 +25,7 @@ from rotor.spectra.numerics import allowed_lines
 from rotor.spectra.spectrum import Spectrum
 from rotor.spectra.widths import doppler
 from rotor.thermodynamics.classical_limit import classical_partition_function
-from rotor.thermodynamics.gas_numerics import left_out_of_gas
+from rotor.thermodynamics.gas_numerics import neglected_in_gas
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 
@@ -111,7 +111,7 @@ SPINS = [
 @pytest.mark.parametrize("j", [1, 4])
 def test_known_couplings_of_spins(name, constants, effect, j):
     top = replace(rotor.read(name), spin_constants=SpinConstants.parse(constants))
-    size = next(omission.size for omission in left_out_of_levels(top, j, SEMI_RIGID) if omission.name == effect)
+    size = next(omission.size for omission in neglected_in_levels(top, j, SEMI_RIGID) if omission.name == effect)
     split = solve_levels(top, j, jmin=j, effects=(*SEMI_RIGID, *spin_effects(top)))
     plain = solve_levels(top, j, jmin=j)
     names = [name for name in plain.quanta if name != "j"]
@@ -137,7 +137,7 @@ def test_quantum_corrections_of_a_classical_gas(name, kelvin):
         / classical_partition_function(truncated(top, 2), kelvin)
         - 1
     )
-    size = next(omission.size for omission in left_out_of_gas(top, kelvin) if omission.name == "quantum corrections")
+    size = next(omission.size for omission in neglected_in_gas(top, kelvin) if omission.name == "quantum corrections")
     assert 1 / 3 < size / 100 / abs(exact) < 3  # the first term of a series
 
 
@@ -191,9 +191,9 @@ def test_nothing_is_written_by_a_plan(call, folder):
 
 def test_couplings_of_spins_that_are_left_out_name_the_key_that_adds_them():
     top = rotor.read("HCN")
-    said = {omission.name: omission.basis for omission in left_out_of_levels(top, 8, SEMI_RIGID)}
+    said = {omission.name: omission.basis for omission in neglected_in_levels(top, 8, SEMI_RIGID)}
     assert "effects.hyperfine = true adds them" in said["nuclear quadrupole"]
-    with_spins = left_out_of_levels(top, 8, (*SEMI_RIGID, *spin_effects(top)))
+    with_spins = neglected_in_levels(top, 8, (*SEMI_RIGID, *spin_effects(top)))
     assert not any("effects.hyperfine" in item.basis for item in with_spins)
 
 

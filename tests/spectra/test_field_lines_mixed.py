@@ -15,7 +15,7 @@ from rotor.quantum.effects.hyperfine import quadrupole_of_tensor
 from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.spins import Spin
-from rotor.spectra.fields.light import light_of
+from rotor.spectra.fields.light import light_components
 from rotor.spectra.fields.lines import field_lines
 from rotor.spectra.lines import line_list
 from rotor.thermodynamics.field_mixture import field_mixture
@@ -172,7 +172,7 @@ def test_executors_change_nothing():
 
 
 def test_lights():
-    assert light_of((0, 0, 2)).about((1.0, 0.0, 1.0)).angle_degrees == pytest.approx(45.0)  # round-off
+    assert light_components((0, 0, 2)).about((1.0, 0.0, 1.0)).angle_degrees == pytest.approx(45.0)  # round-off
     for wrong in ((0, 0, 0), (1, 2), "up", float("nan")):
         with pytest.raises(ValueError, match="three components"):
-            light_of(wrong)
+            light_components(wrong)

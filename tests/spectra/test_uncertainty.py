@@ -10,7 +10,7 @@ import pytest
 
 import rotor
 from rotor.formats.line_tables import catalogue
-from rotor.formats.spcat.hamiltonian.codes import constants_of
+from rotor.formats.spcat.hamiltonian.codes import file_constants
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.estimates.uncertainty import level_errors
@@ -68,7 +68,7 @@ def test_err_column_of_the_reference_program(shared):
     """SPCAT's ERR from the covariance of a fit with 15 constants, J ≤ 60: to its last digit on all lines it prints."""
     folder = shared / "reference" / "spfit" / "ared6_500_p0p1pct"
     file = read_par(folder / "ared6_500_p0p1pct.var")
-    constants = constants_of(file, errors=True)
+    constants = file_constants(file, errors=True)
     names = [p.label.removeprefix("-").replace("Del", "Delta").replace("del", "delta") for p in file.parameters]
     signs = np.array([-1.0 if p.label.startswith("-") else 1.0 for p in file.parameters])
     correlations = correlations_in(file.rest, len(names)) * np.outer(signs, signs)

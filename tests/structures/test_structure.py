@@ -15,7 +15,7 @@ from places import PROJECT
 
 import rotor
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.symmetry.point_group import symmetry_of
+from rotor.molecules.symmetry.point_group import molecule_symmetry
 from rotor.statistics.least_squares import minimise
 from rotor.structures.consistency import doubts, gains, moments_across_planes, without_each
 from rotor.structures.coordinates import bonds_and_angles, moved_to, named, symmetric_displacements, symmetric_geometry
@@ -179,7 +179,7 @@ def test_coordinates_are_set_without_loss_of_symmetry():
     assert [coordinate.value(moved) for coordinate in coordinates] == pytest.approx(
         targets, abs=1e-10
     )  # Newton's method to round-off
-    assert symmetry_of(Molecule(molecule.symbols, moved), 1e-8).point_group == "C3v"
+    assert molecule_symmetry(Molecule(molecule.symbols, moved), 1e-8).point_group == "C3v"
 
 
 def test_contradictions_and_nonsense_are_refused():

@@ -11,7 +11,7 @@ from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.quantum.effects.of_top import effects_of
 from rotor.thermodynamics import GAS_CONSTANT, VibrationalStates, thermodynamic_functions
-from rotor.thermodynamics.electronic import ElectronicStates, electronic_states_of
+from rotor.thermodynamics.electronic import ElectronicStates, electronic_states
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
@@ -80,13 +80,13 @@ def test_heat_and_enthalpy_of_a_splitting():
 
 def test_what_a_molecule_says():
     assert rotor.read("O2").molecule.multiplicity == 3
-    assert electronic_states_of(rotor.read("O2").molecule).degeneracies == (3,)
-    assert electronic_states_of(rotor.read("NO2").molecule).degeneracies == (2,)
-    assert electronic_states_of(rotor.read("CH2_s3B1d").molecule).degeneracies == (3,)
-    assert electronic_states_of(rotor.read("water").molecule).degeneracies == (1,)
+    assert electronic_states(rotor.read("O2").molecule).degeneracies == (3,)
+    assert electronic_states(rotor.read("NO2").molecule).degeneracies == (2,)
+    assert electronic_states(rotor.read("CH2_s3B1d").molecule).degeneracies == (3,)
+    assert electronic_states(rotor.read("water").molecule).degeneracies == (1,)
     odd = replace(rotor.read("NO2").molecule, multiplicity=None)
-    assert "odd number of electrons" in electronic_states_of(odd).text
-    assert electronic_states_of(replace(odd, charge=1)).degeneracies == (1,)
+    assert "odd number of electrons" in electronic_states(odd).text
+    assert electronic_states(replace(odd, charge=1)).degeneracies == (1,)
     assert rotor.read("O2", isotopes="1=18O").molecule.multiplicity == 3
     with pytest.raises(ValueError, match="multiplicity 2: with an even number of electrons"):
         replace(rotor.read("water").molecule, multiplicity=2)
@@ -138,7 +138,7 @@ def test_refusals(call, options, said):
 
 
 def test_constants_alone_have_no_electrons():
-    assert electronic_states_of(Top.from_constants("B=10 GHz").molecule) == ElectronicStates()
+    assert electronic_states(Top.from_constants("B=10 GHz").molecule) == ElectronicStates()
 
 
 def test_a_linear_doublet_notes_orbital_momentum(call):

@@ -93,7 +93,7 @@ def test_levels_keep_their_barycentre():
 def test_weights_add_up_to_those_of_j(weights):
     split = solve_levels(Top(METHANE, spin_weights=weights), 24)
     sums = [split.weight[split.quanta["j"] == j].sum() for j in range(25)]
-    assert sums == weights.of_spherical(np.arange(25)).tolist()
+    assert sums == weights.spherical_weights(np.arange(25)).tolist()
 
 
 def test_sign_of_dt_turns_the_order_of_energy():

@@ -13,7 +13,7 @@ from rotor.tops.constants import Constants
 from rotor.tops.kind_of_constants import A_REDUCTION, S_REDUCTION, ray_kappa, vocabulary
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.states.state_constants import StateConstants
-from rotor.tops.states.state_texts import weights_of_text
+from rotor.tops.states.state_texts import parse_weights
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 
@@ -195,7 +195,7 @@ def test_text_reads_back_exactly(b, distortion, unit):
         (StateConstants.parse, "E[1]=100 E[1]=200 MHz", r"E\[1\]"),
         (SpinConstants.parse, "chi_aa(14N)=-4 chi_aa(14N)=-3 MHz", r"chi_aa\(14N\)"),
         (
-            lambda text: weights_of_text(text, Top.from_constants("A=9 B=6 C=5 GHz")),
+            lambda text: parse_weights(text, Top.from_constants("A=9 B=6 C=5 GHz")),
             "[1] even=3,odd=1 [1] even=1,odd=3",
             "state 1",
         ),

@@ -18,13 +18,13 @@ from scipy.linalg import expm
 import rotor
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.symmetry.point_group import find_symmetry, symmetry_of
+from rotor.molecules.symmetry.point_group import find_symmetry, molecule_symmetry
 from rotor.tops.spins.spin_statistics import (
     character_rows,
     inverting_symmetry,
     spin_characters,
     spin_weights,
-    weights_of,
+    statistical_weights,
 )
 from rotor.tops.spins.spin_weights import IRREPS, SpinWeights, irreps_in_j
 from rotor.tops.top import Top
@@ -78,37 +78,45 @@ RATIOS = {
 
 @pytest.mark.parametrize("label", RATIOS)
 def test_textbook_ratios(label):
-    assert weights_of(molecule(label), electronic=SPECIES[label].electronic).to_mapping() == RATIOS[label]
+    assert statistical_weights(molecule(label), electronic=SPECIES[label].electronic).to_mapping() == RATIOS[label]
 
 
 def test_all_the_spin_functions_of_13c60_are_counted():
     """Each irrep with its dimension: together 2^60, exactly, up to the divisor taken out."""
-    weights = weights_of(molecule("13C60"))
+    weights = statistical_weights(molecule("13C60"))
     assert 2**60 % np.dot((1, 3, 3, 4, 5), weights.values) == 0
 
 
 def test_benzene_by_levels():
     """Pairs ±K weigh 10, 11, 9, 14 for |K| = 6p, 6p±1, 6p±2, 6p+3; K = 0 weighs 7 and 3, J even and odd."""
-    weights = weights_of(molecule("C6H6"))
-    assert weights.of_symmetric(7, np.arange(1, 8)).tolist() == [2 * w for w in (11, 9, 14, 9, 11, 10, 11)]
-    assert weights.of_symmetric([4, 5], [0, 0]).tolist() == [14, 6]
+    weights = statistical_weights(molecule("C6H6"))
+    assert weights.symmetric_weights(7, np.arange(1, 8)).tolist() == [2 * w for w in (11, 9, 14, 9, 11, 10, 11)]
+    assert weights.symmetric_weights([4, 5], [0, 0]).tolist() == [14, 6]
 
 
 def test_states_of_an_inverting_molecule():
     """NH3: J even, K = 0 only in the upper state; NH2D: 1:3 turns to 3:1 (Townes and Schawlow, chapter 12)."""
     ammonia, partly = molecule("NH3"), molecule("NH2D, lower of the doublet")
-    assert weights_of(ammonia, inversion="symmetric").to_mapping() == {"0even": 0, "0odd": 4, "1": 1, "2": 1}
-    assert weights_of(ammonia, inversion="antisymmetric").to_mapping() == {"0even": 4, "0odd": 0, "1": 1, "2": 1}
-    assert weights_of(partly, inversion="symmetric").to_mapping() == {"ee": 1, "eo": 1, "oe": 3, "oo": 3}
-    assert weights_of(partly, inversion="antisymmetric").to_mapping() == {"ee": 3, "eo": 3, "oe": 1, "oo": 1}
+    assert statistical_weights(ammonia, inversion="symmetric").to_mapping() == {"0even": 0, "0odd": 4, "1": 1, "2": 1}
+    assert statistical_weights(ammonia, inversion="antisymmetric").to_mapping() == {
+        "0even": 4,
+        "0odd": 0,
+        "1": 1,
+        "2": 1,
+    }
+    assert statistical_weights(partly, inversion="symmetric").to_mapping() == {"ee": 1, "eo": 1, "oe": 3, "oo": 3}
+    assert statistical_weights(partly, inversion="antisymmetric").to_mapping() == {"ee": 3, "eo": 3, "oe": 1, "oo": 1}
 
 
 @settings(max_examples=20, deadline=None)
 @given(label=st.sampled_from(["NH3", "PH3", "ND3"]), j=st.integers(0, 9))
 def test_both_states_of_the_doublet_add_up_to_the_unresolved_one(label, j):
     k = np.arange(j + 1)
-    pair = [weights_of(molecule(label), inversion=state).of_symmetric(j, k) for state in make_spin_weights.STATES]
-    whole = weights_of(molecule(label)).of_symmetric(j, k)
+    pair = [
+        statistical_weights(molecule(label), inversion=state).symmetric_weights(j, k)
+        for state in make_spin_weights.STATES
+    ]
+    whole = statistical_weights(molecule(label)).symmetric_weights(j, k)
     total = pair[0] + pair[1]
     assert np.array_equal(total * whole[0], whole * total[0])
 
@@ -150,7 +158,7 @@ def brute_force_weights(molecule_: Molecule, jmax: int, electronic: str = "even"
     Rotational functions of one energy times all products of spin functions; those kept by the projector on what
     every rotation with its permutation leaves alike are counted by its rank.
     """
-    symmetry = symmetry_of(molecule_)
+    symmetry = molecule_symmetry(molecule_)
     spins = [nucleus.spin for nucleus in molecule_.nuclei if nucleus.spin]
     atoms = [atom for atom, nucleus in enumerate(molecule_.nuclei) if nucleus.spin]
     rank_of = {atom: rank for rank, atom in enumerate(atoms)}
@@ -187,21 +195,21 @@ def brute_force_weights(molecule_: Molecule, jmax: int, electronic: str = "even"
 
 def predicted(molecule_: Molecule, levels, electronic: str = "even") -> list[int]:
     """What the weights say of the same levels: asymmetric in order of energy, symmetric by K, spherical by J."""
-    weights, symmetry = weights_of(molecule_, electronic=electronic), symmetry_of(molecule_)
+    weights, symmetry = statistical_weights(molecule_, electronic=electronic), molecule_symmetry(molecule_)
     if symmetry.linear:
-        return [int(weights.of_j(j)) for _, j, _, _ in levels]
+        return [int(weights.linear_weights(j)) for _, j, _, _ in levels]
     kinds = len(set(moments(symmetry).tolist()))
     if kinds == 1:
-        return [int(weights.of_spherical(j)) for _, j, _, _ in levels]
+        return [int(weights.spherical_weights(j)) for _, j, _, _ in levels]
     out = []
     for j in sorted({level[1] for level in levels}):
         if kinds == 2:
             oblate = bool(np.diff(moments(symmetry))[0] == 0)
             k = np.arange(j, -1, -1) if oblate else np.arange(j + 1)
-            out += weights.of_symmetric(j, k, oblate).tolist()
+            out += weights.symmetric_weights(j, k, oblate).tolist()
         else:
             labels = [((tau + 1) // 2, j - tau // 2) for tau in range(2 * j + 1)]
-            out += [weights.of_ka_kc("eo"[ka % 2] + "eo"[kc % 2]) for ka, kc in labels]
+            out += [weights.asymmetric_weight("eo"[ka % 2] + "eo"[kc % 2]) for ka, kc in labels]
     return out
 
 
@@ -247,9 +255,9 @@ def test_against_the_sum_over_all_spin_functions(label, jmax):
 def test_all_levels_of_one_j_hold_the_right_number_of_spin_functions(label, j):
     """Σ over levels of the weight = Σ_R χ_J(R) f(R) / Σ 1, whatever the rule, up to the divisor taken out."""
     species, sample = SPECIES[label], molecule(label)
-    symmetry = symmetry_of(sample)
+    symmetry = molecule_symmetry(sample)
     f = spin_characters(symmetry, [nucleus.spin for nucleus in sample.nuclei], species.electronic)
-    weights = weights_of(sample, electronic=species.electronic)
+    weights = statistical_weights(sample, electronic=species.electronic)
 
     def allowed(jj):
         if symmetry.linear:
@@ -261,12 +269,12 @@ def test_all_levels_of_one_j_hold_the_right_number_of_spin_functions(label, j):
     def counted(jj):
         k = np.arange(jj + 1)
         if symmetry.linear:
-            return int(weights.of_j(jj))
+            return int(weights.linear_weights(jj))
         if weights.rule == "KaKc":
             labels = [((tau + 1) // 2, jj - tau // 2) for tau in range(2 * jj + 1)]
-            assert weights.of_symmetric(jj, k).sum() == weights.of_symmetric(jj, k, oblate=True).sum()
-            return sum(weights.of_ka_kc("eo"[ka % 2] + "eo"[kc % 2]) for ka, kc in labels)
-        return int(weights.of_spherical(jj) if weights.rule == "irrep" else weights.of_symmetric(jj, k).sum())
+            assert weights.symmetric_weights(jj, k).sum() == weights.symmetric_weights(jj, k, oblate=True).sum()
+            return sum(weights.asymmetric_weight("eo"[ka % 2] + "eo"[kc % 2]) for ka, kc in labels)
+        return int(weights.spherical_weights(jj) if weights.rule == "irrep" else weights.symmetric_weights(jj, k).sum())
 
     reference = next(jj for jj in range(8) if counted(jj))
     assert counted(j) * allowed(reference) == pytest.approx(allowed(j) * counted(reference), rel=1e-9)  # round-off
@@ -296,7 +304,7 @@ def test_rotation_shift_and_order_of_atoms_change_no_weight(label, seed):
         tuple(sample.mass_numbers[i] for i in order),
     )
     inversion = SPECIES[label].inversion
-    assert weights_of(mixed, inversion=inversion) == weights_of(sample, inversion=inversion)
+    assert statistical_weights(mixed, inversion=inversion) == statistical_weights(sample, inversion=inversion)
 
 
 # An accidental symmetric top keeps its asymmetric-top weights (and the same for a sphere)
@@ -314,18 +322,18 @@ def test_accidental_symmetric_top_keeps_its_weights():
     """F2O with I_a = I_b by numbers: an oblate top whose levels K = Kc weigh what eo + oe, ee + oo do."""
     accidental, plain = square_f2o(1.0), square_f2o(0.5)
     assert Top.from_molecule(accidental).kind == "oblate"
-    assert symmetry_of(accidental).rotation_group == "C2"
-    weights = weights_of(accidental)
-    assert weights.rule == weights_of(plain).rule == "KaKc"
+    assert molecule_symmetry(accidental).rotation_group == "C2"
+    weights = statistical_weights(accidental)
+    assert weights.rule == statistical_weights(plain).rule == "KaKc"
     assert sorted(weights.values) == [1, 1, 3, 3]
-    assert weights.of_symmetric(3, np.arange(4), oblate=True).tolist() == [3, 4, 4, 4]
-    assert weights.of_symmetric(2, np.arange(3), oblate=True).tolist() == [1, 4, 4]
+    assert weights.symmetric_weights(3, np.arange(4), oblate=True).tolist() == [3, 4, 4, 4]
+    assert weights.symmetric_weights(2, np.arange(3), oblate=True).tolist() == [1, 4, 4]
 
 
 def test_accidental_sphere_keeps_its_weights():
     """By K modulo 3 and by parities, J = 1: 0, ±1 of CH3Cl; 1_01, 1_11, 1_10 of H2O."""
-    assert weights_of(molecule("CH3-35Cl")).of_spherical([0, 1]).tolist() == [2, 4]
-    assert weights_of(molecule("H2O")).of_spherical([0, 1]).tolist() == [1, 7]
+    assert statistical_weights(molecule("CH3-35Cl")).spherical_weights([0, 1]).tolist() == [2, 4]
+    assert statistical_weights(molecule("H2O")).spherical_weights([0, 1]).tolist() == [1, 7]
 
 
 def test_weights_follow_the_axis_that_the_isotopes_leave():
@@ -334,8 +342,8 @@ def test_weights_follow_the_axis_that_the_isotopes_leave():
     hydrogens = [i + 1 for i, symbol in enumerate(ethene.symbols) if symbol == "H"]
     places = ethene.positions_angstrom[np.array(hydrogens) - 1]
     geminal = hydrogens[int(np.argsort(np.linalg.norm(places - places[0], axis=1))[1])]
-    assert weights_of(ethene.with_isotopes({hydrogens[0]: "2H"})).rule == "none"
-    pair = weights_of(ethene.with_isotopes({hydrogens[0]: "2H", geminal: "2H"})).to_mapping()
+    assert statistical_weights(ethene.with_isotopes({hydrogens[0]: "2H"})).rule == "none"
+    pair = statistical_weights(ethene.with_isotopes({hydrogens[0]: "2H", geminal: "2H"})).to_mapping()
     assert pair == {"ee": 5, "eo": 5, "oe": 7, "oo": 7}  # f = 2²·3² = 36 and -2·3 = -6 about a: 15 and 21
 
 
@@ -378,12 +386,12 @@ def geometry(name: str, isotopes: str) -> Molecule:
 
 def weight_per_level(molecule_: Molecule, quanta) -> np.ndarray:
     """Predicted weight, both signs of K together, of levels with the quanta of a catalogue."""
-    weights, j = weights_of(molecule_), quanta[:, 0].astype(int)
+    weights, j = statistical_weights(molecule_), quanta[:, 0].astype(int)
     if weights.rule == "KaKc":
         parity = [f"{'eo'[ka % 2]}{'eo'[kc % 2]}" for ka, kc in quanta[:, 1:3].tolist()]
-        return np.array([weights.of_ka_kc(species) for species in parity])
+        return np.array([weights.asymmetric_weight(species) for species in parity])
     if weights.rule == "K":
-        return weights.of_symmetric(j, np.abs(quanta[:, 1]).astype(int))
+        return weights.symmetric_weights(j, np.abs(quanta[:, 1]).astype(int))
     return np.ones(len(j), dtype=np.int64)
 
 
@@ -421,7 +429,7 @@ def test_table_of_the_docs_is_what_the_code_gives():
 
 
 def test_rows_of_characters():
-    rows = character_rows(symmetry_of(molecule("CH4")), [nucleus.spin for nucleus in molecule("CH4").nuclei])
+    rows = character_rows(molecule_symmetry(molecule("CH4")), [nucleus.spin for nucleus in molecule("CH4").nuclei])
     assert [(r.rotation, r.count, r.character) for r in rows] == [("E", 1, 16), ("C2", 3, 4), ("C3", 8, 4)]
     assert rows[2].cycles == ((0.0, 1, 1), (0.5, 1, 1), (0.5, 3, 1))
 
@@ -431,7 +439,7 @@ def test_rows_of_characters():
 
 def test_mistakes_are_told():
     water, ammonia = molecule("H2O"), molecule("NH3")
-    computed, ethylene = symmetry_of(water), symmetry_of(molecule("C2H4"))
+    computed, ethylene = molecule_symmetry(water), molecule_symmetry(molecule("C2H4"))
     for call, message in [
         (lambda: spin_weights(computed, [0, 0.5]), "2 spins for 3 nuclei"),
         (lambda: spin_weights(computed, [0, 0.4, 0.4]), "multiples of 1/2"),
@@ -439,12 +447,12 @@ def test_mistakes_are_told():
         (lambda: spin_weights(computed, [0, 0.5, 0.5], "Sigma"), "'even', 'odd' for C2"),
         (lambda: spin_weights(ethylene, [0, 0, *[0.5] * 4], "odd"), "4 characters"),
         (lambda: spin_weights(ethylene, [0, 0, *[0.5] * 4], [1, -1, -1, -1]), "multiply like the rotations"),
-        (lambda: weights_of(ammonia, inversion="up"), "'symmetric' or 'antisymmetric'"),
-        (lambda: weights_of(ammonia, inversion="symmetric", electronic="odd"), "leave `electronic`"),
-        (lambda: weights_of(water, inversion="symmetric"), "flat within"),
-        (lambda: weights_of(g2_molecule("C2H6"), inversion="symmetric"), "no plane to invert"),
-        (lambda: weights_of(g2_molecule("CH4"), inversion="symmetric"), "no plane to invert"),
-        (lambda: weights_of(g2_molecule("H2CCl2"), inversion="symmetric"), "nuclei meet"),
+        (lambda: statistical_weights(ammonia, inversion="up"), "'symmetric' or 'antisymmetric'"),
+        (lambda: statistical_weights(ammonia, inversion="symmetric", electronic="odd"), "leave `electronic`"),
+        (lambda: statistical_weights(water, inversion="symmetric"), "flat within"),
+        (lambda: statistical_weights(g2_molecule("C2H6"), inversion="symmetric"), "no plane to invert"),
+        (lambda: statistical_weights(g2_molecule("CH4"), inversion="symmetric"), "no plane to invert"),
+        (lambda: statistical_weights(g2_molecule("H2CCl2"), inversion="symmetric"), "nuclei meet"),
     ]:
         with pytest.raises(ValueError, match=message):
             call()
@@ -455,7 +463,7 @@ def test_characters_given_by_hand():
     oxygen = find_symmetry("OO", [16.0, 16.0], [[0, 0, 0], [0, 0, 1.2]])
     assert spin_weights(oxygen, [0, 0], [1, -1]) == spin_weights(oxygen, [0, 0], "odd")
 
-    ethylene = symmetry_of(molecule("C2H4"))
+    ethylene = molecule_symmetry(molecule("C2H4"))
     spins = [nucleus.spin for nucleus in molecule("C2H4").nuclei]
     sevens = set()
     for signs in ([1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]):
@@ -474,14 +482,14 @@ def test_pairs_of_a_symmetric_top_by_numbers_add_up_its_asymmetric_levels(weight
         for oblate in (False, True):
             sums = [0] * (j + 1)
             for ka, kc in labels:
-                sums[kc if oblate else ka] += by_parity.of_ka_kc("eo"[ka % 2] + "eo"[kc % 2])
-            assert by_parity.of_symmetric(j, np.arange(j + 1), oblate).tolist() == sums
+                sums[kc if oblate else ka] += by_parity.asymmetric_weight("eo"[ka % 2] + "eo"[kc % 2])
+            assert by_parity.symmetric_weights(j, np.arange(j + 1), oblate).tolist() == sums
 
 
 def test_too_many_spins_to_add_up_are_told():
     many = SpinWeights("J", ("even", "odd"), (2**60, 2**60 + 1))
     with pytest.raises(ValueError, match="use none"):
-        many.of_j(3)
+        many.linear_weights(3)
 
 
 def test_rules_are_told_by_their_classes():

@@ -15,7 +15,7 @@ from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.quantum.effects.watson import centrifugal_operators, operators_by_name, rigid_operators
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
-from rotor.tops.operators import powers_of_spelled, published_name, spelled_term
+from rotor.tops.operators import published_name, spelled_powers, spelled_term
 from rotor.tops.top import Top
 
 RIGID = {"A": 9000.0, "B": 5000.0, "C": 3000.0}
@@ -26,12 +26,12 @@ powers = st.tuples(*[st.integers(0, 60)] * 3).filter(any)
 
 @given(powers)
 def test_every_term_has_a_name_that_reads_back(term):
-    assert powers_of_spelled(spelled_term(*term)) == term
+    assert spelled_powers(spelled_term(*term)) == term
 
 
 @pytest.mark.parametrize("name", ["J", "Jz", "J3", "J4Jz1", "Jpm3", "JzJ2", "Jz2J4", "J04", "", "DJ", "J2x", "J0"])
 def test_what_is_no_spelled_term(name):
-    assert powers_of_spelled(name) is None
+    assert spelled_powers(name) is None
 
 
 @pytest.mark.parametrize("representation", ["Ir", "IIIl", "IIr"])

@@ -13,7 +13,11 @@ from places import PROJECT
 
 import rotor
 from rotor import api
+from rotor.alignment.pulse import Kick
 from rotor.calls import EXAMPLES
+from rotor.tops.constants import Constants
+from rotor.tops.spins.spin_weights import SpinWeights
+from rotor.tops.states.state_constants import StateConstants
 from rotor.verbs.verb import verb_of
 
 
@@ -134,6 +138,20 @@ def test_names_that_moved_warn_and_say_where_they_are(name):
         return
     with pytest.warns(DeprecationWarning, match=rf"rotor\.{name} is rotor\.api\.{name} from version 0\.3 on"):
         assert getattr(rotor, name) is getattr(api, name)
+
+
+@pytest.mark.parametrize(
+    ("call", "answer"),
+    [
+        (lambda: Kick.of_strength(5.0, 4.04), Kick.from_strength(5.0, 4.04)),
+        (lambda: Constants(B=5.0).own_name("D_J"), "D"),
+        (lambda: StateConstants({"E[1]": 5.0, "B[1]": 3.0}).of_state(1), {"E": 5.0, "B": 3.0}),
+        (lambda: SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3}).of_irrep("F2"), 3),
+    ],
+)
+def test_methods_with_new_names_warn_and_answer_under_their_former_names(call, answer):
+    with pytest.warns(DeprecationWarning, match=r"\.\w+ is \w+ from version 0\.3 on"):
+        assert call() == answer
 
 
 def test_further_building_blocks_are_in_one_place():

@@ -17,7 +17,7 @@ import pytest
 from view_cases import DIPOLE, KELVIN, NAME, NOISE, SERIES, TRUE, WIDTH, assign_line, true_lines, write_case
 
 from rotor.viewer.actions import ACTIONS
-from rotor.viewer.fits import assignments_of
+from rotor.viewer.fits import fit_assignments
 from rotor.viewer.opening import open_session
 from rotor.viewer.peak_fit import fit_peak
 from rotor.viewer.pyramid import pyramid
@@ -385,11 +385,11 @@ def test_exports_are_read_by_the_other_verbs(service, call, tmp_path):
 
 
 def test_an_exported_page_has_everything_inside(service, tmp_path):
-    from rotor.viewer.export_page import data_of_page, export_page
+    from rotor.viewer.export_page import export_page, read_page
 
     assign_line(service, *SERIES[0])
     text = export_page(service)
-    data = data_of_page(text)
+    data = read_page(text)
     assert data["hello"]["session"]["records"]["line/1"]["upper"] == [2, 0, 2]
     assert data["x"]["steps"] == len(service.spectrum)
     assert "src=" not in text.split('id="rotor-data"')[0]
@@ -681,5 +681,5 @@ def test_dipole_of_the_case_is_that_of_its_file(service):
 def test_the_comment_of_one_line_of_several_is_kept():
     model = SimpleNamespace(quanta=("j",), record=SimpleNamespace(name="OCS"), halves=frozenset())
     lines = {n: Line(1, (n,), (n - 1,), 12163.0 * n, 0.01, n, comment="weak" if n == 2 else "") for n in (1, 2, 3)}
-    assert list(assignments_of(model, lines).comments) == ["", "weak", ""]
-    assert not any(assignments_of(model, {1: lines[1], 3: lines[3]}).comments)
+    assert list(fit_assignments(model, lines).comments) == ["", "weak", ""]
+    assert not any(fit_assignments(model, {1: lines[1], 3: lines[3]}).comments)

@@ -28,7 +28,7 @@ from rotor.geometry.rotations import IDENTITY, to_matrix, vector_product
 
 @dataclass(frozen=True)
 class RollingEllipsoid(Torque, AddedInertia):
-    """An ellipsoidal body on a plane normal to gravity; L is that about the point of contact (`momentum_of` makes it).
+    """An ellipsoidal body on a plane normal to gravity; L is that about the point of contact (`total_momentum` makes it).
 
     semiaxes: (3,). gravity: (3,), acceleration in space, towards the plane. centre: (3,), of the ellipsoid, from the centre
     of mass in body axes. axes: (4,), quaternion from the ellipsoid's axes to the body's principal axes.

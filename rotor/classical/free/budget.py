@@ -26,7 +26,7 @@ EPS = sys.float_info.epsilon
 EVALUATED = 32 * EPS  # theta functions, and products of three quaternions
 DOUBLED = 64 * EPS**2  # of a phase in two doubles
 LAST_DIGITS = 4 * EPS  # error of k'² if six numbers each have an error of one unit in the last place
-GIVEN = "moments and angular momentum have no stated uncertainty"
+EXACT_INPUT = "moments and angular momentum have no stated uncertainty"
 
 
 def attitude_budget(motion: FreeMotion, last: float, growth_rate: float, converted: bool) -> ErrorBudget:
@@ -76,7 +76,7 @@ def _data(motion: FreeMotion, last: float, growth_rate: float) -> ErrorTerm:
     """The term of the data: not estimated, with a note if their last digits leave the phase of the flips unknown."""
     shift = flip_phase_error(float(motion.period), last, growth_rate)
     if shift < 1.0:
-        return ErrorTerm(None, GIVEN)
+        return ErrorTerm(None, EXACT_INPUT)
     return ErrorTerm(
         None,
         f"the phase of the flips is not known after {last:.2g}, one unit in the last place of the data moves it by {shift:.2g} rad",

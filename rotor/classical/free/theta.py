@@ -100,7 +100,7 @@ class Constants:
     turning: DoubleDouble
 
 
-def frame_of(moments: Floats, momentum: Floats) -> Frame:
+def momentum_frame(moments: Floats, momentum: Floats) -> Frame:
     """The frame with the axis that L circles third (from the exact sign of D2) and L3 > 0."""
     order = np.argsort(moments, axis=-1, kind="stable")
     d2 = _d2_j1_j3(_columns(moments, order), _columns(momentum, order))
@@ -116,7 +116,7 @@ def frame_of(moments: Floats, momentum: Floats) -> Frame:
     return Frame(axes, signs, _columns(moments, axes), (m1, m2, m3), d2)
 
 
-def constants_of(frame: Frame) -> Constants:
+def theta_constants(frame: Frame) -> Constants:
     """Amplitudes, moduli, phase rates and the initial phase; about 30 digits for those that determine phases."""
     j1, j2, j3 = (DoubleDouble.of(j) for j in frame.moments)
     j21, j31, j32 = (DoubleDouble.difference(frame.moments[a], frame.moments[b]) for a, b in ((1, 0), (2, 0), (2, 1)))
@@ -140,15 +140,15 @@ def constants_of(frame: Frame) -> Constants:
     per_half_period = choose(frame.separatrix, DoubleDouble.of(np.ones_like(mc.hi)), integrals.mean / PI)
     start = _first_integral(frame, s1 * j31 / -(j1 * d3), s2 * j32 / -(j2 * d3), mc) * per_half_period
     b = ((-(j1 * d3) / j31).sqrt().hi, (-(j2 * d3) / j32).sqrt().hi, b3.hi)
-    start = choose(frame.momentum[0] < 0.0, _sign_of(frame.momentum[1]) - start, start)
+    start = choose(frame.momentum[0] < 0.0, _sign(frame.momentum[1]) - start, start)
     turning = choose(frame.separatrix, g / j2, turning)
     return Constants(g, b, mc.hi, kk.hi, integrals.mean.hi, speed * per_half_period, start, turning)
 
 
 def moving_rows(moments: Floats, momentum: Floats) -> Rows:
     """Rows of bodies (n, 3) whose momentum moves in the body; `left` is set to the identity."""
-    frame = frame_of(moments, momentum)
-    c = constants_of(frame)
+    frame = momentum_frame(moments, momentum)
+    c = theta_constants(frame)
     near = c.mc < TRANSFORM_BELOW
     kind = np.where(frame.separatrix, SEPARATRIX, np.where(near, NEAR_SEPARATRIX, CIRCULATING))
     other_mean, y, y_rest = _amplitude_integrals(frame, c)
@@ -169,7 +169,7 @@ def moving_rows(moments: Floats, momentum: Floats) -> Rows:
         axes=frame.axes,
         signs=frame.signs,
         left=_identities(len(moments)),
-        right=from_matrix(_rows_of_axes(frame)),
+        right=from_matrix(_frame_rotation(frame)),
         momentum0=momentum,
     )
 
@@ -268,7 +268,7 @@ def _columns(array: Floats, axes: NDArray[np.int64]) -> tuple[Floats, Floats, Fl
     return first, second, third
 
 
-def _rows_of_axes(frame: Frame) -> Floats:
+def _frame_rotation(frame: Frame) -> Floats:
     """The rotation from body axes to the frame: row i is the signed unit vector of the frame's axis i."""
     matrix = np.zeros((len(frame.axes), 3, 3))
     np.put_along_axis(matrix, frame.axes[:, :, None], frame.signs[:, :, None], axis=-1)
@@ -279,5 +279,5 @@ def _identities(n: int) -> Floats:
     return np.tile([1.0, 0.0, 0.0, 0.0], (n, 1))
 
 
-def _sign_of(values: Floats) -> DoubleDouble:
+def _sign(values: Floats) -> DoubleDouble:
     return DoubleDouble.of(np.where(values < 0.0, -1.0, 1.0))

@@ -16,7 +16,7 @@ from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
 from rotor.classical.free._kernels import evaluate
 from rotor.classical.free.theta import Rows
-from rotor.classical.integrators._kernels import FINITE, LANES, ONE, _length, _upright, block_turns
+from rotor.classical.integrators._kernels import FINITE, LANES, WHOLE_STEP, _length, _upright, block_turns
 from rotor.geometry._kernels import conjugate, product
 
 
@@ -97,7 +97,7 @@ def add_stepped(
             row[10 * LANES + k], row[11 * LANES + k] = math.cos(half), math.sin(half)
         for i in range(sums.shape[1]):
             if i > 0:
-                symmetric_steps(block_turns, row, ONE, step, steps)
+                symmetric_steps(block_turns, row, WHOLE_STEP, step, steps)
                 _turn_about_l(row)
             _add_block(row, here, vector, axes, beta, sums[:, i])
 

@@ -191,10 +191,10 @@ def _limit_along_third(moments: Floats) -> float:
     mc = np.clip(d2 * (i3 - i1) / (d1 * (i3 - i2)), 1e-300, 1.0)
     mean = np.sqrt(i3 * d1 / (i3 - i1)) * 0.5 * np.pi / ellipkm1(mc)
     weighed = (n1 / i1 + s2 / i2 + n3 / i3) ** -1.5
-    return float(np.sum(measure * weighed * mean**2) / _weight_of_directions(moments))
+    return float(np.sum(measure * weighed * mean**2) / _direction_weight(moments))
 
 
-def _weight_of_directions(moments: Floats) -> float:
+def _direction_weight(moments: Floats) -> float:
     """∫ (Σ n_i²/I_i)^(-3/2) over an octant: (π/2) √(I1 I2 I3), the volume in which L is normal."""
     return float(0.5 * np.pi * np.sqrt(np.prod(moments)))
 

@@ -41,7 +41,7 @@ def lever(attitude: Floats, arm: Floats, force: Floats) -> Floats:
 
 
 @njit(cache=True, inline="always")
-def turn_of(u: Any) -> Any:
+def half_angle_terms(u: Any) -> Any:
     """cos(θ/2), sin(θ/2)/θ and (1 - (θ/2) cot(θ/2))/θ² of a rotation vector, θ = |u|.
 
     With y = θ²/4 the series are Σ (-y)^n/(2n)!, ½ Σ (-y)^n/(2n+1)! and Σ |B_2k|/(2k)! θ^(2k-2), B_2k Bernoulli's numbers; the terms
@@ -66,13 +66,13 @@ def turn_of(u: Any) -> Any:
 @njit(cache=True, inline="always")
 def ahead(q: Any, u: Any) -> Any:
     """q exp(u)."""
-    cosine, half_sinc, _ = turn_of(u)
+    cosine, half_sinc, _ = half_angle_terms(u)
     return product(q, exponential(cosine, half_sinc, u))
 
 
 @njit(cache=True, inline="always")
-def turning_of(u: Any, omega: Any, factor: Any) -> Any:
-    """du/dt = ω + ½ u x ω + f u x (u x ω), f = (1 - (θ/2) cot(θ/2))/θ², θ = |u|: the last of `turn_of`."""
+def rotation_vector_rate(u: Any, omega: Any, factor: Any) -> Any:
+    """du/dt = ω + ½ u x ω + f u x (u x ω), f = (1 - (θ/2) cot(θ/2))/θ², θ = |u|: the last of `half_angle_terms`."""
     a = cross(u, omega)
     b = cross(u, a)
     return (
@@ -94,11 +94,11 @@ def placed(attitude: Floats, change: Floats, space: Floats, here: Floats, moment
 
 @njit(cache=True, nogil=True)
 def turning(change: Floats, omega: Floats, out: Floats) -> None:
-    """out[:, 3:] = du/dt of `turning_of` for u = change[:, 3:]."""
+    """out[:, 3:] = du/dt of `rotation_vector_rate` for u = change[:, 3:]."""
     for i in range(change.shape[0]):
         u = (change[i, 3], change[i, 4], change[i, 5])
-        _, _, factor = turn_of(u)
-        out[i, 3], out[i, 4], out[i, 5] = turning_of(u, vector_at(omega, i), factor)
+        _, _, factor = half_angle_terms(u)
+        out[i, 3], out[i, 4], out[i, 5] = rotation_vector_rate(u, vector_at(omega, i), factor)
 
 
 @njit(cache=True, nogil=True)

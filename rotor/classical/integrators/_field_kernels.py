@@ -16,7 +16,7 @@ from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
-from rotor.classical.integrators._kernels import FINITE, LANES, ONE, sine_cosine, sine_series
+from rotor.classical.integrators._kernels import FINITE, LANES, WHOLE_STEP, sine_cosine, sine_series
 from rotor.classical.integrators._torque_kernels import swing, times_matrix
 from rotor.classical.torque_form import BODY_FIXED, LEVER, SPACE_FIXED
 from rotor.geometry._kernels import conjugate, cross, exponential, product, quaternion_at, turned, vector_at
@@ -146,7 +146,7 @@ def advance_in_field(
         _torque(codes, parameters, start, row)
         _kick(row, 0.5 * step)
         for k in range(1, steps + 1):
-            symmetric_steps(field_turns, row, ONE, step, 1)
+            symmetric_steps(field_turns, row, WHOLE_STEP, step, 1)
             _sphere(row, step)
             _torque(codes, parameters, start + k * step, row)
             _kick(row, step if k < steps else 0.5 * step)

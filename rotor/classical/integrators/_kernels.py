@@ -18,7 +18,7 @@ from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
 from rotor.geometry._kernels import conjugate, half_third_row, matrix, product, quaternion_at, to_third
 
-ONE = (1.0,)  # fractions of a step of order 2
+WHOLE_STEP = (1.0,)  # fractions of a step of order 2
 LANES = 128
 RUNS = 6
 FINITE = {"contract", "nnan", "ninf", "nsz"}  # products with zeros of a quaternion are optimised away
@@ -91,7 +91,7 @@ def advance_blocks(blocks: Any, step: float, steps: int, rates: Floats, axes: Fl
             left[i, 0], left[i, 1], left[i, 2], left[i, 3] = product(
                 product(quaternion_at(attitude, body), conjugate(tilt)), about_l
             )
-        symmetric_steps(block_turns, row, ONE, step, steps)
+        symmetric_steps(block_turns, row, WHOLE_STEP, step, steps)
         for i in range(count):
             body = begin + i
             q = product((row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i]), axes[body])

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from rotor.arrays import Floats
-from rotor.classical.integrators._attitude_kernels import ahead, turn_of, turning_of
+from rotor.classical.integrators._attitude_kernels import ahead, half_angle_terms, rotation_vector_rate
 from rotor.classical.integrators._rolling_kernels import rolling_omega, rolling_torque
 from rotor.classical.integrators._torque_kernels import torque_at
 from rotor.geometry._kernels import conjugate, exponential, product, turned
@@ -43,7 +43,7 @@ def _rate(form: Any, inverse: Floats, time: float, state: Any, change: Any, out:
     """dL/dt in space and du/dt of body i into out[stage, i]; state: L in space and attitude before the step."""
     codes, parameters, inner = form
     u = (change[i, 3], change[i, 4], change[i, 5])
-    cosine, half_sinc, factor = turn_of(u)
+    cosine, half_sinc, factor = half_angle_terms(u)
     q = product((state[i, 3], state[i, 4], state[i, 5], state[i, 6]), exponential(cosine, half_sinc, u))
     m = turned(conjugate(q), (state[i, 0] + change[i, 0], state[i, 1] + change[i, 1], state[i, 2] + change[i, 2]))
     omega = (
@@ -52,7 +52,7 @@ def _rate(form: Any, inverse: Floats, time: float, state: Any, change: Any, out:
         (m[2] - inner[2]) * inverse[i, 2],
     )
     torque = turned(q, torque_at(codes, parameters, time, q, omega))
-    rate = turning_of(u, omega, factor)
+    rate = rotation_vector_rate(u, omega, factor)
     for k in range(3):
         out[stage, i, k], out[stage, i, 3 + k] = torque[k], rate[k]
 
@@ -64,14 +64,14 @@ def _rolling_rate(
     """Rates of a body that rolls; forms: the parameters of its contacts beside those of `_rate`."""
     rolling, (codes, parameters, inner) = forms
     u = (change[i, 3], change[i, 4], change[i, 5])
-    cosine, half_sinc, factor = turn_of(u)
+    cosine, half_sinc, factor = half_angle_terms(u)
     q = product((state[i, 3], state[i, 4], state[i, 5], state[i, 6]), exponential(cosine, half_sinc, u))
     m = turned(conjugate(q), (state[i, 0] + change[i, 0], state[i, 1] + change[i, 1], state[i, 2] + change[i, 2]))
     relative = m[0] - inner[0], m[1] - inner[1], m[2] - inner[2]
     omega = rolling_omega(rolling, q, relative, (inverse[i, 0], inverse[i, 1], inverse[i, 2]))
     rolling_part, others = rolling_torque(rolling, q, omega), torque_at(codes, parameters, time, q, omega)
     torque = turned(q, (rolling_part[0] + others[0], rolling_part[1] + others[1], rolling_part[2] + others[2]))
-    rate = turning_of(u, omega, factor)
+    rate = rotation_vector_rate(u, omega, factor)
     for k in range(3):
         out[stage, i, k], out[stage, i, 3 + k] = torque[k], rate[k]
 

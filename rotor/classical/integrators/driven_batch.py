@@ -18,7 +18,7 @@ from rotor.arrays import Floats
 from rotor.classical.effect import ClassicalEffect
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.batch import over_blocks, rates_and_axes
-from rotor.classical.system import System, system_of
+from rotor.classical.system import System, flatten_system
 from rotor.classical.torque_form import BODY_FIXED, INDUCED, LEVER, SystemForm
 from rotor.geometry.rotations import normalised, to_matrix
 
@@ -82,7 +82,7 @@ def propagate_driven(
         raise ValueError(f"the momenta of many bodies have shape (n, 3); got {momentum.shape}")
     if steps < 1:
         raise ValueError(f"expected at least one step; got {steps} (to go back, give a negative step)")
-    form = _served(system_of(body, effects))
+    form = _served(flatten_system(body, effects))
     n = len(momentum)
     out = momentum.copy(), np.array(np.broadcast_to(normalised(attitude), (n, 4)))
     rates, axes = (np.broadcast_to(a, (n, a.shape[-1])) for a in rates_and_axes(body))

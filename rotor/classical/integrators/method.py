@@ -26,20 +26,20 @@ from rotor.arrays import Floats
 from rotor.classical.effect import ClassicalEffect
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.compositions import fractions
-from rotor.classical.system import System, system_of
+from rotor.classical.system import System, flatten_system
 from rotor.geometry.rotations import IDENTITY, normalised
 
 STEPS_OF_A_CALL = 1_000_000  # of order 2 of one body: some tenths of a second, in which a compiled call obeys no signal
 
 
-def steps_of_a_call(work: int) -> int:
+def steps_per_call(work: int) -> int:
     """Number of steps in a compiled call, if each is `work` steps of order 2 of a single body."""
     return max(1, STEPS_OF_A_CALL // max(work, 1))
 
 
 def pieces(steps: int, work: int) -> Iterator[int]:
     """Numbers of steps of the compiled calls that make up `steps`; the calls between which a signal is obeyed."""
-    most = steps_of_a_call(work)
+    most = steps_per_call(work)
     for first in range(0, steps, most):
         yield min(most, steps - first)
 
@@ -132,7 +132,7 @@ def integrate(
     momentum0 = checked_momentum(momentum0, moments)
     attitude0 = normalised(attitude0)
     shape = np.broadcast_shapes(moments.shape[:-1], momentum0.shape[:-1], attitude0.shape[:-1])
-    system = system_of(np.broadcast_to(moments, (*shape, 3)), effects)
+    system = flatten_system(np.broadcast_to(moments, (*shape, 3)), effects)
     m0 = np.broadcast_to(momentum0, (*shape, 3)).reshape(-1, 3)
     q0 = np.broadcast_to(attitude0, (*shape, 4)).reshape(-1, 4)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.classical.integrators.method import Composed, pieces, steps_of_a_call
+from rotor.classical.integrators.method import Composed, pieces, steps_per_call
 from rotor.classical.system import System, acting_inverse
 from rotor.classical.torque_form import kernels_are_compiled
 
@@ -109,7 +109,7 @@ class SymmetricTopSplitting(Composed):
         inverse = system.start_acting
         forms = system.compiled, inverse, turned_axes(inverse), self.kick_fractions
         state = path[0].copy(), np.zeros_like(path[0]), np.zeros((path.shape[1], 3))
-        for place in _places(counts, steps_of_a_call(path.shape[1] * len(self.kick_fractions))):
+        for place in _places(counts, steps_per_call(path.shape[1] * len(self.kick_fractions))):
             kicked(*forms, times, counts, path, state, place)
         return True
 

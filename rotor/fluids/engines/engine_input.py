@@ -13,9 +13,9 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.classical.euler import kinetic_energy
-from rotor.fluids.forces.models import RigidModel, models_of, shapes_of
+from rotor.fluids.forces.models import RigidModel, find_models, model_shapes
 from rotor.fluids.initial_box import at_rest, check_apart, model_labels, thermal_momenta
-from rotor.fluids.motion.bodies import Bodies, Pose, bodies_of
+from rotor.fluids.motion.bodies import Bodies, Pose, rigid_bodies
 from rotor.fluids.motion.thermometers import Kinetic
 from rotor.fluids.settings import Settings
 from rotor.geometry.rotations import rotate
@@ -47,20 +47,20 @@ class EngineInput:
     degrees: Degrees
 
     @cached_property
-    def sites_of_kinds(self) -> Ints:
+    def sites_per_kind(self) -> Ints:
         """(species,) number of sites."""
         return np.array([len(kind.model.sites) for kind in self.species])
 
     @cached_property
     def first_sites(self) -> Ints:
         """(molecules,) index of the first site of each molecule."""
-        lengths = self.sites_of_kinds[self.kinds]
+        lengths = self.sites_per_kind[self.kinds]
         return np.asarray(np.cumsum(lengths) - lengths)
 
     @cached_property
-    def molecule_of_site(self) -> Ints:
+    def site_molecule(self) -> Ints:
         """(sites,) the molecule of each site."""
-        return np.repeat(np.arange(len(self.kinds)), self.sites_of_kinds[self.kinds])
+        return np.repeat(np.arange(len(self.kinds)), self.sites_per_kind[self.kinds])
 
     @cached_property
     def site_masses(self) -> Floats:
@@ -76,7 +76,7 @@ class EngineInput:
     def motion(self) -> Motion:
         """The initial motion, without forces."""
         zero = np.zeros_like(self.site_positions)
-        return rigid_motion(self.molecule_of_site, self.site_masses, self.site_positions, self.site_velocities, zero)
+        return rigid_motion(self.site_molecule, self.site_masses, self.site_positions, self.site_velocities, zero)
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ class Frame:
     half: bool = False
 
 
-def engine_input_of(atoms: Any, settings: Settings) -> EngineInput:
+def make_engine_input(atoms: Any, settings: Settings) -> EngineInput:
     """The input of an engine from an ASE box: each molecule is replaced by its model, superposed on its atoms.
 
     Velocities are the rigid part of those of the box; a box without velocities gets thermal ones at the temperature of the settings,
@@ -212,9 +212,9 @@ def engine_input_of(atoms: Any, settings: Settings) -> EngineInput:
     its shortest edge, atoms in another order than in the models, and molecules that deviate from their model or overlap.
     """
     edges = _edges(atoms, settings.cutoff_angstrom)
-    models = models_of(settings.model)
+    models = find_models(settings.model)
     labels = model_labels(atoms, models)
-    bodies, pose = bodies_of(atoms, labels, shapes_of(models))
+    bodies, pose = rigid_bodies(atoms, labels, model_shapes(models))
     check_apart(atoms, bodies)
     by_symbols = {model.symbols: model for model in models}
     heads = [int(np.argmax(bodies.species == number)) for number in range(len(bodies.names))]
@@ -247,7 +247,7 @@ def _edges(atoms: Any, cutoff_angstrom: float) -> Floats:
 
 
 def _starting_motion(atoms: Any, bodies: Bodies, pose: Pose, settings: Settings, removed: int) -> tuple[Floats, Floats]:
-    """Momenta and angular momenta (body axes) of the box, or thermal ones, as in `rotor.fluids.run.dynamics_of`."""
+    """Momenta and angular momenta (body axes) of the box, or thermal ones, as in `rotor.fluids.run.make_dynamics`."""
     if atoms.get_momenta().any():
         momentum, angular = bodies.wrench(bodies.masses[:, None] * atoms.get_velocities(), pose.attitude)
         return (at_rest(bodies, momentum) if removed else momentum), angular

@@ -52,8 +52,8 @@ def equimomental_points(model: RigidModel, masses: Floats) -> EquimomentalPoints
     otherwise equal masses with the second moments Σ m x xᵀ of the molecule: two at ±√(J/M) on a line, three or four at the
     corners of a triangle or tetrahedron scaled along the principal axes.
 
-    >>> from rotor.fluids.forces.models import model_of
-    >>> equimomental_points(model_of("spce"), np.array([15.9949, 1.0078, 1.0078])).are_atoms
+    >>> from rotor.fluids.forces.models import find_model
+    >>> equimomental_points(find_model("spce"), np.array([15.9949, 1.0078, 1.0078])).are_atoms
     True
     """
     places = model.positions_angstrom[: len(masses)]

@@ -12,8 +12,8 @@ import numpy as np
 
 from rotor.checks import RunStopped
 from rotor.fluids.checkpoint import TextFile, csv_line, trajectory_file
-from rotor.fluids.engines.engine_input import EngineInput, Frame, engine_input_of, point_velocities
-from rotor.fluids.engines.results import engine_frames, row_of
+from rotor.fluids.engines.engine_input import EngineInput, Frame, make_engine_input, point_velocities
+from rotor.fluids.engines.results import engine_frames, frame_row
 from rotor.fluids.record import FluidRecord
 from rotor.fluids.run import COLUMNS, Outputs, ns_per_day, progress_bar
 from rotor.fluids.settings import Settings
@@ -58,7 +58,7 @@ def follow_engine(
     RunStopped
         If it stops before the end.
     """
-    engine_input, frames = _frames_of(engine, atoms, settings, outputs, threads)
+    engine_input, frames = _start_frames(engine, atoms, settings, outputs, threads)
     with _engine_errors():
         return _follow(frames, engine_input, atoms, settings, outputs, on_start)
 
@@ -68,12 +68,12 @@ def check_engine(engine: str, atoms: Atoms, settings: Settings, outputs: Outputs
 
     Raises the same errors as `follow_engine`.
     """
-    _, frames = _frames_of(engine, atoms, settings, outputs, threads)
+    _, frames = _start_frames(engine, atoms, settings, outputs, threads)
     with _engine_errors(), closing(frames):
         next(frames)
 
 
-def _frames_of(
+def _start_frames(
     engine: str, atoms: Atoms, settings: Settings, outputs: Outputs, threads: int
 ) -> tuple[EngineInput, Generator[Frame]]:
     """The input of the engine, and its frames; the engine starts when the first frame is requested."""
@@ -82,7 +82,7 @@ def _frames_of(
         raise ValueError(
             f"frames_every {frames_every}: with {engine} expected a multiple of the {settings.every} steps between rows"
         )
-    engine_input = engine_input_of(atoms, settings)
+    engine_input = make_engine_input(atoms, settings)
     options: dict[str, Any] = {THREAD_OPTIONS[engine]: threads, "accuracy": settings.ewald_tolerance}
     with _engine_errors():
         return engine_input, engine_frames(engine, engine_input, settings, **options)
@@ -114,7 +114,7 @@ def _follow(
         on_start()
         csv, trajectories = _opened(stack, outputs)
         for frame in itertools.chain([first], frames):
-            rows.append(row_of(frame, engine_input, settings))
+            rows.append(frame_row(frame, engine_input, settings))
             if csv is not None:
                 csv.add(csv_line(rows[-1]))
             if trajectories and frame.step % (outputs.frames_every or settings.every) == 0:
@@ -137,7 +137,7 @@ def _opened(stack: ExitStack, outputs: Outputs) -> tuple[Any, list[Any]]:
 
 def _placed(frame: Frame, engine_input: EngineInput, atoms: Atoms) -> Atoms:
     """The box at a frame, with the velocities of its rigid motion."""
-    masses, owners = engine_input.site_masses[engine_input.real], engine_input.molecule_of_site[engine_input.real]
+    masses, owners = engine_input.site_masses[engine_input.real], engine_input.site_molecule[engine_input.real]
     placed: Atoms = atoms.copy()
     placed.set_masses(masses)
     placed.positions = frame.positions

@@ -21,7 +21,7 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.fluids.engines.engine_input import EngineInput, Frame, rigid_motion
 from rotor.fluids.engines.lammps_input import data_file, input_file, table_file
-from rotor.fluids.engines.pair_tables import Form, tail_of
+from rotor.fluids.engines.pair_tables import Form, dispersion_tail
 from rotor.fluids.settings import Settings
 from rotor.temporary import locked_folder
 from rotor.units import EV_PER_ANGSTROM3_BAR
@@ -138,7 +138,7 @@ def frames(
             )
             assert process.stdout is not None
             try:
-                yield from _read(process.stdout, engine_input, tail_of(engine_input, settings, form))
+                yield from _read(process.stdout, engine_input, dispersion_tail(engine_input, settings, form))
             finally:
                 process.stdout.close()
                 if process.poll() is None and sys.exc_info()[0] is not None:
@@ -177,7 +177,7 @@ def _read(stream: IO[bytes], engine_input: EngineInput, tail: tuple[float, float
         step, potential, pressure, bath = numbers[:4].tolist()
         positions, velocities, forces = numbers[4:].reshape(3, n, 3)
         motion = rigid_motion(
-            engine_input.molecule_of_site, engine_input.site_masses, positions, velocities * units.ASE_TIME_PS, forces
+            engine_input.site_molecule, engine_input.site_masses, positions, velocities * units.ASE_TIME_PS, forces
         )
         pressure += tail[1] * EV_PER_ANGSTROM3_BAR if step else float("nan")
         yield Frame(int(step), positions[engine_input.real], motion, potential + tail[0], bath, pressure)

@@ -58,11 +58,11 @@ def site_types(engine_input: EngineInput) -> SiteTypes:
 def data_file(engine_input: EngineInput) -> str:
     """Atoms, velocities and bonds of a box (`read_data`, atom_style full)."""
     site_kinds = site_types(engine_input)
-    within = np.arange(len(engine_input.site_masses)) - engine_input.first_sites[engine_input.molecule_of_site]
+    within = np.arange(len(engine_input.site_masses)) - engine_input.first_sites[engine_input.site_molecule]
     types = np.concatenate([site_kinds.by_species[k] for k in engine_input.kinds])
     charges = np.array([site.charge_e for site in site_kinds.sites])[types - 1]
     bonded = np.flatnonzero(within)
-    most = int(engine_input.sites_of_kinds.max())
+    most = int(engine_input.sites_per_kind.max())
     lines = ["a box of rigid molecules", "", f"{len(types)} atoms", f"{len(site_kinds.sites)} atom types"]
     if len(bonded):
         lines += [
@@ -73,11 +73,11 @@ def data_file(engine_input: EngineInput) -> str:
         ]
     lines += ["", *(f"0 {edge:.17g} {axis}lo {axis}hi" for edge, axis in zip(engine_input.edges, "xyz", strict=True))]
     lines += _section("Masses", [(m,) for m in site_kinds.masses])
-    columns = zip(engine_input.molecule_of_site + 1, types, charges, *engine_input.site_positions.T, strict=True)
+    columns = zip(engine_input.site_molecule + 1, types, charges, *engine_input.site_positions.T, strict=True)
     lines += _section("Atoms # full", columns)
     lines += _section("Velocities", engine_input.site_velocities / units.ASE_TIME_PS)
     if len(bonded):
-        first = engine_input.first_sites[engine_input.molecule_of_site[bonded]]
+        first = engine_input.first_sites[engine_input.site_molecule[bonded]]
         lines += _section("Bonds", [(1, int(i) + 1, int(j) + 1) for i, j in zip(first, bonded, strict=True)])
     return "\n".join(lines) + "\n"
 
@@ -157,7 +157,7 @@ def ensemble_commands(engine_input: EngineInput, settings: Settings) -> list[str
             "nose-hoover: LAMMPS' chains for rigid bodies hold translations and rotations apart and count the total momentum, "
             "which stays at 0: translations would be too warm by N/(N - 1); use langevin, or OpenMM"
         )
-    single, bodies = engine_input.sites_of_kinds == 1, engine_input.sites_of_kinds > 1
+    single, bodies = engine_input.sites_per_kind == 1, engine_input.sites_per_kind > 1
     bath = f"{settings.temperature_k:.17g} {settings.temperature_k:.17g} {1 / settings.friction_per_ps:.17g}"
     noise = settings.ensemble == "langevin"
     commands = []
@@ -199,7 +199,7 @@ def input_file(
     str
         Text of the file.
     """
-    bonded = bool(np.any(engine_input.sites_of_kinds > 1))
+    bonded = bool(np.any(engine_input.sites_per_kind > 1))
     lines = ["units metal", "atom_style full", "boundary p p p"]
     lines += ["bond_style zero nocoeff", "special_bonds lj/coul 0 0 0"] if bonded else []
     lines += ["read_data data.box", *(["bond_coeff *"] if bonded else [])]

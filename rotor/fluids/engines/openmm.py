@@ -17,7 +17,7 @@ from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.fluids.engines.engine_input import EngineInput, Frame, Motion, point_velocities, rigid_motion
 from rotor.fluids.engines.equimomental import EquimomentalPoints, equimomental_points
-from rotor.fluids.engines.pair_tables import Form, tail_of
+from rotor.fluids.engines.pair_tables import Form, dispersion_tail
 from rotor.fluids.settings import Settings
 from rotor.units import EV_PER_ANGSTROM3_BAR
 
@@ -306,7 +306,9 @@ def session(
     context.setPositions(mine.positions / 10)
     context.applyConstraints(1e-7)
     context.computeVirtualSites()
-    ready = Session(context, mine, settings, tail_of(engine_input, settings, form), float(np.prod(engine_input.edges)))
+    ready = Session(
+        context, mine, settings, dispersion_tail(engine_input, settings, form), float(np.prod(engine_input.edges))
+    )
     ready.start(point_velocities(engine_input.motion(), mine.owners, mine.masses, mine.positions[mine.massive]))
     return ready
 

@@ -78,7 +78,7 @@ def _charges(r: Floats, settings: Settings, form: Form) -> tuple[Floats, Floats]
     return damped - c + b * (r - cutoff), damped / r + slope * np.exp(-((alpha * r) ** 2)) / r - b
 
 
-def tail_of(engine_input: EngineInput, settings: Settings, form: Form) -> tuple[float, float]:
+def dispersion_tail(engine_input: EngineInput, settings: Settings, form: Form) -> tuple[float, float]:
     """Energy (eV) and pressure (eV/Å³) of the dispersion beyond the cutoff, for a uniform fluid."""
     counts = np.bincount(engine_input.kinds, minlength=len(engine_input.species))
     models = tuple(kind.model for kind in engine_input.species)

@@ -11,7 +11,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.fluids.engines.engine_input import EngineInput, Frame, engine_input_of
+from rotor.fluids.engines.engine_input import EngineInput, Frame, make_engine_input
 from rotor.fluids.motion.thermometers import THERMOMETERS, temperatures
 from rotor.fluids.record import FluidRecord
 from rotor.fluids.settings import Settings
@@ -58,10 +58,10 @@ def run_engine(name: str, atoms: Any, settings: Settings, **options: Any) -> Eng
     RuntimeError
         If it stops during the run.
     """
-    engine_input = engine_input_of(atoms, settings)
+    engine_input = make_engine_input(atoms, settings)
     seen = list(engine_frames(name, engine_input, settings, **options))
     return EngineRun(
-        engine_input, record_of(seen, engine_input, settings), np.stack([frame.positions for frame in seen])
+        engine_input, frame_record(seen, engine_input, settings), np.stack([frame.positions for frame in seen])
     )
 
 
@@ -103,13 +103,13 @@ def engine_frames(name: str, engine_input: EngineInput, settings: Settings, **op
         yield frame
 
 
-def record_of(frames: Iterable[Frame], engine_input: EngineInput, settings: Settings) -> FluidRecord:
+def frame_record(frames: Iterable[Frame], engine_input: EngineInput, settings: Settings) -> FluidRecord:
     """The table of frames."""
-    rows = np.array([row_of(frame, engine_input, settings) for frame in frames], dtype=np.float64)
+    rows = np.array([frame_row(frame, engine_input, settings) for frame in frames], dtype=np.float64)
     return FluidRecord(*rows.reshape(-1, len(fields(FluidRecord))).T)
 
 
-def row_of(frame: Frame, engine_input: EngineInput, settings: Settings) -> list[float]:
+def frame_row(frame: Frame, engine_input: EngineInput, settings: Settings) -> list[float]:
     """A row of the table.
 
     Kinetic energies are those of the thermometer without an error of order h² (`rotor.fluids.motion.thermometers`): "mixed" for momenta

@@ -170,8 +170,8 @@ def assemble(atoms: Any, models: tuple[RigidModel, ...]) -> Assembly:
     """The molecules of an ase.Atoms: by its array "molecule" if present, otherwise by the sequence of atoms.
 
     >>> from ase.build import molecule
-    >>> from rotor.fluids.forces.models import model_of
-    >>> len(assemble(molecule("H2O") + molecule("H2O"), (model_of("spce"),)))
+    >>> from rotor.fluids.forces.models import find_model
+    >>> len(assemble(molecule("H2O") + molecule("H2O"), (find_model("spce"),)))
     2
     """
     if len({model.symbols for model in models}) != len(models):

@@ -147,10 +147,10 @@ _WATERS = (
 MODELS: dict[str, RigidModel] = {model.name: model for model in (*_WATERS, _nitrogen(), _carbon_dioxide(), _argon())}
 
 
-def model_of(name: str) -> RigidModel:
+def find_model(name: str) -> RigidModel:
     """The model of this name; a ValueError lists the available names.
 
-    >>> model_of("spce").symbols
+    >>> find_model("spce").symbols
     ('O', 'H', 'H')
     """
     if name.lower() not in MODELS:
@@ -158,23 +158,23 @@ def model_of(name: str) -> RigidModel:
     return MODELS[name.lower()]
 
 
-def models_of(names: str | RigidModel | Sequence[str | RigidModel]) -> tuple[RigidModel, ...]:
+def find_models(names: str | RigidModel | Sequence[str | RigidModel]) -> tuple[RigidModel, ...]:
     """Models from names joined by commas, models, or several of either.
 
-    >>> [model.name for model in models_of("spce,argon")]
+    >>> [model.name for model in find_models("spce,argon")]
     ['spce', 'argon']
     """
     if isinstance(names, str):
-        return tuple(model_of(name.strip()) for name in names.split(","))
+        return tuple(find_model(name.strip()) for name in names.split(","))
     if isinstance(names, RigidModel):
         return (names,)
-    return tuple(model for name in names for model in models_of(name))
+    return tuple(model for name in names for model in find_models(name))
 
 
-def shapes_of(models: Iterable[RigidModel]) -> dict[tuple[str, ...], Floats]:
-    """Places (atoms, 3) of the real atoms of each model by their elements, as `rotor.fluids.motion.bodies.bodies_of` takes them.
+def model_shapes(models: Iterable[RigidModel]) -> dict[tuple[str, ...], Floats]:
+    """Places (atoms, 3) of the real atoms of each model by their elements, as `rotor.fluids.motion.bodies.rigid_bodies` takes them.
 
-    >>> shapes_of(models_of("trappe-n2"))[("N", "N")].tolist()
+    >>> model_shapes(find_models("trappe-n2"))[("N", "N")].tolist()
     [[0.0, 0.0, -0.55], [0.0, 0.0, 0.55]]
     """
     return {model.symbols: model.positions_angstrom[: len(model.symbols)] for model in models}

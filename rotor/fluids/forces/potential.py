@@ -28,7 +28,7 @@ from rotor.fluids.forces.ewald import (
     wave_vectors,
 )
 from rotor.fluids.forces.interactions import PairTables, pair_tables, reaction_field, screened, switched, tail
-from rotor.fluids.forces.models import RigidModel, models_of
+from rotor.fluids.forces.models import RigidModel, find_models
 from rotor.fluids.forces.neighbours import CLOSEST_ANGSTROM, Neighbours
 from rotor.fluids.settings import ELECTROSTATICS
 
@@ -102,7 +102,7 @@ class RigidPotential(Calculator):
         damping_per_angstrom: float = 0.2, ewald: EwaldParameters | None = None, tolerance: float = 1e-5,
         long_range_correction: bool = True, skin_angstrom: float = 2.0, threads: int = 1, **kwargs: Any,
     ) -> None:  # fmt: skip
-        self.models = models_of(models)
+        self.models = find_models(models)
         self.cutoff_angstrom, self.electrostatics, self.dielectric = cutoff_angstrom, electrostatics, dielectric
         self.switch_width_angstrom, self.damping_per_angstrom = switch_width_angstrom, damping_per_angstrom
         self.ewald, self.tolerance = ewald, tolerance
@@ -206,7 +206,7 @@ class RigidPotential(Calculator):
         neighbours.update(np.ascontiguousarray(atoms.positions, dtype=float))
         forces, totals = self._pair_sum(neighbours)
         centres = self._mass_centres(neighbours, atoms.get_masses())
-        virial = self._virial_of_pairs(neighbours, forces, totals, centres)
+        virial = self._pair_virial(neighbours, forces, totals, centres)
         volume = math.prod(neighbours.box_angstrom.tolist())
         terms = {"dispersion": float(totals[0])}
         if volume and self.long_range_correction:
@@ -236,7 +236,7 @@ class RigidPotential(Calculator):
                     self.tolerance, self.cutoff_angstrom, charges[charges != 0], box
                 )
                 self._waves = wave_vectors(self._ewald, box)
-            self._field = self._field_of()
+            self._field = self._charge_parameters()
         return self._neighbours
 
     def _refuse_open_box(self, box: Floats) -> None:
@@ -245,7 +245,7 @@ class RigidPotential(Calculator):
         if self.electrostatics == "ewald" and not box.all():
             raise ValueError("Ewald's sum needs a cell that repeats in all three directions (pbc)")
 
-    def _field_of(self) -> Floats:
+    def _charge_parameters(self) -> Floats:
         """Parameters of the kernel of charges."""
         if self.electrostatics == "reaction-field":
             return reaction_field(self.cutoff_angstrom, self.dielectric)
@@ -297,7 +297,7 @@ class RigidPotential(Calculator):
         _pair_kernels.mass_centres(neighbours.sites, a.first_atom, a.first_site, masses, centres)
         return centres
 
-    def _virial_of_pairs(self, neighbours: Neighbours, forces: Floats, totals: Floats, centres: Floats) -> Floats:
+    def _pair_virial(self, neighbours: Neighbours, forces: Floats, totals: Floats, centres: Floats) -> Floats:
         """Σ F ⊗ R with centres of mass: the sum over list's centres, and Σ F (R - c) of each molecule's total force."""
         from rotor.fluids.forces import _pair_kernels
 

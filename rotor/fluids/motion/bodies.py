@@ -119,7 +119,7 @@ class Bodies:
         return out
 
 
-def bodies_of(
+def rigid_bodies(
     atoms: Atoms,
     molecules: ArrayLike | Sequence[Sequence[int]] | None = None,
     shapes: Mapping[tuple[str, ...], ArrayLike] | None = None,
@@ -155,7 +155,7 @@ def bodies_of(
     Examples
     --------
     >>> from ase.build import molecule
-    >>> bodies, pose = bodies_of(molecule("H2O"))
+    >>> bodies, pose = rigid_bodies(molecule("H2O"))
     >>> bodies.moments.round(2).tolist(), bodies.degrees().total
     ([[0.64, 1.17, 1.81]], 6)
     """

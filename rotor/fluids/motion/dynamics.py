@@ -17,7 +17,7 @@ from ase.md.md import MolecularDynamics
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
-from rotor.fluids.motion.bodies import SHAPE_TOLERANCE_ANGSTROM, bodies_of
+from rotor.fluids.motion.bodies import SHAPE_TOLERANCE_ANGSTROM, rigid_bodies
 from rotor.fluids.motion.state import Flows, State
 from rotor.fluids.motion.thermometers import (
     THERMOMETERS,
@@ -48,7 +48,7 @@ class RigidDynamics(MolecularDynamics):
     thermostat : Thermostat, optional
         None for constant energy.
     molecules, shapes, tolerance_angstrom
-        As of `rotor.fluids.motion.bodies.bodies_of`.
+        As of `rotor.fluids.motion.bodies.rigid_bodies`.
     removed : int, optional
         Degrees of freedom removed from the motion. Default: 3 if the total momentum is conserved, which must then be zero, and 0 with a
         thermostat that changes it. With walls or fields give 0.
@@ -87,7 +87,7 @@ class RigidDynamics(MolecularDynamics):
     ) -> None:
         if not (np.isfinite(timestep) and timestep != 0.0):
             raise ValueError(f"timestep {timestep}: expected a time other than 0, in ASE's unit (2 * ase.units.fs)")
-        self.bodies, pose = bodies_of(atoms, molecules, shapes, tolerance_angstrom)
+        self.bodies, pose = rigid_bodies(atoms, molecules, shapes, tolerance_angstrom)
         self.thermostat, self._tolerance = thermostat, tolerance_angstrom
         self._flows = Flows(self.bodies)
         conserves_momentum = thermostat is None or thermostat.conserves_momentum

@@ -66,8 +66,8 @@ def kinetic_energy(bodies: Bodies, momentum: Floats, angular: Floats) -> Kinetic
     """½ Σ p²/m and ½ Σ L_i²/I_i of momenta (n, 3) and angular momenta (n, 3) in principal axes; ASE's units give eV.
 
     >>> from ase.build import molecule
-    >>> from rotor.fluids.motion.bodies import bodies_of
-    >>> bodies, _ = bodies_of(molecule("N2"))
+    >>> from rotor.fluids.motion.bodies import rigid_bodies
+    >>> bodies, _ = rigid_bodies(molecule("N2"))
     >>> round(kinetic_energy(bodies, np.array([[bodies.mass[0], 0.0, 0.0]]), np.zeros((1, 3))).translation_ev, 4)
     14.0031
     """

@@ -185,12 +185,12 @@ def _library() -> Iterator[tuple[str, Callable[[], Batch]]]:
 
 def _library_batch(name: str) -> Batch:
     from rotor.formats.read_write import read
-    from rotor.observed.species import species_of_lines
+    from rotor.observed.species import species_from_lines
     from rotor.spectra.lines import line_list
 
     top = read(name)
     lines = line_list(top, temperature_k=_LIBRARY_K, min_lgint=_LIBRARY_CUT, range_mhz=(0.0, _LIBRARY_MHZ))
-    return Batch(f"{LIBRARY}: {name}", [species_of_lines(lines, name)])
+    return Batch(f"{LIBRARY}: {name}", [species_from_lines(lines, name)])
 
 
 def _add(engine: DuckDBPyConnection, name: str, read: Callable[[], Batch], facts: SourceFacts) -> Added:

@@ -54,12 +54,12 @@ def read_cat_species(
         For an unreadable line, with file, line and column, for a file without lines, and for a file with several tags.
     """
     file = Path(path)
-    return species_of_catalogue(
+    return species_from_catalogue(
         read_cat(file), entries if entries is not None else catdir_beside(file), name, str(file), partition
     )
 
 
-def species_of_catalogue(
+def species_from_catalogue(
     catalogue: Catalogue,
     entries: Mapping[int, CatdirEntry],
     name: str | None = None,
@@ -126,13 +126,13 @@ def read_cat_with(path: str | os.PathLike[str], partition: str | None) -> Specie
         if "note" in species.identity:
             raise ValueError(f"{partition}: has no Q for tag {species.identity['tag']} of {os.fspath(path)}")
         return species
-    return read_cat_species(path, {}, Path(path).stem, partition_of_text(partition))
+    return read_cat_species(path, {}, Path(path).stem, parse_partition(partition))
 
 
-def partition_of_text(text: str) -> PartitionTable:
+def parse_partition(text: str) -> PartitionTable:
     """Q(T) from `T=Q` pairs in K, separated by commas.
 
-    >>> round(partition_of_text("75=27.46, 300=108.87").at(300.0), 9)
+    >>> round(parse_partition("75=27.46, 300=108.87").at(300.0), 9)
     108.87
     """
     pairs = [pair.split("=") for pair in text.split(",") if pair.strip()]

@@ -81,7 +81,7 @@ def read_states(path: Path) -> States:
     )
 
 
-def partition_of_states(states: States, path: Path) -> PartitionTable:
+def states_partition(states: States, path: Path) -> PartitionTable:
     """Q(T) of the .pf file beside the states, else Σ g exp(-E/kT)."""
     beside = path.with_name(_base(path) + ".pf")
     if beside.exists():
@@ -96,7 +96,7 @@ def exomol_species(path: Path, states: States) -> Iterator[SpeciesLines]:
 
     Raises ValueError with file and line for what cannot be read, and where there is no .trans file.
     """
-    partition, base = partition_of_states(states, path), _base(path)
+    partition, base = states_partition(states, path), _base(path)
     files = sorted(file for file in path.parent.glob(f"{base}*.trans*"))
     if not files:
         raise ValueError(f"{path}: no {base}*.trans file beside it")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.formats.catalogue.exomol import opened
-from rotor.formats.hitran import LENGTH, TEMPERATURE_K, isotopologue_of, nm2_mhz, read_hitran
+from rotor.formats.hitran import LENGTH, TEMPERATURE_K, isotopologue_number, nm2_mhz, read_hitran
 from rotor.observed.partition import PartitionTable
 from rotor.observed.species import SpeciesLines, species_lines, strength_from_einstein
 
@@ -37,7 +37,7 @@ def hitran_species(path: Path) -> Iterator[SpeciesLines]:
         for key in np.unique(piece["species"]).tolist():
             rows = {name: values[piece["species"] == key] for name, values in piece.items()}
             if key not in tables:
-                tables[key] = stated or _partition_of_intensities(rows)
+                tables[key] = stated or _intensity_partition(rows)
             yield _species(key, rows, tables[key], path, stated is None)
 
 
@@ -65,7 +65,7 @@ def _partition_beside(path: Path) -> PartitionTable | None:
     return PartitionTable(kelvin, q, str(beside))
 
 
-def _partition_of_intensities(rows: Columns) -> PartitionTable:
+def _intensity_partition(rows: Columns) -> PartitionTable:
     """Q(296 K) as the median over lines of the value from strength and intensity."""
     frequency = rows["wavenumber"] * units.MHZ_PER_CM
     strength = strength_from_einstein(rows["a"], frequency, rows["g_upper"])
@@ -83,11 +83,11 @@ def _pieces(path: Path) -> Iterator[Columns]:
     count = 0
     with opened(path) as handle:
         while lines := handle.readlines(PIECE_LINES * (LENGTH + 1)):
-            yield _columns_of(lines, path, count)
+            yield _record_columns(lines, path, count)
             count += len(lines)
 
 
-def _columns_of(lines: list[bytes], path: Path, before: int) -> Columns:
+def _record_columns(lines: list[bytes], path: Path, before: int) -> Columns:
     """Columns of records; those of unusual length, and faulty ones, go through the reader that names the fault."""
     bodies = [line.rstrip(b"\r\n") for line in lines]
     try:
@@ -134,4 +134,4 @@ def _slow_columns(lines: list[bytes], path: Path, before: int) -> Columns:
 
 
 def _name(text: str) -> str:
-    return f"HITRAN {int(text[:-1])}, isotopologue {isotopologue_of(text[-1])}"
+    return f"HITRAN {int(text[:-1])}, isotopologue {isotopologue_number(text[-1])}"

@@ -22,7 +22,7 @@ from rotor.observed.partition import SUMMED_K, PartitionTable
 
 def partition_from_lines(catalogue: Catalogue) -> PartitionTable:
     """Q(T) summed over the levels of a catalogue's lines."""
-    energy_k, weight = levels_of_lines(catalogue)
+    energy_k, weight = catalogue_levels(catalogue)
     kelvin = np.array(SUMMED_K)
     q = np.exp(-energy_k / kelvin[:, None]) @ weight
     last = int(max(catalogue.quanta_upper[:, 0].max(), catalogue.quanta_lower[:, 0].max()))
@@ -30,7 +30,7 @@ def partition_from_lines(catalogue: Catalogue) -> PartitionTable:
     return PartitionTable(kelvin, q, source)
 
 
-def levels_of_lines(catalogue: Catalogue) -> tuple[Floats, Floats]:
+def catalogue_levels(catalogue: Catalogue) -> tuple[Floats, Floats]:
     """E/k above the lowest level and degeneracy of every level of a catalogue, (m,) each."""
     upper_2f1, lower_2f1 = (
         _components(catalogue, quanta) for quanta in (catalogue.quanta_upper, catalogue.quanta_lower)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.molecules.library import atoms_of, names
+from rotor.formats.molecules.library import count_atoms, names
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.molecules.molecule import Molecule
 
@@ -54,7 +54,7 @@ def _library_entry(molecule: Molecule) -> tuple[str, MoleculeFile] | None:
 
 def _elements(formula: str) -> dict[str, int]:
     counts: dict[str, int] = {}
-    for atom, number in atoms_of(formula).items():
+    for atom, number in count_atoms(formula).items():
         element = "".join(letter for letter in atom if letter.isalpha())
         element = _HYDROGEN.get(element, element)
         counts[element] = counts.get(element, 0) + number

@@ -25,7 +25,7 @@ SETTINGS = ("vt_max", "functions", "spin_states")
 KEYS = ("source", "unverified", "unit", "frame", "names", "exchanged", *SETTINGS)
 
 
-def internal_rotation_of(table: TableReader | None, constants: Constants | None) -> InternalRotationConstants | None:
+def read_internal_rotation(table: TableReader | None, constants: Constants | None) -> InternalRotationConstants | None:
     """The constants of an internal rotor; ValueError, with file and table, for unknown names and a frame that is not stated."""
     if table is None:
         return None

@@ -10,7 +10,7 @@ from rotor.formats.atomic_write import open_atomic
 from rotor.tops.states.level_table import LevelTable
 
 _NUMBERS = ("energy_mhz", "error_mhz")
-_OWN = "own_error_mhz"
+_ERROR_COLUMN = "own_error_mhz"
 _QUANTA = ("v", "j", "ka", "kc", "k")
 
 
@@ -33,7 +33,9 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
         raise ValueError(
             f"{path}: expected the columns j (v, k, ka, kc), energy_mhz, error_mhz; found {', '.join(names) or 'none'}"
         )
-    columns: dict[str, list[float]] = {name: [] for name in (*quanta, *_NUMBERS, *([_OWN] if _OWN in names else []))}
+    columns: dict[str, list[float]] = {
+        name: [] for name in (*quanta, *_NUMBERS, *([_ERROR_COLUMN] if _ERROR_COLUMN in names else []))
+    }
     for (number, _), row in zip(lines[1:], rows[1:], strict=True):
         for name, values in columns.items():
             try:
@@ -42,7 +44,7 @@ def read_level_table(path: str | os.PathLike[str], source: str = "") -> LevelTab
                 raise ValueError(f"{path}, line {number}: {name} is no number: {','.join(row)!r}") from None
     try:
         labels = {name: np.array(columns[name], dtype=np.int64) for name in quanta}
-        unshared_errors = np.array(columns[_OWN]) if _OWN in columns else None
+        unshared_errors = np.array(columns[_ERROR_COLUMN]) if _ERROR_COLUMN in columns else None
         return LevelTable(
             labels, np.array(columns["energy_mhz"]), np.array(columns["error_mhz"]), source, unshared_errors
         )

@@ -102,7 +102,7 @@ def written_formula(name: str, formula: str) -> str:
     if path is None:
         return formula
     spellings = [path.stem, *(key for key, file in names().items() if file == path)]
-    same = (key for key in spellings if atoms_of(key) == atoms_of(formula))
+    same = (key for key in spellings if count_atoms(key) == count_atoms(formula))
     return next(same, None) or next(filter(None, (_substituted(key, formula) for key in spellings)), formula)
 
 
@@ -114,11 +114,11 @@ def _substituted(written: str, formula: str) -> str | None:
     """
     tokens = re.findall(r"([A-Z][a-z]?)(\d*)", written)
     isotopes: dict[str, dict[str, int]] = {}
-    for atom, count in atoms_of(formula).items():
+    for atom, count in count_atoms(formula).items():
         isotopes.setdefault(re.sub(r"[\[\]\d]", "", atom), {})[_SHORT.get(atom, atom)] = count
     elements = [element for element, _ in tokens]
     whole = "".join(f"{element}{count}" for element, count in tokens) == written
-    if not whole or atoms_of(written) != {element: sum(counts.values()) for element, counts in isotopes.items()}:
+    if not whole or count_atoms(written) != {element: sum(counts.values()) for element, counts in isotopes.items()}:
         return None
     if any(len(counts) > 1 and (element != "H" or elements.count("H") > 1) for element, counts in isotopes.items()):
         return None
@@ -134,7 +134,7 @@ def _substituted(written: str, formula: str) -> str | None:
 _SHORT = {"[2H]": "D", "[3H]": "T"}
 
 
-def atoms_of(formula: str) -> dict[str, int]:
+def count_atoms(formula: str) -> dict[str, int]:
     """Number of atoms of each element, or of each marked isotope, in a formula."""
     counts: dict[str, int] = {}
     for atom, number in re.findall(r"(\[\d+[A-Z][a-z]?\]|[A-Z][a-z]?)(\d*)", formula):

@@ -100,28 +100,28 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rotor.formats.magnetic_table import magnetic_of_table
-from rotor.formats.molecules.internal_rotation_table import internal_rotation_of
+from rotor.formats.magnetic_table import read_magnetic
+from rotor.formats.molecules.internal_rotation_table import read_internal_rotation
 from rotor.formats.molecules.molecule_tables import (
     MeasuredLines,
     Served,
     TableReader,
-    catalogue_of,
-    constants_of,
-    covariance_of,
-    dipole_of,
+    file_kind,
     geometry,
-    kind_of,
-    level_table_of,
-    polarizability_of,
+    read_constants,
+    read_covariance,
+    read_dipole,
+    read_measured_lines,
+    read_named_level_table,
+    read_polarizability,
+    read_served,
+    read_spin_weights,
     refuse_unknown_keys,
-    served_of,
-    spin_weights_of,
     unverified_in,
     with_polarizability,
 )
-from rotor.formats.molecules.spin_table import spins_of_table
-from rotor.formats.molecules.state_table import states_of
+from rotor.formats.molecules.spin_table import read_spins
+from rotor.formats.molecules.state_table import read_states
 from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule
 from rotor.tops.components import Tensor
@@ -264,13 +264,13 @@ def parse_molecule_file(
     if listed and "constants" in tables:
         tables = {name: table for name, table in tables.items() if name in ("constants", "dipole", "serves")}
     top = TableReader(where, "", content)
-    constants = constants_of(tables.get("constants"))
-    dipole = dipole_of(tables.get("dipole"))
+    constants = read_constants(tables.get("constants"))
+    dipole = read_dipole(tables.get("dipole"))
     molecule = geometry(tables.get("geometry"), top.text("name", default_name), dipole, tables.get("dipole"))
-    polarizability = polarizability_of(tables.get("polarizability"), constants, molecule)
-    states = states_of(tables.get("states"), constants)
-    spins = spins_of_table(tables.get("spins"), molecule)
-    internal = internal_rotation_of(tables.get("internal_rotation"), constants)
+    polarizability = read_polarizability(tables.get("polarizability"), constants, molecule)
+    states = read_states(tables.get("states"), constants)
+    spins = read_spins(tables.get("spins"), molecule)
+    internal = read_internal_rotation(tables.get("internal_rotation"), constants)
     return MoleculeFile(
         name=top.text("name", default_name),
         names=top.texts("names"),
@@ -279,16 +279,16 @@ def parse_molecule_file(
         vibrational_difference=tables["geometry"].number("vibrational_difference", 0.0) if molecule else None,
         constants=constants,
         dipole_abc_debye=dipole,
-        spin_weights=spin_weights_of(tables.get("spin_weights"), constants),
+        spin_weights=read_spin_weights(tables.get("spin_weights"), constants),
         sources=sources,
-        catalogue=catalogue_of(tables.get("catalogue")),
+        catalogue=read_measured_lines(tables.get("catalogue")),
         polarizability_abc_angstrom3=polarizability,
-        levels=level_table_of(tables.get("levels"), folder),
-        serves=served_of(tables.get("serves")),
+        levels=read_named_level_table(tables.get("levels"), folder),
+        serves=read_served(tables.get("serves")),
         unverified=unverified,
-        covariance=covariance_of(tables.get("covariance"), constants, states, spins, internal),
+        covariance=read_covariance(tables.get("covariance"), constants, states, spins, internal),
         states=states,
         spin_constants=spins,
-        magnetic=magnetic_of_table(tables.get("magnetic"), kind_of(constants, molecule)),
+        magnetic=read_magnetic(tables.get("magnetic"), file_kind(constants, molecule)),
         internal_rotation=internal,
     )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import whole_of_lower
+from rotor.arrays import symmetric_from_lower
 from rotor.formats.molecules.level_table import read_level_table
 from rotor.geometry.inertia import PrincipalFrame, point_masses, principal_frame
 from rotor.molecules.molecule import ELECTRONIC, Molecule
@@ -218,11 +218,11 @@ def geometry(
         raise ValueError(f"{table.place}, atoms: {reason}") from None
     if dipole is None or dipole_table is None:
         return molecule
-    vector = np.array(dipole) @ _frame_of(molecule).axes
+    vector = np.array(dipole) @ _principal_frame(molecule).axes
     return replace(molecule, dipole_debye=vector, dipole_source=dipole_table.text("source"))
 
 
-def _frame_of(molecule: Molecule) -> PrincipalFrame:
+def _principal_frame(molecule: Molecule) -> PrincipalFrame:
     body = point_masses(molecule.masses_u, molecule.positions_angstrom)
     return principal_frame(body, molecule.masses_u, molecule.positions_angstrom)
 
@@ -230,7 +230,7 @@ def _frame_of(molecule: Molecule) -> PrincipalFrame:
 def with_polarizability(molecule: Molecule | None, tensor: Tensor | None, table: TableReader | None) -> Molecule | None:
     if molecule is None or tensor is None or table is None:
         return molecule
-    axes = _frame_of(molecule).axes
+    axes = _principal_frame(molecule).axes
     turned = axes.T @ np.array(tensor) @ axes
     return replace(molecule, polarizability_angstrom3=turned, polarizability_source=table.text("source"))
 
@@ -245,7 +245,7 @@ def _atoms(table: TableReader) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     return tuple(row[0] for row in rows), np.array([row[1:] for row in rows], dtype=np.float64)
 
 
-def constants_of(table: TableReader | None) -> Constants | None:
+def read_constants(table: TableReader | None) -> Constants | None:
     if table is None:
         return None
     settings = {key: table.text(key) for key in ("reduction", "representation", "kind") if key in table.content}
@@ -267,7 +267,7 @@ def constants_of(table: TableReader | None) -> Constants | None:
         raise ValueError(f"{table.place}: {reason}") from None
 
 
-def covariance_of(
+def read_covariance(
     table: TableReader | None, *parts: Constants | StateConstants | SpinConstants | InternalRotationConstants | None
 ) -> Covariance | None:
     """The covariance from the lower triangle of correlations and the uncertainties of all constants, states and spins included."""
@@ -289,12 +289,12 @@ def covariance_of(
     for i, row in enumerate(rows):
         matrix[i, : i + 1] = row
     try:
-        return Covariance.from_correlations(names, [errors[name] for name in names], whole_of_lower(matrix))
+        return Covariance.from_correlations(names, [errors[name] for name in names], symmetric_from_lower(matrix))
     except ValueError as reason:
         raise ValueError(f"{table.place}: {reason}") from None
 
 
-def dipole_of(table: TableReader | None) -> tuple[float, float, float] | None:
+def read_dipole(table: TableReader | None) -> tuple[float, float, float] | None:
     if table is None:
         return None
     table.refuse_unknown(("unit", "source", "unverified", "a", "b", "c"))
@@ -307,7 +307,7 @@ _ELEMENTS = ("aa", "bb", "cc", "ab", "ac", "bc")
 _AXIAL = (("parallel", "perpendicular"), ("mean", "anisotropy"))
 
 
-def polarizability_of(
+def read_polarizability(
     table: TableReader | None, constants: Constants | None, molecule: Molecule | None
 ) -> Tensor | None:
     """The tensor along a, b, c, from its elements or from the two numbers of an axial tensor."""
@@ -318,7 +318,7 @@ def polarizability_of(
     elements = [key for key in table.content if key not in ("unit", "source", "unverified")]
     values = {key: table.quantity(key, table.content[key], unit, "Å3") for key in elements}
     if tuple(sorted(elements)) in (tuple(sorted(pair)) for pair in _AXIAL):
-        return _axial(table, values, kind_of(constants, molecule))
+        return _axial(table, values, file_kind(constants, molecule))
     if not {"aa", "bb", "cc"} <= set(elements) <= set(_ELEMENTS):
         raise ValueError(
             f"{table.place}: {', '.join(elements) or 'nothing'}: expected aa, bb and cc (with ab, ac, bc where not 0), "
@@ -341,15 +341,15 @@ def _axial(table: TableReader, values: Mapping[str, float], kind: str) -> Tensor
     return (aa, 0.0, 0.0), (0.0, across, 0.0), (0.0, 0.0, cc)
 
 
-def kind_of(constants: Constants | None, molecule: Molecule | None) -> str:
+def file_kind(constants: Constants | None, molecule: Molecule | None) -> str:
     """The kind of top of a file, from its constants, else its geometry."""
     if constants is not None:
         return constants.kind
     assert molecule is not None  # the reader refuses a file with neither
-    return kind_from_moments(_frame_of(molecule).moments).kind
+    return kind_from_moments(_principal_frame(molecule).moments).kind
 
 
-def spin_weights_of(table: TableReader | None, constants: Constants | None) -> SpinWeights:
+def read_spin_weights(table: TableReader | None, constants: Constants | None) -> SpinWeights:
     if table is None:
         return SpinWeights()
     classes = {key: value for key, value in table.content.items() if key != "source"}
@@ -379,7 +379,7 @@ def uncertain_number(table: TableReader, key: str, unit: str) -> tuple[float, fl
     return value, entry.quantity("uncertainty", entry.content["uncertainty"], unit, "MHz")
 
 
-def catalogue_of(table: TableReader | None) -> MeasuredLines | None:
+def read_measured_lines(table: TableReader | None) -> MeasuredLines | None:
     if table is None:
         return None
     table.refuse_unknown(("tag", "source", "lines", "rms_mhz", "j_max", "k_max"))
@@ -394,7 +394,7 @@ def catalogue_of(table: TableReader | None) -> MeasuredLines | None:
     )
 
 
-def served_of(table: TableReader | None) -> Served | None:
+def read_served(table: TableReader | None) -> Served | None:
     if table is None:
         return None
     table.refuse_unknown(("j_max", "k_max", "max_ghz", "error_mhz", "source"))
@@ -404,7 +404,7 @@ def served_of(table: TableReader | None) -> Served | None:
     return Served(j_max, error, table.whole("k_max"), table.number("max_ghz", 0.0))
 
 
-def level_table_of(table: TableReader | None, folder: Path | None) -> LevelTable | None:
+def read_named_level_table(table: TableReader | None, folder: Path | None) -> LevelTable | None:
     """The level energies in the file that the table names, beside the molecule file."""
     if table is None:
         return None

@@ -35,7 +35,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 from rotor.formats.molecules.molecule_tables import TableReader, uncertain_number
-from rotor.tops.spins.spin_constants import SpinConstants, is_isotope, parse_spins, spin_text, spins_of, twice_of
+from rotor.tops.spins.spin_constants import SpinConstants, is_isotope, parse_spins, spin_names, spin_text, twice_spin
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
@@ -45,7 +45,7 @@ OTHER_NUCLEI = "other nuclei"
 _OF_SPIN = ("spin", "atom", "total", "source", "unverified")
 
 
-def spins_of_table(table: TableReader | None, molecule: Molecule | None) -> SpinConstants | None:
+def read_spins(table: TableReader | None, molecule: Molecule | None) -> SpinConstants | None:
     """The spin constants of a file, checked; None without any."""
     if table is None:
         return None
@@ -81,7 +81,7 @@ def _twice(part: TableReader, name: str) -> int:
     size = str(stated) if isinstance(stated, float | int) and not isinstance(stated, bool) else None
     size = part.text("spin") if stated is not None and size is None else size
     try:
-        return twice_of(name) if size is None else parse_spins(f"{name}={size}")[name]
+        return twice_spin(name) if size is None else parse_spins(f"{name}={size}")[name]
     except ValueError as reason:
         raise ValueError(f"{part.place}: {reason}") from None
 
@@ -132,7 +132,7 @@ def spin_tables(
         }
         tables[name]["unverified"] = True if f"spins.{name}" in unverified else None
     for name, value in constants.values.items():
-        key = ",".join(spins_of(name))
+        key = ",".join(spin_names(name))
         tables.setdefault(key, {"source": constants.sources.get(key)})
         symbol = name.partition("(")[0] + name.partition(")")[2]
         tables[key][symbol] = uncertain_entry(value, constants.uncertainties.get(name))

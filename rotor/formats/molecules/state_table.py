@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotor.formats.molecules.molecule_tables import Table, TableReader, is_number, spin_weights_of, uncertain_number
+from rotor.formats.molecules.molecule_tables import Table, TableReader, is_number, read_spin_weights, uncertain_number
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants
 
 
-def states_of(table: TableReader | None, constants: Constants | None) -> StateConstants | None:
+def read_states(table: TableReader | None, constants: Constants | None) -> StateConstants | None:
     """Further states of a top: constants with the state in brackets, their names, weights and dipoles."""
     if table is None:
         return None
@@ -24,7 +24,7 @@ def states_of(table: TableReader | None, constants: Constants | None) -> StateCo
             if error is not None:
                 errors[key] = error
     weights = {
-        _state(table, v): _weights_of_state(table, weight, constants) for v, weight in _part(table, "weights").items()
+        _state(table, v): _state_weights(table, weight, constants) for v, weight in _part(table, "weights").items()
     }
     dipoles = {}
     for pair, moment in _part(table, "dipoles").items():
@@ -53,10 +53,10 @@ def _state(table: TableReader, text: str) -> int:
     return int(text)
 
 
-def _weights_of_state(table: TableReader, classes: Any, constants: Constants) -> SpinWeights:
+def _state_weights(table: TableReader, classes: Any, constants: Constants) -> SpinWeights:
     if classes == {}:  # what the rule "none" is written as: all levels of this state alike
         return SpinWeights()
-    weights = spin_weights_of(TableReader(f"{table.place}", "weights", classes), constants)
+    weights = read_spin_weights(TableReader(f"{table.place}", "weights", classes), constants)
     if weights.to_mapping() != classes:
         raise ValueError(
             f"{table.place}, weights = {classes}: expected numbers without a common divisor, as those of state 0 have"

@@ -103,7 +103,7 @@ def _least_k(species: int, first: int) -> int:
     return least if least >= first else first + (first - least) % 2
 
 
-def blocks_of(file: ParameterFile, groups: Sequence[Group]) -> Blocks | None:
+def numbered_blocks(file: ParameterFile, groups: Sequence[Group]) -> Blocks | None:
     """The blocks of a file; None for cases that are not supported (see the head of this module)."""
     states = sorted((state for group in groups for state in group.states), key=lambda state: state.number)
     digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
@@ -227,7 +227,7 @@ def sub_blocks(group: Group, levels: Levels, negative: bool) -> tuple[list[SubBl
     """Sub-block and |K| of each level of a group; negative: for a symmetric top, of the component -K."""
     quanta, n = levels.quanta, levels.rotational
     v = np.array([state.number for state in group.states])[levels.quantum("v")]
-    k = group.k_of(levels)
+    k = group.basis_k(levels)
     if "kc" in quanta:
         species = species_numbers(quanta["ka"], quanta["kc"], group.oblate)
     else:

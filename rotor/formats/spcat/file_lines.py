@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.arrays import Floats, Indices, Ints, end_to_end, rising_order, rows_of
+from rotor.arrays import Floats, Indices, Ints, copy_rows, end_to_end, rising_order
 from rotor.formats.spcat.block_numbers import Blocks, sub_blocks
 from rotor.formats.spcat.file_model import Group
-from rotor.formats.spcat.file_quanta import Format, quanta_of
+from rotor.formats.spcat.file_quanta import Format, listed_quanta
 from rotor.formats.spcat.hamiltonian.states import species_numbers
 from rotor.formats.spcat.solved_groups import SolvedGroup
-from rotor.formats.spcat.text.catalogue import Catalogue, catalogue_of
+from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.int_file import Request
@@ -47,7 +47,7 @@ class GroupLines:
 _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower", "error_mhz")
 
 
-def transitions_of(group: Group, levels: Levels, request: Request) -> Transitions:
+def group_transitions(group: Group, levels: Levels, request: Request) -> Transitions:
     """The transitions between existing levels of equal weight in a group that may pass the cut of an .int file.
 
     Parameters
@@ -126,7 +126,7 @@ def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices)
     """
     if levels.kind in ("prolate", "oblate"):  # both weights are equal
         return np.ones(len(upper), dtype=bool)
-    quanta, along, v = levels.quanta, group.k_of(levels), levels.quantum("v")
+    quanta, along, v = levels.quanta, group.basis_k(levels), levels.quantum("v")
     weights = np.zeros((len(levels), 2), dtype=np.int64)
     for place, state in enumerate(group.states):
         weights[v == place] = state.block_weights(quanta["ka"], quanta["kc"], along)[v == place]
@@ -134,7 +134,7 @@ def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices)
     return np.asarray(((high[:, :, None] == low[:, None, :]) & (high[:, :, None] > 0)).any(axis=(1, 2)))
 
 
-def weights_of_lines(group: Group, levels: Levels, transitions: Transitions) -> Ints:
+def line_weights(group: Group, levels: Levels, transitions: Transitions) -> Ints:
     """The nuclear-spin weight of each line, or a single one for all, for one component of ±K.
 
     It is the weight of the level in the later block, by F, first state and species."""
@@ -181,7 +181,7 @@ def least_intensity(request: Request, frequency_mhz: Floats) -> Floats:
     return np.asarray(10.0**request.str0 + 10.0**request.str1 * (frequency_mhz / _STR_SCALE_MHZ) ** 2)
 
 
-def lines_of(
+def group_lines(
     group: Group, levels: Levels, spread: Floats | None, transitions: Transitions, form: Format, request: Request
 ) -> GroupLines:
     """The lines of a group within the limits of an .int file, one for each component of a K doublet.
@@ -215,7 +215,7 @@ def lines_of(
     error = np.zeros(len(up)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
     g_upper = (levels.multiplicity * (levels.weight // levels.components))[up]
     columns = (transitions.frequency_mhz, intensity, levels.energy_mhz[low], error)
-    index, upper, lower = _one_component_each(group, levels, form, up, low)
+    index, upper, lower = _single_component(group, levels, form, up, low)
     frequency, strength, energy, error = (column[index] for column in columns)
     return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error, transitions)
 
@@ -227,7 +227,7 @@ def _intensity(group: Group, levels: Levels, transitions: Transitions, request: 
     out *= transitions.strength_debye2
     if (levels.components > 1).any():
         out /= np.maximum(levels.components[transitions.upper], levels.components[transitions.lower])
-    out *= weights_of_lines(group, levels, transitions)
+    out *= line_weights(group, levels, transitions)
     below = np.expm1(-transitions.frequency_mhz / kt)
     with np.errstate(over="ignore"):  # far below zero and cold, where no line may start
         below *= -np.exp(-levels.energy_mhz / kt)[transitions.lower]
@@ -235,14 +235,17 @@ def _intensity(group: Group, levels: Levels, transitions: Transitions, request: 
     return out
 
 
-def _one_component_each(
+def _single_component(
     group: Group, levels: Levels, form: Format, up: Indices, low: Indices
 ) -> tuple[Ints | slice, Quanta, Quanta]:
     """The transition of each line of one component of ±K, and the quantum numbers of its levels, (lines, width)."""
-    plus = quanta_of(group, levels, form).astype(np.int16)
+    plus = listed_quanta(group, levels, form).astype(np.int16)
     if (levels.components == 1).all():
-        return slice(None), rows_of(plus, up), rows_of(plus, low)
-    pair, minus = (levels.components[up], levels.components[low]), quanta_of(group, levels, form, True).astype(np.int16)
+        return slice(None), copy_rows(plus, up), copy_rows(plus, low)
+    pair, minus = (
+        (levels.components[up], levels.components[low]),
+        listed_quanta(group, levels, form, True).astype(np.int16),
+    )
     count = np.maximum(*pair)
     twice = np.flatnonzero((pair[0] == 2) & (pair[1] == 2))
     rest = np.flatnonzero(count == 1)
@@ -300,7 +303,9 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, *,
         "energy_lower_cm": joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
         "g_upper": joined["g_upper"][order],
     }
-    return catalogue_of(numbers, quanta["upper"], quanta["lower"], qnfmt[order].astype(np.int32), tag, linear=linear)
+    return predicted_catalogue(
+        numbers, quanta["upper"], quanta["lower"], qnfmt[order].astype(np.int32), tag, linear=linear
+    )
 
 
 def _rising(frequency_mhz: Floats) -> Ints | slice:
@@ -310,7 +315,7 @@ def _rising(frequency_mhz: Floats) -> Ints | slice:
     return rising_order(frequency_mhz)
 
 
-_EVERY = 99  # quantum numbers; no file has as many
+_ALL_NUMBERS = 99  # quantum numbers; no file has as many
 _RANKS = 9999  # the largest number of four digits
 
 
@@ -337,9 +342,9 @@ def as_level_list(solved: Sequence[SolvedGroup], form: Format, blocks: Blocks | 
         for negative in (False, True) if (levels.components > 1).any() else (False,):
             rows = np.flatnonzero((levels.weight > 0) & (levels.components > int(negative)))
             g = levels.multiplicity * (levels.weight // levels.components)
-            quanta = quanta_of(group, levels, replace(form, most=_EVERY), negative)
+            quanta = listed_quanta(group, levels, replace(form, most=_ALL_NUMBERS), negative)
             numbered = form.aggregates(len(group.spins))
-            pattern = quanta_of(group, levels, form, negative)[:, -2] if numbered else np.full(len(levels), -1)
+            pattern = listed_quanta(group, levels, form, negative)[:, -2] if numbered else np.full(len(levels), -1)
             energy = levels.energy_mhz / units.MHZ_PER_CM
             numbers = _numbers(group, levels, blocks, negative, rows)
             tables.append([*numbers, *(column[rows] for column in (energy, error, mixing, g, quanta, pattern))])

@@ -13,24 +13,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.file_spins import coupled_spins, lines_of_coupled_spins, with_their_spins
+from rotor.formats.spcat.file_spins import coupled_spin_lines, coupled_spins, with_their_spins
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
-from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, dipoles_of, moment_of
+from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, line_moment, split_dipoles
 from rotor.formats.spcat.hamiltonian.file_effect import (
     CodedLine,
     FileEffect,
     coded_lines,
+    ignored_states,
     real_lines,
-    reasons_of_states,
 )
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, pairs_of
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, l_doubled_pairs
 from rotor.formats.spcat.hamiltonian.l_spins import named_by_l
 from rotor.formats.spcat.hamiltonian.labels import named_by
 from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
-from rotor.formats.spcat.hamiltonian.phases import Phases, odd_of_turned, phases_of, turned_axis, with_dipoles
+from rotor.formats.spcat.hamiltonian.phases import Phases, read_phases, turned_axis, turned_odd_axes, with_dipoles
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, falls_with_k
-from rotor.formats.spcat.hamiltonian.series import Series, series_of
-from rotor.formats.spcat.hamiltonian.states import EVERY_K, StateOptions, states_of
+from rotor.formats.spcat.hamiltonian.series import Series, file_series
+from rotor.formats.spcat.hamiltonian.states import ALL_K, StateOptions, file_states
 from rotor.formats.spcat.hamiltonian.symmetry import (
     SpeciesPairs,
     forbidden,
@@ -65,7 +65,7 @@ class Group:
     top: Top
     effect: FileEffect
     oblate: bool
-    axial_kmax: int = EVERY_K
+    axial_kmax: int = ALL_K
     diag: int = 0
     by_k: bool = False
 
@@ -74,7 +74,7 @@ class Group:
         """Doubled spins."""
         return self.states[0].spins
 
-    def k_of(self, levels: Levels) -> Ints:
+    def basis_k(self, levels: Levels) -> Ints:
         """|K| of levels along the axis of the basis."""
         return levels.quantum("k" if "kc" not in levels.quanta else "kc" if self.oblate else "ka")
 
@@ -158,7 +158,7 @@ def line_names(file: ParameterFile) -> tuple[str, ...]:
     return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
 
 
-def groups_of(
+def connected_groups(
     file: ParameterFile,
     intensities: IntensityFile,
     *,
@@ -171,23 +171,23 @@ def groups_of(
     as_spcat: reproduce erroneous moments of SPCAT. full_basis: the basis has all K up to N, unless KNMIN = KNMAX, where K is a quantum
     number of the state, such as l. highest_n: highest N of the levels; a larger KNMAX has no effect.
     """
-    states = states_of(file)
+    states = file_states(file)
     if full_basis:
-        states = tuple(state.with_every_k() for state in states)
+        states = tuple(state.with_all_k() for state in states)
     elif highest_n is not None:
         states = tuple(state.with_k_to(highest_n) for state in states)
     first = file.options[0]
-    doubled = pairs_of(states)
-    members, oblate = members_of_pairs(doubled), first.nvib < 0
-    dipoles, others = dipoles_of(intensities.dipoles, len(states))
-    phases = phases_of(file, len(states), members)
+    doubled = l_doubled_pairs(states)
+    members, oblate = paired_states(doubled), first.nvib < 0
+    dipoles, others = split_dipoles(intensities.dipoles, len(states))
+    phases = read_phases(file, len(states), members)
     axes_within_states = moments_within_states(dipoles, others, states, members)
     phases = with_dipoles(phases, axes_within_states, oblate, as_spcat and bool(phases.odd))
     lines = _acting(file, states, doubled, phases.odd)[0]
-    dipoles, others = _dipoles_of_both_components(dipoles, doubled), _others_of_both(others, doubled)
+    dipoles, others = _doubled_dipoles(dipoles, doubled), _doubled_others(others, doubled)
     pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
     lines = with_their_spins(lines, states)[0]
-    light = Light(dipoles, others, series_of(file, len(states), doubled), phases, axes_within_states)
+    light = Light(dipoles, others, file_series(file, len(states), doubled), phases, axes_within_states)
     return [
         _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
         for numbers in connected_parts(len(states), [*pairs, *doubled])
@@ -225,13 +225,13 @@ def moments_within_states(
 
 def left_out(file: ParameterFile) -> list[str]:
     """A sentence for each parameter that the declared symmetry forbids, or whose spins or states do not exist."""
-    states = states_of(file)
-    doubled = pairs_of(states)
-    lines, reasons = _acting(file, states, doubled, phases_of(file, len(states), members_of_pairs(doubled)).odd)
-    return reasons_of_states(file, len(states)) + reasons + with_their_spins(lines, states)[1]
+    states = file_states(file)
+    doubled = l_doubled_pairs(states)
+    lines, reasons = _acting(file, states, doubled, read_phases(file, len(states), paired_states(doubled)).odd)
+    return ignored_states(file, len(states)) + reasons + with_their_spins(lines, states)[1]
 
 
-def members_of_pairs(doubled: list[Pair]) -> frozenset[int]:
+def paired_states(doubled: list[Pair]) -> frozenset[int]:
     """The states of l-doubled pairs."""
     return frozenset(v for pair in doubled for v in pair)
 
@@ -241,7 +241,7 @@ def _acting(
 ) -> tuple[list[CodedLine], list[str]]:
     """The lines that symmetry allows and that are real with the odd axes of the file, and why others are left out."""
     lines, forbidden = allowed(coded_lines(file, len(states), doubled), states, doubled, file.options[0].nvib < 0)
-    lines, imaginary = real_lines(lines, odd, members_of_pairs(doubled))
+    lines, imaginary = real_lines(lines, odd, paired_states(doubled))
     return lines, forbidden + imaginary
 
 
@@ -294,14 +294,14 @@ def _turns_alone(state: StateOptions, line: CodedLine) -> bool:
     return state.fold > 2 and not touches
 
 
-def _dipoles_of_both_components(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
+def _doubled_dipoles(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
     """Dipoles with those of the state K l > 0 of an l-doubled pair copied to both states."""
     return {
         pair_of_states: moment for states, moment in dipoles.items() for pair_of_states in _at_components(states, pairs)
     }
 
 
-def _others_of_both(others: list[tuple[Dipole, DipoleCode]], pairs: list[Pair]) -> list[tuple[Dipole, DipoleCode]]:
+def _doubled_others(others: list[tuple[Dipole, DipoleCode]], pairs: list[Pair]) -> list[tuple[Dipole, DipoleCode]]:
     """Other moments, with those of the state K l > 0 of an l-doubled pair copied to both states."""
     return [
         (dipole, code._replace(states=pair_of_states))
@@ -340,13 +340,13 @@ def _group(
     moments = {(here[b], here[a]): mu for (a, b), mu in light.dipoles.items() if a in here and b in here}
     acting = [(dipole, code) for dipole, code in light.others if set(code.states) <= set(here)]
     beside = tuple(
-        moment_of(
+        line_moment(
             dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, light.series
         )
         for dipole, code in acting
     )
     group_lines = [line for line in lines if line.states is None or set(line.states) <= set(here)]
-    usable = lines_of_coupled_spins(group_lines, states, not doubled, basis_axes(oblate))
+    usable = coupled_spin_lines(group_lines, states, not doubled, basis_axes(oblate))
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
     if kind in ("prolate", "oblate") and beside:
@@ -355,7 +355,7 @@ def _group(
     coupled = coupled_spins(states[0], first)
     turned = _turned(usable, light, doubled)
     if light.phases.odd:
-        fixed = light.phases._replace(odd=odd_of_turned(turned)) if turned else light.phases
+        fixed = light.phases._replace(odd=turned_odd_axes(turned)) if turned else light.phases
         moments, beside = turned_moments(
             moments, beside, turned, with_dipoles(fixed, light.axes_within_states, oblate, False)
         )
@@ -367,7 +367,7 @@ def _group(
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
-    kmax = states[0].kmax if kind in ("prolate", "oblate") else EVERY_K
+    kmax = states[0].kmax if kind in ("prolate", "oblate") else ALL_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.spind < 0)
 
 
@@ -426,5 +426,5 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
 
 def _limits(states: list[StateOptions]) -> dict[int, tuple[int, int]]:
     """KNMIN and KNMAX by state, where they restrict the basis."""
-    cut = [(place, state) for place, state in enumerate(states) if state.kmin > 0 or state.kmax < EVERY_K]
+    cut = [(place, state) for place, state in enumerate(states) if state.kmin > 0 or state.kmax < ALL_K]
     return {place: (state.kmin, state.kmax) for place, state in cut}

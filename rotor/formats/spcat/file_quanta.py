@@ -76,7 +76,7 @@ class Format:
         return code + 10 * (h & 7 if h > 9 else h)
 
 
-def format_of(file: ParameterFile, groups: list[Group]) -> Format:
+def quanta_format(file: ParameterFile, groups: list[Group]) -> Format:
     """Format of the quantum numbers of a file."""
     first = file.options[0]
     linear = all(state.linear for group in groups for state in group.states)
@@ -86,7 +86,7 @@ def format_of(file: ParameterFile, groups: list[Group]) -> Format:
     return Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, equivalent)
 
 
-def quanta_of(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
+def listed_quanta(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
     """The quantum numbers of each row as the file lists them, for one component of ±K.
 
     Parameters
@@ -129,7 +129,7 @@ def _rotation(group: Group, levels: Levels, v: Ints, form: Format, negative: boo
             return _ka_kc(group, levels, v)
         n = levels.rotational  # linear, in a file with the quanta of asymmetric tops
         return [np.zeros_like(n), n]
-    k = group.k_of(levels)
+    k = group.basis_k(levels)
     odd = is_odd(quanta["ka"], quanta["kc"]) if "kc" in quanta else np.full(len(levels), negative)
     return [np.where(odd & ~_unsigned(group, v, k), -k, k)]
 
@@ -145,7 +145,7 @@ def _unsigned(group: Group, v: Ints, k: Ints) -> NDArray[np.bool_]:
 def _ka_kc(group: Group, levels: Levels, v: Ints) -> list[Ints]:
     """Ka and Kc; for E species the K across the axis is N - K, or N - K + 1 in the first state of an l-doubled pair."""
     n, ka, kc = levels.rotational, levels.quanta["ka"], levels.quanta["kc"]
-    along = group.k_of(levels)
+    along = group.basis_k(levels)
     firsts = [pair.first for pair in group.effect.pairs]
     other = np.where(_unsigned(group, v, along), n - along + np.isin(v, firsts), ka if group.oblate else kc)
     return [other, along] if group.oblate else [along, other]

@@ -11,7 +11,7 @@ from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.hamiltonian.file_effect import CodedLine
 from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
 from rotor.formats.spcat.hamiltonian.states import StateOptions
-from rotor.formats.spcat.hamiltonian.symmetry import exchange_of, halved_across
+from rotor.formats.spcat.hamiltonian.symmetry import exchange_part, halved_across
 from rotor.formats.spcat.text.par import Options
 from rotor.quantum.spins.operators import ByElements
 from rotor.quantum.spins.scheme import Spin
@@ -51,7 +51,7 @@ def _highest_spin(line: CodedLine) -> int:
     return max((*line.operator.spins, 1 if line.operator.ns else 0), default=0)
 
 
-def lines_of_coupled_spins(
+def coupled_spin_lines(
     lines: Iterable[CodedLine], states: Sequence[StateOptions], by_exchange: bool, axes: str
 ) -> tuple[CodedLine, ...]:
     """The lines of connected states in functions of the total spin of equivalent nuclei.
@@ -78,7 +78,7 @@ def lines_of_coupled_spins(
         state_of = {state.number: state for state in states}
         return tuple(part for line in usable for part in _by_exchange(line, state_of))
     if first.equivalent == 3:
-        return tuple(_with_factors_of_three(line, len(first.spins), axes) for line in usable)
+        return tuple(_with_threefold_factors(line, len(first.spins), axes) for line in usable)
     return usable
 
 
@@ -87,14 +87,14 @@ def _by_exchange(line: CodedLine, state_of: Mapping[int, StateOptions]) -> list[
     if not line.operator.spins:
         return [line]
     if line.states:
-        return [line._replace(exchange=exchange_of(line.symmetry.axis, *(state_of[v] for v in line.states)))]
-    part_by_state = {v: exchange_of(line.symmetry.axis, state, state) for v, state in state_of.items()}
+        return [line._replace(exchange=exchange_part(line.symmetry.axis, *(state_of[v] for v in line.states)))]
+    part_by_state = {v: exchange_part(line.symmetry.axis, state, state) for v, state in state_of.items()}
     if len(set(part_by_state.values())) == 1:
         return [line._replace(exchange=next(iter(part_by_state.values())))]
     return [line._replace(states=(v, v), exchange=part) for v, part in part_by_state.items()]
 
 
-def _with_factors_of_three(line: CodedLine, spins: int, axes: str) -> CodedLine:
+def _with_threefold_factors(line: CodedLine, spins: int, axes: str) -> CodedLine:
     """A line with SPCAT's factors for three equivalent spins."""
     touches = max(line.operator.spins, default=0) > spins - 3
     if touches and isinstance(line.operator.rotor, ByElements):

@@ -8,9 +8,9 @@ from rotor.formats.spcat.hamiltonian.code_table import split_code, state_digits
 from rotor.formats.spcat.hamiltonian.codes import (
     NOT_YET,
     PLURAL_NOT_YET,
-    constants_of,
+    file_constants,
     is_linear,
-    parameters_of,
+    parameter_lines,
 )
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import Header, Options, ParameterFile
@@ -28,7 +28,7 @@ NO_NAME = (
 )
 
 
-def weights_of(options: Options, symmetric: bool = True) -> SpinWeights:
+def option_weights(options: Options, symmetric: bool = True) -> SpinWeights:
     """The spin weights of an option line, divided by their common divisor, which Q in the .int file may still contain.
 
     IAX 1, 2, 3: WTPL and WTMN for rotational states even and odd under a half turn about a, b, c. IAX 6, 9: WTPL
@@ -91,7 +91,7 @@ def fold_parts(fold: int, plus: int, minus: int, e_weight: int) -> list[int]:
     return [2 * plus, 2 * minus, *[2 * e_weight if min(plus, minus) > 0 else e_weight] * (fold - 1)]
 
 
-def options_of(constants: Constants, weights: SpinWeights, kmax: int) -> Options:
+def option_line(constants: Constants, weights: SpinWeights, kmax: int) -> Options:
     """The option line for one vibrational state, K up to `kmax`.
 
     Levels of asymmetric tops are ordered by DIAG = 3: with 0 SPCAT returns first-order energies instead of eigenvalues where the diagonal
@@ -141,7 +141,7 @@ def _coded_weights(weights: SpinWeights, oblate: bool) -> tuple[int, int, int, i
     raise ValueError(f"spin weights {dict(by_class)}: one option line of SPFIT cannot say these")
 
 
-def dipole_of(file: IntensityFile) -> tuple[float, float, float]:
+def file_dipole(file: IntensityFile) -> tuple[float, float, float]:
     """(μa, μb, μc) in D from the dipole lines of the lowest state; lines of one code are added."""
     components = [0.0, 0.0, 0.0]
     for dipole in file.dipoles:
@@ -153,20 +153,20 @@ def dipole_of(file: IntensityFile) -> tuple[float, float, float]:
     return components[0], components[1], components[2]
 
 
-def top_of(parameters: ParameterFile, intensities: IntensityFile | None = None) -> Top:
+def spcat_top(parameters: ParameterFile, intensities: IntensityFile | None = None) -> Top:
     """The top of a .par or .var file, with the dipole of an optional .int file.
 
     The symmetry axis of a symmetric top is a if prolate and c if oblate, independent of the basis of the file. Raises ValueError for spins,
     more than one vibrational state, and internal rotation.
     """
-    constants = constants_of(parameters)
+    constants = file_constants(parameters)
     if intensities is not None and intensities.request.flags >= 1000:
         raise ValueError(f"FLAGS = {intensities.request.flags}: constants in cm⁻¹ {PLURAL_NOT_YET}")
-    dipole = dipole_of(intensities) if intensities else None
+    dipole = file_dipole(intensities) if intensities else None
     oblate_basis = parameters.options[0].nvib < 0
     if dipole and (constants.kind, oblate_basis) in (("prolate", True), ("oblate", False)):
         dipole = dipole[::-1]
-    weights = weights_of(parameters.options[0], constants.kind in ("prolate", "oblate"))
+    weights = option_weights(parameters.options[0], constants.kind in ("prolate", "oblate"))
     name = parameters.title
     return Top.from_constants(
         constants, dipole_abc_debye=dipole, spin_weights=weights, name=name, symmetry_checked=False
@@ -181,9 +181,9 @@ def names_what_is_not_there(parameters: ParameterFile) -> bool:
 
 def parameter_file(top: Top, kmax: int) -> ParameterFile:
     """The .var or .par file of a top, for levels with K up to `kmax`."""
-    parameters = parameters_of(top.constants)
+    parameters = parameter_lines(top.constants)
     header = Header(npar=len(parameters), nline=1, nitr=1, errtst=1e6)
-    return ParameterFile(top.name, header, (options_of(top.constants, top.spin_weights, kmax),), parameters)
+    return ParameterFile(top.name, header, (option_line(top.constants, top.spin_weights, kmax),), parameters)
 
 
 def intensity_file(top: Top, request: Request) -> IntensityFile:

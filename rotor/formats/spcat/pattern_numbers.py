@@ -21,7 +21,7 @@ def pattern_numbers(group: Group, levels: Levels, names: list[str]) -> Ints:
     if not group.states[0].i_tot:
         return _among(pattern_steps(spins), _steps(chain, spins))
     if group.states[0].equivalent == 3:
-        return _among(_patterns_of_three(spins), _steps_of_three(chain, spins))
+        return _among(_threefold_patterns(spins), _threefold_steps(chain, spins))
     total, totals = chain.pop(-2), range(0, spins[-1] + spins[-2] + 1, 2)
     all_steps = np.concatenate([np.insert(pattern_steps((*spins[:-2], i_tot)), 1, i_tot, axis=1) for i_tot in totals])
     all_steps = all_steps[np.lexsort((all_steps[:, 1], all_steps[:, 0]))]  # lexsort is stable within one I_tot
@@ -29,7 +29,7 @@ def pattern_numbers(group: Group, levels: Levels, names: list[str]) -> Ints:
     return _among(all_steps, np.insert(steps, 1, total, axis=1))
 
 
-def _patterns_of_three(spins: tuple[int, ...]) -> Ints:
+def _threefold_patterns(spins: tuple[int, ...]) -> Ints:
     """2(N - F), I_tot, the other steps and the species of all patterns with a total of three spins, in the order of SPCAT."""
     tables = []
     for total in range(3 * spins[-1] % 2, 3 * spins[-1] + 1, 2):
@@ -41,7 +41,7 @@ def _patterns_of_three(spins: tuple[int, ...]) -> Ints:
     return table[np.lexsort((table[:, 1], table[:, 0]))]
 
 
-def _steps_of_three(chain: list[Ints], spins: tuple[int, ...]) -> Ints:
+def _threefold_steps(chain: list[Ints], spins: tuple[int, ...]) -> Ints:
     """Steps of levels with a total of three spins."""
     total, symmetry = chain[-2], chain[-3] // 2
     steps = _steps([*chain[:-3], chain[-1]], (*spins[:-3], total))

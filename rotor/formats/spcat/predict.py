@@ -13,19 +13,19 @@ from functools import cached_property, partial
 from pathlib import Path
 
 from rotor.formats.spcat import wavenumbers
-from rotor.formats.spcat.block_numbers import blocks_of
-from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, lines_of, transitions_of
+from rotor.formats.spcat.block_numbers import numbered_blocks
+from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, group_lines, group_transitions
 from rotor.formats.spcat.file_model import Group
-from rotor.formats.spcat.file_quanta import Format, format_of
-from rotor.formats.spcat.hamiltonian.states import states_of
+from rotor.formats.spcat.file_quanta import Format, quanta_format
+from rotor.formats.spcat.hamiltonian.states import file_states
 from rotor.formats.spcat.hamiltonian.undiagonalized import is_undiagonalized
 from rotor.formats.spcat.prediction_notes import (
-    note_of_diagonal_elements,
-    note_of_qrot,
-    notes_of_basis,
-    notes_of_diagonal,
-    notes_of_files,
-    notes_of_full_basis,
+    basis_notes,
+    diagonal_elements_note,
+    falling_diagonal_notes,
+    file_notes,
+    full_basis_notes,
+    qrot_notes,
 )
 from rotor.formats.spcat.solved_groups import SolvedGroup, groups_to_solve, highest_n, joined_lines, solved_groups
 from rotor.formats.spcat.text.catalogue import Catalogue
@@ -121,7 +121,7 @@ def predict(
         files = wavenumbers.files_in_mhz(parameters, intensities)
         in_mhz = predict(*files, as_spcat=as_spcat, full_basis=full_basis)
         return replace(in_mhz, catalogue=wavenumbers.catalogue_in_cm(in_mhz.catalogue), request=request)
-    further = (*note_of_qrot(request, as_spcat), *_not_written(request))
+    further = (*qrot_notes(request, as_spcat), *_not_written(request))
     if as_spcat and request.qrot < 1:
         request = replace(request, qrot=1.0)
         intensities = replace(intensities, request=request)
@@ -146,20 +146,20 @@ def _predicted(parameters: ParameterFile, intensities: IntensityFile, as_spcat: 
     """The prediction of files in MHz, without the notes on line 2 of the .int file."""
     request, diag = intensities.request, parameters.options[0].diag
     groups = groups_to_solve(parameters, intensities, as_spcat, full_basis)
-    form = format_of(parameters, groups)
+    form = quanta_format(parameters, groups)
     solved = solved_groups(parameters, groups, request, form)
-    notes = notes_of_files(parameters, intensities, as_spcat) + _notes_without_diagonalization(solved, as_spcat)
-    listed = [lines_of(*each, transitions_of(each.group, each.levels, request), form, request) for each in solved]
+    notes = file_notes(parameters, intensities, as_spcat) + _notes_without_diagonalization(solved, as_spcat)
+    listed = [group_lines(*each, group_transitions(each.group, each.levels, request), form, request) for each in solved]
     pieces = [(lines, form.qnfmt(each.group.spins)) for lines, each in zip(listed, solved, strict=True)]
 
     present = [each.group for each in solved]
     linear = all(state.linear for group in present for state in group.states)
     if any(state.is_cut for group in present for state in group.states):
-        notes += notes_of_basis(present, groups_to_solve(parameters, intensities, as_spcat, True), request)
+        notes += basis_notes(present, groups_to_solve(parameters, intensities, as_spcat, True), request)
     highest = highest_n(parameters, request)
-    notes += notes_of_diagonal(present, diag, highest)
+    notes += falling_diagonal_notes(present, diag, highest)
     if full_basis:
-        notes += notes_of_full_basis(states_of(parameters), highest)
+        notes += full_basis_notes(file_states(parameters), highest)
     return Prediction(
         as_catalogue(pieces, form, request.tag, linear=linear),
         joined_lines(parameters, solved, [lines.transitions for lines in listed], form, request),
@@ -177,7 +177,7 @@ def _without_blocks(solved: SolvedGroup) -> SolvedGroup:
 
 def _listed_levels(parameters: ParameterFile, solved: list[SolvedGroup], form: Format) -> LevelList:
     """The levels as SPCAT lists them, with its block numbers and places."""
-    return as_level_list(solved, form, blocks_of(parameters, [each.group for each in solved]))
+    return as_level_list(solved, form, numbered_blocks(parameters, [each.group for each in solved]))
 
 
 def _notes_without_diagonalization(solved: list[SolvedGroup], as_spcat: bool) -> list[str]:
@@ -195,7 +195,7 @@ def _notes_without_diagonalization(solved: list[SolvedGroup], as_spcat: bool) ->
             "DIAG below 0: diagonal elements in place of eigenvalues, which are computed for asymmetric tops and states over Wang "
             "functions alone; give DIAG = 0, or leave --as-spcat out for eigenvalues"
         )
-    return [note_of_diagonal_elements(undiagonalized) for undiagonalized in dict.fromkeys(listed)]
+    return [diagonal_elements_note(undiagonalized) for undiagonalized in dict.fromkeys(listed)]
 
 
 def _is_diagonal(group: Group) -> bool:

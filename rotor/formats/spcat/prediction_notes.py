@@ -9,27 +9,27 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rotor.formats.spcat.file_model import Group, left_out, members_of_pairs, moments_within_states
+from rotor.formats.spcat.file_model import Group, left_out, moments_within_states, paired_states
 from rotor.formats.spcat.hamiltonian.dipole_codes import (
     EVEN_ORDER,
     DipoleCode,
     Dipoles,
-    dipoles_of,
-    has_error_of_program,
+    deviates_in_spcat,
+    split_dipoles,
 )
-from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
-from rotor.formats.spcat.hamiltonian.phases import phases_of, with_dipoles
-from rotor.formats.spcat.hamiltonian.states import StateOptions, states_of
+from rotor.formats.spcat.hamiltonian.l_doubled import l_doubled_pairs
+from rotor.formats.spcat.hamiltonian.phases import read_phases, with_dipoles
+from rotor.formats.spcat.hamiltonian.states import StateOptions, file_states
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
-from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, ParameterFile, note_of_npar
+from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, ParameterFile, npar_notes
 
 
-def notes_of_files(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
+def file_notes(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes that follow from the files without their levels."""
-    return [*note_of_npar(parameters), *left_out(parameters), *_notes_of_moments(parameters, intensities, as_spcat)]
+    return [*npar_notes(parameters), *left_out(parameters), *_moment_notes(parameters, intensities, as_spcat)]
 
 
-def note_of_qrot(request: Request, as_spcat: bool) -> list[str]:
+def qrot_notes(request: Request, as_spcat: bool) -> list[str]:
     """A note for QROT below 1, which SPCAT replaces by 1."""
     if not 0 < request.qrot < 1:
         return []
@@ -45,21 +45,21 @@ def _choice(program: str, as_spcat: bool) -> str:
     )
 
 
-def _notes_of_moments(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
+def _moment_notes(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes on dipole lines for which SPCAT deviates from its documentation, and on their phases."""
-    states = states_of(parameters)
-    dipoles, others = dipoles_of(intensities.dipoles, len(states))
+    states = file_states(parameters)
+    dipoles, others = split_dipoles(intensities.dipoles, len(states))
     oblate = parameters.options[0].nvib < 0
-    wrong = [str(dipole.code) for dipole, code in others if has_error_of_program(code, oblate)]
+    wrong = [str(dipole.code) for dipole, code in others if deviates_in_spcat(code, oblate)]
     notes = []
     if wrong:
         lines = f"dipole{'s' if len(wrong) > 1 else ''} {', '.join(dict.fromkeys(wrong))}"
         program = "SPCAT computes another moment than its documentation says (docs/spcat_codes.md)"
         notes.append(f"{lines}: {_choice(program, as_spcat)}")
 
-    members = members_of_pairs(pairs_of(states))
+    members = paired_states(l_doubled_pairs(states))
     file_phases, within = (
-        phases_of(parameters, len(states), members),
+        read_phases(parameters, len(states), members),
         moments_within_states(dipoles, others, states, members),
     )
     phases = with_dipoles(file_phases, within, oblate, False)
@@ -80,7 +80,7 @@ def _has_unlike_orders(dipoles: Dipoles, others: Iterable[DipoleCode]) -> bool:
     return any(len(each) > 1 for (low, high), each in orders.items() if low != high)
 
 
-def notes_of_basis(groups: list[Group], whole: list[Group], request: Request) -> list[str]:
+def basis_notes(groups: list[Group], whole: list[Group], request: Request) -> list[str]:
     """Levels that KNMIN and KNMAX exclude, and the shifts of the remaining levels.
 
     Parameters
@@ -98,14 +98,14 @@ def notes_of_basis(groups: list[Group], whole: list[Group], request: Request) ->
         One sentence for each group whose basis is cut.
     """
     cut = [group for group in groups if any(state.is_cut for state in group.states)]
-    return [_note_of_cut(group, [other for other in whole if _share_a_state(group, other)], request) for group in cut]
+    return [_cut_note(group, [other for other in whole if _share_a_state(group, other)], request) for group in cut]
 
 
 def _share_a_state(group: Group, other: Group) -> bool:
     return bool({state.number for state in group.states} & {state.number for state in other.states})
 
 
-def _note_of_cut(group: Group, whole: list[Group], request: Request) -> str:
+def _cut_note(group: Group, whole: list[Group], request: Request) -> str:
     half = sum(group.spins) % 2
     twice_f = 2 * request.fend - half
     levels, count = _energies([group], twice_f)
@@ -113,7 +113,7 @@ def _note_of_cut(group: Group, whole: list[Group], request: Request) -> str:
     shift = max(
         (abs(energy - all_energies[label]) for label, energy in levels.items() if label in all_energies), default=0.0
     )
-    limits = ", ".join(_limits_of(state) for state in group.states if state.is_cut)
+    limits = ", ".join(_k_limits(state) for state in group.states if state.is_cut)
     angular = f"F = {twice_f}/2" if half else f"{'F' if group.spins else 'J'} = {twice_f // 2}"
     moved = (
         f"the others lie up to {shift:.3g} MHz from where the whole basis has them" if count else "no other is there"
@@ -124,9 +124,9 @@ def _note_of_cut(group: Group, whole: list[Group], request: Request) -> str:
     )
 
 
-def _limits_of(state: StateOptions) -> str:
+def _k_limits(state: StateOptions) -> str:
     low = f"KNMIN = {state.kmin}" if state.kmin else ""
-    high = f"KNMAX = {state.kmax}" if state.with_every_k().kmax != state.kmax else ""
+    high = f"KNMAX = {state.kmax}" if state.with_all_k().kmax != state.kmax else ""
     return f"{' and '.join(filter(None, (low, high)))} of state {state.number}"
 
 
@@ -144,7 +144,7 @@ def _energies(groups: Iterable[Group], twice_f: int) -> tuple[dict[tuple[int, ..
     return energies, count
 
 
-def note_of_diagonal_elements(undiagonalized: bool) -> str:
+def diagonal_elements_note(undiagonalized: bool) -> str:
     """The note for DIAG below 0: whether the levels are diagonal elements, as in SPCAT, or eigenvalues."""
     if not undiagonalized:
         return UNDIAGONALIZED_NOTE
@@ -154,7 +154,7 @@ def note_of_diagonal_elements(undiagonalized: bool) -> str:
     )
 
 
-def notes_of_diagonal(groups: Iterable[Group], diag: int, highest_n: int) -> list[str]:
+def falling_diagonal_notes(groups: Iterable[Group], diag: int, highest_n: int) -> list[str]:
     """A note for DIAG = 0 if the diagonal of the Hamiltonian falls with K, so that labels by energy differ from those by K."""
     falls = [n for group in groups if (n := group.falls_from(highest_n)) is not None]
     if diag or not falls:
@@ -165,11 +165,11 @@ def notes_of_diagonal(groups: Iterable[Group], diag: int, highest_n: int) -> lis
     ]
 
 
-def notes_of_full_basis(states: Iterable[StateOptions], highest_n: int) -> list[str]:
+def full_basis_notes(states: Iterable[StateOptions], highest_n: int) -> list[str]:
     """A note for each ignored KNMIN and KNMAX that would exclude levels up to the highest N."""
     lifted = [state for state in states if state.with_k_to(highest_n).is_cut]
     return [
-        f"{_limits_of(state)} is lifted by --full-basis: every K to N is in the basis, which is not what the file says"
+        f"{_k_limits(state)} is lifted by --full-basis: every K to N is in the basis, which is not what the file says"
         for state in lifted
     ]
 
@@ -177,9 +177,9 @@ def notes_of_full_basis(states: Iterable[StateOptions], highest_n: int) -> list[
 MOST_K = 99  # largest K in the quantum numbers of a catalogue
 
 
-def notes_of_range(states: Iterable[StateOptions], name: str) -> list[str]:
+def range_notes(states: Iterable[StateOptions], name: str) -> list[str]:
     """A note for files that are read as a top, whose basis has all K independent of KNMIN and KNMAX."""
-    cut = [_limits_of(state) for state in states if state.with_k_to(MOST_K).is_cut]
+    cut = [_k_limits(state) for state in states if state.with_k_to(MOST_K).is_cut]
     if not cut:
         return []
     return [

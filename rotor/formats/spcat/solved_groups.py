@@ -11,11 +11,11 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints, end_to_end
-from rotor.formats.spcat.file_model import Group, groups_of, line_names
+from rotor.formats.spcat.file_model import Group, connected_groups, line_names
 from rotor.formats.spcat.file_quanta import Format
 from rotor.formats.spcat.hamiltonian.code_table import join_code, split_code
-from rotor.formats.spcat.hamiltonian.codes import constants_of
-from rotor.formats.spcat.hamiltonian.states import states_of
+from rotor.formats.spcat.hamiltonian.codes import file_constants
+from rotor.formats.spcat.hamiltonian.states import file_states
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.variances import variance_factor
@@ -32,12 +32,12 @@ def groups_to_solve(
 ) -> list[Group]:
     """The groups for the levels of an .int file, which reach N = FEND + the sum of the spins."""
     highest = highest_n(parameters, intensities.request)
-    return groups_of(parameters, intensities, as_spcat=as_spcat, full_basis=full_basis, highest_n=highest)
+    return connected_groups(parameters, intensities, as_spcat=as_spcat, full_basis=full_basis, highest_n=highest)
 
 
 def highest_n(parameters: ParameterFile, request: Request) -> int:
     """The highest N of the levels up to FEND."""
-    return request.fend + max(sum(state.spins) for state in states_of(parameters)) // 2
+    return request.fend + max(sum(state.spins) for state in file_states(parameters)) // 2
 
 
 class SolvedGroup(NamedTuple):
@@ -128,8 +128,8 @@ def joined_lines(
         temperature_k=t,
         min_lgint=request.str0,
         range_mhz=request.range_mhz,
-        given_partition=PartitionFunction(t, request.qrot * above, None, math.nan, "given"),
-        given_spread=np.concatenate(spreads) if spreads else None,
+        stated_partition=PartitionFunction(t, request.qrot * above, None, math.nan, "given"),
+        stated_spread=np.concatenate(spreads) if spreads else None,
     ).sorted()
 
 
@@ -177,7 +177,7 @@ def _shown(parameters: ParameterFile, group: Group) -> Top:
     if group.states[0].linear:
         option = replace(option, spind=-1, knmax=0)
     try:
-        constants = constants_of(replace(parameters, options=(option,), parameters=tuple(parameters_of_state)))
+        constants = file_constants(replace(parameters, options=(option,), parameters=tuple(parameters_of_state)))
     except ValueError:
         return group.top
     return replace(group.top, constants=constants)

@@ -65,7 +65,7 @@ def _estimated(parameter: Parameter) -> float:
     return error if HELD_BELOW <= error < FREE_ABOVE and not parameter.constrained else 0.0
 
 
-def _is_of_numbers(line: str) -> bool:
+def _is_numeric(line: str) -> bool:
     return not line.strip() or line.strip()[0] in "+-.0123456789"
 
 
@@ -74,7 +74,7 @@ def _correlations(file: ParameterFile) -> Floats:
 
     As in SPCAT (`getpar`, `getvar`), V is ignored after fewer parameters than NPAR, and so is text after the parameters, such as another
     list."""
-    rows = list(takewhile(_is_of_numbers, file.rest.splitlines()))
+    rows = list(takewhile(_is_numeric, file.rest.splitlines()))
     if len(file.parameters) < file.header.npar:
         rows = []
     words = [line[i : i + _WIDTH] for line in rows for i in range(0, len(line.rstrip()), _WIDTH)]

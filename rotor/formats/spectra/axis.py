@@ -63,10 +63,10 @@ class ReadChoices:
     pixel: tuple[int, int] | None = None
 
 
-def frequency_of_velocity(velocity_km_s: Any, rest_mhz: float, convention: str = RADIO) -> Floats:
+def velocity_to_frequency(velocity_km_s: Any, rest_mhz: float, convention: str = RADIO) -> Floats:
     """Frequencies in MHz of velocities; ValueError for an unknown convention.
 
-    >>> [round(float(frequency_of_velocity(1000.0, 1e5, convention)), 3) for convention in CONVENTIONS]
+    >>> [round(float(velocity_to_frequency(1000.0, 1e5, convention)), 3) for convention in CONVENTIONS]
     [99666.436, 99667.545, 99666.99]
     """
     beta = np.asarray(velocity_km_s, dtype=np.float64) / _C_KM_S
@@ -89,7 +89,7 @@ def axis_mhz(values: Any, unit: str, where: str, choices: ReadChoices, rest_mhz:
         rest = choices.rest_mhz or rest_mhz
         if rest is None:
             raise ValueError(f"{where}: velocities without a rest frequency; state it, such as --rest 230.538GHz")
-        return frequency_of_velocity(numbers * _VELOCITY_UNITS[text], rest, choices.convention or RADIO)
+        return velocity_to_frequency(numbers * _VELOCITY_UNITS[text], rest, choices.convention or RADIO)
     if text in _LENGTH_UNITS:
         return np.asarray(units.SPEED_OF_LIGHT_M_PER_S * 1e-6 / (numbers * _LENGTH_UNITS[text]))
     accepted = ", ".join([*AXIS_UNITS, *list(_VELOCITY_UNITS)[:2], *_LENGTH_UNITS])

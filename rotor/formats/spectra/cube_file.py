@@ -13,9 +13,9 @@ from rotor.arrays import Floats
 from rotor.formats.spectra.axis import ReadChoices, intensity_unit
 from rotor.formats.spectra.fits_file import (
     astropy_fits,
-    beam_of,
-    frame_of,
     image_axis_mhz,
+    read_beam,
+    rest_frame,
     spectral_axis_number,
     unreadable,
 )
@@ -98,11 +98,11 @@ def read_cube(path: Path, choices: ReadChoices | None = None) -> Cube:
     planes = planes.reshape(planes.shape[0], *planes.shape[-2:])
     frequency, rest = image_axis_mhz(header, axis, len(planes), name, choices)
     order = np.argsort(frequency, kind="stable")
-    beam = beam_of(header, choices)
+    beam = read_beam(header, choices)
     factor = _to_kelvin(header, frequency, beam, name, choices)
     values = planes[order] * factor[order, None, None].astype(planes.dtype if planes.dtype.kind == "f" else np.float64)
     noise = _noise(values, None if choices.noise is None else choices.noise * float(np.median(factor)))
-    return Cube(frequency[order], values, noise, _sky(header), beam, choices.frame or frame_of(header), rest, name)
+    return Cube(frequency[order], values, noise, _sky(header), beam, choices.frame or rest_frame(header), rest, name)
 
 
 def _to_kelvin(

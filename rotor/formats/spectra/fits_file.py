@@ -21,8 +21,8 @@ from rotor.formats.spectra.axis import (
     RELATIVISTIC,
     ReadChoices,
     axis_mhz,
-    frequency_of_velocity,
     intensity_unit,
+    velocity_to_frequency,
 )
 from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
 
@@ -165,7 +165,7 @@ def image_axis_mhz(
         convention = (
             RADIO if int(header.get("VELREF", 257)) > 256 else OPTICAL
         )  # AIPS: 256 is added for radio velocities
-    return frequency_of_velocity(world * 1e-3, used, convention), used
+    return velocity_to_frequency(world * 1e-3, used, convention), used
 
 
 def _is_class(header: Mapping[str, Any], kind: str) -> bool:
@@ -221,7 +221,7 @@ def _read_rows(hdu: Any, columns: Mapping[str, Any], data: str, name: str, choic
         )
         if rest is None:
             raise ValueError(f"{name}: a velocity axis ({kind}) without RESTFREQ; state the rest frequency")
-        frequency = frequency_of_velocity(axis * 1e-3, rest, convention)
+        frequency = velocity_to_frequency(axis * 1e-3, rest, convention)
     unit = columns[data].unit or header.get("BUNIT") or header.get("TUNIT")
     return _spectrum(np.asarray(frequency), values, header, rest, unit, name, choices)
 
@@ -271,7 +271,7 @@ def _spectrum(
         if key in header
     }
     notes = []
-    frame = choices.frame or frame_of(header)
+    frame = choices.frame or rest_frame(header)
     if frame == "TOPOCENT":
         notes.append("frequencies are topocentric: the motion of the Earth is in the velocities")
     if choices.noise is not None:
@@ -284,20 +284,20 @@ def _spectrum(
         unit=chosen,
         rest_mhz=rest,
         frame=frame,
-        beam_arcsec=beam_of(header, choices),
+        beam_arcsec=read_beam(header, choices),
         notes=notes,
         header={key.lower().replace("-", "_"): value for key, value in selected.items()},
     )
 
 
-def beam_of(header: Mapping[str, Any], choices: ReadChoices) -> tuple[float, float] | None:
+def read_beam(header: Mapping[str, Any], choices: ReadChoices) -> tuple[float, float] | None:
     """Full widths of the beam as stated by the user, else by the header."""
     if choices.beam_arcsec is not None or not (header.get("BMAJ") and header.get("BMIN")):
         return choices.beam_arcsec
     return float(header["BMAJ"]) * 3600, float(header["BMIN"]) * 3600
 
 
-def frame_of(header: Mapping[str, Any]) -> str:
+def rest_frame(header: Mapping[str, Any]) -> str:
     """SPECSYS, else the end of CTYPE, else that of CLASS, which moves with the source."""
     if header.get("SPECSYS"):
         return str(header["SPECSYS"]).strip()

@@ -33,7 +33,7 @@ def read_spectrum(source: str | os.PathLike[str] | Any, choices: ReadChoices | N
         With file and rule for what cannot be read.
     """
     if hasattr(source, "spectral_axis") and hasattr(source, "flux"):
-        return spectrum_of_specutils(source, choices)
+        return from_specutils(source, choices)
     path = Path(source)
     if path.is_dir():
         raise ValueError(
@@ -53,7 +53,7 @@ def read_spectrum(source: str | os.PathLike[str] | Any, choices: ReadChoices | N
     return read_text_spectrum(path, choices)
 
 
-def spectrum_of_specutils(spectrum: Any, choices: ReadChoices | None = None) -> ObservedSpectrum:
+def from_specutils(spectrum: Any, choices: ReadChoices | None = None) -> ObservedSpectrum:
     """A one-dimensional `specutils.Spectrum` (Spectrum1D), its units converted by astropy."""
     from astropy import units as astropy_units
 

@@ -80,10 +80,10 @@ class Output:
         return ValueError(f"{self.where}: line {i + 1}: {rule}: {self.lines[i].strip()[:80]!r}")
 
 
-def program_of(text: str) -> Program | None:
+def detect_program(text: str) -> Program | None:
     """The supported program that an output names first; None for others.
 
-    >>> program_of("Copyright (c) 1988-2016, Gaussian, Inc.  All Rights Reserved.").name
+    >>> detect_program("Copyright (c) 1988-2016, Gaussian, Inc.  All Rights Reserved.").name
     'Gaussian'
     """
     named = [program for program in PROGRAMS if program.banner in text]

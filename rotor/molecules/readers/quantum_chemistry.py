@@ -19,14 +19,14 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.geometry.superposition import Superposition, superpose
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.nuclei import isotope, isotope_of_mass
+from rotor.molecules.nuclei import isotope, isotope_by_mass
 from rotor.molecules.readers.cfour_orca import read_plain, reads_itself, unread
 from rotor.molecules.readers.field_gradients import with_field_gradients
 from rotor.molecules.readers.ground_state import dipole_lines, is_excited, printed_dipole
 from rotor.molecules.readers.programs import (
     Output,
     coordinates_angstrom,
-    program_of,
+    detect_program,
     refuse_cut,
     refuse_unreadable,
     tables,
@@ -75,7 +75,7 @@ def read_output(path: Path | str) -> Molecule:
     neglected. Reader: N. M. O'Boyle, A. L. Tenderholt, K. M. Langner, J. Comput. Chem. 29, 839 (2008).
     """
     text = _text(Path(path))
-    program = program_of(text)
+    program = detect_program(text)
     if not has_cclib() and not needs_no_cclib(Path(path)):
         raise ValueError(f"{path}: {WITHOUT_CCLIB}")
     if program is None:
@@ -99,7 +99,7 @@ def _text(path: Path) -> str:
 def needs_no_cclib(path: Path) -> bool:
     """Whether an output is read without cclib: CFOUR, ORCA from version 6."""
     text = _text(path)
-    program = program_of(text)
+    program = detect_program(text)
     return program is not None and reads_itself(Output(str(path), tuple(text.splitlines()), program))
 
 
@@ -111,7 +111,7 @@ def has_cclib() -> bool:
 def is_output(path: Path) -> bool:
     """Whether `read_output` can read a file, judged by its banner, or by cclib if installed."""
     text = _text(path)
-    if program_of(text) is not None:
+    if detect_program(text) is not None:
         return True
     if not has_cclib():
         return False
@@ -182,7 +182,7 @@ def _isotopes(data: Any, where: str) -> tuple[tuple[str, ...], tuple[int, ...]]:
     mass_numbers = []
     for number, symbol, mass in zip(numbers, symbols, masses, strict=True):
         average = abs(mass - atomic_masses[number]) < 5e-3  # programs' averages differ in the third decimal
-        near = isotope(symbol) if average else isotope_of_mass(symbol, float(mass))
+        near = isotope(symbol) if average else isotope_by_mass(symbol, float(mass))
         mass_numbers.append(near.mass_number)
     return symbols, tuple(mass_numbers)
 

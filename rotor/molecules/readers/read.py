@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.nuclei import element_symbol, isotope, isotope_of_mass
+from rotor.molecules.nuclei import element_symbol, isotope, isotope_by_mass
 from rotor.molecules.readers.quantum_chemistry import WITHOUT_CCLIB, has_cclib, is_output, needs_no_cclib, read_output
-from rotor.molecules.readers.sdf_entries import entry_bytes, entry_of
+from rotor.molecules.readers.sdf_entries import entry_bytes, parse_entry
 from rotor.molecules.readers.smiles import from_rdkit, from_smiles, parse_sdf
 from rotor.molecules.readers.xyz import decode, parse_xyz
 from rotor.units import DEBYE_PER_E_ANGSTROM
@@ -73,7 +73,7 @@ def _read_word(word: str) -> Molecule:
     if word.startswith(_PREFIX):
         return from_smiles(word.removeprefix(_PREFIX).strip())
     path = Path(word)
-    if entry_of(word) is not None:
+    if parse_entry(word) is not None:
         return _read_file(path)
     if not path.is_file():
         return g2_molecule(word)
@@ -83,7 +83,7 @@ def _read_word(word: str) -> Molecule:
 
 
 def _read_file(path: Path) -> Molecule:
-    entry = entry_of(str(path))
+    entry = parse_entry(str(path))
     if entry is not None:
         molecule = parse_sdf(decode(entry_bytes(*entry), str(path)), str(path))
         return molecule if molecule.name else replace(molecule, name=f"{entry[0].stem}_{entry[1]}")
@@ -183,7 +183,7 @@ def _ase_mass_numbers(atoms: Any, symbols: tuple[str, ...]) -> tuple[int, ...]:
             numbers.append(isotope(symbol).mass_number)
             continue
         try:
-            numbers.append(isotope_of_mass(symbol, float(mass)).mass_number)
+            numbers.append(isotope_by_mass(symbol, float(mass)).mass_number)
         except ValueError as reason:
             raise ValueError(f"atom {i + 1}: {reason}") from None
     return tuple(numbers)

@@ -11,10 +11,10 @@ SDF_SUFFIXES = (".sdf", ".sd")
 _ENTRY = re.compile(r"(.+\.sdf?)#(\d+)", flags=re.IGNORECASE | re.DOTALL)
 
 
-def entry_of(word: str) -> tuple[Path, int] | None:
+def parse_entry(word: str) -> tuple[Path, int] | None:
     """File and number of a word such as many.sdf#3; None for other words, and if a file has exactly this name.
 
-    >>> entry_of("many.sdf#3"), entry_of("water")
+    >>> parse_entry("many.sdf#3"), parse_entry("water")
     ((PosixPath('many.sdf'), 3), None)
     """
     entry = _ENTRY.fullmatch(word)

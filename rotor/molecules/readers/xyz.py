@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rotor.molecules.molecule import Molecule
-from rotor.molecules.nuclei import Isotope, element_symbol, isotope, isotope_of_mass
+from rotor.molecules.nuclei import Isotope, element_symbol, isotope, isotope_by_mass
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
@@ -190,7 +190,7 @@ def _nucleus(words: list[str], columns: _Columns, where: str) -> Isotope:
         )
     try:
         nucleus = isotope(element_symbol(int(label)) if label.isdecimal() else label)
-        return nucleus if columns.mass is None else isotope_of_mass(nucleus.symbol, _number(words[columns.mass], where))
+        return nucleus if columns.mass is None else isotope_by_mass(nucleus.symbol, _number(words[columns.mass], where))
     except ValueError as reason:
         raise ValueError(f"{where}: {reason}") from None
 

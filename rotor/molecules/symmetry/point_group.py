@@ -92,11 +92,11 @@ class Symmetry:
         return "; ".join(parts)
 
 
-def symmetry_of(molecule: Molecule, tolerance: float = TOLERANCE) -> Symmetry:
+def molecule_symmetry(molecule: Molecule, tolerance: float = TOLERANCE) -> Symmetry:
     """The symmetry of a molecule's nuclei, isotopes distinguished; see `find_symmetry`.
 
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
-    >>> symmetry_of(water).point_group, symmetry_of(water.with_isotopes("2=2H")).point_group
+    >>> molecule_symmetry(water).point_group, molecule_symmetry(water.with_isotopes("2=2H")).point_group
     ('C2v', 'Cs')
     """
     kinds = list(zip(molecule.symbols, molecule.mass_numbers, strict=True))
@@ -148,7 +148,7 @@ def find_symmetry(
     if shortest < CLOSEST_ANGSTROM:
         raise ValueError(f"two nuclei are {shortest:.3g} Å apart, nearer than {CLOSEST_ANGSTROM} Å; remove one of them")
     reach, near_reach = tolerance * shortest, NEAR * shortest
-    line, off_line = _line_of(points)
+    line, off_line = _best_line(points)
     if off_line <= reach:
         return _linear_symmetry(labels, masses, points, line, tolerance, shortest)
 
@@ -181,7 +181,7 @@ def _checked(kinds: Sequence[Hashable], masses_u: ArrayLike, positions: ArrayLik
     return labels, masses, points - masses @ points / masses.sum()
 
 
-def _line_of(points: Floats) -> tuple[Floats, float]:
+def _best_line(points: Floats) -> tuple[Floats, float]:
     """The direction (3,) of the best line through the centre, and the largest distance of a point from it."""
     direction = np.linalg.svd(points, full_matrices=False)[2][0]
     off = np.linalg.norm(points - np.outer(points @ direction, direction), axis=1)

@@ -113,14 +113,14 @@ def _refuse_weights_of_the_pair(top: Top, weights: SpinWeights) -> None:
     A geometry decides this. Without one, weights that equal those of the two nuclei are assumed to count them, unless they are stated to be
     those of the other nuclei.
     """
-    from rotor.tops.spins.spin_statistics import weights_of
+    from rotor.tops.spins.spin_statistics import statistical_weights
 
     assert top.spin_constants is not None
     twice = top.spin_constants.twice[next(iter(top.spin_constants.totals))]
-    all_nuclei = None if top.molecule is None else weights_of(top.molecule)
+    all_nuclei = None if top.molecule is None else statistical_weights(top.molecule)
     if weights.with_pair(twice) == all_nuclei:
         return
-    if weights == all_nuclei or (weights.is_of_pair(twice) and not top.spin_constants.weights_of_others):
+    if weights == all_nuclei or (weights.fits_pair(twice) and not top.spin_constants.weights_of_others):
         raise ValueError(
             f"{' and '.join(top.spin_constants.totals)} in a total spin: the spin weights of {top.name or 'this top'} count their "
             f"{(twice + 1) ** 2} functions already; give weights of the other nuclei alone: of two, 1 to levels of even total spin, "

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.tops.operators import Operators, Powers, added, axes_of, distortion_terms, powers_of_spelled
+from rotor.tops.operators import Operators, Powers, added, axis_order, distortion_terms, spelled_powers
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -41,7 +41,7 @@ def operators_of_name(constants: Constants, name: str) -> Operators:
 
 def _powers(name: str) -> Powers:
     """Powers (p, q, n) of a name that spells its operator."""
-    powers = powers_of_spelled(name)
+    powers = spelled_powers(name)
     if powers is None:
         raise ValueError(f"{name} has no operator here")
     return powers
@@ -58,7 +58,7 @@ def _rigid_terms(constants: Constants) -> dict[str, Operators]:
     if constants.kind in ("prolate", "oblate"):
         along, equal = ("A", "C") if constants.kind == "prolate" else ("C", "A")
         return {along: {(0, 1, 0): 1.0}, "B": {(1, 0, 0): 1.0, (0, 1, 0): -1.0}, equal: {}}
-    x, y, z = (axis.upper() for axis in axes_of(str(constants.representation)))
+    x, y, z = (axis.upper() for axis in axis_order(str(constants.representation)))
     return {
         z: {(0, 1, 0): 1.0},
         x: {(1, 0, 0): 0.5, (0, 1, 0): -0.5, (0, 0, 1): 0.25},

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum.estimates.plans import plan_of_levels
+from rotor.quantum.estimates.plans import plan_levels
 from rotor.requests.budget import ROUNDING
 from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics, numerical_error
@@ -220,6 +220,6 @@ LEVELS = Numerics(
         f"observables.jmax: {NOTHING_CHEAPER}; it says which levels, not how well",
         *reason_of_no_distortion_sweep(request.top),
     ),
-    plan=plan_of_levels,
+    plan=plan_levels,
     rounding=lambda request: rounding_of(request.top, request.jmax),
 )

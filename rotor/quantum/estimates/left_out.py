@@ -27,12 +27,12 @@ HYPERFINE_KEY = (
 )
 
 
-def left_out_of_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[LeftOut, ...]:
+def neglected_in_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[LeftOut, ...]:
     """Neglected effects of levels and lines of one J in MHz, largest first; effects without an estimate come last."""
     from rotor.quantum.estimates.beyond import COMPUTE
-    from rotor.quantum.estimates.limits import every_limit
+    from rotor.quantum.estimates.limits import all_limits
 
-    limits = every_limit(top, j, effects)
+    limits = all_limits(top, j, effects)
     parts = [
         LeftOut(limit.name, limit.size_mhz, "MHz", f"at J = {j}: {limit.text.replace(COMPUTE, HYPERFINE_KEY)}")
         for limit in limits

@@ -91,13 +91,13 @@ def model_limits(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[Lim
     present = {effect.name for effect in effects} | set(known_limits)
     shift_mhz = 0.0 if quadrupole is None else quadrupole.size_mhz or 0.0
     nuclear = _nuclear_limits(top, effects, present, shift_mhz)
-    limits = [*known_limits.values(), *_limits_of_constants(top, j), *nuclear]
+    limits = [*known_limits.values(), *_constant_limits(top, j), *nuclear]
     if top.molecule is not None:
-        limits += _limits_of_geometry(top, top.molecule, j, present)
+        limits += _geometry_limits(top, top.molecule, j, present)
     return largest_first(limits)
 
 
-def every_limit(top: Top, j: int, effects: Sequence[QuantumEffect], *, tabulated: bool = False) -> list[Limit]:
+def all_limits(top: Top, j: int, effects: Sequence[QuantumEffect], *, tabulated: bool = False) -> list[Limit]:
     """`model_limits` with the effects that follow from the constants, however small (`rotor.quantum.estimates.beyond`).
 
     tabulated: all energies are from the table of the top, so that the distortion series does not matter.
@@ -129,7 +129,7 @@ def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Seq
     }
 
 
-def _limits_of_constants(top: Top, j: int) -> list[Limit]:
+def _constant_limits(top: Top, j: int) -> list[Limit]:
     """The error of a geometry, and the distortion that rigid constants neglect."""
     limits, b = [], _largest(top)
     rigid = not any(name not in "ABC" for name in top.constants.values)
@@ -227,7 +227,7 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
     return "; ".join(texts)
 
 
-def _limits_of_geometry(top: Top, molecule: Molecule, j: int, present: set[str]) -> list[Limit]:
+def _geometry_limits(top: Top, molecule: Molecule, j: int, present: set[str]) -> list[Limit]:
     """Large-amplitude motions and unpaired electrons that the geometry shows."""
     from rotor.molecules.bonds import bonded_atoms
     from rotor.quantum.estimates.methyl_groups import methyl_groups

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from rotor.quantum.estimates.left_out import left_out_of_levels
+from rotor.quantum.estimates.left_out import neglected_in_levels
 from rotor.requests.plan import Growth, Plan
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ MOST_J_COMPARED = {1: 30, 2: 8, 3: 3}  # highest J at which the torsional trunca
 
 def plan_fields(top: Top, j: int, effects: Sequence[QuantumEffect]) -> dict[str, Any]:
     """Effects, good quantum numbers and neglected effects, as fields of a plan."""
-    left_out = left_out_of_levels(top, j, effects)
+    left_out = neglected_in_levels(top, j, effects)
     return {"effects": effect_texts(top, j, effects), "good": good_numbers(top, effects), "left_out": left_out}
 
 
@@ -91,7 +91,7 @@ def torsional_parts(top: Top, constants: InternalRotationConstants, jmax: int) -
     ]
 
 
-def plan_of_levels(request: Any) -> Plan:
+def plan_levels(request: Any) -> Plan:
     """The plan of a list of levels."""
     from rotor.quantum.request import answer_levels
 

@@ -20,7 +20,7 @@ from rotor import units
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, data_term, model_term, parameter_names
-from rotor.quantum.estimates.limits import every_limit, limit_facts
+from rotor.quantum.estimates.limits import all_limits, limit_facts
 from rotor.quantum.estimates.uncertainty import known_covariance, level_errors, source_of_errors
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.quantum.solve import solve_levels
@@ -71,7 +71,7 @@ class MapAnswer(TextOf):
         """Error budget of the energies."""
         top, j, effects = self._hamiltonian
         data = joined_data(*self.moment_terms(), constants_term(top, effects, j))
-        return map_budget(self.states, [*every_limit(top, j, effects), *self.field_limits()], data)
+        return map_budget(self.states, [*all_limits(top, j, effects), *self.field_limits()], data)
 
     def facts(self) -> Mapping[str, Any]:
         """Everything about the answer but its table of states, by the keys of docs/verbs."""

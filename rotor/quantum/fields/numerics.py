@@ -91,7 +91,7 @@ def plan_in_field(request: Any, answer: Callable[[Any], Any], words: dict[str, s
     )
 
 
-def _plan_of_stark(request: Any) -> Plan:
+def _plan_stark(request: Any) -> Plan:
     """The plan of levels in an electric field."""
     words = {
         "kind": "stark",
@@ -103,7 +103,7 @@ def _plan_of_stark(request: Any) -> Plan:
     return plan_in_field(followed, answer_stark, words)
 
 
-def _plan_of_zeeman(request: Any) -> Plan:
+def _plan_zeeman(request: Any) -> Plan:
     """The plan of levels in a magnetic field."""
     words = {"kind": "zeeman", "acts": "magnetic moments in the field, up to {:g} T", "good": "M"}
     return plan_in_field(request, answer_zeeman, words)
@@ -114,10 +114,10 @@ STARK = Numerics(
     {"MHz": Goal("energies")},
     knobs=(_basis(lambda request: range(request.j_highest + 2, request.jmax + 1), ENERGIES, _energies),),
     prepare=_with_basis,
-    plan=_plan_of_stark,
+    plan=_plan_stark,
 )
 ZEEMAN = Numerics(
     {"MHz": Goal("energies")},
     knobs=(_basis(lambda request: (), ENERGY, answer_zeeman),),
-    plan=_plan_of_zeeman,
+    plan=_plan_zeeman,
 )

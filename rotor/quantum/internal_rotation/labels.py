@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.one_to_one import one_to_one
+from rotor.quantum.one_to_one import match_names
 
 
 def torsional_numbers(vectors: NDArray[np.generic], t: Ints) -> Ints:
@@ -55,7 +55,7 @@ def named_by_overlap(numbers: Ints, t: Ints, vectors: NDArray[np.generic]) -> In
         overlaps = np.abs(vectors[np.ix_(functions, states)]) ** 2
         if len(states) < len(functions):
             overlaps = np.hstack([overlaps, np.zeros((len(functions), len(functions) - len(states)))])
-        names[states] = functions[one_to_one(overlaps)[: len(states)]]
+        names[states] = functions[match_names(overlaps)[: len(states)]]
     return names
 
 

@@ -21,7 +21,7 @@ from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.levels import Levels, MomentBlock, SpeciesMoments
 from rotor.quantum.operators.rotation import body_tensor
 from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
-from rotor.tops.internal_rotation import InternalRotationConstants, species_of_tops
+from rotor.tops.internal_rotation import InternalRotationConstants, sigma_species
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
@@ -285,12 +285,12 @@ class Degeneracies:
 
         Weights of inequivalent tops are products; each of the species has two components, σ and -σ, but for that of σ = 0.
         """
-        names = species_of_tops(self.constants.tops)
+        names = sigma_species(self.constants.tops)
         if self.equivalent:
             counts = SpinCounts(self.constants.spin_states, self.constants.exchanged)
             signs = np.array([1, -1])
             divisor = np.gcd.reduce(
-                np.concatenate([counts.functions_of_species(sigma, signs) for sigma in species_of_tops(2).values()])
+                np.concatenate([counts.functions_of_species(sigma, signs) for sigma in sigma_species(2).values()])
             )
             x = functions.labels.get("x", np.ones(len(functions.labels["J"]), dtype=np.int64))
             return np.asarray(counts.functions_of_species(names[species], x[rows]) // divisor)

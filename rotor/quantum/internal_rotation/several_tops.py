@@ -29,7 +29,7 @@ from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_x, j_y, j_z
 from rotor.quantum.operators.torsion import cosine, p_alpha, sine
 from rotor.quantum.torsion import TorsionalPotential
-from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS, PAIRS, species_of_tops
+from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS, PAIRS, sigma_species
 
 AXES = (j_z(), j_x(), j_y())  # P along a, b, c
 EACH = 9  # functions of each top from which products are formed
@@ -117,7 +117,7 @@ class SeveralTops:
     @property
     def species(self) -> Mapping[str, Species]:
         """(σ1, σ2, ...) by name; each stands for (-σ1, -σ2, ...) too, and AE for EA if two tops are equivalent."""
-        names = species_of_tops(len(self.tops))
+        names = sigma_species(len(self.tops))
         return {name: sigma for name, sigma in names.items() if name != "EA" or not self.axis}
 
     @property

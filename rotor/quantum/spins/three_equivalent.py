@@ -31,7 +31,7 @@ from rotor.quantum.spins.rotor import ALONE, Channel, Exist
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.quantum.wang.j_operators import phase
-from rotor.tops.operators import axes_of
+from rotor.tops.operators import axis_order
 
 _ZERO = 1e-12  # smaller elements, relative to the largest, are round-off of sums that cancel
 _OF_THE_AXIS = 1e-9  # limit of elements that break the threefold axis, relative to the largest; round-off is smaller
@@ -192,7 +192,7 @@ def _functions(plan: Plan, patterns: Ints, parts: list[SpinPart], rows: list[Row
 
 def _along(plan: Plan) -> int:
     """Column of K among v, Ka and Kc: 1 or 2."""
-    axis = axes_of(plan.shared.representation)[2]
+    axis = axis_order(plan.shared.representation)[2]
     if axis == "b":
         raise ValueError(
             f"representation {plan.shared.representation}: the threefold axis is a or c, the z of the basis"

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.tops.operators import REPRESENTATIONS as REPRESENTATIONS
-from rotor.tops.operators import axes_of
+from rotor.tops.operators import axis_order
 
 _WANG = ((0, 1), (2, -1), (1, 1), (1, -1))  # E+, E-, O+, O-: lowest K and s
 
@@ -95,7 +95,7 @@ def wang_blocks(j: int, representation: str) -> list[WangBlock]:
     >>> [(b.species, b.size) for b in wang_blocks(1, "Ir")]
     [('eo', 1), ('oe', 1), ('oo', 1)]
     """
-    axes = axes_of(representation)
+    axes = axis_order(representation)
     sized = [(first, sign, (j - first) // 2 + 1) for first, sign in _WANG if j >= first]
     return sorted(WangBlock(j, _species(j, first, sign, axes), first, sign, size) for first, sign, size in sized)
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.quantum.wang.basis import WangBlock
-from rotor.tops.operators import axes_of
+from rotor.tops.operators import axis_order
 
 Complexes = NDArray[np.complex128]
 
@@ -121,7 +121,7 @@ def components(j: int, representation: str) -> Mapping[str, JOperator]:
     up, down = raising(j), lowering(j)
     sense = -1.0 if representation.endswith("l") else 1.0
     along_x, along_y = 0.5 * (up + down), sense * 0.5j * (up - down)
-    return MappingProxyType(dict(zip(axes_of(representation), (along_x, along_y, j_z(j)), strict=True)))
+    return MappingProxyType(dict(zip(axis_order(representation), (along_x, along_y, j_z(j)), strict=True)))
 
 
 def half_turn(j: int, representation: str, axis: str) -> JOperator:
@@ -131,7 +131,7 @@ def half_turn(j: int, representation: str, axis: str) -> JOperator:
     ([-1.0, 1.0, -1.0], [0.0, 0.0, -1.0])
     """
     k = np.arange(-j, j + 1)
-    along = axes_of(representation).index(axis)
+    along = axis_order(representation).index(axis)
     if along == 2:
         return JOperator(j, {0: (1.0 - 2.0 * (k % 2)).astype(np.complex128)})
     signs = 1.0 - 2.0 * ((j + along * k) % 2)  # |k⟩ becomes ±|-k⟩

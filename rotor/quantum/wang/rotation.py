@@ -120,7 +120,7 @@ def _linear(
         quanta={"j": j},
         multiplicity=2 * j + 1,
         components=np.ones_like(j),
-        weight=top.spin_weights.of_j(j),
+        weight=top.spin_weights.linear_weights(j),
         effects=effects,
         blocks=tuple(
             _single_function(int(number), e, row) for row, (number, e) in enumerate(zip(j, energy, strict=True))
@@ -148,7 +148,7 @@ def _spherical(
     scalars, dt = scalar_and_tensor(operators)
     j, energy = _scalar_energies(scalars, jmin, jmax)
     if not dt:
-        weight = weights.of_spherical(j)
+        weight = weights.spherical_weights(j)
         return Levels("spherical", None, jmax, energy, {"j": j}, 2 * j + 1, 2 * j + 1, weight, effects=effects)
 
     split = [tensor_eigenvalues(int(value), 1 if dt > 0 else -1) for value in j]
@@ -162,7 +162,7 @@ def _spherical(
         quanta={"j": np.repeat(j, sizes), "irrep": irreps},
         multiplicity=2 * np.repeat(j, sizes) + 1,
         components=np.array([DIMENSION[irrep] for irrep in irreps]),
-        weight=np.array([weights.of_irrep(irrep) for irrep in irreps]),
+        weight=np.array([weights.irrep_weight(irrep) for irrep in irreps]),
         effects=effects,
     )
 
@@ -176,7 +176,7 @@ def _symmetric(top: Top, effects: tuple[QuantumEffect, ...], operators: Operator
     for (p, q, _), c in operators.items():
         energy += c * x**p * squares**q
 
-    weight = top.spin_weights.of_symmetric(j, k, oblate=top.kind == "oblate")
+    weight = top.spin_weights.symmetric_weights(j, k, oblate=top.kind == "oblate")
     components = np.where(k == 0, 1, 2)
     return Levels(top.kind, None, jmax, energy, {"j": j, "k": k}, 2 * j + 1, components, weight, effects=effects)
 
@@ -260,7 +260,7 @@ def _weights_of_blocks(top: Top, blocks: tuple[SolvedBlock, ...], quanta: dict[s
     """Spin weights of levels in blocks; all levels of an asymmetric block have the same."""
     if top.kind == "asymmetric":
         return np.repeat(
-            [top.spin_weights.of_ka_kc(b.basis.species) for b in blocks], [len(b.energies_mhz) for b in blocks]
+            [top.spin_weights.asymmetric_weight(b.basis.species) for b in blocks], [len(b.energies_mhz) for b in blocks]
         )
     ones = np.ones(len(quanta["j"]), dtype=np.int64)
     bare = Levels(top.kind, None, int(quanta["j"].max()), ones.astype(float), dict(quanta), ones, ones, ones)

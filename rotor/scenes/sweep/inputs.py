@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from rotor.molecules.readers.sdf_entries import entry_bytes, entry_of
+from rotor.molecules.readers.sdf_entries import entry_bytes, parse_entry
 from rotor.scenes.scene import within
 from rotor.version import version
 
@@ -46,7 +46,7 @@ class InputHashes:
         return hashes
 
     def _files(self, key: str, word: str) -> Iterator[tuple[str, str]]:
-        entry = entry_of(within(self._folder, word))
+        entry = parse_entry(within(self._folder, word))
         if entry is not None and entry[0].is_file():
             yield word, hashlib.sha256(entry_bytes(*entry)).hexdigest()
             return

@@ -70,10 +70,10 @@ def _square(components: Sequence[NDArray[Any]], vector: Vector) -> Floats:
     return np.asarray(np.abs(x + y + z) ** 2)
 
 
-def light_of(light: LightText) -> Light:
+def light_components(light: LightText) -> Light:
     """The light of a name in `LIGHT`, an angle with the field in degrees, or three components along X, Y, Z; else ValueError.
 
-    >>> light_of("perpendicular").factors
+    >>> light_components("perpendicular").factors
     (1.1248198369963932e-32, 1.5)
     """
     if isinstance(light, str) and light in LIGHT:

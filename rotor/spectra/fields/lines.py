@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_one_of, require_positive
+from rotor.checks import require_choice, require_positive
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.stark import Z, acting, checked_direction, map_request
 from rotor.quantum.fields.block_states import BlockStates
@@ -33,7 +33,7 @@ from rotor.quantum.fields.field_map import each_block, smallest_jmax
 from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.transitions import BlockPair, pairs_of_blocks, states_of_both_signs
-from rotor.spectra.fields.light import Light, LightText, Vector, light_of
+from rotor.spectra.fields.light import Light, LightText, Vector, light_components
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table
 from rotor.thermodynamics.field_mixture import POPULATIONS, Populations, populations_in_field
@@ -195,9 +195,9 @@ def field_lines(
     >>> found.frequency_mhz.round(2).tolist(), round(float(found.strength_debye2[0]), 4)  # S μ² = 0.49 D²
     ([12000.0, 12005.52], 0.49)
     """
-    seen, unit = light_of(light), checked_direction(direction)
+    seen, unit = light_components(light), checked_direction(direction)
     require_positive("temperature_k", temperature_k, "K")
-    require_one_of("populations", populations, POPULATIONS)
+    require_choice("populations", populations, POPULATIONS)
     request = map_request(
         top,
         fields_kv_per_cm,
@@ -214,7 +214,7 @@ def field_lines(
     mixed = not solved[0].block.space.m_is_good
     seen = seen if mixed else seen.about(unit)
     parts = [
-        _lines_of(solved, pair, strength, populations_of_states, j_highest)
+        _pair_lines(solved, pair, strength, populations_of_states, j_highest)
         for pair, strength in _strengths(acting(top, 0.0, unit, effects)[0], solved, seen, unit)
     ]
     columns = _joined(parts)
@@ -223,7 +223,7 @@ def field_lines(
     columns = _strong(columns, len(request.fields))
     return FieldLines(
         top=top,
-        light=light_of(light).text,
+        light=light_components(light).text,
         temperature_k=temperature_k,
         populations=populations,
         field_kv_per_cm=np.tile(request.fields, len(columns["upper"]) // len(request.fields)),
@@ -279,7 +279,7 @@ class _Part(NamedTuple):
     names: tuple[NDArray[Any], ...]
 
 
-def _lines_of(
+def _pair_lines(
     solved: list[BlockStates], pair: BlockPair, strength: Floats, populations: Populations, j_highest: int
 ) -> _Part:
     """Lines between the states of two blocks; strength: (fields, up, low)."""

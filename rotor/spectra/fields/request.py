@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.checks import require_one_of
+from rotor.checks import require_choice
 from rotor.quantum.fields.stark_request import StarkRequest
 from rotor.requests.field import CONDITIONS, OBSERVABLES, check_fields, declared
 from rotor.requests.readers import Custom, Quantity, Range, Text
-from rotor.spectra.fields.light import LightText, light_of
+from rotor.spectra.fields.light import LightText, light_components
 from rotor.table import Table
 from rotor.thermodynamics.field_mixture import POPULATIONS, field_mixture
 
@@ -98,9 +98,9 @@ class FieldSample:
     )  # fmt: skip
 
     def __post_init__(self) -> None:
-        light_of(self.light)
+        light_components(self.light)
         check_fields(self)
-        require_one_of("populations", self.populations, POPULATIONS)
+        require_choice("populations", self.populations, POPULATIONS)
         if self.range_mhz is not None and not 0 <= self.range_mhz[0] < self.range_mhz[1]:
             raise ValueError(f"range_mhz: {self.range_mhz}: expected two rising frequencies")
 
@@ -112,7 +112,7 @@ class FieldRequest(FieldSample):
     stark: StarkRequest
 
 
-def lines_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> FieldLines:
+def compute_lines(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> FieldLines:
     """The lines at each field of the map."""
     return _lines_at(request, states.fields, executor)
 
@@ -138,7 +138,7 @@ def _lines_at(request: FieldRequest, fields: Any, executor: Executor | None) -> 
     return lines if request.line is None else lines.lobes(*request.line)
 
 
-def spectrum_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Spectrum:
+def compute_spectrum(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Spectrum:
     """The cross section at the highest field, with lines broadened by the spread of the field."""
     from rotor.spectra.fields.spectrum import FieldDistribution, field_spectrum
 
@@ -170,16 +170,16 @@ def _around(lines: FieldLines, linewidth_mhz: float) -> tuple[float, float]:
     return max(float(frequency.min()) - margin, 0.0), float(frequency.max()) + margin
 
 
-def coefficients_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
+def compute_coefficients(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
     """Stark coefficients of the states, or of the lines between the two levels of `line`."""
     from rotor.spectra.fields.stark_coefficients import level_coefficients, line_coefficients
 
     if request.line is None:
         return level_coefficients(states)
-    return line_coefficients(lines_of(request, states, executor))
+    return line_coefficients(compute_lines(request, states, executor))
 
 
-def mixture_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
+def thermal_mixture(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
     """Means of the thermal mixture at each field."""
     stark = request.stark
     if stark.hyperfine:
@@ -196,7 +196,7 @@ def mixture_of(request: FieldRequest, states: FieldMap, executor: Executor | Non
     )
 
 
-def deflection_of(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
+def effective_dipoles(request: FieldRequest, states: FieldMap, executor: Executor | None = None) -> Table:
     """Effective dipoles, a column for each state."""
     from rotor.quantum.fields.deflection import deflection_table
 
@@ -205,9 +205,9 @@ def deflection_of(request: FieldRequest, states: FieldMap, executor: Executor | 
 
 Maker = Callable[[FieldRequest, "FieldMap", "Executor | None"], Table]
 MAKERS: Mapping[str, Maker] = {
-    "lines": lines_of,
-    "spectrum": spectrum_of,
-    "coefficients": coefficients_of,
-    "mixture": mixture_of,
-    "deflection": deflection_of,
+    "lines": compute_lines,
+    "spectrum": compute_spectrum,
+    "coefficients": compute_coefficients,
+    "mixture": thermal_mixture,
+    "deflection": effective_dipoles,
 }

@@ -101,13 +101,13 @@ def level_coefficients(states: FieldMap) -> StarkCoefficients:
 def line_coefficients(lines: FieldLines) -> StarkCoefficients:
     """Stark coefficients of lines: those of the upper state minus those of the lower state."""
     first = [rows.start for rows in lines.pairs()]
-    values, errors = _series_of_blocks(lines.request, lines.blocks)
+    values, errors = _field_series(lines.request, lines.blocks)
     upper, lower = lines.upper_state[first], lines.lower_state[first]
     names = {name: getattr(lines, name)[first] for name in ("upper", "upper_m", "lower", "lower_m")}
     return _coefficients(names, values[upper] - values[lower], errors[upper] + errors[lower])
 
 
-def _series_of_blocks(request: MapRequest, blocks: Sequence[FieldBlock]) -> FieldSeries:
+def _field_series(request: MapRequest, blocks: Sequence[FieldBlock]) -> FieldSeries:
     series = [_block_series(request, block) for block in blocks]
     coefficients, errors = (np.concatenate(parts) for parts in zip(*series, strict=True))
     return FieldSeries(coefficients, errors)

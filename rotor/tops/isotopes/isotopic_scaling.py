@@ -18,7 +18,7 @@ from rotor.arrays import Floats
 from rotor.geometry.inertia import PrincipalFrame
 from rotor.tops.components import symmetric_tensor
 from rotor.tops.constants import Constants
-from rotor.tops.operators import distortion_terms, powers_of_spelled
+from rotor.tops.operators import distortion_terms, spelled_powers
 from rotor.tops.top import Top
 
 # Errors of scaled distortion constants against fitted ones; test_isotopologues.py measures them again.
@@ -120,7 +120,7 @@ def carried_over(parent: Top, rigid: Top, turned: Top, axes: str, angle: float) 
     order = ["abc".index(letter) for letter in axes]
     values = np.array(parent.constants.rigid)[order] * ratios
     values, turned = _in_order(values, turned)
-    constants = _constants_of_kind(values, turned.kind)
+    constants = _kind_constants(values, turned.kind)
     name = parent.name or "the parent"
     note = (
         f"constants are those of {name} times the ratio calculated from its geometry; constants scaled in this way were wrong by "
@@ -186,7 +186,7 @@ def _in_order(values: Floats, turned: Top) -> tuple[Floats, Top]:
     return values[order], annotated
 
 
-def _constants_of_kind(values: Floats, kind: str) -> Constants:
+def _kind_constants(values: Floats, kind: str) -> Constants:
     a, b, c = (float(value) for value in values)
     return {
         "linear": lambda: Constants(B=(b + c) / 2, kind=kind),
@@ -227,7 +227,7 @@ def _with_distortion(
 def _powers(constants: Constants, names: list[str]) -> dict[str, tuple[int, int, int]]:
     """Powers (p, q, n) of the operator of each distortion constant."""
     table = distortion_terms(constants.kind, constants.reduction)
-    spelled = {name: powers_of_spelled(name) for name in names}
+    spelled = {name: spelled_powers(name) for name in names}
     return {name: powers if (powers := spelled[name]) else next(iter(table[name])) for name in names}
 
 

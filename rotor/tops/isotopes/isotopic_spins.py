@@ -18,7 +18,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.molecules.nuclei import Isotope
-from rotor.tops.spins.spin_constants import SpinConstants, spins_of
+from rotor.tops.spins.spin_constants import SpinConstants, spin_names
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
@@ -92,7 +92,7 @@ def _only_atom(molecule: Molecule, spin: str) -> int | None:
 
 
 def _pair_notes(constants: SpinConstants) -> list[str]:
-    pairs = [name for name in constants.values if len(spins_of(name)) != 1]
+    pairs = [name for name in constants.values if len(spin_names(name)) != 1]
     return [f"{', '.join(pairs)}: constants of two spins are not carried over"] if pairs else []
 
 

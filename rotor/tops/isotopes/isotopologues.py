@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import isotope, natural_isotopes
-from rotor.molecules.symmetry.point_group import Symmetry, symmetry_of
+from rotor.molecules.symmetry.point_group import Symmetry, molecule_symmetry
 from rotor.tops.allowed import invariant_vector
 from rotor.tops.isotopes.isotopic_scaling import carried_over, matched_axes, turned_degrees
 from rotor.tops.isotopes.isotopic_spins import carried_spins
@@ -156,7 +156,7 @@ def _geometry(parent: Top) -> Molecule:
 
 def _bare_symmetry(molecule: Molecule) -> Symmetry:
     """The symmetry of the geometry, isotopes ignored."""
-    return symmetry_of(replace(molecule, mass_numbers=_abundant(molecule)))
+    return molecule_symmetry(replace(molecule, mass_numbers=_abundant(molecule)))
 
 
 def _permutations(symmetry: Symmetry) -> list[NDArray[np.int64]]:

@@ -59,23 +59,23 @@ class SpinConstants:
                 raise ValueError(
                     f"spin {name}: expected 1/2, 1, 3/2, ..., found {twice}/2; a nucleus without spin splits nothing"
                 )
-            if _ISOTOPE.fullmatch(name) and twice != twice_of(name):
+            if _ISOTOPE.fullmatch(name) and twice != twice_spin(name):
                 raise ValueError(
-                    f"spin {name} = {spin_text(twice)}: the isotope has {spin_text(twice_of(name))}; leave its spin out, or give it "
+                    f"spin {name} = {spin_text(twice)}: the isotope has {spin_text(twice_spin(name))}; leave its spin out, or give it "
                     "another name"
                 )
         _refuse_totals(self.totals, self.twice)
         if self.weights_of_others and not self.totals:
             raise ValueError("spin weights of the other nuclei: expected a total spin of nuclei beside them")
         for name in self.values:
-            for spin in spins_of(name):
+            for spin in spin_names(name):
                 if spin not in self.twice:
                     raise ValueError(f"{name}: spin {spin} is not among {', '.join(self.twice) or 'none'}")
-            if name.startswith("chi_") and any(self.twice[spin] < 2 for spin in spins_of(name)):
+            if name.startswith("chi_") and any(self.twice[spin] < 2 for spin in spin_names(name)):
                 raise ValueError(f"{name}: a spin of 1/2 has no quadrupole moment; that needs a spin of 1 or more")
         pairs: dict[tuple[str, ...], str] = {}
         for name in self.values:
-            first = pairs.setdefault((name.partition("(")[0], name.partition(")")[2], *sorted(spins_of(name))), name)
+            first = pairs.setdefault((name.partition("(")[0], name.partition(")")[2], *sorted(spin_names(name))), name)
             if first != name:
                 raise ValueError(f"{first} and {name} are one constant of two spins; give it once")
         for name, error in self.uncertainties.items():
@@ -97,7 +97,7 @@ class SpinConstants:
         return {
             name.partition("(")[0]: value
             for name, value in self.values.items()
-            if spins_of(name) == (spin,) and "[" not in name
+            if spin_names(name) == (spin,) and "[" not in name
         }
 
     @classmethod
@@ -141,7 +141,7 @@ class SpinConstants:
         {'S': 1, '1H': 1}
         """
         listed, totals = parse_coupled(spins or "")
-        twice: dict[str, int] = {**listed, **{s: twice_of(s) for s in _named(values_mhz) if s not in listed}}
+        twice: dict[str, int] = {**listed, **{s: twice_spin(s) for s in _named(values_mhz) if s not in listed}}
         ordered = {name: twice[name] for name in sorted(twice, key=lambda name: name in totals)}
         return cls(values_mhz, ordered, source, totals=totals)
 
@@ -176,23 +176,23 @@ def _without_spin(text: str) -> str:
 
 
 def _named(values: Mapping[str, float]) -> list[str]:
-    return list(dict.fromkeys(spin for name in values for spin in spins_of(name)))
+    return list(dict.fromkeys(spin for name in values for spin in spin_names(name)))
 
 
-def spins_of(name: str) -> tuple[str, ...]:
+def spin_names(name: str) -> tuple[str, ...]:
     """Names of the spins of a constant.
 
-    >>> spins_of("T_aa(S,14N)")
+    >>> spin_names("T_aa(S,14N)")
     ('S', '14N')
     """
     inside = name.partition("(")[2].partition(")")[0]
     return tuple(part.strip() for part in inside.split(",") if part.strip())
 
 
-def twice_of(spin: str) -> int:
+def twice_spin(spin: str) -> int:
     """Twice the spin of the isotope that a spin is named after.
 
-    >>> twice_of("14N"), twice_of("35Cl_2"), twice_of("D")
+    >>> twice_spin("14N"), twice_spin("35Cl_2"), twice_spin("D")
     (2, 3, 2)
     """
     match = _ISOTOPE.fullmatch(spin)
@@ -204,7 +204,7 @@ def twice_of(spin: str) -> int:
 def is_isotope(name: str, twice: int) -> bool:
     """Whether a name is that of an isotope whose nucleus has the spin `twice`/2."""
     try:
-        return twice_of(name) == twice
+        return twice_spin(name) == twice
     except ValueError:
         return False
 
@@ -251,7 +251,7 @@ def parse_coupled(text: str) -> tuple[dict[str, int], dict[str, str]]:
                 raise ValueError(f"{text!r}: expected spins such as S=1/2 14N or 35Cl_1+35Cl_2; {part!r} is none")
             if name in spins:
                 raise ValueError(f"{text!r}: spin {name} is given twice; once is enough")
-            spins |= parse_spins(f"{name}={value}") if equals else {name: twice_of(name)}
+            spins |= parse_spins(f"{name}={value}") if equals else {name: twice_spin(name)}
         totals |= dict.fromkeys(together, "I") if len(together) > 1 else {}
     return spins, totals
 

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Ints
 from rotor.molecules.molecule import CLOSEST_ANGSTROM, Molecule
 from rotor.molecules.symmetry.operations import Operation, shortest_distance
-from rotor.molecules.symmetry.point_group import TOLERANCE, Symmetry, find_symmetry, symmetry_of
+from rotor.molecules.symmetry.point_group import TOLERANCE, Symmetry, find_symmetry, molecule_symmetry
 from rotor.tops.spins.spin_weights import IRREPS, SPECIES, SpinWeights, character_table
 
 STATES = ("symmetric", "antisymmetric")  # lower and upper state of each inversion doublet
@@ -39,7 +39,7 @@ class CharacterRow:
     character: int
 
 
-def weights_of(
+def statistical_weights(
     molecule: Molecule,
     tolerance: float = TOLERANCE,
     electronic: str | Sequence[int] | None = None,
@@ -50,7 +50,7 @@ def weights_of(
     Parameters
     ----------
     molecule : Molecule
-    tolerance : as for `symmetry_of`.
+    tolerance : as for `molecule_symmetry`.
     electronic : symmetry of the electronic and vibrational state under the rotations, as for `spin_weights`; None for
         that of the molecule.
     inversion : None for unresolved inversion doublets; `"symmetric"` or `"antisymmetric"` for the weights of one state of
@@ -64,15 +64,15 @@ def weights_of(
     Examples
     --------
     >>> water = Molecule(("O", "H", "H"), [[0, 0, 0.1173], [0, 0.7572, -0.4692], [0, -0.7572, -0.4692]])
-    >>> weights_of(water).to_mapping()
+    >>> statistical_weights(water).to_mapping()
     {'ee': 1, 'eo': 3, 'oe': 3, 'oo': 1}
-    >>> weights_of(water.with_isotopes("2=2H")).to_mapping()
+    >>> statistical_weights(water.with_isotopes("2=2H")).to_mapping()
     {}
     """
     spins = [nucleus.spin for nucleus in molecule.nuclei]
     electronic = molecule.electronic if electronic is None else electronic
     if inversion is None:
-        return spin_weights(symmetry_of(molecule, tolerance), spins, electronic)
+        return spin_weights(molecule_symmetry(molecule, tolerance), spins, electronic)
     if inversion not in STATES:
         raise ValueError(f"inversion {inversion!r}: expected None, 'symmetric' or 'antisymmetric'")
     if electronic != "even":
@@ -146,7 +146,7 @@ def character_rows(
     """The characters f(R) behind the weights, one row for each class of rotations: E first, the others by name."""
     counts: dict[tuple[str, tuple[tuple[float, int, int], ...], int], int] = {}
     for operation, character in zip(symmetry.rotations, spin_characters(symmetry, spins, electronic), strict=True):
-        key = _name_of(symmetry, operation), cycles(operation.permutation, spins), character
+        key = _operation_name(symmetry, operation), cycles(operation.permutation, spins), character
         counts[key] = counts.get(key, 0) + 1
     ordered = sorted(
         counts.items(), key=lambda item: (item[0][0] != "E", item[0])
@@ -264,7 +264,7 @@ def _principal_letter(symmetry: Symmetry, operation: Operation) -> str:
     return "abc"[int(np.argmax(np.abs(symmetry.axes_abc @ operation.axis)))]
 
 
-def _name_of(symmetry: Symmetry, operation: Operation) -> str:
+def _operation_name(symmetry: Symmetry, operation: Operation) -> str:
     """E, C3, C2(b) along a principal axis, C2′ across the main axis, C4² along a fourfold one."""
     if operation.order == 1:
         return "E"
@@ -290,7 +290,7 @@ def _by_parities(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int
         ka, kc = (-1 if parity == "o" else 1 for parity in species)
         signs = {"E": 1, "C2(a)": ka, "C2(b)": ka * kc, "C2(c)": kc}
         terms = [
-            signs[_name_of(symmetry, operation)] * f
+            signs[_operation_name(symmetry, operation)] * f
             for operation, f in zip(symmetry.rotations, characters, strict=True)
         ]
         weights[species] = sum(terms) // len(terms)
@@ -327,7 +327,7 @@ def _by_irrep(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int]:
     irreps = IRREPS[symmetry.rotation_group]
     classes, table = character_table(irreps)
     character_by_name = {
-        _name_of(symmetry, operation): f for operation, f in zip(symmetry.rotations, characters, strict=True)
+        _operation_name(symmetry, operation): f for operation, f in zip(symmetry.rotations, characters, strict=True)
     }
     names = ["E" if n == 1 else f"C{n}" for n, _, _ in classes]
     if symmetry.rotation_group == "O":

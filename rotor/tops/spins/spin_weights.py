@@ -14,6 +14,8 @@ from math import gcd
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rotor.checks import Renamed
+
 SPECIES = ("ee", "eo", "oe", "oo")  # parities of Ka and Kc
 MOST_WEIGHT = 2**53  # weights up to here add up exactly
 CUBIC_IRREPS = ("A1", "A2", "E", "F1", "F2")  # of the rotation group O
@@ -36,7 +38,7 @@ class SpinWeights:
 
     >>> SpinWeights.from_mapping({"ee": 10, "eo": 30, "oe": 30, "oo": 10})
     SpinWeights(rule='KaKc', classes=('ee', 'eo', 'oe', 'oo'), values=(1, 3, 3, 1))
-    >>> SpinWeights.from_mapping({"0even": 14, "0odd": 6, "1": 11, "2": 9, "3": 14, "4": 9, "5": 11}).of_symmetric(6, 6)
+    >>> SpinWeights.from_mapping({"0even": 14, "0odd": 6, "1": 11, "2": 9, "3": 14, "4": 9, "5": 11}).symmetric_weights(6, 6)
     array(20)
     """
 
@@ -48,7 +50,7 @@ class SpinWeights:
     def from_mapping(cls, weights: dict[str, int]) -> SpinWeights:
         """Weights from a mapping by class name, reduced by their common divisor; the names of the classes determine the rule."""
         names = {str(name): weight for name, weight in weights.items()}
-        rule, classes = _rule_of(set(names))
+        rule, classes = _weight_rule(set(names))
         values = [names[name] for name in classes]
         if any(int(v) != v or v < 0 for v in values) or not any(values):
             raise ValueError(f"spin weights {weights}: expected whole numbers of 0 or more, not all 0")
@@ -93,10 +95,10 @@ class SpinWeights:
         both = zip(self.classes, self.values, self.exchanged().values, strict=True)
         return SpinWeights.from_mapping({name: even * weight + odd * other for name, weight, other in both})
 
-    def is_of_pair(self, twice: int) -> bool:
+    def fits_pair(self, twice: int) -> bool:
         """Whether the weights are those of only two nuclei of spin i = `twice`/2: a ratio of i + 1 to i.
 
-        >>> SpinWeights.from_mapping({"ee": 6, "eo": 6, "oe": 3, "oo": 3}).is_of_pair(2)
+        >>> SpinWeights.from_mapping({"ee": 6, "eo": 6, "oe": 3, "oo": 3}).fits_pair(2)
         True
         """
         divisor = gcd(twice, 2)
@@ -107,7 +109,7 @@ class SpinWeights:
         """Mean weight of a component over many levels; the classical limit of Q contains it."""
         if self.rule == "irrep":
             j = np.arange(60)  # the counts of irreps repeat with J modulo 12 (T, O) or 30 (I)
-            return float(self.of_spherical(j).sum() / (2 * j + 1).sum())
+            return float(self.spherical_weights(j).sum() / (2 * j + 1).sum())
         values = self._by_residue() if self.rule == "K" else self.values
         return float(sum(values) / len(values))
 
@@ -117,14 +119,14 @@ class SpinWeights:
         self._require(("K",), "K")
         return len(self.classes) - ("0odd" in self.classes)
 
-    def of_ka_kc(self, species: str) -> int:
+    def asymmetric_weight(self, species: str) -> int:
         """Weight of a level of an asymmetric top; species: parities of Ka and Kc."""
         if self.rule == "none":
             return 1
         self._require(("KaKc",), "an asymmetric top")
         return self.values[self.classes.index(species)]
 
-    def of_symmetric(self, j: ArrayLike, k: ArrayLike, oblate: bool = False) -> NDArray[np.int64]:
+    def symmetric_weights(self, j: ArrayLike, k: ArrayLike, oblate: bool = False) -> NDArray[np.int64]:
         """Weights of symmetric-top levels (J, |K|), summed over both signs of K.
 
         For weights by parities of (Ka, Kc) (an accidentally symmetric top, or one with only twofold axes), K is Ka, or Kc if `oblate`.
@@ -142,7 +144,7 @@ class SpinWeights:
         alone = self._whole_numbers()[j % 2 if "0odd" in self.classes else np.zeros_like(j)]
         return np.asarray(np.where(k == 0, alone, doubled[k % len(doubled)]))
 
-    def of_spherical(self, j: ArrayLike) -> NDArray[np.int64]:
+    def spherical_weights(self, j: ArrayLike) -> NDArray[np.int64]:
         """Weights of the levels J of a spherical top, summed over the irreps in its 2J+1 components of K.
 
         Weights by K or by parities of (Ka, Kc), of an accidentally spherical top, are summed in the same way.
@@ -154,13 +156,13 @@ class SpinWeights:
         if self.rule == "irrep":
             counts = irreps_in_j(j, self.classes)
             return np.asarray(np.tensordot(self._whole_numbers(), counts, axes=1))
-        sums = [self.of_symmetric(value, np.arange(value + 1)).sum() for value in j.ravel().tolist()]
+        sums = [self.symmetric_weights(value, np.arange(value + 1)).sum() for value in j.ravel().tolist()]
         return np.array(sums, dtype=np.int64).reshape(j.shape)
 
-    def of_irrep(self, irrep: str) -> int:
+    def irrep_weight(self, irrep: str) -> int:
         """Weight of a level of a spherical top with all its 1, 2 or 3 components, by its irrep A1, A2, E, F1 or F2.
 
-        >>> SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3}).of_irrep("F2")
+        >>> SpinWeights.from_mapping({"A": 5, "E": 2, "F": 3}).irrep_weight("F2")
         3
         """
         if irrep not in CUBIC_IRREPS:
@@ -174,13 +176,19 @@ class SpinWeights:
             )
         return int(self._whole_numbers()[self.classes.index(irrep if irrep in self.classes else irrep[0])])
 
-    def of_j(self, j: ArrayLike) -> NDArray[np.int64]:
+    def linear_weights(self, j: ArrayLike) -> NDArray[np.int64]:
         """Weights of linear-molecule levels, by parity of J."""
         j = np.asarray(j)
         if self.rule == "none":
             return np.ones(j.shape, dtype=np.int64)
         self._require(("J",), "a linear molecule")
         return np.asarray(self._whole_numbers()[j % 2])
+
+    of_ka_kc = Renamed("asymmetric_weight")
+    of_symmetric = Renamed("symmetric_weights")
+    of_spherical = Renamed("spherical_weights")
+    of_irrep = Renamed("irrep_weight")
+    of_j = Renamed("linear_weights")
 
     def _by_residue(self) -> NDArray[np.float64]:
         """Weight of a component of a pair with |K| > 0, by |K| modulo n; half of 0even + 0odd for residue 0."""
@@ -261,7 +269,7 @@ _EXAMPLES = {
 }
 
 
-def _rule_of(names: set[str]) -> tuple[str, tuple[str, ...]]:
+def _weight_rule(names: set[str]) -> tuple[str, tuple[str, ...]]:
     if names == set(SPECIES):
         return "KaKc", SPECIES
     if names == {"even", "odd"}:

@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
+from rotor.checks import Renamed
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.units import parse_quantity
 
@@ -76,8 +77,8 @@ class StateConstants:
         self._refuse_unknown_states()
         first_names: dict[tuple[str, tuple[int, ...]], str] = {}
         for name in self.couplings:
-            kind_of_coupling(name)
-            first = first_names.setdefault((name.partition("[")[0].strip(), states_of_name(name)), name)
+            coupling_kind(name)
+            first = first_names.setdefault((name.partition("[")[0].strip(), state_numbers(name)), name)
             if first != name:
                 raise ValueError(f"{first} and {name} are one coupling; give it once")
         if self.symmetry and self.symmetry not in GROUPS:
@@ -99,13 +100,15 @@ class StateConstants:
         """The names of the constants that connect two states."""
         return tuple(name for name, states in self._states.items() if len(states) == 2)
 
-    def of_state(self, v: int) -> dict[str, float]:
+    def for_state(self, v: int) -> dict[str, float]:
         """Constants of a state in MHz, E included, by name without brackets.
 
-        >>> StateConstants({"E[1]": 5.0, "B[1]": 3.0}).of_state(1)
+        >>> StateConstants({"E[1]": 5.0, "B[1]": 3.0}).for_state(1)
         {'E': 5.0, 'B': 3.0}
         """
         return {name.partition("[")[0]: self.values[name] for name, states in self._states.items() if states == (v,)}
+
+    of_state = Renamed("for_state")
 
     def name_of(self, v: int) -> str:
         """The name of a state, or its number if it has no name."""
@@ -130,7 +133,7 @@ class StateConstants:
             return ()
         of_pairs: dict[tuple[int, ...], dict[str, str]] = {}
         for name in self.couplings:
-            of_pairs.setdefault(self._states[name], {}).setdefault(kind_of_coupling(name), name)
+            of_pairs.setdefault(self._states[name], {}).setdefault(coupling_kind(name), name)
         notes = []
         for kinds in of_pairs.values():
             if len(kinds) > 2:
@@ -143,7 +146,7 @@ class StateConstants:
 
     @property
     def _states(self) -> dict[str, tuple[int, ...]]:
-        return {name: states_of_name(name) for name in self.values}
+        return {name: state_numbers(name) for name in self.values}
 
     def _refuse_unknown_states(self) -> None:
         numbers = {0} | {states[0] for states in self._states.values() if len(states) == 1}
@@ -170,7 +173,7 @@ class StateConstants:
         """
         taken: dict[tuple[int, ...], tuple[str, str]] = {}
         for name in self.couplings:
-            kind = _class_of(kind_of_coupling(name), even)
+            kind = _coupling_class(coupling_kind(name), even)
             first, other = taken.setdefault(self._states[name], (name, kind))
             if kind != other:
                 raise ValueError(
@@ -206,10 +209,10 @@ def _vector(vector: Any) -> Vector:
     return a, b, c
 
 
-def states_of_name(name: str) -> tuple[int, ...]:
+def state_numbers(name: str) -> tuple[int, ...]:
     """Numbers of the states in the brackets of a name, in rising order.
 
-    >>> states_of_name("B[1]"), states_of_name("G_c[1,0]")
+    >>> state_numbers("B[1]"), state_numbers("G_c[1,0]")
     ((1,), (0, 1))
     """
     inside = name.partition("[")[2].rstrip("]").split(",")
@@ -225,10 +228,10 @@ def states_of_name(name: str) -> tuple[int, ...]:
     return states
 
 
-def kind_of_coupling(name: str) -> str:
+def coupling_kind(name: str) -> str:
     """Axis of the rotation that a coupling transforms like; "" for W.
 
-    >>> [kind_of_coupling(name) for name in ("G_c[0,1]", "F_bc_J[0,1]", "W_pm2[0,1]")]
+    >>> [coupling_kind(name) for name in ("G_c[0,1]", "F_bc_J[0,1]", "W_pm2[0,1]")]
     ['c', 'a', '']
     """
     match = _COUPLINGS.fullmatch(name.partition("[")[0])
@@ -237,7 +240,7 @@ def kind_of_coupling(name: str) -> str:
     return match["g"] or {"bc": "a", "ac": "b", "ab": "c"}.get(match["f"] or "", "")
 
 
-def _class_of(kind: str, even: str) -> str:
+def _coupling_class(kind: str, even: str) -> str:
     """Class of a kind of coupling: kinds that the group does not distinguish share it. Kinds in `even` are totally symmetric."""
     if kind in even:
         return ""

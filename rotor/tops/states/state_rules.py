@@ -12,7 +12,7 @@ import numpy as np
 
 from rotor.tops.constants import Constants
 from rotor.tops.kind_of_constants import vocabulary
-from rotor.tops.operators import powers_of_spelled
+from rotor.tops.operators import spelled_powers
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import StateConstants, Vector
 
@@ -31,12 +31,12 @@ def refuse_incomplete_states(states: StateConstants, kind: str, constants: Const
     rigid = [name for name in constants.values if name in ("A", "B", "C")]
     known = ("E", *vocabulary(kind, constants.reduction))
     for v in range(1, states.count):
-        strange = [name for name in states.of_state(v) if name not in known and not powers_of_spelled(name)]
+        strange = [name for name in states.for_state(v) if name not in known and not spelled_powers(name)]
         if strange:
             raise ValueError(f"{strange[0]}[{v}]: a state of this {kind} top has {', '.join(known)}")
         if kind == "asymmetric" and constants.reduction is None:
             _refuse_reduced(states, v)
-        missing = [name for name in rigid if name not in states.of_state(v)]
+        missing = [name for name in rigid if name not in states.for_state(v)]
         if missing:
             raise ValueError(
                 f"state {states.name_of(v)}: no {', '.join(f'{name}[{v}]' for name in missing)}; each state has constants of its own"
@@ -45,7 +45,7 @@ def refuse_incomplete_states(states: StateConstants, kind: str, constants: Const
 
 def _refuse_reduced(states: StateConstants, v: int) -> None:
     """Raise ValueError for distortion constants of a further state if the first state has no reduction."""
-    reduced = [name for name in states.of_state(v) if name not in ("E", "A", "B", "C") and not powers_of_spelled(name)]
+    reduced = [name for name in states.for_state(v) if name not in ("E", "A", "B", "C") and not spelled_powers(name)]
     if reduced:
         raise ValueError(
             f"{reduced[0]}[{v}]: the constants of the first state are rigid and have no reduction; "

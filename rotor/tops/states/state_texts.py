@@ -93,8 +93,8 @@ def _changed(states: StateConstants, key: str, text: str, top: Top) -> StateCons
     if key == "state_symmetry":
         return replace(states, symmetry=text.strip())
     if key == "state_weights":
-        return replace(states, weights={**states.weights, **weights_of_text(text, top)})
-    return replace(states, dipoles={**states.dipoles, **dipoles_of_text(text)})
+        return replace(states, weights={**states.weights, **parse_weights(text, top)})
+    return replace(states, dipoles={**states.dipoles, **parse_dipoles(text)})
 
 
 def _parsed(key: str, make: Callable[[], T]) -> T:
@@ -104,10 +104,10 @@ def _parsed(key: str, make: Callable[[], T]) -> T:
         raise ValueError(f"{key}: {error}") from None
 
 
-def dipoles_of_text(text: str) -> dict[tuple[int, int], Vector]:
+def parse_dipoles(text: str) -> dict[tuple[int, int], Vector]:
     """Dipoles in debye by pairs of states, from `[1] 0,0,1.3 [0,1] 0,0,1.47`.
 
-    >>> dipoles_of_text("[1]=0,0,1.3 [0,1]=0,0,1.47 D")
+    >>> parse_dipoles("[1]=0,0,1.3 [0,1]=0,0,1.47 D")
     {(1, 1): (0.0, 0.0, 1.3), (1, 0): (0.0, 0.0, 1.47)}
     """
     dipoles: dict[tuple[int, int], Vector] = {}
@@ -122,7 +122,7 @@ def dipoles_of_text(text: str) -> dict[tuple[int, int], Vector]:
     return dipoles
 
 
-def weights_of_text(text: str, top: Top) -> dict[int, SpinWeights]:
+def parse_weights(text: str, top: Top) -> dict[int, SpinWeights]:
     """Spin weights by state, from `[0] even=1,odd=3 [1] even=3,odd=1`; "none" for equal weights of all levels."""
     weights: dict[int, SpinWeights] = {}
     for (state,), part in _items(text, "[1] even=3,odd=1", 1):

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import rotor.formats.spcat
-from rotor.formats.spcat.hamiltonian.code_table import TABLE, Kind, product_of_axes, split_code
+from rotor.formats.spcat.hamiltonian.code_table import TABLE, Kind, axis_product, split_code
 from rotor.formats.spcat.hamiltonian.codes import AXES
-from rotor.formats.spcat.hamiltonian.operators import operator_of
-from rotor.formats.spcat.hamiltonian.spin_operators import plain_of_j
+from rotor.formats.spcat.hamiltonian.operators import code_operator
+from rotor.formats.spcat.hamiltonian.spin_operators import single_j_operator
 from rotor.quantum.wang.j_operators import anticommutator, components, half_turn
 
 J = 6
@@ -28,8 +28,8 @@ def test_every_typ_stands_in_one_row():
 def test_symmetries_are_those_of_the_operators(typ: int, representation: str):
     """Half turns about a, b, c, time reversal (with the factor i of an odd operator) and the change of K, by elements over |J k>."""
     digits, oblate = split_code(10_000 * typ), representation == "IIIl"
-    symmetry, operator = digits.symmetry(oblate), operator_of(digits, AXES[representation])
-    matrix = (operator.by_j or plain_of_j(operator.plain or {}))(J, representation).matrix
+    symmetry, operator = digits.symmetry(oblate), code_operator(digits, AXES[representation])
+    matrix = (operator.by_j or single_j_operator(operator.plain or {}))(J, representation).matrix
     assert matrix.any()
     for axis in "abc":
         turn = half_turn(J, representation, axis).matrix
@@ -51,14 +51,14 @@ def test_the_codes_of_na_nb_nc_are_those_of_the_manual(typ: int, axis: str):
     of = components(J, "Ir")
     first, second = (letter for letter in "abc" if letter != axis)
     for code, matrix in ((typ, 1j * of[axis].matrix), (typ + 1, anticommutator(of[first], of[second]).matrix)):
-        operator = operator_of(split_code(10_000 * code), AXES["Ir"])
+        operator = code_operator(split_code(10_000 * code), AXES["Ir"])
         assert operator.by_j is not None
         np.testing.assert_allclose(operator.by_j(J, "Ir").matrix, matrix, atol=1e-12)
 
 
 def test_axes_multiply_as_half_turns_do():
     pairs = [("a", "b"), ("b", "c"), ("a", "c"), ("b", "b"), ("", "a")]
-    assert [product_of_axes(*pair) for pair in pairs] == ["c", "a", "b", "", "a"]
+    assert [axis_product(*pair) for pair in pairs] == ["c", "a", "b", "", "a"]
 
 
 def test_no_other_module_compares_numbers_of_typ():

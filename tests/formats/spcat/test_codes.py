@@ -51,7 +51,7 @@ def test_codes_that_are_none_are_refused():
     with pytest.raises(ValueError, match="digits"):
         codes.split_code(10**13)
     with pytest.raises(ValueError, match="KSQ = 10 does not fit 1 digit"):
-        codes.code_of_term(0, 10, 0)
+        codes.term_code(0, 10, 0)
 
 
 # Names
@@ -72,7 +72,7 @@ def test_codes_and_signs_are_those_of_the_hamiltonian(kind, reduction, table):
     for item in table:
         constants = Constants(**rigid, **{item.name: 1.0}, kind=kind, reduction=reduction)
         ((term, coefficient),) = centrifugal_operators(constants).items()
-        assert (item.code, item.sign) == (codes.code_of_term(*term), coefficient)
+        assert (item.code, item.sign) == (codes.term_code(*term), coefficient)
 
 
 @pytest.mark.parametrize(
@@ -81,13 +81,13 @@ def test_codes_and_signs_are_those_of_the_hamiltonian(kind, reduction, table):
 def test_the_reduction_is_that_of_the_operators_before_that_of_the_letter(letter, code, reduction):
     """deltaK, 41000, is Watson's A-reduction alone; DeltaK and deltaJ, 2000 and 40100, are in both."""
     text = f"x\n4 1 1 0\n{letter} 1 1 0 99\n10000 9400.0 0\n20000 3100.0 0\n30000 2500.0 0\n{code} -1e-3 0\n"
-    assert codes.constants_of(read_par(text.encode())).reduction == reduction
+    assert codes.file_constants(read_par(text.encode())).reduction == reduction
 
 
 def test_signs_of_published_constants():
-    a = codes.constants_of(read_par(SAMPLES / "h2o_octic.var"))
+    a = codes.file_constants(read_par(SAMPLES / "h2o_octic.var"))
     assert (a["DeltaJ"], a["deltaJ"], a["PhiK"], a["LK"]) == (37.59422, 15.210402, 3.733028, -0.005)
-    s = codes.constants_of(read_par(SAMPLES / "h2co.var"))
+    s = codes.file_constants(read_par(SAMPLES / "h2co.var"))
     assert (s["DJ"], s["d1"], s["HJ"]) == (7.031916984780129e-2, -1.043742519322449e-2, -1.476578679469996e-9)
 
 
@@ -133,42 +133,42 @@ def test_levels_from_codes_are_those_of_the_program(case):
 @pytest.mark.parametrize("case", CASES)
 def test_named_constants_say_the_same_hamiltonian_as_the_codes(case):
     file = read_par(SAMPLES / f"{case}.var")
-    constants = codes.constants_of(file)
+    constants = codes.file_constants(file)
     operators = {**rigid_operators(constants)}
     for term, value in centrifugal_operators(constants).items():
         operators[term] = operators.get(term, 0.0) + value
     direct = {p.code: p.value for p in file.parameters}
-    distortion = {codes.code_of_term(*term): v for term, v in operators.items() if sum(term) > 1 and term != (0, 0, 1)}
+    distortion = {codes.term_code(*term): v for term, v in operators.items() if sum(term) > 1 and term != (0, 0, 1)}
     assert distortion == {code: v for code, v in direct.items() if code not in (100, 1000, 10000, 20000, 30000)}
 
 
 def test_mean_and_difference_codes_make_the_same_constants():
     a, b, c = 9.0, 4.0, 3.0
-    direct = codes.constants_of(file_of((10000, a), (20000, b), (30000, c)))
-    mean = codes.constants_of(file_of((100, (b + c) / 2), (1000, a - (b + c) / 2), (40000, (b - c) / 4)))
+    direct = codes.file_constants(file_of((10000, a), (20000, b), (30000, c)))
+    mean = codes.file_constants(file_of((100, (b + c) / 2), (1000, a - (b + c) / 2), (40000, (b - c) / 4)))
     assert direct == mean == Constants(A=a, B=b, C=c, representation="Ir")
     oblate = Options("a", nvib=-1, knmax=20)
-    mean = codes.constants_of(
+    mean = codes.file_constants(
         file_of((199, (a + b) / 2), (1099, c - (a + b) / 2), (40099, (b - a) / 4), options=oblate)
     )
     assert mean == Constants(A=a, B=b, C=c, representation="IIIl")
 
 
 def test_kinds():
-    assert codes.constants_of(file_of((100, 5.0), (1000, -2.0))).kind == "oblate"
-    assert codes.constants_of(file_of((100, 5.0), (200, -1e-3))).kind == "spherical"
-    assert codes.constants_of(read_par(SAMPLES / "ocs.var")).kind == "linear"
+    assert codes.file_constants(file_of((100, 5.0), (1000, -2.0))).kind == "oblate"
+    assert codes.file_constants(file_of((100, 5.0), (200, -1e-3))).kind == "spherical"
+    assert codes.file_constants(read_par(SAMPLES / "ocs.var")).kind == "linear"
 
 
 def test_errors_become_uncertainties_when_asked():
     file = read_par((SAMPLES / "h2co.var").read_bytes().replace(b"1.00000000E-037", b"2.5E-03"))
-    assert codes.constants_of(file).uncertainties == {}
-    assert set(codes.constants_of(file, errors=True).uncertainties.values()) == {2.5e-3}
+    assert codes.file_constants(file).uncertainties == {}
+    assert set(codes.file_constants(file, errors=True).uncertainties.values()) == {2.5e-3}
     twice = file_of((100, 5.0), (1000, 1.0), (1000, 1.0))
     twice = ParameterFile(*[getattr(twice, n) for n in ("title", "header", "options")], tuple(
         Parameter(p.code, p.value, 0.5) for p in twice.parameters
     ))  # fmt: skip
-    assert codes.constants_of(twice, errors=True).uncertainties == {"B": 0.5}
+    assert codes.file_constants(twice, errors=True).uncertainties == {"B": 0.5}
 
 
 @pytest.mark.parametrize(
@@ -190,14 +190,14 @@ def test_errors_become_uncertainties_when_asked():
 )
 def test_what_is_not_computed_yet_is_refused_by_name(file, words):
     with pytest.raises(ValueError, match=words):
-        codes.constants_of(file)
+        codes.file_constants(file)
 
 
 def test_terms_without_a_published_name_are_spelled_out():
-    constants = codes.constants_of(read_par(SAMPLES / "h2s.par"))
+    constants = codes.file_constants(read_par(SAMPLES / "h2s.par"))
     assert constants["J8Jpm2"] == pytest.approx(9.6347e-10, rel=1e-4)  # code 40400; printed here with five digits
     assert constants["Jpm10"] == pytest.approx(3.18e-10, rel=1e-3)  # code 80000
-    again = {p.code: p.value for p in codes.parameters_of(constants)}
+    again = {p.code: p.value for p in codes.parameter_lines(constants)}
     assert again[40400] == constants["J8Jpm2"]
 
 
@@ -207,26 +207,26 @@ def test_terms_without_a_published_name_are_spelled_out():
 @pytest.mark.parametrize("case", CASES)
 def test_spin_weights_are_those_of_the_listed_levels(case):
     options = read_par(SAMPLES / f"{case}.var").options[0]
-    weights = model.weights_of(options)
+    weights = model.option_weights(options)
     common = gcd(options.wtpl, options.wtmn, options.ewt if options.iax in model.FOLD else 0)
     levels = read_egy(SAMPLES / f"{case}_part.egy")
     for i in range(len(levels)):
         j, *k = levels.quanta[i].tolist()
         if len(k) == 2:
-            expected = weights.of_ka_kc("".join("eo"[q % 2] for q in k))
+            expected = weights.asymmetric_weight("".join("eo"[q % 2] for q in k))
         else:
             both = 2 if k and k[0] else 1  # the two signs of K are two lines of the file
-            expected = int(weights.of_symmetric(j, abs(k[0]))) // both if k else int(weights.of_j(j))
+            expected = int(weights.symmetric_weights(j, abs(k[0]))) // both if k else int(weights.linear_weights(j))
         assert levels.degeneracy[i] == expected * common * (2 * j + 1)
     if case == "so2":
         assert len(levels) == 41  # those of weight 0 are not listed
 
 
 def test_weights_of_other_option_lines():
-    assert model.weights_of(Options("l", -1, 1, 0, 0, 0, 2, 1, 3)).to_mapping() == {"even": 1, "odd": 3}
-    assert model.weights_of(Options("l", -1, 1, 0, 0, 0, 1, 1, 3)) == SpinWeights()
-    assert model.weights_of(Options("s", -1, 1, 0, 20, 0, 1, 6, 4)).to_mapping() == {"0": 3, "1": 2}
-    assert model.weights_of(Options("a", 1, 1, 0, 20, 0, 3, 10, 6, 1)).to_mapping() == {
+    assert model.option_weights(Options("l", -1, 1, 0, 0, 0, 2, 1, 3)).to_mapping() == {"even": 1, "odd": 3}
+    assert model.option_weights(Options("l", -1, 1, 0, 0, 0, 1, 1, 3)) == SpinWeights()
+    assert model.option_weights(Options("s", -1, 1, 0, 20, 0, 1, 6, 4)).to_mapping() == {"0": 3, "1": 2}
+    assert model.option_weights(Options("a", 1, 1, 0, 20, 0, 3, 10, 6, 1)).to_mapping() == {
         "ee": 3,
         "oe": 3,
         "eo": 5,
@@ -246,15 +246,15 @@ def test_weights_of_other_option_lines():
 )
 def test_weights_that_are_not_computed_yet_are_refused(options, words):
     with pytest.raises(ValueError, match=words):
-        model.weights_of(options)
+        model.option_weights(options)
 
 
 def test_weights_of_a_threefold_axis_with_one_class_missing():
     """NH3 of one inversion state: K = 0 has odd J; half of the E levels are there, at twice their weight (SPFIT's documentation)."""
-    computed = model.weights_of(Options(iax=6, wtpl=0, wtmn=4, ewt=2)).to_mapping()
+    computed = model.option_weights(Options(iax=6, wtpl=0, wtmn=4, ewt=2)).to_mapping()
     assert computed == {"0even": 0, "0odd": 4, "1": 1, "2": 1}
     with pytest.raises(ValueError, match="IAX = 6 of an asymmetric top"):
-        model.weights_of(Options(iax=6, wtpl=0, wtmn=4, ewt=2), False)
+        model.option_weights(Options(iax=6, wtpl=0, wtmn=4, ewt=2), False)
 
 
 # There and back
@@ -263,11 +263,11 @@ def test_weights_of_a_threefold_axis_with_one_class_missing():
 @pytest.mark.parametrize("case", CASES)
 def test_a_top_goes_to_files_and_comes_back(case):
     file, intensities = read_par(SAMPLES / f"{case}.var"), read_int(SAMPLES / f"{case}.int")
-    top = model.top_of(file, intensities)
+    top = model.spcat_top(file, intensities)
     again = read_par(format_par(model.parameter_file(top, file.options[0].knmax)))
     values = {p.code: p.value for p in file.parameters}
     assert {p.code: p.value for p in again.parameters} == pytest.approx(values, rel=4e-16)  # A - B: one rounding
-    back = model.top_of(again, model.intensity_file(top, intensities.request))
+    back = model.spcat_top(again, model.intensity_file(top, intensities.request))
     assert back.dipole_abc_debye == top.dipole_abc_debye
     assert back.spin_weights == top.spin_weights
     assert again.options[0].nvib == file.options[0].nvib
@@ -285,7 +285,7 @@ def test_a_top_goes_to_files_and_comes_back(case):
 def test_weights_go_to_an_option_line_and_come_back(weights, representation):
     constants = Constants(A=3.0, B=2.0, C=1.0, representation=representation)
     spin_weights = SpinWeights.from_mapping(weights)
-    assert model.weights_of(model.options_of(constants, spin_weights, 10)) == spin_weights
+    assert model.option_weights(model.option_line(constants, spin_weights, 10)) == spin_weights
 
 
 @pytest.mark.parametrize(
@@ -298,28 +298,28 @@ def test_weights_go_to_an_option_line_and_come_back(weights, representation):
 )
 def test_weights_of_symmetric_and_linear_tops_come_back(constants, weights):
     spin_weights = SpinWeights.from_mapping(weights)
-    assert model.weights_of(model.options_of(constants, spin_weights, 10)) == spin_weights
+    assert model.option_weights(model.option_line(constants, spin_weights, 10)) == spin_weights
 
 
 def test_what_the_files_cannot_say_is_refused():
     with pytest.raises(ValueError, match="representation IIIr"):
-        codes.parameters_of(Constants(A=3.0, B=2.0, C=1.0, representation="IIIr"))
+        codes.parameter_lines(Constants(A=3.0, B=2.0, C=1.0, representation="IIIr"))
     four = SpinWeights.from_mapping({"ee": 7, "eo": 3, "oe": 3, "oo": 1})
     with pytest.raises(ValueError, match="cannot say"):
-        model.options_of(Constants(A=3.0, B=2.0, C=1.0), four, 10)
+        model.option_line(Constants(A=3.0, B=2.0, C=1.0), four, 10)
     with pytest.raises(ValueError, match=r"has no dipole"):
         model.intensity_file(Top.from_constants("B=1 MHz"), Request())
     with pytest.raises(ValueError, match=r"dipole 30001: .*not computed yet"):
-        model.dipole_of(read_int(SAMPLES / "co_4.int"))
+        model.file_dipole(read_int(SAMPLES / "co_4.int"))
     waves = IntensityFile("t", Request(flags=1000), (Dipole(1, 1.0),))
     with pytest.raises(ValueError, match="cm⁻¹"):
-        model.top_of(file_of((100, 5.0)), waves)
+        model.spcat_top(file_of((100, 5.0)), waves)
 
 
 def test_the_symmetry_axis_is_where_the_kind_says():
     along_z = IntensityFile("t", Request(), (Dipole(1, 1.5),))
-    assert model.top_of(file_of((100, 5.0), (1000, 2.0)), along_z).dipole_abc_debye == (1.5, 0.0, 0.0)
-    assert model.top_of(file_of((100, 5.0), (1000, -2.0)), along_z).dipole_abc_debye == (0.0, 0.0, 1.5)
+    assert model.spcat_top(file_of((100, 5.0), (1000, 2.0)), along_z).dipole_abc_debye == (1.5, 0.0, 0.0)
+    assert model.spcat_top(file_of((100, 5.0), (1000, -2.0)), along_z).dipole_abc_debye == (0.0, 0.0, 1.5)
 
 
 def test_mutated_parameter_files_make_a_top_or_a_refusal():
@@ -332,7 +332,7 @@ def test_mutated_parameter_files_make_a_top_or_a_refusal():
         for _ in range(int(rng.integers(1, 3))):
             data[int(rng.integers(start, len(data)))] = int(rng.choice(list(b" 0123456789.+-E/")))
         try:
-            top = model.top_of(read_par(bytes(data)))
+            top = model.spcat_top(read_par(bytes(data)))
         except ValueError:
             refused += 1
         else:
@@ -344,7 +344,7 @@ def test_mutated_parameter_files_make_a_top_or_a_refusal():
 def test_spelled_terms_are_written_by_their_code_and_others_refused():
     """A term beyond the published names has a code; the cubic tensor of a spherical top has none."""
     top = Constants(A=9000.0, B=5000.0, C=3000.0, DJ=0.1, terms={(2, 1, 3): 1e-9})
-    written = {p.code: p.value for p in codes.parameters_of(top)}
+    written = {p.code: p.value for p in codes.parameter_lines(top)}
     assert written[61200] == 1e-9  # J⁴ Jz² (J₊⁶ + J₋⁶): KSQ 1, NSQ 2, type 6
     with pytest.raises(ValueError, match="no code for it"):
-        codes.parameters_of(Constants(kind="spherical", B=157122.0, Dt=0.13))
+        codes.parameter_lines(Constants(kind="spherical", B=157122.0, Dt=0.13))

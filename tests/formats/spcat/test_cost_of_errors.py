@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from places import ORACLES
 
-from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
@@ -61,7 +61,7 @@ def test_functions_beyond_knmax_are_left_out_before_they_become_blocks(monkeypat
     monkeypatch.setattr(rotor, "_axial_blocks", counted)
     par, request = _files("ch3cn_quad", span=30)
     par = replace(par, options=tuple(replace(option, knmax=3) for option in par.options))
-    (group,) = groups_of(par, request)
+    (group,) = connected_groups(par, request)
     levels = group.levels((0, 60))
     assert set(made[-1].tolist()) == set(levels.quanta["k"].tolist()) == {0, 1, 2, 3}
 
@@ -69,7 +69,7 @@ def test_functions_beyond_knmax_are_left_out_before_they_become_blocks(monkeypat
 def test_an_axial_top_with_spins_is_solved_in_whole_arrays():
     """CH3CN with ¹⁴N to F = 30, in calls of functions a level: 34; 146 where every block was solved by itself."""
     par, request = _files("ch3cn_quad", span=30)
-    group = groups_of(par, request)[0]
+    group = connected_groups(par, request)[0]
     group.levels((0, 60))
     profile = cProfile.Profile()
     profile.enable()
@@ -95,7 +95,7 @@ def test_an_axial_top_with_spins_is_solved_in_whole_arrays():
 def test_derivatives_are_differences(name: str):
     """∂E/∂c of every parameter beside central differences of solved levels, for each way that a file is solved."""
     par, request = _files(name)
-    for group in groups_of(par, request):
+    for group in connected_groups(par, request):
         twice_f = (2 * SPAN + sum(group.spins) % 2,) * 2
         levels, names = group.levels(twice_f), tuple(group.effect.parameters(group.top))
         slopes = level_derivatives(group.top, levels, names)

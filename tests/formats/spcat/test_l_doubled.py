@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from full_matrix_rotor import momenta
 
-from rotor.formats.spcat.file_model import groups_of
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, pairs_of
-from rotor.formats.spcat.hamiltonian.states import states_of
+from rotor.formats.spcat.file_model import connected_groups
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, l_doubled_pairs
+from rotor.formats.spcat.hamiltonian.states import file_states
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
@@ -74,7 +74,7 @@ def full_matrix(j: int, pair: bool, to_ground: bool) -> np.ndarray:
 @pytest.mark.parametrize(("pair", "ground"), [(False, False), (True, False), (False, True), (True, True)])
 def test_levels_are_those_of_signed_k_and_l(pair, ground):
     parameters = COMMON + PAIR * pair + TO_GROUND * ground
-    groups = groups_of(_file(parameters), _wanted(), as_spcat=True)
+    groups = connected_groups(_file(parameters), _wanted(), as_spcat=True)
     energies = {j: [] for j in range(6)}
     for group in groups:
         levels = group.levels((0, 10))
@@ -139,7 +139,7 @@ def test_lines_of_a_degenerate_state():
 )
 def test_what_does_not_compute_is_named(options, parameters, says):
     with pytest.raises(ValueError, match=says):
-        groups_of(_file(parameters, options), _wanted())
+        connected_groups(_file(parameters, options), _wanted())
 
 
 def test_the_program_passes_over_parameters_of_the_second_state():
@@ -151,6 +151,6 @@ def test_the_program_passes_over_parameters_of_the_second_state():
 
 
 def test_pairs_are_found_by_their_codes():
-    assert pairs_of(states_of(_file(COMMON))) == [Pair(1, 2)]
+    assert l_doubled_pairs(file_states(_file(COMMON))) == [Pair(1, 2)]
     turned = OPTIONS.replace("-1 101", "-1 201x").replace("0 201 ", "0 101 ").replace("201x", "201")
-    assert pairs_of(states_of(_file(COMMON, turned))) == [Pair(2, 1)]
+    assert l_doubled_pairs(file_states(_file(COMMON, turned))) == [Pair(2, 1)]

@@ -7,9 +7,9 @@ import pytest
 from places import SHARED
 
 from rotor import units
-from rotor.formats.catalogue.level_sum import levels_of_lines, partition_from_lines
+from rotor.formats.catalogue.level_sum import catalogue_levels, partition_from_lines
 from rotor.formats.spcat.text.cat import read_cat
-from rotor.formats.spcat.text.catalogue import catalogue_of
+from rotor.formats.spcat.text.catalogue import predicted_catalogue
 from rotor.formats.spcat.text.fields import BLANK
 
 REFERENCE = SHARED / "reference"
@@ -27,7 +27,7 @@ def catalogue_of_levels(pairs, qnfmt, quanta):
     for i, sides in enumerate(quanta):
         for side in (0, 1):
             table[side, i, : len(sides[side])] = sides[side]
-    return catalogue_of(numbers, table[0], table[1], qnfmt)
+    return predicted_catalogue(numbers, table[0], table[1], qnfmt)
 
 
 def test_a_ladder_of_a_linear_molecule():
@@ -42,12 +42,12 @@ def test_a_ladder_of_a_linear_molecule():
 
 def test_weights_of_spins_and_half_integers():
     """Two lines of a spin-3/2 nucleus, F = 5/2 - 3/2 and 3/2 - 3/2, and one with a spin weight of 3 whose last number is v."""
-    energy, weight = levels_of_lines(
+    energy, weight = catalogue_levels(
         catalogue_of_levels([(100.0, 0.0, 6), (90.0, 0.0, 4)], 112, [((1, 3), (0, 2)), ((1, 2), (0, 2))])
     )
     assert sorted(weight.tolist()) == [4.0, 4.0, 6.0]  # 2F+1 of 3/2, 3/2, 5/2
     assert energy.max() == pytest.approx(100.0 / units.MHZ_PER_K, rel=1e-12)
-    _, weight = levels_of_lines(catalogue_of_levels([(50.0, 10.0, 15)], 1404, [((2, 1, 2, 1), (1, 0, 1, 1))]))
+    _, weight = catalogue_levels(catalogue_of_levels([(50.0, 10.0, 15)], 1404, [((2, 1, 2, 1), (1, 0, 1, 1))]))
     assert sorted(weight.tolist()) == [9.0, 15.0]  # the spin weight 3 of the upper level is that of the lower
 
 
@@ -56,7 +56,7 @@ def test_a_level_counts_once_with_the_weight_of_its_line():
         b"  115271.2018  0.0005 -5.0105 2    0.0000  3 -28503 101 1           0\n"
         b"  230538.0000  0.0005 -4.1197 2    3.8450  5 -28503 101 2           1\n"
     )
-    assert sorted(levels_of_lines(twice)[1].tolist()) == [1.0, 3.0, 5.0]
+    assert sorted(catalogue_levels(twice)[1].tolist()) == [1.0, 3.0, 5.0]
 
 
 def published() -> dict[int, dict[float, float]]:

@@ -13,8 +13,8 @@ import pytest
 import qutip
 from direct_product import on_spins, rotor_matrix, space_cosines, states_up_to
 
-from rotor.formats.spcat.file_model import groups_of
-from rotor.formats.spcat.hamiltonian.dipole_codes import moment_of, split_dipole
+from rotor.formats.spcat.file_model import connected_groups
+from rotor.formats.spcat.hamiltonian.dipole_codes import line_moment, split_dipole
 from rotor.formats.spcat.text.int_file import Dipole, read_int
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.solve import solve_levels
@@ -37,7 +37,7 @@ def _files(spind: str, oblate: bool, dipoles: str):
 
 
 def _ours(spind: str, oblate: bool, dipoles: str):
-    (group,) = groups_of(*_files(spind, oblate, dipoles))
+    (group,) = connected_groups(*_files(spind, oblate, dipoles))
     levels = group.levels((0, 2 * TOP) if spind == "1" else (1, 2 * TOP + 1))
     return levels, all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
 
@@ -215,7 +215,7 @@ def test_a_spin_with_a_moment_and_n(oblate):
 @pytest.mark.parametrize("code", [10001, 20002, 81001, 110002, 110000])
 def test_a_moment_that_time_reversal_turns_is_none_of_one_state(code):
     with pytest.raises(ValueError, match="time reversal would change the sign"):
-        moment_of(Dipole(code, 1.0), split_dipole(code, 1), (0, 0), 1)
+        line_moment(Dipole(code, 1.0), split_dipole(code, 1), (0, 0), 1)
 
 
 @pytest.mark.parametrize("as_spcat", [False, True])
@@ -226,7 +226,7 @@ def test_a_cosine_without_an_angle_is_the_plain_dipole(beside, as_spcat):
     for code in (103, 70103):
         par, request = _files("1", False, f"{code} 1.0\n{beside}")
         coupling = replace(par.parameters[-1], code=20010, value=100.0)
-        (group,) = groups_of(replace(par, parameters=(*par.parameters, coupling)), request, as_spcat=as_spcat)
+        (group,) = connected_groups(replace(par, parameters=(*par.parameters, coupling)), request, as_spcat=as_spcat)
         levels = group.levels((0, 8))
         lines = all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
         results.append(dict(zip(zip(lines.upper, lines.lower, strict=True), lines.strength_debye2, strict=True)))

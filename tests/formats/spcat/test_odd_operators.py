@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from full_matrix_rotor import momenta, reduced_vector
 
-from rotor.formats.spcat.file_model import groups_of, left_out
+from rotor.formats.spcat.file_model import connected_groups, left_out
 from rotor.formats.spcat.names.named_top import named_top
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
@@ -26,7 +26,7 @@ def _file(parameters, spin=1, nvib=1, phase=0):
 
 
 def _energies(file, j):
-    (group,) = groups_of(file, IntensityFile("", Request(), ()))
+    (group,) = connected_groups(file, IntensityFile("", Request(), ()))
     levels = group.levels((2 * j, 2 * j))
     return np.sort(levels.energy_mhz[levels.rotational == j])
 
@@ -135,7 +135,7 @@ def test_a_spin_along_the_axis():
     """c φ_a·S of S = 1/2: its square is c²/4, so that N = J ± 1/2 with one k give a matrix with the elements ±d and √(c²/4 - d²)."""
     b, off, c, j = 5000.0, 1234.5, 88.8, 3.5
     file = _file(((199, b), (1099, off), (10200000, c)), spin=2)
-    (group,) = groups_of(file, IntensityFile("", Request(), ()))
+    (group,) = connected_groups(file, IntensityFile("", Request(), ()))
     levels = group.levels((7, 7))
     expected = []
     for k in range(-4, 5):

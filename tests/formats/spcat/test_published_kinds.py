@@ -16,7 +16,7 @@ from full_matrix_codes import case_of
 from full_matrix_levels import solve
 from places import ORACLES
 
-from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.text.int_file import IntensityFile, read_int
 from rotor.formats.spcat.text.par import ParameterFile, read_par
 
@@ -111,7 +111,7 @@ def _wanted() -> IntensityFile:
 def _energies(par: ParameterFile, twice: int) -> np.ndarray:
     """Energies of one F from the package, over all groups of states and with K up to KNMAX, rising."""
     errors = []
-    for group in groups_of(par, _wanted(), as_spcat=True):
+    for group in connected_groups(par, _wanted(), as_spcat=True):
         if (sum(group.spins) - twice) % 2 == 0:
             levels = group.levels((twice, twice))
             here = levels.multiplicity == twice + 1
@@ -186,7 +186,7 @@ def test_option_fields_by_commas_are_those_in_full():
         3,
         3,
     )  # blanks: as the line before
-    (group,) = groups_of(comma, _wanted())
+    (group,) = connected_groups(comma, _wanted())
     levels = group.levels((4, 4))
     assert group.oblate
     assert set(levels.weight[levels.quanta["v"] == 1].tolist()) == {3}
@@ -198,7 +198,8 @@ def test_codes_of_eighteen_states_name_two_of_them():
     code = split_code(40010405, 18)
     assert sorted((code.v1, code.v2)) == [4, 5]
     groups = [
-        [state.number for state in group.states] for group in groups_of(_parameters(_eighteen_states()), _wanted())
+        [state.number for state in group.states]
+        for group in connected_groups(_parameters(_eighteen_states()), _wanted())
     ]
     assert sorted(v for group in groups for v in group) == list(range(18))
     assert {0, 1, 4, 5, 16, 17} < set(groups[0])

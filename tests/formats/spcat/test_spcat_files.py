@@ -15,7 +15,7 @@ from rotor.formats.spcat.text.cat import format_lines, read_cat
 from rotor.formats.spcat.text.egy import format_egy, read_egy, write_egy
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, format_int, read_int, write_int
-from rotor.formats.spcat.text.lin import LineList, format_lin, line_list, note_of_remarks, read_lin, write_lin
+from rotor.formats.spcat.text.lin import LineList, format_lin, line_list, read_lin, remark_notes, write_lin
 from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile, format_par, read_par, write_par
 
 SAMPLES = ORACLES / "spcat"
@@ -297,9 +297,9 @@ def test_words_behind_the_error_of_a_line_are_a_remark():
     read = read_lin(line)
     assert (read.frequency.tolist(), read.error.tolist(), read.weight.tolist()) == ([5.0], [0.1], [1.0])
     assert format_lin(read) == line
-    assert note_of_remarks(read, read.blends()) == []
+    assert remark_notes(read, read.blends()) == []
     blend = read_lin(line + b"  2  1" + line[6:])
-    assert "2 blended lines have words where their weight may stand" in note_of_remarks(blend, blend.blends())[0]
+    assert "2 blended lines have words where their weight may stand" in remark_notes(blend, blend.blends())[0]
 
 
 def test_lines_that_do_not_fit_are_refused():

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from places import ORACLES
 
-from rotor.formats.spcat.file_model import groups_of, left_out
-from rotor.formats.spcat.hamiltonian.dipole_codes import moment_of, split_dipole
-from rotor.formats.spcat.hamiltonian.operators import operator_of
+from rotor.formats.spcat.file_model import connected_groups, left_out
+from rotor.formats.spcat.hamiltonian.dipole_codes import line_moment, split_dipole
+from rotor.formats.spcat.hamiltonian.operators import code_operator
 from rotor.formats.spcat.predict import predict, predict_file
 from rotor.formats.spcat.text.cat import format_lines, read_cat
 from rotor.formats.spcat.text.catalogue import Catalogue
@@ -124,7 +124,7 @@ CENTRES = {((40, 0, 40), (39, 0, 39)): 223433.75785, ((41, 0, 41), (40, 0, 40)):
 @pytest.mark.parametrize(("factor", "off"), [(1.0, 0.0), (-1.0, 7.0)])
 def test_coriolis_terms_of_third_order(factor, off):
     """620001 and 621001 move these lines by 4 MHz; with the other sign they are 7 MHz off."""
-    (group,) = groups_of(_bare_clclo2(factor), IntensityFile("", Request(), ()), as_spcat=True)
+    (group,) = connected_groups(_bare_clclo2(factor), IntensityFile("", Request(), ()), as_spcat=True)
     levels = group.levels((2 * 39, 2 * 41))
     for (upper, lower), centre in CENTRES.items():
         energies = [levels.energy_mhz[levels.find(v=0, j=j, ka=ka, kc=kc)] for j, ka, kc in (upper, lower)]
@@ -146,7 +146,7 @@ def test_coriolis_terms_of_third_order(factor, off):
 def test_moments_that_do_not_compute_are_named(code, says):
     dipole = Dipole(code, 1.0)
     with pytest.raises(ValueError, match=says):
-        moment_of(dipole, split_dipole(code, 1), (0, 0), 1)
+        line_moment(dipole, split_dipole(code, 1), (0, 0), 1)
 
 
 def test_operators_of_n_are_hermitian_and_obey_time_reversal():
@@ -156,7 +156,7 @@ def test_operators_of_n_are_hermitian_and_obey_time_reversal():
 
     for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):
         for typ in (*range(12, 18), *range(20, 28), *range(40, 48), *range(60, 68)):
-            coded = operator_of(split_code(typ * 10000), axes)
+            coded = code_operator(split_code(typ * 10000), axes)
             matrix = coded.by_j(6, representation).matrix
             sign = -1 if coded.odd else 1
             np.testing.assert_allclose(matrix, sign * matrix.conj().T, atol=1e-9)  # i times a Hermitian operator
@@ -175,9 +175,9 @@ def test_low_orders_are_cartesian_products():
         of = components(5, representation)
         for typ, axis in ((20, "a"), (40, "b"), (60, "c")):
             others = [of[x] for x in "abc" if x != axis]
-            pair = operator_of(split_code((typ + 1) * 10000), axes).by_j(5, representation)
+            pair = code_operator(split_code((typ + 1) * 10000), axes).by_j(5, representation)
             np.testing.assert_allclose(pair.matrix, anticommutator(*others).matrix, atol=1e-12)  # sums of two products
-            alone = operator_of(split_code(typ * 10000), axes).by_j(5, representation)
+            alone = code_operator(split_code(typ * 10000), axes).by_j(5, representation)
             factor = 1j if representation == "Ir" else -1j
             np.testing.assert_allclose(alone.matrix, factor * of[axis].matrix, atol=1e-14)  # round-off
 
@@ -186,7 +186,7 @@ def test_the_energy_of_one_k():
     """802000 is the energy of K = 2 and 802100 the same times N(N+1), in a symmetric top, whose energies are B N(N+1) + (A - B) K²."""
     values = ("100 9000.0", "1000 100000.0", "802000 50.0", "802100 0.5")
     text = "a case\n 4 1 1 0 0 1e6 1 1\na 1 1 0 9 0 1 1 1 0 1 0\n" + "".join(f"{value} 0\n" for value in values)
-    (group,) = groups_of(read_par(text.encode()), IntensityFile("", Request(), ()))
+    (group,) = connected_groups(read_par(text.encode()), IntensityFile("", Request(), ()))
     levels = group.levels((0, 8))
     square, k = levels.rotational * (levels.rotational + 1.0), levels.quanta["ka"]
     expected = 9000.0 * square + 1e5 * k**2 + (k == 2) * (50.0 + 0.5 * square)
@@ -208,7 +208,7 @@ def test_the_energy_of_one_k():
 def test_totals_of_three_that_do_not_compute_are_named(options, says):
     file = read_par(f"a case\n 1 0 0 0\n{options}\n 100 1.0 0\n".encode())
     with pytest.raises(ValueError, match=says):
-        groups_of(file, IntensityFile("", Request(), ()))
+        connected_groups(file, IntensityFile("", Request(), ()))
 
 
 def test_terms_of_three_nuclei_that_spcat_leaves_out_are_noted():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from full_matrix_rotor import momenta
 
-from rotor.formats.spcat.file_model import groups_of, left_out
+from rotor.formats.spcat.file_model import connected_groups, left_out
 from rotor.formats.spcat.hamiltonian.file_effect import coded_lines
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
@@ -23,7 +23,7 @@ def _file(parameters, options="a 1 1 0 20 0 1 1 1 0 1 0\n"):
 
 
 def _energies(file, j):
-    (group,) = groups_of(file, IntensityFile("", Request(), ()))
+    (group,) = connected_groups(file, IntensityFile("", Request(), ()))
     levels = group.levels((2 * j, 2 * j))
     return np.sort(levels.energy_mhz[levels.rotational == j])
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from places import ORACLES
 
-from rotor.formats.spcat.block_numbers import blocks_of
+from rotor.formats.spcat.block_numbers import numbered_blocks
 from rotor.formats.spcat.file_lines import as_level_list
-from rotor.formats.spcat.file_model import groups_of
-from rotor.formats.spcat.file_quanta import format_of
+from rotor.formats.spcat.file_model import connected_groups
+from rotor.formats.spcat.file_quanta import quanta_format
 from rotor.formats.spcat.predict import Prediction, predict
 from rotor.formats.spcat.solved_groups import SolvedGroup
 from rotor.formats.spcat.text.cat import read_cat
@@ -107,8 +107,8 @@ def test_levels_with_more_than_six_quanta_have_all_of_them():
     """As the program writes them: the number of the pattern in brackets, then N, Ka, Kc, v, F1, ... F."""
     file = read_par((KINDS / "patterns_of_i_tot" / "patterns_of_i_tot.var").read_bytes())
     request = read_int((KINDS / "patterns_of_i_tot" / "patterns_of_i_tot.int").read_bytes())
-    group = groups_of(file, replace(request, request=replace(request.request, fend=0)), as_spcat=True)[0]
-    levels = as_level_list([SolvedGroup(group, group.levels((0, 0)), None)], format_of(file, [group]))
+    group = connected_groups(file, replace(request, request=replace(request.request, fend=0)), as_spcat=True)[0]
+    levels = as_level_list([SolvedGroup(group, group.levels((0, 0)), None)], quanta_format(file, [group]))
     written = format_level(levels.level(0))
     assert written[63:].startswith(":(")
     assert len(written[63:].rstrip()) == 1 + 5 + 3 * 8
@@ -123,9 +123,9 @@ def test_a_list_of_many_levels_fits_its_columns():
     """The program's list of this file has four blocks for every N; where its numbers are not known here, ranks go to 9999."""
     file = read_par(SYMMETRIC.replace(b"s 1 1 0 50", b"s 1 1 0 200"))
     request = read_int(b"a top\n1 1 1000.0 0 104 -9 -9 60.0 300.0\n1 1.2\n")
-    group = groups_of(file, request)[0]
-    solved, form = [SolvedGroup(group, group.levels((0, 208)), None)], format_of(file, [group])
-    levels = as_level_list(solved, form, blocks=blocks_of(file, [group]))
+    group = connected_groups(file, request)[0]
+    solved, form = [SolvedGroup(group, group.levels((0, 208)), None)], quanta_format(file, [group])
+    levels = as_level_list(solved, form, blocks=numbered_blocks(file, [group]))
     assert (len(levels), levels.block.max(), levels.rank.max()) == (105**2, 4 * 105, 53)
     others = as_level_list(solved, form)
     assert (len(others), others.block.max(), others.rank.max()) == (105**2, 2, 9999)

@@ -13,7 +13,7 @@ import pytest
 import qutip
 from direct_product import on_spins, rotor_matrix, space_cosines, states_up_to
 
-from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
 
@@ -29,7 +29,7 @@ def _ours(spind: str, oblate: bool, code: int, value: float) -> list[tuple[int, 
         f"two\n9 1 1 0 0.0 1e6 1.0 1.0\n{option}\n{rigid}200001 30.0 1\n910000 0.13 1\n910011 0.21 1\n{code} {value} 1\n".encode()
     )
     request = read_int(b"two\n0 999 1000.0 0 3 -30 -30 9999.99 300.0\n11 1.0\n")
-    (group,) = groups_of(par, request)
+    (group,) = connected_groups(par, request)
     total = sum(int(size) - 1 for size in spind)
     last = 2 * TOP - total
     levels = group.levels((total % 2, last))

@@ -199,7 +199,7 @@ def test_two_wells_tunnel():
 def test_wave_functions_are_normal_and_solve_the_equation():
     answer = answer_torsion(TorsionRequest(top_of("C2H6"), "1-2", "V3=1013 cm-1", vmax=2))
     angles = 2 * np.pi * np.arange(720) / 720
-    psi = answer.functions_of_levels(angles)
+    psi = answer.wave_functions(angles)
     overlap = psi.T @ psi * 2 * np.pi / 720
     assert np.diag(overlap) == pytest.approx(1, abs=1e-9)  # round-off
     assert overlap - np.diag(np.diag(overlap)) == pytest.approx(0, abs=1e-9)
@@ -320,11 +320,11 @@ def test_the_derivatives_are_those_of_ln_q():
 
 def test_limits_of_the_heat_capacity():
     """R/2 of a free rotor, R of a deep well that is hot against hν, 0 at 0 K."""
-    free = hindered_rotor_functions(threefold(1e-3), [300.0], 3).of_method("levels")
+    free = hindered_rotor_functions(threefold(1e-3), [300.0], 3).for_method("levels")
     assert free.cv_over_r[0] == pytest.approx(0.5, abs=1e-6)  # kT is 40 F
-    deep = hindered_rotor_functions(threefold(6e9, 3e4), [10000.0], 3).of_method("levels")
+    deep = hindered_rotor_functions(threefold(6e9, 3e4), [10000.0], 3).for_method("levels")
     assert deep.cv_over_r[0] == pytest.approx(1.0, abs=0.03)  # first anharmonic order, kT/2V3
-    cold = hindered_rotor_functions(threefold(V3), [10.0], 3).of_method("levels")
+    cold = hindered_rotor_functions(threefold(V3), [10.0], 3).for_method("levels")
     assert cold.cv_over_r[0] < 1e-6
 
 
@@ -334,25 +334,25 @@ def test_the_classical_partition_function_of_a_cosine():
     kt = t * units.MHZ_PER_K
     expected = np.sqrt(np.pi * kt / F) * i0e(V3 / (2 * kt)) / 3
     functions = hindered_rotor_functions(threefold(V3), t, 3)
-    assert functions.of_method("classical").ln_q == pytest.approx(np.log(expected), abs=1e-12)  # round-off
+    assert functions.for_method("classical").ln_q == pytest.approx(np.log(expected), abs=1e-12)  # round-off
     u = 3 * math.sqrt(F * V3) / kt  # hν/kT of a well
     corrected = np.log(expected * u * np.exp(-u / 2) / (1 - np.exp(-u)))
-    assert functions.of_method("Pitzer-Gwinn").ln_q == pytest.approx(
+    assert functions.for_method("Pitzer-Gwinn").ln_q == pytest.approx(
         corrected, abs=1e-9
     )  # Q_qm/Q_cl of an oscillator, from the foot
 
 
 def test_every_approximation_has_its_limits():
     hot = hindered_rotor_functions(threefold(3e5, 3e4), [10000.0], 3)
-    exact = hot.of_method("levels").ln_q[0]
+    exact = hot.for_method("levels").ln_q[0]
     for name in ("classical", "Pitzer-Gwinn"):
-        assert hot.of_method(name).ln_q[0] == pytest.approx(exact, abs=1e-4)  # first quantum order, (hν/kT)²/24
-    free = hot.of_method("free rotor").ln_q[0]
-    assert hot.of_method("tanh").ln_q[0] == pytest.approx(free, abs=0.01)  # tanh y = y - y³/3 at y = 0.07
+        assert hot.for_method(name).ln_q[0] == pytest.approx(exact, abs=1e-4)  # first quantum order, (hν/kT)²/24
+    free = hot.for_method("free rotor").ln_q[0]
+    assert hot.for_method("tanh").ln_q[0] == pytest.approx(free, abs=0.01)  # tanh y = y - y³/3 at y = 0.07
     cold = hindered_rotor_functions(threefold(1e9), [30.0], 3)
     for name in ("harmonic", "Pitzer-Gwinn", "tanh"):
-        assert cold.of_method(name).ln_q[0] == pytest.approx(
-            cold.of_method("levels").ln_q[0], abs=0.2
+        assert cold.for_method(name).ln_q[0] == pytest.approx(
+            cold.for_method("levels").ln_q[0], abs=0.2
         )  # 9F/16kT of the zero point
     assert list(dict.fromkeys(hot.method.tolist())) == list(METHODS)
 
@@ -365,7 +365,7 @@ def test_wells_of_different_depth_are_weighed():
     wells, kt = answer.torsion.wells(), 1000 * units.MHZ_PER_K
     q = sum(math.exp(-one.energy_mhz / kt) / (2 * math.sinh(one.quantum_mhz / (2 * kt))) for one in wells)
     assert len(wells) == 2
-    assert answer.functions.of_method("harmonic").ln_q[0] == pytest.approx(math.log(q), rel=1e-9)
+    assert answer.functions.for_method("harmonic").ln_q[0] == pytest.approx(math.log(q), rel=1e-9)
 
 
 def test_a_heavy_group_is_refused():

@@ -9,7 +9,7 @@ import pytest
 from places import ORACLES
 from spin_elements import elements_of_parts
 
-from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.reduced import connections
@@ -21,7 +21,7 @@ KINDS = ORACLES / "kinds"
 def _group(name: str, span: int):
     folder = KINDS / name if (KINDS / name).is_dir() else KINDS.parent / name
     par, request = read_par(folder / f"{name}.var"), read_int(folder / f"{name}.int")
-    return groups_of(par, replace(request, request=replace(request.request, fend=span)))[0]
+    return connected_groups(par, replace(request, request=replace(request.request, fend=span)))[0]
 
 
 @pytest.mark.parametrize(

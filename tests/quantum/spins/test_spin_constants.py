@@ -17,7 +17,7 @@ from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermodynamics import partition_function
 from rotor.thermodynamics.spin_factor import rotational_sum
 from rotor.tops.constants import Constants
-from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spins_of, twice_of
+from rotor.tops.spins.spin_constants import SpinConstants, parse_spins, spin_names, twice_spin
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
@@ -36,8 +36,8 @@ def test_text_becomes_values_and_spins():
     mixed = SpinConstants.parse("eps_aa(S)=500kHz b_F(S,14N)=12.5 MHz", "S=1/2 14N=1")
     assert dict(mixed.values) == {"eps_aa(S)": 0.5, "b_F(S,14N)": 12.5}
     assert list(mixed.twice.items()) == [("S", 1), ("14N", 2)]
-    assert spins_of("b_F(S,14N)") == ("S", "14N")
-    assert (twice_of("2H"), parse_spins("I=3/2")) == (2, {"I": 3})
+    assert spin_names("b_F(S,14N)") == ("S", "14N")
+    assert (twice_spin("2H"), parse_spins("I=3/2")) == (2, {"I": 3})
 
 
 @pytest.mark.parametrize(

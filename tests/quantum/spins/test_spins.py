@@ -10,7 +10,7 @@ import pytest
 from full_matrix_codes import case_of
 from full_matrix_levels import solve, strengths
 
-from rotor.formats.spcat.file_model import groups_of
+from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole, quadrupole_of_tensor
@@ -337,7 +337,7 @@ def test_the_scalar_between_two_states_mixes_them(value):
         f"two\n4 1 1 0 0 1e6 1 1\na 3 2 0 9 0 1 1 1 0 1 0\n199 3000 1\n1099 500 1\n11 1500 1\n10000010 {value} 1\n".encode()
     )
     request = read_int(b"two\n0 999 1000.0 0 6 -30 -30 9999.99 300.0\n1 1.0\n12 1.0\n")
-    (group,) = groups_of(par, request)
+    (group,) = connected_groups(par, request)
     levels = group.levels((0, 10))
     for f in range(6):
         f_energies = levels.energy_mhz[levels.multiplicity == 2 * f + 1]

@@ -11,8 +11,8 @@ from collections.abc import Iterable
 
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, split_code
 from rotor.formats.spcat.hamiltonian.codes import is_held
-from rotor.formats.spcat.hamiltonian.l_doubled import pairs_of
-from rotor.formats.spcat.hamiltonian.states import states_of
+from rotor.formats.spcat.hamiltonian.l_doubled import l_doubled_pairs
+from rotor.formats.spcat.hamiltonian.states import file_states
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.connected import connected_parts
 
@@ -25,7 +25,7 @@ def left_at_zero(file: ParameterFile) -> frozenset[int]:
     """Places of parameters of value 0 that are held, or that connect otherwise unconnected sets and therefore remain 0."""
     places = _places(file)
     acting = (place for place, p in zip(places, file.parameters, strict=True) if place and p.value)
-    set_of_node = _sets(acting, len(states_of(file)))
+    set_of_node = _sets(acting, len(file_states(file)))
     apart = [place is not None and all(set_of_node[a] != set_of_node[b] for a, b in _edges(place)) for place in places]
     return frozenset(
         i for i, p in enumerate(file.parameters) if not p.value and (p.constrained or is_held(p) or apart[i])
@@ -40,8 +40,8 @@ def stay_at_zero(file: ParameterFile) -> list[str]:
 
 def _places(file: ParameterFile) -> list[Place | None]:
     """States and symmetry of the operator of each parameter without spins between definite states; None for others."""
-    states = states_of(file)
-    if any(state.spins for state in states) or pairs_of(states):
+    states = file_states(file)
+    if any(state.spins for state in states) or l_doubled_pairs(states):
         return [None] * len(file.parameters)
     return [_place(split_code(parameter.code, len(states)), len(states)) for parameter in file.parameters]
 

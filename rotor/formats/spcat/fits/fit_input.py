@@ -23,8 +23,8 @@ from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, is_held
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
-from rotor.formats.spcat.text.lin import LineList, note_of_defaults, note_of_remarks, read_lin, with_defaults
-from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, Header, Parameter, ParameterFile, note_of_npar, read_par
+from rotor.formats.spcat.text.lin import LineList, default_note, read_lin, remark_notes, with_defaults
+from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, Header, Parameter, ParameterFile, npar_notes, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
@@ -90,10 +90,10 @@ def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
     named = _named_constants(file)
     if named is not None:
         return QUANTA[named[0].kind]
-    from rotor.formats.spcat.file_quanta import format_of
-    from rotor.formats.spcat.fits.fit_states import groups_for_fit, names_of_quanta
+    from rotor.formats.spcat.file_quanta import quanta_format
+    from rotor.formats.spcat.fits.fit_states import groups_for_fit, quanta_names
 
-    return names_of_quanta(format_of(file, groups_for_fit(file)))
+    return quanta_names(quanta_format(file, groups_for_fit(file)))
 
 
 def _named_constants(file: ParameterFile) -> tuple[Constants, Floats] | None:
@@ -265,9 +265,9 @@ def _kmax(file: ParameterFile, constants: Constants) -> int | None:
 def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str) -> tuple[Assignments, list[str]]:
     """Lines up to NLINE as assignments, wavenumbers divided by CAL, with the blends of the file."""
     lines = with_defaults(lines, names)
-    notes = [note_of_defaults(lines)] if lines.defaulted else []
+    notes = [default_note(lines)] if lines.defaulted else []
     blends = lines.blends()
-    notes += note_of_remarks(lines, blends)
+    notes += remark_notes(lines, blends)
     used = np.arange(len(lines)) < abs(header.nline)
     if len(lines) and not used.any():
         raise ValueError(f"NLINE = {header.nline}: no line counts; give as many as the .lin file has, {len(lines)}")
@@ -313,7 +313,7 @@ def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> No
 
 def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignments) -> list[str]:
     """Notes on deviations from SPFIT."""
-    notes = note_of_npar(file)
+    notes = npar_notes(file)
     below = [p.label or str(p.code) for p in file.parameters if not p.constrained and (p.error or 0.0) < 0]
     if below:
         notes.append(f"a-priori errors below 0: {', '.join(below)} are held, as SPFIT does")

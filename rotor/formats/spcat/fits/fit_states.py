@@ -14,8 +14,8 @@ from functools import partial
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.formats.spcat.file_model import Group, groups_of, line_names
-from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
+from rotor.formats.spcat.file_model import Group, connected_groups, line_names
+from rotor.formats.spcat.file_quanta import Format, listed_quanta, quanta_format
 from rotor.formats.spcat.fits.at_zero import left_at_zero
 from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
 from rotor.formats.spcat.hamiltonian.l_spins import functions_by_l, named_by_l
@@ -38,13 +38,13 @@ def groups_for_fit(file: ParameterFile) -> list[Group]:
     """Groups of connected states, with all parameter lines that a fit may move from 0; K is limited as in SPFIT."""
     left = left_at_zero(file)
     nonzero = tuple(p if i in left else replace(p, value=p.value or AT_ZERO_MHZ) for i, p in enumerate(file.parameters))
-    return groups_of(replace(file, parameters=nonzero), _NO_REQUEST)
+    return connected_groups(replace(file, parameters=nonzero), _NO_REQUEST)
 
 
-def names_of_quanta(form: Format) -> tuple[str, ...]:
+def quanta_names(form: Format) -> tuple[str, ...]:
     """Names of the columns of quantum numbers in a .lin file: n, (k | ka, kc), (v), and sums with spins.
 
-    >>> names_of_quanta(Format(3, True, 1)), names_of_quanta(Format(1, False, 2))
+    >>> quanta_names(Format(3, True, 1)), quanta_names(Format(1, False, 2))
     (('n', 'ka', 'kc', 'v', 'f'), ('n', 'f1', 'f'))
     """
     rotation = {1: ("n",), 2: ("n", "k"), 3: ("n", "ka", "kc")}[form.rotation]
@@ -78,10 +78,10 @@ class FileLevels(LevelModel):
         Raises ValueError for labels without a level, with the first of them, and for unsupported parameters.
         """
         groups = groups_for_fit(file)
-        form = format_of(file, groups)
+        form = quanta_format(file, groups)
         reduced = np.flatnonzero(labels[:, -1] < 0) if form.spins else np.zeros(0, dtype=np.int64)
         if len(reduced):
-            refuse_far_f(labels, reduced, form, names_of_quanta(form), max(sum(group.spins) for group in groups))
+            refuse_far_f(labels, reduced, form, quanta_names(form), max(sum(group.spins) for group in groups))
         names, parts = line_names(file), _searched(file, groups, form, labels, reduced)
         return cls(names, BlockLevels.of(names, parts, len(labels)), reduced, excluded_parameters(file))
 
@@ -114,9 +114,7 @@ def _searched(
         none = lost[~np.isin(lost, reduced) | (positive[lost, -1] >= HIGHEST_SEARCHED)]
         if len(none):
             first = " ".join(map(str, labels[none[0]].tolist()))
-            raise MissingLevelsError(
-                f"there is no level {first} ({', '.join(names_of_quanta(form))}) in this model", none
-            )
+            raise MissingLevelsError(f"there is no level {first} ({', '.join(quanta_names(form))}) in this model", none)
         positive[lost, -1] += 1
 
 
@@ -136,7 +134,7 @@ def _with_labels(
     group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats
 ) -> list[AssignedLevels]:
     """Assign labels to the levels of a group by their quantum numbers, a few F at a time."""
-    here = _places_of_group(group, form, labels)
+    here = _group_places(group, form, labels)
     if not len(here):
         return []
     total = labels[here, -1] if form.spins else labels[here, 0]
@@ -163,7 +161,7 @@ def _assign_without_spins(
     place = {state.number: v for v, state in enumerate(group.states)}
     v = [place[number] for number in labels[here, 3].tolist()] if form.states else np.zeros(len(here), dtype=np.int64)
     parameters = tuple(group.effect.parameters(group.top))
-    columns, start = _columns_of(group, names, values)
+    columns, start = _parameter_columns(group, names, values)
     requested = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
     naming = naming_by(group.diag, group.oblate, group.diagonal(int(labels[here, 0].max())))
     blocks = labelled_states(group.top, (group.effect,), parameters, requested, start, naming)
@@ -174,29 +172,29 @@ def _assign_with_spins(
     group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
 ) -> list[AssignedLevels]:
     """Blocks of the labels at the places `here` with these doubled F, for states with spins."""
-    columns, start = _columns_of(group, names, values)
+    columns, start = _parameter_columns(group, names, values)
     parameters = tuple(group.effect.parameters(group.top))
 
     def rows_of(levels: Levels, chosen: Ints) -> Ints:
         if group.effect.pairs:
             levels = named_by_l(levels, group.effect.pairs, str(levels.representation))
-        return _rows_of(group, levels, form, labels[here[chosen]])
+        return _label_rows(group, levels, form, labels[here[chosen]])
 
-    functions = partial(_functions_of, group) if group.effect.pairs else None
+    functions = partial(_label_functions, group) if group.effect.pairs else None
     assigned = assigned_with_spins(group.top, (group.effect,), parameters, start, twice, rows_of, functions)
     return [AssignedLevels(here[part.rows], columns, part.blocks) for part in assigned]
 
 
-def _rows_of(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
+def _label_rows(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
     """The row of each label among the levels, -1 if it has none."""
     rows_by_label: dict[tuple[int, ...], int] = {}
     for negative in (True, False):
-        for row, label in enumerate(map(tuple, quanta_of(group, levels, form, negative).tolist())):
+        for row, label in enumerate(map(tuple, listed_quanta(group, levels, form, negative).tolist())):
             rows_by_label.setdefault(label, row)
     return np.array([_row(rows_by_label, tuple(label), form) for label in labels.tolist()])
 
 
-def _columns_of(group: Group, names: Sequence[str], values: Floats) -> tuple[Ints, Floats]:
+def _parameter_columns(group: Group, names: Sequence[str], values: Floats) -> tuple[Ints, Floats]:
     """Columns of the parameters of a group, and their values."""
     columns = np.array([names.index(name) for name in group.effect.parameters(group.top)])
     return columns, np.where(values == 0, AT_ZERO_MHZ, values)[columns]
@@ -207,25 +205,25 @@ def _assign_in_blocks(
 ) -> list[AssignedLevels]:
     """Blocks of the labels at the places `here` with these doubled J, for states without spins."""
     levels = levels_in_blocks(group, distinct(twice).tolist())
-    rows = _rows_of(group, levels, form, labels[here])
+    rows = _label_rows(group, levels, form, labels[here])
     has_level = rows >= 0
     if not has_level.any():
         return []
     parameters = tuple(group.effect.parameters(group.top))
-    columns, start = _columns_of(group, names, values)
-    functions = _functions_of(group, levels) if group.effect.pairs else None
+    columns, start = _parameter_columns(group, names, values)
+    functions = _label_functions(group, levels) if group.effect.pairs else None
     named = functions is None and "kc" in levels.quanta
     naming = naming_by(group.diag, group.oblate, group.diagonal(levels.jmax)) if named else None
     blocks = unit_levels(group.top, levels, rows[has_level], parameters, start, functions, naming)
     return [AssignedLevels(here[has_level], columns, blocks)]
 
 
-def _functions_of(group: Group, levels: Levels) -> Functions:
+def _label_functions(group: Group, levels: Levels) -> Functions:
     """The functions that label levels of l-doubled states."""
     return partial(functions_by_l, pairs=group.effect.pairs, representation=str(levels.representation))
 
 
-def _places_of_group(group: Group, form: Format, labels: Ints) -> Ints:
+def _group_places(group: Group, form: Format, labels: Ints) -> Ints:
     """Places of the labels whose state belongs to the group."""
     if not form.states:
         return np.arange(len(labels))

@@ -46,7 +46,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     back = codes @ fit.parameters.matrix  # derivatives of SPFIT's parameters by the free constants
     back[np.abs(back) < _ROUND_OFF] = 0.0
     if int(back.any(axis=1).sum()) == len(fit.parameters.names):
-        parameters, free = _one_for_one(fit, file.parameters, back, variances)
+        parameters, free = _matched_parameters(fit, file.parameters, back, variances)
     else:
         parameters, free = _tied(fit, file.parameters, back, matrix, variances)
     numbers = iter(range(len(free)))
@@ -90,7 +90,7 @@ def _is_determined(fit: Fit, row: Floats) -> bool:
     return bool(np.isfinite(fit.errors[row != 0]).all())
 
 
-def _one_for_one(
+def _matched_parameters(
     fit: Fit, parameters: tuple[Parameter, ...], back: Floats, variances: bool
 ) -> tuple[list[Parameter], Floats]:
     """The parameters if as many move as constants are free; and the moving ones as combinations (m, n) of the free constants."""

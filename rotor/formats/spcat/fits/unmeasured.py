@@ -9,7 +9,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments
 from rotor.formats.spcat.file_model import Group
-from rotor.formats.spcat.file_quanta import Format, format_of, quanta_of
+from rotor.formats.spcat.file_quanta import Format, listed_quanta, quanta_format
 from rotor.formats.spcat.fits.fit_states import groups_for_fit, levels_in_blocks
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.spins.levels import unmixed_levels
@@ -32,9 +32,9 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
         Measured lines; F below 0 and energies are ignored.
     """
     groups = groups_for_fit(file)
-    form = format_of(file, groups)
+    form = quanta_format(file, groups)
     highest = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
-    tables = [_labels_of(group, form, highest) for group in groups]
+    tables = [_group_labels(group, form, highest) for group in groups]
     labels, first = np.unique(np.concatenate([table[0] for table in tables]), axis=0, return_index=True)
     energies = np.concatenate([table[1] for table in tables])[first]
 
@@ -66,7 +66,7 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
     return labels[table[:, 0]], labels[table[:, 1]]
 
 
-def _labels_of(group: Group, form: Format, highest: int) -> tuple[Ints, Floats]:
+def _group_labels(group: Group, form: Format, highest: int) -> tuple[Ints, Floats]:
     """Labels (n, k) with N up to the highest, and energies of the levels without spins, MHz."""
     if group.spins:
         total = sum(group.spins)
@@ -76,7 +76,7 @@ def _labels_of(group: Group, form: Format, highest: int) -> tuple[Ints, Floats]:
     else:
         levels = levels_in_blocks(group, range(0, 2 * highest + 1, 2))
     tables = [
-        quanta_of(group, levels, form, negative) for negative in ((False, True) if form.rotation == 2 else (False,))
+        listed_quanta(group, levels, form, negative) for negative in ((False, True) if form.rotation == 2 else (False,))
     ]
     labels = np.concatenate(tables)
     inside = labels[:, 0] <= highest

@@ -78,7 +78,7 @@ class Tensor(NamedTuple):
         return self.rank % 2 == 1
 
     def shape(self, z: str) -> tuple[int, bool]:
-        """K of the tensor, and whether it is E + E† or (E - E†)/i, by its species (`operators._tensor_of_n`)."""
+        """K of the tensor, and whether it is E + E† or (E - E†)/i, by its species (`operators._tensor_in_n`)."""
         x, y = ("c", "b") if z == "a" else ("a", "b")
         along = {"": "", x: "x", y: "y", z: "z"}[self.axis]
         k = self.rank - (self.rank % 2 if along in ("z", "") else 1 - self.rank % 2)
@@ -131,7 +131,7 @@ class Digits(NamedTuple):
         return Tensor(self.row.rank + self.row.step * (self.typ - self.row.first), self.row.axis)
 
     @property
-    def axis_of_square(self) -> str:
+    def square_axis(self) -> str:
         """The axis of Na², Nb² or Nc²."""
         return "abc"[self.typ - self.row.first]
 
@@ -143,7 +143,7 @@ class Digits(NamedTuple):
         return self.tensor.rank // 2 if self.kind is Kind.LADDER else 0
 
     @property
-    def k_of_level(self) -> int:
+    def level_k(self) -> int:
         """K of an energy of one K."""
         return 10 * (self.typ - self.row.first) + self.ksq
 
@@ -176,7 +176,7 @@ class Digits(NamedTuple):
     @property
     def is_constant(self) -> bool:
         """Whether the code names a constant of a series, which is not an operator and is not fitted."""
-        return self.kind is Kind.EULER and self._second_of_pair and self.ksq < 2
+        return self.kind is Kind.EULER and self._is_second_of_pair and self.ksq < 2
 
     @property
     def is_series(self) -> bool:
@@ -187,17 +187,17 @@ class Digits(NamedTuple):
     def euler(self) -> tuple[int, int]:
         """Number of the Euler series of the code, and its power of K²."""
         if self.kind is Kind.EULER:
-            return self.ladder, self.ksq + 8 * self._second_of_pair
+            return self.ladder, self.ksq + 8 * self._is_second_of_pair
         return self.ex - 1, self.ksq
 
     @property
     def base(self) -> Digits:
         """The code of the operator that an Euler series multiplies."""
-        typ = self.typ if self.kind is not Kind.EULER else typ_of_ladder(self.ladder)
+        typ = self.typ if self.kind is not Kind.EULER else ladder_typ(self.ladder)
         return self._replace(ex=0, ksq=0, nsq=0, typ=typ)
 
     @property
-    def _second_of_pair(self) -> bool:
+    def _is_second_of_pair(self) -> bool:
         return (self.typ - self.row.first) % 2 == 1
 
     @property
@@ -233,43 +233,43 @@ class Digits(NamedTuple):
         odd = self.kind is Kind.TENSOR and tensor.odd
         delta_k = tensor.shape(z)[0] if self.kind is Kind.TENSOR else 2 * self.ladder
         commutator = self.i1 == 0 and self.i2 > 0
-        axis = product_of_axes(tensor.axis, z) if sine else tensor.axis
+        axis = axis_product(tensor.axis, z) if sine else tensor.axis
         return Symmetry(axis, (odd != sine) != commutator, delta_k, self.kind is Kind.SQUARE and not sine)
 
     def states(self, count: int) -> tuple[int, int] | None:
         """The two states of the code in a file with this number of them, lower first; None for all states."""
         low, high = sorted((self.v1, self.v2))
-        return None if low == every_state(count) else (low, high)
+        return None if low == all_states_digit(count) else (low, high)
 
     def is_place_holder(self, count: int) -> bool:
         """Whether the code stands between a state and all (9, 99, 999)."""
-        return (self.v1 == every_state(count)) != (self.v2 == every_state(count))
+        return (self.v1 == all_states_digit(count)) != (self.v2 == all_states_digit(count))
 
     def missing_state(self, count: int) -> int | None:
         """The number of a state that does not exist; None if both do."""
         high = max(self.v1, self.v2)
-        return high if count <= high != every_state(count) else None
+        return high if count <= high != all_states_digit(count) else None
 
 
 SPIN_ALONG_Z = 5  # NS from here on: N_z S_z in place of the 1 of TYP 0
 
 
-def product_of_axes(first: str, second: str) -> str:
+def axis_product(first: str, second: str) -> str:
     """The axis of a product of two operators along axes.
 
-    >>> product_of_axes("a", "b"), product_of_axes("a", "a"), product_of_axes("", "c")
+    >>> axis_product("a", "b"), axis_product("a", "a"), axis_product("", "c")
     ('c', '', 'c')
     """
     axes = ("", "a", "b", "c")
     return axes[axes.index(first) ^ axes.index(second)]
 
 
-def typ_of_ladder(n: int) -> int:
+def ladder_typ(n: int) -> int:
     """TYP of N₊^2n + N₋^2n, of 1 for n = 0."""
     return LADDERS.first + n - 1 if n else 0
 
 
-def typ_of_square(axis: str) -> int:
+def square_typ(axis: str) -> int:
     """TYP of Na², Nb², Nc²."""
     return next(row.first for row in TABLE if row.kind is Kind.SQUARE) + "abc".index(axis)
 
@@ -281,14 +281,14 @@ def typ_along(axis: str) -> int:
 
 def typ_across(letters: str) -> int:
     """TYP of NbNc + NcNb, ... by two axes."""
-    return _ALONG[product_of_axes(letters[0], letters[1])].first + 1
+    return _ALONG[axis_product(letters[0], letters[1])].first + 1
 
 
 TYPES_BETWEEN = (  # interactions of two states without spins, by name
     {f"G_{axis}": typ_along(axis) for axis in "abc"}
     | {f"F_{letters}": typ_across(letters) for letters in PAIRS}
     | {"W": 0}
-    | {f"W_pm{2 * n}": typ_of_ladder(n) for n in (1, 2, 3)}
+    | {f"W_pm{2 * n}": ladder_typ(n) for n in (1, 2, 3)}
 )
 
 
@@ -297,7 +297,7 @@ def state_digits(states: int) -> int:
     return 1 if states <= 9 else 2 if states <= 99 else 3
 
 
-def every_state(states: int) -> int:
+def all_states_digit(states: int) -> int:
     """The V1 and V2 that stand for all states: 9, 99 or 999."""
     return int(10 ** state_digits(states)) - 1
 

@@ -14,17 +14,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, join_code, split_code, typ_of_ladder, typ_of_square
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, join_code, ladder_typ, split_code, square_typ
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.tops import operators as published
 from rotor.tops.constants import Constants
 from rotor.tops.kind_of_constants import RIGID
-from rotor.tops.operators import Operators, axes_of, powers_of_spelled, spelled_term
+from rotor.tops.operators import Operators, axis_order, spelled_powers, spelled_term
 
 NOT_YET = "is read but not computed yet"
 PLURAL_NOT_YET = "are read but not computed yet"
 
-AXES = {basis: axes_of(basis) for basis in ("Ir", "IIIl")}  # x, y, z of the two bases
+AXES = {basis: axis_order(basis) for basis in ("Ir", "IIIl")}  # x, y, z of the two bases
 
 
 def basis_axes(oblate: bool) -> str:
@@ -40,19 +40,19 @@ class Named(NamedTuple):
     sign: int
 
 
-def code_of_term(p: int, q: int, n: int) -> int:
+def term_code(p: int, q: int, n: int) -> int:
     """The code of ½{Jz^2q, J₊^2n + J₋^2n} J^2p (n = 0: Jz^2q J^2p) in the lowest state.
 
-    >>> [code_of_term(*term) for term in ((1, 0, 0), (0, 1, 0), (1, 0, 1), (0, 0, 4))]
+    >>> [term_code(*term) for term in ((1, 0, 0), (0, 1, 0), (1, 0, 1), (0, 0, 4))]
     [100, 1000, 40100, 70000]
     """
-    return join_code(Digits(0, 0, 0, 0, 0, typ=typ_of_ladder(n), ksq=q, nsq=p, v2=0, v1=0))
+    return join_code(Digits(0, 0, 0, 0, 0, typ=ladder_typ(n), ksq=q, nsq=p, v2=0, v1=0))
 
 
 def _named(terms: Iterable[tuple[str, Operators]]) -> tuple[Named, ...]:
     """Names, codes and signs of constants that multiply one term each."""
     signed_terms = ((name, *next(iter(operators.items()))) for name, operators in terms)
-    return tuple(Named(name, code_of_term(*powers), int(sign)) for name, powers, sign in signed_terms)
+    return tuple(Named(name, term_code(*powers), int(sign)) for name, powers, sign in signed_terms)
 
 
 def _by_order(term: tuple[str, Operators]) -> tuple[int, int]:
@@ -98,7 +98,7 @@ def _single_state(options: tuple[Options, ...]) -> Options:
     return first
 
 
-def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
+def file_constants(file: ParameterFile, *, errors: bool = False) -> Constants:
     """The named constants of a .par or .var file with one vibrational state and no spin.
 
     Values of equal codes are added, as SPFIT does. The reduction follows from the operators, or from the letter of the option line if they
@@ -112,7 +112,7 @@ def constants_of(file: ParameterFile, *, errors: bool = False) -> Constants:
     kind = _kind(options, rigid, values)
     reduction = _reduction(options, values) if kind == "asymmetric" else None
 
-    names = _names_of(values, kind, reduction)
+    names = _code_names(values, kind, reduction)
     named: dict[str, Any] = _rigid_constants(options, rigid, kind)
     named |= {names[code].name: names[code].sign * value for code, value in values.items()}
 
@@ -136,19 +136,19 @@ def constants_and_matrix(file: ParameterFile) -> tuple[Constants, NDArray[np.flo
     >>> constants.values["A"], matrix.tolist()
     (9.0, [[1.0, 1.0], [0.0, 1.0]])
     """
-    constants = constants_of(file)
+    constants = file_constants(file)
     options, names = file.options[0], list(constants.values)
     factors_by_code: dict[int, dict[str, float]] = {}
     for code in {_whole_code(parameter) for parameter in file.parameters}:
         if code in _RIGID:
             factors_by_code[code] = _rigid_constants(options, {code: 1.0}, constants.kind)
         else:
-            named = _names_of([code], constants.kind, constants.reduction)[code]
+            named = _code_names([code], constants.kind, constants.reduction)[code]
             factors_by_code[code] = {named.name: float(named.sign)}
     matrix = np.zeros((len(names), len(file.parameters)))
     for column, parameter in enumerate(file.parameters):
         for name, factor in factors_by_code[_whole_code(parameter)].items():
-            matrix[names.index(constants.own_name(name)), column] += factor
+            matrix[names.index(constants.spelling(name)), column] += factor
     return constants, matrix
 
 
@@ -163,7 +163,7 @@ def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int
     return values, spreads
 
 
-def _names_of(codes: Iterable[int], kind: str, reduction: str | None) -> dict[int, Named]:
+def _code_names(codes: Iterable[int], kind: str, reduction: str | None) -> dict[int, Named]:
     """Names of distortion codes: published ones, else spelled operators such as J8Jpm2 for 40400."""
     names = {item.code: item for item in _vocabulary(kind, reduction)}
     for code in codes:
@@ -182,8 +182,8 @@ def _spelled_code(code: int, kind: str, reduction: str | None) -> str:
     return spelled_term(d.nsq, d.ksq, n)
 
 
-SQUARES = {join_code(Digits(0, 0, 0, 0, 0, typ_of_square(x), 0, 0, 0, 0)): x.upper() for x in "abc"}
-MEAN, ALONG, ACROSS = code_of_term(1, 0, 0), code_of_term(0, 1, 0), code_of_term(0, 0, 1)  # N², Nz², N₊² + N₋²
+SQUARES = {join_code(Digits(0, 0, 0, 0, 0, square_typ(x), 0, 0, 0, 0)): x.upper() for x in "abc"}
+MEAN, ALONG, ACROSS = term_code(1, 0, 0), term_code(0, 1, 0), term_code(0, 0, 1)  # N², Nz², N₊² + N₋²
 _RIGID = (*SQUARES, MEAN, ALONG, ACROSS)
 
 
@@ -253,12 +253,12 @@ def _vocabulary(kind: str, reduction: str | None) -> tuple[Named, ...]:
     return SYMMETRIC if kind in ("prolate", "oblate") else LINEAR
 
 
-def parameters_of(constants: Constants) -> tuple[Parameter, ...]:
+def parameter_lines(constants: Constants) -> tuple[Parameter, ...]:
     """The parameter lines of named constants, with their uncertainties as errors, or 1e-37 (fixed) without an uncertainty.
 
     Raises ValueError for representations other than Iʳ and IIIˡ.
 
-    >>> [(p.code, p.value, p.label) for p in parameters_of(Constants(B=6081.5, D=0.0013))]
+    >>> [(p.code, p.value, p.label) for p in parameter_lines(Constants(B=6081.5, D=0.0013))]
     [(100, 6081.5, 'B'), (200, -0.0013, '-D')]
     """
     representation = constants.representation
@@ -296,16 +296,16 @@ def _distortion_parameters(constants: Constants) -> tuple[Parameter, ...]:
         if item.name in constants
     )
     return named + tuple(
-        Parameter(_code_of_spelled(name), constants[name], spread.get(name, FIXED), name) for name in unnamed
+        Parameter(_operator_code(name), constants[name], spread.get(name, FIXED), name) for name in unnamed
     )
 
 
-def _code_of_spelled(name: str) -> int:
+def _operator_code(name: str) -> int:
     """The code of a spelled operator such as `J4Jz2Jpm2`."""
-    powers = powers_of_spelled(name)
+    powers = spelled_powers(name)
     if powers is None:
         raise ValueError(f"{name}: SPFIT's files have no code for it; leave it out")
-    return code_of_term(*powers)
+    return term_code(*powers)
 
 
 FIXED = 1e-37  # error of a parameter that is not fitted

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from rotor.formats.spcat.hamiltonian.code_table import state_digits
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
-from rotor.formats.spcat.hamiltonian.moment_words import imaginary, tensor_of, words_of
-from rotor.formats.spcat.hamiltonian.series import Series, angles_by_k, factor_of_k
+from rotor.formats.spcat.hamiltonian.moment_words import imaginary, moment_tensor, type_words
+from rotor.formats.spcat.hamiltonian.series import Series, angles_by_k, k_factor
 from rotor.formats.spcat.text.int_file import Dipole
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment, Written
 
@@ -45,7 +45,7 @@ def split_dipole(code: int, states: int) -> DipoleCode:
     return DipoleCode(typ + 10 * second, spin, (low, high), axis)
 
 
-def dipoles_of(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tuple[Dipole, DipoleCode]]]:
+def split_dipoles(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list[tuple[Dipole, DipoleCode]]]:
     """(μa, μb, μc) in D by pairs of states (lower first) with equal codes added, and the lines of other moments."""
     plain: dict[tuple[int, int], list[float]] = {}
     others = []
@@ -66,7 +66,7 @@ _POWERS = {3: "J", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP with powers of N² of 
 _WRITTEN = (0, 1, 2, 3, 4, 6, 9, 10, 11, 12)
 
 
-def moment_of(
+def line_moment(
     dipole: Dipole,
     code: DipoleCode,
     states: tuple[int, int],
@@ -117,7 +117,7 @@ def moment_of(
     if not as_spcat and states[0] == states[1] and _is_turned(code):
         raise ValueError(f"dipole {dipole.code}: {_TURNED}")
     if code.typ in FOURIER:
-        return _fourier_of(dipole, code, states, series or Series(), oblate, as_spcat)
+        return _fourier_moment(dipole, code, states, series or Series(), oblate, as_spcat)
     if code.spin > spins:
         raise ValueError(f"dipole {dipole.code}: spin {code.spin} is not among the {spins} that SPIND names")
     if code.axis > 3:
@@ -135,15 +135,15 @@ def moment_of(
     if code.axis and powers and (powers != "[J]" or states[0] == states[1]):
         return Moment(value, states, _along(code.axis), powers)
     if (code.typ == 5 and code.axis) or code.typ in _WRITTEN:
-        words = words_of(0 if powers else code.typ, code.axis, oblate, as_spcat=as_spcat)
+        words = type_words(0 if powers else code.typ, code.axis, oblate, as_spcat=as_spcat)
         commutator = code.typ in (5, 11)
         written = Written(words, bool(code.axis), commutator)
         return Moment(value, states[::-1], powers="" if commutator else powers, written=written)
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
 
 
-def has_error_of_program(code: DipoleCode, oblate: bool) -> bool:
-    """Whether SPCAT deviates from its documentation, so that `as_spcat` changes the result of `moment_of`."""
+def deviates_in_spcat(code: DipoleCode, oblate: bool) -> bool:
+    """Whether SPCAT deviates from its documentation, so that `as_spcat` changes the result of `line_moment`."""
     magnetic, alone = code.axis == 0, code.states[0] == code.states[1]
     if alone and _is_turned(code):
         return True
@@ -175,7 +175,7 @@ def _spin_moment(
     """The magnetic moment of a spin."""
     spin = f"I{code.spin}"
     if code.axis == 0 and code.typ in (0, 3, 4, 6, 9):
-        words = words_of(0 if code.typ in _POWERS else code.typ, 0, oblate, with_spin=True)
+        words = type_words(0 if code.typ in _POWERS else code.typ, 0, oblate, with_spin=True)
         return Moment(value, states, powers=_POWERS.get(code.typ, ""), spin=spin, written=Written(words, False))
     if code.typ == 0 and code.axis == (3 if oblate else 1):
         return Moment(value, states[::-1], _along(code.axis), spin=spin)
@@ -183,13 +183,13 @@ def _spin_moment(
         if code.axis == 0 and as_spcat:
             if code.typ == 1:
                 return Moment(value, states, powers="3K-J", spin=spin)
-            return Moment(value, states, spin=spin, written=Written(words_of(6, 0, oblate, with_spin=True), False))
-        tensor = tensor_of(code.typ, code.axis, oblate)
+            return Moment(value, states, spin=spin, written=Written(type_words(6, 0, oblate, with_spin=True), False))
+        tensor = moment_tensor(code.typ, code.axis, oblate)
         return Moment(value, states[::-1], tensor=tensor, spin=spin, with_i=code.axis > 0)
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
 
 
-def _fourier_of(
+def _fourier_moment(
     dipole: Dipole, code: DipoleCode, states: tuple[int, int], series: Series, oblate: bool, as_spcat: bool
 ) -> Moment:
     """TYP 0 times a function of K; states: numbers in the group, the higher number of the file first."""
@@ -204,10 +204,10 @@ def _fourier_of(
         return Moment(dipole.value, states, _along(code.axis), cosine=(high, low))
     in_debye = bool(code.axis) or (sine and not as_spcat)
     value = dipole.value * (1.0 if in_debye else DEBYE_PER_BOHR_MAGNETON)
-    words = words_of(0, code.axis, oblate, as_spcat=as_spcat)
+    words = type_words(0, code.axis, oblate, as_spcat=as_spcat)
     if sine:
         words = tuple(word._replace(factor=imaginary(oblate) * word.factor) for word in words)
-    function_of_k = factor_of_k(n, sine, series, code.states)
+    function_of_k = k_factor(n, sine, series, code.states)
     return Moment(value, states[::-1], written=Written(words, bool(code.axis), factor_of_k=function_of_k))
 
 

@@ -16,15 +16,15 @@ from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Symmetry, s
 from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, basis_axes
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
 from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, energy_of_k
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, k_energy
 from rotor.formats.spcat.hamiltonian.phases import half_turned
 from rotor.formats.spcat.hamiltonian.series import (
     Series,
     coded_operator,
+    file_series,
     refuse_within_pairs,
-    series_of,
 )
-from rotor.formats.spcat.hamiltonian.spin_operators import plain_of_j
+from rotor.formats.spcat.hamiltonian.spin_operators import single_j_operator
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.effect import QuantumEffect
@@ -73,7 +73,7 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     """The parameter lines of a file; a series with constants of each state gives one line for each.
 
     Parameters of value zero are skipped, as are those between a state and 9 (99, 999), which are place holders in SPFIT, those of states
-    that do not exist (`reasons_of_states`), and constants of series.
+    that do not exist (`ignored_states`), and constants of series.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     options = file.options[0]
     if not 0 <= options.xopt < 80:
         raise ValueError(f"XOPT = {options.xopt}: expected PHASE + 10 NEWLZ + 20 NOFC + 40 G12, 0 to 79")
-    series = series_of(file, states, pairs)
+    series = file_series(file, states, pairs)
     result: list[CodedLine] = []
     for place, parameter in enumerate(file.parameters, 1):
         digits = split_code(parameter.code, states)
@@ -106,7 +106,7 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
             continue
         label = f" /{parameter.label}" if parameter.label else ""
         try:
-            coded = _lines_of(digits, states, series, options)
+            coded = _coded_lines(digits, states, series, options)
             lines = [_within_pairs(line, digits, pairs, options) for line in coded]
         except ValueError as error:
             raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
@@ -114,7 +114,7 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     return result
 
 
-def reasons_of_states(file: ParameterFile, states: int) -> list[str]:
+def ignored_states(file: ParameterFile, states: int) -> list[str]:
     """A sentence for each parameter of a state that does not exist, which SPCAT ignores."""
     reasons = list[str]()
     for parameter in file.parameters:
@@ -125,7 +125,7 @@ def reasons_of_states(file: ParameterFile, states: int) -> list[str]:
     return reasons
 
 
-def _lines_of(digits: Digits, count: int, series: Series, options: Options) -> list[CodedLine]:
+def _coded_lines(digits: Digits, count: int, series: Series, options: Options) -> list[CodedLine]:
     """The lines of a code; a series in all states gives one line for each state, with its constants."""
     oblate = options.nvib < 0
     symmetry, axes, states = digits.symmetry(oblate), basis_axes(oblate), digits.states(count)
@@ -162,7 +162,7 @@ def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], option
 
 def _half_difference(line: CodedLine, digits: Digits, first: int, options: Options) -> CodedLine:
     """TYP 80 to 89 of the state with K l ≤ 0, with NEWLZ: half the difference of the energies of one K with K l > 0 and K l < 0."""
-    operator = energy_of_k(digits.k_of_level, digits.nsq, 1j if options.nvib > 0 else -1j)
+    operator = k_energy(digits.level_k, digits.nsq, 1j if options.nvib > 0 else -1j)
     return line._replace(operator=CodedOperator(by_j=operator, odd=True), states=(first, first))
 
 
@@ -313,7 +313,7 @@ class FileEffect(QuantumEffect):
                 couplings += [Coupling(line.name, *pair, operator_at) for pair in pairs]
             elif states and states[0] != states[1]:
                 assert operator.plain is not None
-                couplings.append(Coupling(line.name, *states, plain_of_j(operator.plain)))
+                couplings.append(Coupling(line.name, *states, single_j_operator(operator.plain)))
         restricted = (self._restricted(coupling) for coupling in couplings)
         return tuple(replace(coupling, operator=_stored(coupling.operator)) for coupling in restricted)
 
@@ -345,7 +345,7 @@ class FileEffect(QuantumEffect):
         operator = line.operator
         if operator.plain is not None and states[0] == states[1]:
             return []  # listed with the operators of both components
-        operator_at = operator.by_j or plain_of_j(operator.plain or {})
+        operator_at = operator.by_j or single_j_operator(operator.plain or {})
         if operator.odd and states[0] == states[1] and self.axes[2] == "c":
             operator_at = _turned_round(operator_at)  # -i stands between states of an oblate basis, not within a pair
         try:

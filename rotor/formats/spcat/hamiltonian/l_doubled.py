@@ -42,7 +42,7 @@ class Pair(NamedTuple):
     second: int
 
 
-def pairs_of(states: Sequence[StateOptions]) -> list[Pair]:
+def l_doubled_pairs(states: Sequence[StateOptions]) -> list[Pair]:
     """The l-doubled pairs among the states of a file; ValueError for a state without its partner."""
     pairs, at = [], 0
     while at < len(states):
@@ -173,7 +173,7 @@ def couplings_with_pairs(
 # Names of levels
 
 
-def functions_of_l(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
+def l_functions(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
     """The functions (n, n), in rows, that label the states of a block, and their labels v, Ka, Kc (n, 3).
 
     States that are not l-doubled have basis functions, a pair has |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0. A half turn across the
@@ -207,9 +207,9 @@ def functions_of_l(block: SolvedBlock, pairs: Sequence[Pair], representation: st
 _UNCOUPLED = "l-doubled states without a coupling of their components; give -2Aζ (TYP 20) for them"
 
 
-def names_of_block(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
+def block_names(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
     """Labels and weights of the states of a block."""
-    functions, names = functions_of_l(block, pairs, representation)
+    functions, names = l_functions(block, pairs, representation)
     shares = (functions @ block.vectors) ** 2
     function_of_state = assigned(shares, np.ones(len(functions), dtype=np.int64))
     return names[function_of_state], shares[function_of_state, np.arange(len(function_of_state))]

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, functions_of_l, names_of_block, over_real_states
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, block_names, l_functions, over_real_states
 from rotor.formats.spcat.hamiltonian.labels import renamed
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
@@ -89,11 +89,11 @@ def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Le
     functions_by_block: dict[int, tuple[Floats, Ints]] = {}
     for block in levels.blocks:
         if not isinstance(block, SpinBlock):
-            labels_and_weights.append(names_of_block(block, pairs, representation))
+            labels_and_weights.append(block_names(block, pairs, representation))
             continue
         for part in block.parts:
             if part.number not in functions_by_block:
-                functions_by_block[part.number] = functions_of_l(part.rotor, pairs, representation)
+                functions_by_block[part.number] = l_functions(part.rotor, pairs, representation)
         labels_and_weights.append(_names_with_spins(block, functions_by_block))
     return renamed(levels, *zip(*labels_and_weights, strict=True))
 
@@ -101,14 +101,14 @@ def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Le
 def functions_by_l(block: SolvedBlock | SpinBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
     """The functions (n, n), in rows over the basis, that label the states of a block, and their labels.
 
-    They are |K, l⟩ ± |-K, -l⟩ of `l_doubled.functions_of_l` with each coupling pattern; labels: v, Ka, Kc, doubled pattern if any.
+    They are |K, l⟩ ± |-K, -l⟩ of `l_doubled.l_functions` with each coupling pattern; labels: v, Ka, Kc, doubled pattern if any.
     """
     if not isinstance(block, SpinBlock):
-        return functions_of_l(block, pairs, representation)
+        return l_functions(block, pairs, representation)
     functions = np.zeros((block.parts[-1].place.stop,) * 2)
     names = list[Ints]()
     for part in block.parts:
-        rotational, labels = functions_of_l(part.rotor, pairs, representation)
+        rotational, labels = l_functions(part.rotor, pairs, representation)
         functions[part.place, part.place] = np.kron(np.eye(part.repeats), rotational)
         for pattern in block.patterns[part.patterns]:
             names.append(np.hstack([labels, np.broadcast_to(pattern, (len(labels), len(pattern)))]))

@@ -76,11 +76,11 @@ def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diago
             tables.append(clear[0])
             shares.append(clear[1])
             continue
-        functions = functions_of(block, str(levels.representation))
+        functions = wang_functions(block, str(levels.representation))
         energies = -block.energies_mhz if oblate else block.energies_mhz
         at = places(functions, energies, diag, diagonal)
         tables.append(functions.names[at])
-        shares.append(_shares_of_groups(functions, at, diag))
+        shares.append(_group_weights(functions, at, diag))
     return renamed(levels, tables, shares)
 
 
@@ -156,7 +156,7 @@ def _clear_labels(block: object, oblate: bool, representation: str) -> tuple[Int
     return names, shares
 
 
-def _shares_of_groups(functions: Functions, at: Ints, diag: int) -> Floats:
+def _group_weights(functions: Functions, at: Ints, diag: int) -> Floats:
     """The weight of each state in the group that labels it."""
     group_of_function = np.arange(len(at)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
     inside = group_of_function[:, None] == group_of_function[at][None, :]
@@ -183,7 +183,7 @@ def places(functions: Functions, energies: Floats, diag: int, diagonal: Diagonal
         if diag == 4:
             functions_of_states[states] = _by_k2(functions, members, states, shares, energies)
         else:
-            rising = _in_order_of_k(functions, members) if ranks is None else _by_diagonal(functions, members, ranks)
+            rising = _by_rising_k(functions, members) if ranks is None else _by_diagonal(functions, members, ranks)
             functions_of_states[states[np.argsort(energies[states], kind="stable")]] = rising
     return functions_of_states
 
@@ -211,7 +211,7 @@ def _ranks(diagonal: Floats) -> Floats:
     return ranks
 
 
-def _in_order_of_k(functions: Functions, members: Ints) -> Ints:
+def _by_rising_k(functions: Functions, members: Ints) -> Ints:
     """The functions of a group by rising K; for one K the function with Ka + Kc = N + 1 first."""
     return np.asarray(members[np.lexsort((-functions.above[members], functions.k[members]))])
 
@@ -220,7 +220,7 @@ def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, en
     """Functions for states ordered by ⟨K²⟩ of their part in the group; states of one K by energy."""
     weights = shares[np.ix_(members, states)]
     k2 = (functions.k[members].astype(float) ** 2) @ weights / weights.sum(axis=0)
-    by_k2, by_tau = np.argsort(k2, kind="stable"), _in_order_of_k(functions, members)
+    by_k2, by_tau = np.argsort(k2, kind="stable"), _by_rising_k(functions, members)
     ks, functions_of_states = functions.k[by_tau], np.empty(len(states), dtype=np.int64)
     for k in np.unique(ks):
         run = np.flatnonzero(ks == k)
@@ -229,7 +229,7 @@ def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, en
     return functions_of_states
 
 
-def functions_of(block: SolvedBlock | SpinBlock, representation: str) -> Functions:
+def wang_functions(block: SolvedBlock | SpinBlock, representation: str) -> Functions:
     """The functions |N K ±⟩ of a solved block, with all coupling patterns, by part, pattern and K."""
     if isinstance(block, SpinBlock):
         return _functions_with_spins(block, representation)

@@ -24,7 +24,7 @@ from rotor.quantum.moments import Matrix, Word
 Words = tuple[Word, ...]
 
 
-def axes_of_moments(oblate: bool) -> tuple[str, str, str]:
+def moment_axes(oblate: bool) -> tuple[str, str, str]:
     """The axes at x, y, z in the table of dipole types."""
     return ("b", "a", "c") if oblate else ("b", "c", "a")
 
@@ -34,7 +34,7 @@ def imaginary(oblate: bool) -> complex:
     return -1j if oblate else 1j
 
 
-def words_of(typ: int, sym: int, oblate: bool, with_spin: bool = False, as_spcat: bool = False) -> Words:
+def type_words(typ: int, sym: int, oblate: bool, with_spin: bool = False, as_spcat: bool = False) -> Words:
     """The words of a TYP without its powers of N².
 
     Parameters
@@ -55,22 +55,22 @@ def words_of(typ: int, sym: int, oblate: bool, with_spin: bool = False, as_spcat
     tuple of Word
         Words in debye or magnetons, for a value of 1.
     """
-    x, y, z = axes_of_moments(oblate)
+    x, y, z = moment_axes(oblate)
     if typ == 4:
-        return _half_with(z + z, words_of(0, sym, oblate, with_spin, as_spcat))
+        return _half_with(z + z, type_words(0, sym, oblate, with_spin, as_spcat))
     if typ == 6:
         return _third_order(sym, (x, y, z), with_spin)
     if typ == 12:
-        return _times(-imaginary(oblate), _half_with(z, words_of(2, sym, oblate)))
+        return _times(-imaginary(oblate), _half_with(z, type_words(2, sym, oblate)))
     if typ in (1, 2, 11) or (as_spcat and not sym and not with_spin):
         typ = typ or 1
         return _second_order(typ, sym, (x, y, z), imaginary(oblate))
     return _plain(sym, with_spin)
 
 
-def tensor_of(typ: int, sym: int, oblate: bool) -> Matrix:
+def moment_tensor(typ: int, sym: int, oblate: bool) -> Matrix:
     """c of Σ_ij c_ij φ_i S_j for TYP 1 and 2; for SYM 1 to 3 without the factor i, with its sign in an oblate basis."""
-    x, y, z = axes_of_moments(oblate)
+    x, y, z = moment_axes(oblate)
     c = dict.fromkeys((i + j for i in "abc" for j in "abc"), 0.0)
     if sym:
         i, j = (axis for axis in "abc" if axis != "abc"[sym - 1])

@@ -5,7 +5,7 @@
 | TYP 0; 1, 2, 3; 3 + n | 1; Na², Nb², Nc²; N₊^2n + N₋^2n |
 | TYP 20, 40, 60 | Na, Nb, Nc, between states with the factor i, in an oblate basis -i |
 | TYP 21, 41, 61 | NbNc + NcNb, NaNc + NcNa, NaNb + NbNa |
-| TYP 20 + n, 40 + n, 60 + n, 11 + n | tensors of rank L made of N alone, see `_tensor_of_n`; of odd L between states with the factor i |
+| TYP 20 + n, 40 + n, 60 + n, 11 + n | tensors of rank L made of N alone, see `_tensor_in_n`; of odd L between states with the factor i |
 | TYP 80 + n | the energy of K = 10 n + KSQ alone, with N^2NSQ |
 | I1 | one N is replaced by that spin: Σ c_ij ½{φ_pi, N_j} S_p; TYP 20, 40, 60: φ_a·S, between states |
 | I1 = I2 | two N are: (Ia² - I²/3)/(2I(2I-1)), ... |
@@ -26,7 +26,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from rotor.formats.spcat.hamiltonian.code_table import SPIN_ALONG_Z, Digits, Kind, Tensor, typ_of_square
+from rotor.formats.spcat.hamiltonian.code_table import SPIN_ALONG_Z, Digits, Kind, Tensor, square_typ
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, tensor_with_spins
 from rotor.quantum.effects.interactions import with_powers
@@ -62,18 +62,18 @@ class CodedOperator:
     ns: int = 0
 
 
-def operator_of(digits: Digits, axes: str) -> CodedOperator:
+def code_operator(digits: Digits, axes: str) -> CodedOperator:
     """The operator of a code; axes: the axes x, y, z (bca or bac).
 
     Raises ValueError, with the meaning of the code, if it is not supported.
     """
     _refuse(digits)
     if digits.projects_spin:  # N_z S_z of the first spin: the product of both projections on z
-        digits = digits._replace(i1=1, typ=typ_of_square(axes[2]), ns=digits.ns - SPIN_ALONG_Z)
+        digits = digits._replace(i1=1, typ=square_typ(axes[2]), ns=digits.ns - SPIN_ALONG_Z)
     level = digits.kind is Kind.LEVEL
     if level and digits.spins:
         product = _with_spins(digits._replace(typ=0, ksq=0), axes)
-        k = digits.k_of_level
+        k = digits.level_k
         assert product.rotor is not None
         restricted = multiplied(
             product.rotor, lambda m, n, above, below: 1.0 * ((abs(above) == k) & (above == below)), 1.0, False
@@ -82,13 +82,13 @@ def operator_of(digits: Digits, axes: str) -> CodedOperator:
     if digits.has_spin:
         return _with_spins(digits, axes)
     if level:
-        return CodedOperator(by_j=energy_of_k(digits.k_of_level, digits.nsq))
+        return CodedOperator(by_j=k_energy(digits.level_k, digits.nsq))
     if digits.kind is Kind.TENSOR:
         return CodedOperator(by_j=_operator_by_j(digits, axes), odd=digits.tensor.odd)
     return CodedOperator(plain=_plain(digits, axes))
 
 
-def energy_of_k(k_of_code: int, n2: int, factor: complex = 0.0) -> OperatorOfJ:
+def k_energy(k_of_code: int, n2: int, factor: complex = 0.0) -> OperatorOfJ:
     """N^2p for functions with |K| = 10 (TYP - 80) + KSQ only; a factor ± i multiplies the sign of K."""
 
     def operator(j: int, representation: str) -> JOperator:
@@ -117,7 +117,7 @@ def _plain(d: Digits, axes: str) -> Operators:
     p, q = d.nsq, d.ksq
     if d.kind is not Kind.SQUARE:
         return {(p, q, d.ladder): 1.0}
-    place = axes.index(d.axis_of_square)
+    place = axes.index(d.square_axis)
     if place == 2:
         return {(p, q + 1, 0): 1.0}
     return {(p + 1, q, 0): 0.5, (p, q + 1, 0): -0.5, (p, q, 1): 0.25 if place == 0 else -0.25}
@@ -129,18 +129,18 @@ def _operator_by_j(d: Digits, axes: str) -> OperatorOfJ:
     factor = imaginary(axes, d.tensor.odd)
 
     def operator(j: int, representation: str) -> JOperator:
-        return with_powers(factor * _tensor_of_j(d.tensor, j, representation, axes[2]), powers)
+        return with_powers(factor * _tensor_in_j(d.tensor, j, representation, axes[2]), powers)
 
     return operator
 
 
 @lru_cache(maxsize=1024)
-def _tensor_of_j(tensor: Tensor, j: int, representation: str, z: str) -> JOperator:
-    """`_tensor_of_n` of one J, cached for the parameters of one TYP."""
-    return _tensor_of_n(tensor, components(j, representation), z)
+def _tensor_in_j(tensor: Tensor, j: int, representation: str, z: str) -> JOperator:
+    """`_tensor_in_n` of one J, cached for the parameters of one TYP."""
+    return _tensor_in_n(tensor, components(j, representation), z)
 
 
-def _tensor_of_n(tensor: Tensor, n_abc: Mapping[str, JOperator], z: str) -> JOperator:
+def _tensor_in_n(tensor: Tensor, n_abc: Mapping[str, JOperator], z: str) -> JOperator:
     """The Hermitian operator of a tensor, from Na, Nb, Nc.
 
     With X, Y, Z = Nc, Nb, Na (prolate) or Na, Nb, Nc (oblate), E = (X + iY)^K and {A, B} = AB + BA,
@@ -190,7 +190,7 @@ def _matrix(d: Digits, axes: str) -> Matrix:
     if d.kind is Kind.SCALAR:
         return matrix_of("iso")
     if d.kind is Kind.SQUARE:
-        return matrix_of(d.axis_of_square * 2)
+        return matrix_of(d.square_axis * 2)
     if d.kind is Kind.LADDER:  # N₊² + N₋² = 2 (Nx² - Ny²)
         plain = matrix_of(f"{axes[0] * 2}-{axes[1] * 2}")
         return tuple(tuple(2 * value for value in row) for row in plain)  # type: ignore[return-value]

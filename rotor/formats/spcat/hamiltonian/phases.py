@@ -42,7 +42,7 @@ class Phases(NamedTuple):
         return ("abc"[axis - 1] in self.odd) != self.between_i
 
 
-def phases_of(file: ParameterFile, states: int, doubled: frozenset[int]) -> Phases:
+def read_phases(file: ParameterFile, states: int, doubled: frozenset[int]) -> Phases:
     """The phases by PHASE of XOPT; without it an axis is odd if more parameters along it are odd than even.
 
     A parameter of all states counts once for each state, even if its value is 0. Parameters of l-doubled states do not count.
@@ -107,7 +107,7 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
     """
     axes = sorted(set(used) - {""})
     for g in sorted(
-        ("", "c", "b", "a"), key=lambda g: odd != odd_of_turned(g)
+        ("", "c", "b", "a"), key=lambda g: odd != turned_odd_axes(g)
     ):  # the axis that fits unused axes too is preferred
         if all((axis in odd) == (g not in ("", axis)) for axis in axes):
             return g
@@ -118,10 +118,10 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
     )
 
 
-def odd_of_turned(g: str) -> frozenset[str]:
+def turned_odd_axes(g: str) -> frozenset[str]:
     """The axes along which odd operators are real if a half turn about g accompanies time reversal.
 
-    >>> sorted(odd_of_turned("b")), sorted(odd_of_turned(""))
+    >>> sorted(turned_odd_axes("b")), sorted(turned_odd_axes(""))
     (['a', 'c'], [])
     """
     return frozenset("abc") - {g} if g else frozenset()

@@ -30,8 +30,8 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Tensor, split_code
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, operator_of
-from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, plain_of_j
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, code_operator
+from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, single_j_operator
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
@@ -50,7 +50,7 @@ class Series:
     g12: bool = False
 
 
-def series_of(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]] = ()) -> Series:
+def file_series(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]] = ()) -> Series:
     """The constants of the series of a file.
 
     Parameters
@@ -107,7 +107,7 @@ def _set(series: Series, d: Digits, parameter: Parameter, pair: tuple[int, int])
         )
 
 
-def term_of(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> CodedOperator:
+def series_term(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> CodedOperator:
     """The operator of a code with a series, between two states, lower first.
 
     Parameters
@@ -138,17 +138,17 @@ def term_of(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Co
         raise ValueError("a code has one series alone, and no energy of one K (TYP 80 to 89) with it")
     if d.ff:
         sine, n = d.sine, d.harmonic
-        base = operator_of(d._replace(ff=0), axes)
+        base = code_operator(d._replace(ff=0), axes)
         sampled = _sampled(n, sine) if series.nofc else _fourier(n, sine, series, states)
         return _multiplied(base, sampled, sine, axes)
     return _euler(d, axes, series, states)
 
 
 def coded_operator(d: Digits, axes: str, series: Series, states: tuple[int, int] | None) -> CodedOperator:
-    """The operator of a code, with a series between two states; see `operator_of` and `term_of`."""
+    """The operator of a code, with a series between two states; see `code_operator` and `series_term`."""
     if states is None or not d.is_series:
-        return operator_of(d, axes)
-    return term_of(d, axes, series, states)
+        return code_operator(d, axes)
+    return series_term(d, axes, series, states)
 
 
 def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float, float]:
@@ -170,7 +170,7 @@ def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
     return factor
 
 
-def factor_of_k(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
+def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
     """Factor of an element in a Fourier term: a single K with NOFC; ½(K' + K'') for the sine of n = 0, as in the program.
 
     Parameters
@@ -216,7 +216,7 @@ def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Cod
     if number > 4:
         raise ValueError(f"EX = {d.ex}: there are five Euler series, EX 1 to 5")
     a, b = (constants.get((number, *states), 0.0) for constants in (series.a, series.b))
-    base = operator_of(d.base, axes)
+    base = code_operator(d.base, axes)
     if base.rotor is not None:
         function = _euler_function(a, b, d.nsq, ksq, extra)
         mean = lambda m, n, above, below: (function(m, above) + function(n, below)) / 2  # noqa: E731
@@ -224,7 +224,7 @@ def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Cod
     if base.by_j is not None:
         return _multiplied(base, _mean(d.nsq, ksq, (a, b), extra), False, axes)
     parts = [
-        _by_elements(plain_of_j({(0, 0, n): factor}), _mean(d.nsq + p, ksq + q, (a, b), extra), 1.0)
+        _by_elements(single_j_operator({(0, 0, n): factor}), _mean(d.nsq + p, ksq + q, (a, b), extra), 1.0)
         for (p, q, n), factor in (base.plain or {}).items()
     ]
     return replace(base, plain=None, by_j=_summed(parts))
@@ -266,7 +266,7 @@ def _multiplied(base: CodedOperator, factor: Factor, sine: bool, axes: str) -> C
     if base.rotor is not None:
         alike = multiplied(base.rotor, lambda m, n, above, below: factor(n, above, below), whole, base.odd != sine)
         return replace(base, rotor=alike, odd=base.odd != sine)
-    operator_at = base.by_j or plain_of_j(base.plain or {})
+    operator_at = base.by_j or single_j_operator(base.plain or {})
     return replace(base, plain=None, by_j=_by_elements(operator_at, factor, whole), odd=base.odd != sine)
 
 

@@ -76,10 +76,10 @@ def _with_conjugate(
 def _stretched(order: int, rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
     """A of the head of this module, or the operator with - in place of +."""
     _, n, representation = where
-    return np.asarray(_ladder_of_cosines(rank, frame, sign, where) @ _n(frame, sign, n, representation, order - rank))
+    return np.asarray(_cosine_ladder(rank, frame, sign, where) @ _n(frame, sign, n, representation, order - rank))
 
 
-def _ladder_of_cosines(rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
+def _cosine_ladder(rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
     """φ± or φ± φ± over |N k⟩."""
     m, n, representation = where
     x, y, _ = frame
@@ -164,7 +164,7 @@ def over_k(rotor: Rotor) -> OverK:
     return lambda m, n, rep: factor * symmetric_top_elements(m, n, spherical_components(c, rotor.rank, rep))
 
 
-def plain_of_j(operators: Operators) -> OperatorOfJ:
+def single_j_operator(operators: Operators) -> OperatorOfJ:
     """Powers (p, q, n) as an operator of one J, for interactions of two states."""
 
     def operator(j: int, representation: str) -> JOperator:
@@ -181,7 +181,7 @@ def _power_elements(rotor: Scalar, m: int, n: int) -> Complexes:
     """Elements of powers of N."""
     if m != n:
         return np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
-    return plain_of_j(dict(rotor.operators))(n, "").matrix
+    return single_j_operator(dict(rotor.operators))(n, "").matrix
 
 
 def _with_n(c: Floats, where: Where) -> Complexes:

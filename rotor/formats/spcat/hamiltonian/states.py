@@ -37,7 +37,7 @@ _FOLDS = {
 }  # fmt: skip  # by IAX
 
 
-EVERY_K = 10**6  # a KNMAX without effect
+ALL_K = 10**6  # a KNMAX without effect
 
 
 @dataclass(frozen=True)
@@ -74,22 +74,22 @@ class StateOptions:
         return self.kmin == self.kmax == 0
 
     @property
-    def has_one_k(self) -> bool:
+    def has_fixed_k(self) -> bool:
         """Whether K is a quantum number of the state, such as l of a bending state of a linear molecule."""
         return self.kmin == self.kmax
 
     @property
     def is_cut(self) -> bool:
         """Whether KNMIN or KNMAX excludes K from a basis of several K."""
-        return not self.has_one_k and (self.kmin > 0 or self.kmax < EVERY_K)
+        return not self.has_fixed_k and (self.kmin > 0 or self.kmax < ALL_K)
 
-    def with_every_k(self) -> StateOptions:
+    def with_all_k(self) -> StateOptions:
         """The state with all K up to N in its basis, unless it has a single K."""
-        return self if self.has_one_k else replace(self, kmin=0, kmax=EVERY_K)
+        return self if self.has_fixed_k else replace(self, kmin=0, kmax=ALL_K)
 
     def with_k_to(self, highest_n: int) -> StateOptions:
         """The state without a KNMAX that excludes nothing up to the highest N."""
-        return self if self.has_one_k or self.kmax < highest_n else replace(self, kmax=EVERY_K)
+        return self if self.has_fixed_k or self.kmax < highest_n else replace(self, kmax=ALL_K)
 
     def weights(self, ka: Ints, kc: Ints, k: Ints, odd_spins: Ints | int = 0) -> Ints:
         """Nuclear-spin weight of one component of levels, as in the file; zero or less for a level that does not exist.
@@ -169,13 +169,13 @@ def doubled_spins(spind: int) -> tuple[int, ...]:
     return tuple(size - 1 for size in sizes)
 
 
-def states_of(file: ParameterFile) -> tuple[StateOptions, ...]:
+def file_states(file: ParameterFile) -> tuple[StateOptions, ...]:
     """The options of all states; ValueError for an unsupported axis of weights or l-doubled states."""
     first = file.options[0]
-    return tuple(_state(v, options_of_state(file, v), first) for v in range(max(abs(first.nvib), 1)))
+    return tuple(_state(v, state_options(file, v), first) for v in range(max(abs(first.nvib), 1)))
 
 
-def options_of_state(file: ParameterFile, v: int) -> Options:
+def state_options(file: ParameterFile, v: int) -> Options:
     """The option line of a state, else the first line, in which the digits of VSYM mark states with exchanged weights."""
     first = file.options[0]
     stated = [line for line in file.options[1:] if abs(line.nvib) == v]
@@ -246,7 +246,7 @@ def is_odd(ka: Ints, kc: Ints) -> NDArray[np.bool_]:
     return np.asarray((ka + kc) % 2 == 1)
 
 
-def has_one_state(parameters: ParameterFile) -> bool:
+def is_single_state(parameters: ParameterFile) -> bool:
     """Whether a file has one state and no spin."""
     first = parameters.options[0]
     return abs(first.nvib) == 1 and len(parameters.options) == 1 and not doubled_spins(first.spind)
@@ -255,7 +255,7 @@ def has_one_state(parameters: ParameterFile) -> bool:
 def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bool:
     """Whether a file has one state, no spin and operators of orthorhombic symmetry, so that its constants have names."""
     first = parameters.options[0]
-    if not has_one_state(parameters) or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
+    if not is_single_state(parameters) or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
         return False
     if first.spind < 0 and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
         return False

@@ -67,7 +67,7 @@ def forbidden(
     return ""
 
 
-def exchange_of(axis: str, low: StateOptions, high: StateOptions) -> int:
+def exchange_part(axis: str, low: StateOptions, high: StateOptions) -> int:
     """The part of an operator with one of two equivalent spins that connects levels of equal weight: 1 even, -1 odd, 0 both."""
     even, odd = (weights_agree(axis, low, high, turned) for turned in (0, 1))
     return int(even) - int(odd)

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.formats.spcat.hamiltonian.labels import functions_of, renamed
+from rotor.formats.spcat.hamiltonian.labels import renamed, wang_functions
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
 
@@ -38,7 +38,7 @@ def _functions_as_states(block: SolvedBlock | SpinBlock, representation: str) ->
     The rows of the eigenvectors are rotational states where spins are added. With functions F = T R of rows R, amplitudes A = T V and
     orthogonal V, the functions are the columns of V A^T.
     """
-    functions = functions_of(block, representation)
+    functions = wang_functions(block, representation)
     diagonal: Floats = functions.amplitudes**2 @ block.energies_mhz
     order = np.argsort(diagonal, kind="stable")
     vectors = (block.vectors @ functions.amplitudes.T)[:, order]

@@ -24,15 +24,15 @@ from rotor.formats.spcat.hamiltonian.code_table import (
     PAIRS,
     TYPES_BETWEEN,
     Digits,
-    every_state,
+    all_states_digit,
     join_code,
+    ladder_typ,
     split_code,
+    square_typ,
     typ_across,
-    typ_of_ladder,
-    typ_of_square,
 )
-from rotor.formats.spcat.hamiltonian.codes import AXES, basis_axes, constants_and_matrix, parameters_of
-from rotor.formats.spcat.model import options_of
+from rotor.formats.spcat.hamiltonian.codes import AXES, basis_axes, constants_and_matrix, parameter_lines
+from rotor.formats.spcat.model import option_line
 from rotor.formats.spcat.text.par import Header, ParameterFile
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.spin_effect import ParameterName, parse_name
@@ -49,7 +49,7 @@ _KINDS = (NuclearQuadrupole, SpinRotation, SpinSpin)
 Codes = dict[int, dict[str, float]]  # factors of the named constants in the value of each code
 
 
-def codes_of_names(constants: TopConstants) -> Codes:
+def constant_codes(constants: TopConstants) -> Codes:
     """For each code of the file of a top, the constants in its value and their factors.
 
     Raises ValueError for constants in another representation than Ir and IIIl.
@@ -79,15 +79,15 @@ def _rotational_codes(constants: TopConstants) -> Codes:
     """Factors of the rotational parameters of each state."""
     top, out, states = constants.top, Codes(), _states(constants)
     for v in range(states):
-        values: dict[str, Any] = dict(top.constants.values) if v == 0 or top.states is None else top.states.of_state(v)
+        values: dict[str, Any] = dict(top.constants.values) if v == 0 or top.states is None else top.states.for_state(v)
         if v:
             out[join_code(Digits(0, 0, 0, 0, 0, 0, 0, 0, v, v), states)] = {f"E[{v}]": 1.0}
             values.pop("E", None)
         state_constants = Constants(
             kind=constants.kind, reduction=constants.reduction, representation=constants.representation, **values
         )
-        option = options_of(state_constants, SpinWeights(), 1)
-        file = ParameterFile("", Header(npar=1), (option,), parameters_of(state_constants))
+        option = option_line(state_constants, SpinWeights(), 1)
+        file = ParameterFile("", Header(npar=1), (option,), parameter_lines(state_constants))
         read_back, matrix = constants_and_matrix(file)
         back = np.linalg.inv(matrix)
         for parameter, row in zip(file.parameters, back, strict=True):
@@ -134,7 +134,7 @@ def _spin_codes(
     """The codes of a spin constant, from the matrix c_ij that it multiplies."""
     states, places = _states(constants), [scheme.place(spin) + 1 for spin in term.spins]
     i1, i2 = max(places), (min(places) if len(places) == 2 else 0)
-    wild = 0 if states == 1 else every_state(states)
+    wild = 0 if states == 1 else all_states_digit(states)
     v1, v2 = (wild, wild) if parts.states is None else (max(parts.states), min(parts.states))
     base = Digits(0, 0, i2, i1, parts.ns, 0, parts.nz2, parts.n2, v2, v1)
     rotor = term.rotor
@@ -161,11 +161,11 @@ def _matrix_codes(c: Floats, whole: bool, oblate: bool, acts_on_three: bool) -> 
     diagonal, times = np.diag(c), 2.0 if acts_on_three else 1.0
     mean, across = float(diagonal[x] + diagonal[y]) / 2, times * float(diagonal[x] - diagonal[y]) / 4
     factors = {typ: times * float(c[i, k]) for (i, k), typ in _CROSS.items()}
-    along, ladder = typ_of_square("abc"[z]), typ_of_ladder(1)
+    along, ladder = square_typ("abc"[z]), ladder_typ(1)
     if not whole:
         factors |= {along: float(diagonal[z]) - mean, ladder: across}
     elif acts_on_three or diagonal[0] == diagonal[1] == diagonal[2] or diagonal[x] == -diagonal[y]:
         factors |= {0: mean, along: float(diagonal[z]) - mean, ladder: across}
     else:
-        factors |= {typ_of_square("abc"[i]): float(diagonal[i]) for i in range(3)}
+        factors |= {square_typ("abc"[i]): float(diagonal[i]) for i in range(3)}
     return {typ: factor for typ, factor in factors.items() if abs(factor) > 1e-12}

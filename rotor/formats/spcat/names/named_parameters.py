@@ -10,8 +10,8 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.spcat.hamiltonian.codes import FIXED
-from rotor.formats.spcat.model import options_of
-from rotor.formats.spcat.names.named_codes import codes_of_names
+from rotor.formats.spcat.model import option_line
+from rotor.formats.spcat.names.named_codes import constant_codes
 from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
@@ -31,7 +31,7 @@ def named_parameters(constants: TopConstants, title: str, kmax: int) -> tuple[Pa
 
     A parameter that contains a constant of unknown error has the error 1e-37, which holds it. Raises ValueError as `named_parameter_file`.
     """
-    codes, names = codes_of_names(constants), list(constants.values)
+    codes, names = constant_codes(constants), list(constants.values)
     matrix = np.zeros((len(codes), len(names)))
     for row, factors in enumerate(codes.values()):
         for name, factor in factors.items():
@@ -75,19 +75,19 @@ def _option_lines(constants: TopConstants, kmax: int) -> tuple[Options, ...]:
 
 def _option_line(top: Top, spins: SpinConstants | None, weights: SpinWeights, kmax: int) -> Options:
     """The option line with spins; IAX is negative if two or three of them have a total spin."""
-    line = options_of(top.constants, weights, kmax)
+    line = option_line(top.constants, weights, kmax)
     if spins is None:
         return line
-    line = replace(line, spind=line.spind * spind_of(spins.twice))
+    line = replace(line, spind=line.spind * spind_digits(spins.twice))
     if len(spins.totals) == 3:
         return replace(line, iax=-6, ewt=0)
     return replace(line, iax=-line.iax) if spins.totals else line
 
 
-def spind_of(twice: Mapping[str, int]) -> int:
+def spind_digits(twice: Mapping[str, int]) -> int:
     """SPIND of spins in the order of coupling: 2I + 1 as digits from the right, or two digits each and a last 0 if one is above 9.
 
-    >>> spind_of({"S": 1, "14N": 2}), spind_of({"10B": 6, "other": 9}), spind_of({})
+    >>> spind_digits({"S": 1, "14N": 2}), spind_digits({"10B": 6, "other": 9}), spind_digits({})
     (32, 10070, 1)
     """
     sizes = [size + 1 for size in twice.values()]

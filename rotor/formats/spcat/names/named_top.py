@@ -19,13 +19,13 @@ from rotor.arrays import Floats
 from rotor.formats.spcat.file_model import allowed
 from rotor.formats.spcat.file_spins import with_their_spins
 from rotor.formats.spcat.hamiltonian.code_table import PAIRS, TYPES_BETWEEN, Kind, join_code, split_code
-from rotor.formats.spcat.hamiltonian.codes import ALONG, HELD_BELOW, MEAN, basis_axes, constants_of, is_linear
-from rotor.formats.spcat.hamiltonian.dipole_codes import dipoles_of
-from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, real_lines, reasons_of_states
-from rotor.formats.spcat.hamiltonian.phases import phases_of
-from rotor.formats.spcat.hamiltonian.states import StateOptions, options_of_state, states_of
+from rotor.formats.spcat.hamiltonian.codes import ALONG, HELD_BELOW, MEAN, basis_axes, file_constants, is_linear
+from rotor.formats.spcat.hamiltonian.dipole_codes import split_dipoles
+from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, ignored_states, real_lines
+from rotor.formats.spcat.hamiltonian.phases import read_phases
+from rotor.formats.spcat.hamiltonian.states import StateOptions, file_states, state_options
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
-from rotor.formats.spcat.model import NO_NAME, fold_parts, weights_of
+from rotor.formats.spcat.model import NO_NAME, fold_parts, option_weights
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
@@ -64,13 +64,13 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     ValueError
         With the field or the parameter, for terms without a name.
     """
-    states, first = states_of(file), file.options[0]
+    states, first = file_states(file), file.options[0]
     _refuse(file, states)
     lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
-    odd = phases_of(file, len(states), frozenset()).odd
+    odd = read_phases(file, len(states), frozenset()).odd
     lines, imaginary = real_lines(lines, odd, frozenset())
     lines, without_spins = with_their_spins(lines, states)
-    left_out += imaginary + without_spins + reasons_of_states(file, len(states))
+    left_out += imaginary + without_spins + ignored_states(file, len(states))
     if odd and any(line.symmetry.axis for line in lines):
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
     rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
@@ -78,11 +78,11 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     letter, parameters_of_states = _letter(file, rows), _parameters_by_state(rows, len(states))
     constants, energies = [], []
     for v, parameters in enumerate(parameters_of_states):
-        option = replace(options_of_state(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
+        option = replace(state_options(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
         option = replace(option, nvib=-1 if first.nvib < 0 else 1, vsym=0, text="")
         energies.append(sum(p.value for p in parameters if split_code(p.code).is_energy))
         plain = tuple(p for p in parameters if not split_code(p.code).is_energy)
-        constants.append(_constants_of_state(v, replace(file, options=(option,), parameters=plain), errors))
+        constants.append(_state_constants(v, replace(file, options=(option,), parameters=plain), errors))
     _refuse_unlike(constants)
     turned = (constants[0].kind, first.nvib < 0) in (("prolate", True), ("oblate", False))
     weights = _weights(file, states, constants[0].kind in ("prolate", "oblate"))
@@ -121,10 +121,10 @@ def _refuse(file: ParameterFile, states: tuple[StateOptions, ...]) -> None:
             raise ValueError(f"{what} {NO_NAME}")
 
 
-def _constants_of_state(v: int, file: ParameterFile, errors: bool) -> Constants:
+def _state_constants(v: int, file: ParameterFile, errors: bool) -> Constants:
     """The constants of one state; ValueError, with its number, unless A >= B >= C for its axes."""
     try:
-        return constants_of(file, errors=errors)
+        return file_constants(file, errors=errors)
     except AxisOrderError as reason:
         raise ValueError(f"state {v}: {reason.constants}; axes in another order than A >= B >= C {NO_NAME}") from None
 
@@ -199,17 +199,17 @@ def _weights(file: ParameterFile, states: tuple[StateOptions, ...], symmetric: b
     """The weights of all states; ValueError if states have different common divisors."""
     weights, divisors = [], []
     for v, state in enumerate(states):
-        option = replace(options_of_state(file, v), vsym=0, spind=-1 if file.options[0].spind < 0 else 1)
+        option = replace(state_options(file, v), vsym=0, spind=-1 if file.options[0].spind < 0 else 1)
         option = replace(option, nvib=-1 if file.options[0].nvib < 0 else 1, iax=abs(option.iax))
         if state.equivalent == 3:
             weights.append(SpinWeights())  # with their spins all levels are of A species
             divisors.append(2 * max(state.plus, 1))
         elif state.fold in (3, 5) and state.plus != state.minus:
             option = replace(option, iax=state.iax, wtpl=state.plus, wtmn=state.minus, ewt=-state.e_weight)
-            weights.append(weights_of(option, symmetric))
+            weights.append(option_weights(option, symmetric))
             divisors.append(gcd(*fold_parts(state.fold, state.plus, state.minus, state.e_weight)))
         else:
-            weights.append(weights_of(option))
+            weights.append(option_weights(option))
             divisors.append(2 * (gcd(state.plus, state.minus) if not is_linear(option) else max(state.plus, 1)))
     if len(set(divisors)) > 1:
         raise ValueError(f"WTPL, WTMN: weights of states whose common divisors differ {NO_NAME}")
@@ -221,7 +221,7 @@ def _dipoles(
 ) -> dict[tuple[int, int], tuple[float, float, float]]:
     if intensities is None:
         return {}
-    plain, others = dipoles_of(intensities.dipoles, count)
+    plain, others = split_dipoles(intensities.dipoles, count)
     if others:
         raise ValueError(f"dipole {others[0][0].code}: a moment other than a plain component {NO_NAME}")
     return {pair: mu[::-1] if turned else mu for pair, mu in plain.items()}
@@ -308,7 +308,7 @@ def _element(matrix: Floats, letters: str) -> float:
 def _spins(
     rows: list[tuple[CodedLine, Parameter]], states: tuple[StateOptions, ...], turned: bool, oblate: bool, errors: bool
 ) -> SpinConstants | None:
-    sizes, called = states[0].spins, _names_of_spins(rows, states[0].spins)
+    sizes, called = states[0].spins, _spin_names(rows, states[0].spins)
     equivalent = states[0].equivalent
     sums: dict[tuple[str, str], _Sum] = {}
     for line, parameter in rows:
@@ -349,7 +349,7 @@ def _single_nucleus(line: CodedLine, state: StateOptions, oblate: bool) -> Coded
     return line._replace(operator=halved_across(line.operator, basis_axes(oblate))) if acts_on_three else line
 
 
-def _names_of_spins(rows: list[tuple[CodedLine, Parameter]], sizes: tuple[int, ...]) -> list[str]:
+def _spin_names(rows: list[tuple[CodedLine, Parameter]], sizes: tuple[int, ...]) -> list[str]:
     """Names of the spins: S or the isotope in labels of parameters with one spin, if the size agrees; else I1, I2, ..."""
     names = [f"I{place}" for place in range(1, len(sizes) + 1)]
     for line, parameter in rows:

@@ -17,7 +17,7 @@ from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import load
 from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue, Layout
 from rotor.formats.spcat.text.fields import BLANK
-from rotor.formats.spcat.text.line import Record, error_cap, read_record, spell_record, width_of
+from rotor.formats.spcat.text.line import Record, error_cap, quanta_width, read_record, spell_record
 from rotor.formats.spcat.text.rows import (
     ENERGY,
     ERROR,
@@ -100,7 +100,7 @@ def _odd_line(catalogue: Catalogue, index: int) -> bytes:
     """A line with its stored spelling, or whose numbers do not fit the usual columns."""
     record, layout = _within_format(catalogue.record(index), index), catalogue.layout
     stored = layout.spelling.get(index)
-    if stored is not None and _record_of(stored) == record:
+    if stored is not None and _stored_record(stored) == record:
         ends = stored.endswith(b"\n") or index == len(catalogue) - 1
         return stored if ends else stored + layout.newline
     try:
@@ -111,14 +111,14 @@ def _odd_line(catalogue: Catalogue, index: int) -> bytes:
     return text.rstrip(" ").ljust(length).encode() + layout.newline
 
 
-def _record_of(text: bytes) -> Record:
+def _stored_record(text: bytes) -> Record:
     """The record of a stored spelling, which may begin with blank lines."""
     return read_record(next(line for line in text.split(b"\n") if line.strip()).rstrip(b"\r").decode("ascii"))
 
 
 def _within_format(record: Record, index: int) -> Record:
     """The record with as many columns of quantum numbers as its QNFMT can hold."""
-    width = width_of(record.qnfmt)
+    width = quanta_width(record.qnfmt)
     states = [(*state, *(BLANK,) * width) for state in record[-2:]]
     if any(q != BLANK for state in states for q in state[width:]):
         raise ValueError(
@@ -185,8 +185,8 @@ def read_cat(source: str | os.PathLike[str] | bytes) -> Catalogue:
     """
     text, name = load(source)
     beginning = _BOM if text.startswith(_BOM) else b""
-    lines = _lines_of(text, len(beginning))
-    layout = replace(_layout_of(text, lines), beginning=beginning)
+    lines = _split_lines(text, len(beginning))
+    layout = replace(_guess_layout(text, lines), beginning=beginning)
     columns, is_plain = _read_plain(text, lines, layout)
     return _assembled(text, name, lines, layout, columns, is_plain)
 
@@ -199,7 +199,7 @@ class _Lines(NamedTuple):
     length: int
 
 
-def _lines_of(text: bytes, begin: int) -> _Lines:
+def _split_lines(text: bytes, begin: int) -> _Lines:
     stops = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == ord("\n")) + 1
     if len(text) > (stops[-1] if len(stops) else begin):
         stops = np.append(stops, len(text))
@@ -216,7 +216,7 @@ def _typical_line(text: bytes, lines: _Lines) -> bytes:
     return text[lines.starts[first] : lines.stops[first]]
 
 
-def _layout_of(text: bytes, lines: _Lines) -> Layout:
+def _guess_layout(text: bytes, lines: _Lines) -> Layout:
     """The layout of a typical line; a wrong guess costs time, nothing else."""
     line = _typical_line(text, lines)
     newline = b"\r\n" if line.endswith(b"\r\n") else b"\n"
@@ -238,7 +238,7 @@ def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Ma
     parts = []
     for start in range(0, len(is_plain), _CHUNK):
         chunk = slice(start, start + _CHUNK)
-        rows, regular = _rows_of(text, lines, chunk)
+        rows, regular = _character_rows(text, lines, chunk)
         padded = np.full((len(rows), max(lines.length, QUANTA + 4 * width) + 2), ord(" "), dtype=np.uint8)
         padded[:, : layout.line_length] = rows[:, : layout.line_length]
         columns = take_rows(padded, width, layout.decimals)
@@ -251,10 +251,10 @@ def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Ma
 
 def _width_guess(text: bytes, lines: _Lines) -> int:
     last = _typical_line(text, lines)[QNFMT][-1:]
-    return width_of(int(last)) if last.isdigit() else 6
+    return quanta_width(int(last)) if last.isdigit() else 6
 
 
-def _rows_of(text: bytes, lines: _Lines, chunk: slice) -> tuple[Text, Mask]:
+def _character_rows(text: bytes, lines: _Lines, chunk: slice) -> tuple[Text, Mask]:
     """The lines of a chunk as rows of characters; those of another length are blank and marked false."""
     starts, stops = lines.starts[chunk], lines.stops[chunk]
     regular = stops - starts == lines.length

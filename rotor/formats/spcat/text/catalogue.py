@@ -116,7 +116,7 @@ class Catalogue(Table):
         return Record._make(tuple(value.tolist()) if value.ndim else value.item() for value in values)
 
 
-def catalogue_of(
+def predicted_catalogue(
     numbers: Mapping[str, NDArray[Any]],
     quanta_upper: NDArray[np.int16],
     quanta_lower: NDArray[np.int16],

@@ -147,7 +147,7 @@ def format_level(level: Level) -> str:
     """The line of a level as SPCAT writes it; DoesNotFitError for numbers that do not fit its columns."""
     text = _plain_text(level)
     wide = [f"quantum number {q}" for q in level.quanta if not -99 <= q <= 999]
-    wide += [f"{name} = {value:.10g}" for name, value, limit in _largest_of(level) if not abs(value) < limit]
+    wide += [f"{name} = {value:.10g}" for name, value, limit in _too_large(level) if not abs(value) < limit]
     if wide or text.find(":") != _COLON:
         quanta = " ".join(map(str, level.quanta))
         raise DoesNotFitError(
@@ -156,7 +156,7 @@ def format_level(level: Level) -> str:
     return text
 
 
-def _largest_of(level: Level) -> list[tuple[str, float, float]]:
+def _too_large(level: Level) -> list[tuple[str, float, float]]:
     """The numbers of a level and what is too large for their columns."""
     columns = zip(level[:6], (10**6, 10**4, 1e9, 1e10, 1e3, 10**4), strict=True)
     return [(name, value, limit) for (name, *_), (value, limit) in zip(_FIELDS, columns, strict=True)]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
-from rotor.formats.packed import name_of
+from rotor.formats.packed import source_name
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, whole
 from rotor.spectra.intensity import MOST_LOG10
 from rotor.table import counted
@@ -76,7 +76,7 @@ def read_int(source: str | os.PathLike[str] | bytes) -> IntensityFile:
     """
     lines = read_lines(source)
     if len(lines) < 2:
-        name = lines[0].file if lines else name_of(source)
+        name = lines[0].file if lines else source_name(source)
         raise ValueError(
             f"{name}: {counted(len(lines), 'line')}; expected a title, a line FLAGS TAG QROT FBGN FEND ... and dipoles"
         )

@@ -182,7 +182,7 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0, most: i
     width = max(QUANTA_FIELDS, 2 * per_state)
     plain = [_plain(line) for line in listed]
     fields = [_fields(line, width) for line in plain]
-    missing = next((i for i, row in enumerate(fields) if _lacks_some(row, per_state)), None)
+    missing = next((i for i, row in enumerate(fields) if _is_incomplete(row, per_state)), None)
     if missing is not None:
         per_state = per_state or max((_leading(row) // 2 for row in fields if _leading(row) % 2 == 0), default=0)
         if not per_state:
@@ -266,7 +266,7 @@ def without_zeros_behind(lines: LineList, per_state: int) -> LineList:
     return replace(lines, quanta=quanta)
 
 
-def note_of_remarks(lines: LineList, blends: NDArray[np.int64]) -> list[str]:
+def remark_notes(lines: LineList, blends: NDArray[np.int64]) -> list[str]:
     """What a user must know of blended lines that have words where the weight may stand; in other lines it has no bearing."""
     counts = np.bincount(blends[blends >= 0], minlength=1)
     shared = np.flatnonzero((blends >= 0) & (counts[blends] > 1)).tolist()
@@ -285,7 +285,7 @@ def note_of_remarks(lines: LineList, blends: NDArray[np.int64]) -> list[str]:
     ]
 
 
-def note_of_defaults(lines: LineList) -> str:
+def default_note(lines: LineList) -> str:
     """What a user must know of lines that lack something."""
     return (
         f"{counted(len(lines.defaulted), 'line lacks', 'lines lack')} quantum numbers or an error: "
@@ -325,7 +325,7 @@ def _leading(fields: tuple[int, ...]) -> int:
     return fields.index(BLANK) if BLANK in fields else len(fields)
 
 
-def _lacks_some(fields: tuple[int, ...], per_state: int) -> bool:
+def _is_incomplete(fields: tuple[int, ...], per_state: int) -> bool:
     """Whether a line lacks quantum numbers: an odd count before a blank, or a blank among as many as there should be.
 
     A lower state that begins with a number below 0 is none and needs no more of them.

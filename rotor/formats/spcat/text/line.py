@@ -45,7 +45,7 @@ _FIELDS = (
 )
 
 
-def width_of(qnfmt: int) -> int:
+def quanta_width(qnfmt: int) -> int:
     """Columns of quantum numbers a state takes: six, or more when the last digit of QNFMT says so."""
     return max(6, qnfmt % 10)
 
@@ -69,7 +69,7 @@ def read_record(text: str) -> Record:
     if qnfmt < 0:
         raise ValueError(f"columns 52-55: QNFMT is {qnfmt}; it counts quantum numbers and is not negative")
     upper = _read_state(text, QUANTA, qnfmt, may_be_blank=False)
-    lower = _read_state(text, QUANTA + 2 * width_of(qnfmt), qnfmt, may_be_blank=True)
+    lower = _read_state(text, QUANTA + 2 * quanta_width(qnfmt), qnfmt, may_be_blank=True)
     return Record._make([*numbers, upper, lower])
 
 
@@ -85,7 +85,7 @@ def _read_field(text: str, field: _Field) -> Any:
 
 def _read_state(text: str, start: int, qnfmt: int, *, may_be_blank: bool) -> tuple[int, ...]:
     """The quantum numbers of a state; a lower state that is blank altogether is one that the catalogue does not label."""
-    width, quanta = width_of(qnfmt), []
+    width, quanta = quanta_width(qnfmt), []
     if may_be_blank and not text[start : start + 2 * width].strip(" "):
         return (fields.BLANK,) * width
     for index in range(width):

@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
-from rotor.formats.packed import name_of
+from rotor.formats.packed import source_name
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, spell, whole
 from rotor.table import counted
 
@@ -122,7 +122,7 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
     """
     lines = read_lines(source)
     if len(lines) < 3:
-        name = lines[0].file if lines else name_of(source)
+        name = lines[0].file if lines else source_name(source)
         raise ValueError(f"{name}: {counted(len(lines), 'line')}; expected a title, limits, options and parameters")
     header = _header(lines[1])
     options = [_options(lines[2])]
@@ -186,7 +186,7 @@ def _parameter(line: Line) -> Parameter:
     return Parameter(abs(code), value, error, label, negative, line.text)
 
 
-def note_of_npar(file: ParameterFile) -> list[str]:
+def npar_notes(file: ParameterFile) -> list[str]:
     """A note for a file with fewer parameters than NPAR says."""
     count = len(file.parameters)
     if file.header.npar <= count:
