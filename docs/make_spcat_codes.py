@@ -214,7 +214,7 @@ phases that no functions have, even along both others. Signs of elements between
 strengths are wrong, and energies where there are even operators along another axis too. With odd ones along an axis that no parameter
 concerns they are as here; so they are in the program as it is with PHASE 3, 5 or 6. (3) A sine of series with ΔK = 4 or more has the
 wrong sign in elements between K and -K'. Complex matrices over signed K give the energies and strengths found here
-(tests/formats/spcat/test_odd_operators.py).
+(tests/formats/spcat/hamiltonian/test_odd_operators.py).
 
 Where components of the dipole of both kinds act on a line, its amplitude has a real and an imaginary part, which do not interfere. The
 program adds them, or leaves out one ("has bad phase"). Of eight inputs with other names of K doublets the program in long double or

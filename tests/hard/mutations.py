@@ -89,7 +89,7 @@ MUTATIONS = (
     Mutation(
         5, "rotor/quantum/reductions.py",
         "    place = [old.index(axis) for axis in new]", "    place = [old.index(axis) for axis in (new if new[2] != old[2] else old)]",
-        "tests/quantum/test_conversions.py::test_left_handed_axes_change_signs_alone",
+        "tests/quantum/estimates/test_conversions.py::test_left_handed_axes_change_signs_alone",
     ),
     Mutation(
         6, "rotor/tops/kind_of_constants.py",
@@ -116,13 +116,13 @@ MUTATIONS = (
         10, "rotor/quantum/wang/spherical_top.py",
         "    a_states, e_states = states[:, characters > 0.25], states[:, characters < 0.25]  # 1 and -½",
         "    a_states, e_states = np.split(np.linalg.eigh(matrix)[1], [(characters > 0.25).sum()], axis=1)",
-        "tests/tops/test_clusters.py::test_eigenvalues_and_irreps_of_the_full_matrix",
+        "tests/tops/spins/test_clusters.py::test_eigenvalues_and_irreps_of_the_full_matrix",
     ),
     Mutation(
         11, "rotor/tops/spins/spin_weights.py",
         "        if self.rule == \"none\":\n            return np.asarray(np.where(k == 0, 1, 2))",
         "        if self.rule in (\"none\", \"KaKc\"):\n            return np.asarray(np.where(k == 0, 1, 2))",
-        "tests/tops/test_spin_statistics.py::test_accidental_symmetric_top_keeps_its_weights",
+        "tests/tops/spins/test_spin_statistics.py::test_accidental_symmetric_top_keeps_its_weights",
     ),
     Mutation(
         12, "rotor/structures/least_squares.py",
@@ -142,12 +142,12 @@ MUTATIONS = (
     Mutation(
         15, "rotor/molecules/readers/xyz.py",
         "    plain = word.translate(_MINUS_SIGNS)", "    plain = word",
-        "tests/molecules/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
+        "tests/molecules/readers/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
     ),
     Mutation(
         15, "rotor/molecules/readers/xyz.py",
         '        return float(plain.replace("D", "e").replace("d", "e"))', '        return float(plain.replace("D", "").replace("d", "e"))',
-        "tests/molecules/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
+        "tests/molecules/readers/test_xyz.py::test_every_line_ending_mark_minus_and_exponent_gives_the_same",
     ),
     Mutation(
         16, "rotor/statistics/regression.py",
@@ -222,7 +222,7 @@ MUTATIONS = (
         25, "rotor/classical/free/theta.py",
         "        rates=np.stack([c.pace.hi, c.pace.lo, c.start.hi, c.start.lo, half_turns.hi, half_turns.lo], axis=-1),",
         "        rates=np.stack([c.pace.hi, 0 * y, c.start.hi, 0 * y, half_turns.hi, 0 * y], axis=-1),",
-        "tests/classical/test_free.py::test_double_double_phases_are_what_keeps_a_million_periods",
+        "tests/classical/free/test_free.py::test_double_double_phases_are_what_keeps_a_million_periods",
     ),
     Mutation(
         26, "rotor/geometry/rotations.py", "    angle = np.asarray(2.0 * np.arctan2(sine, q[..., 0]))",

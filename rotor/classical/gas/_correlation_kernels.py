@@ -1,7 +1,7 @@
 """Compiled sums of correlation functions of a free gas from exact attitudes, which are not stored.
 
 Measured (`benchmarks/bench_gas.py`): 0.09 µs per body and time, nearly all for the attitude; 0.006 µs per body for a step of a block of
-128 bodies. The plain forms are in `tests/classical/test_ensembles.py`.
+128 bodies. The plain forms are in `tests/classical/gas/test_ensembles.py`.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from rotor.molecules.nuclei import isotope
 from rotor.table import counted
 
 # Median relative errors of rotational constants against experiment (the smallest constant of each molecule; NIST
-# CCCBDB 22; tests/molecules/test_smiles.py measures them again): 55 molecules of carbon with H, N, O, F, S, Cl, Br by MMFF94, of
+# CCCBDB 22; tests/molecules/readers/test_smiles.py measures them again): 55 molecules of carbon with H, N, O, F, S, Cl, Br by MMFF94, of
 # which a tenth are off by 6 % or more; the six for which only UFF has parameters; ten with hypervalent or cumulated
 # atoms.
 MMFF_UNCERTAINTY = 0.012

@@ -11,8 +11,8 @@
 | nuclei with spin | spin-rotation and spin-spin coupling | not estimated |
 
 D = 4B³/ν² holds exactly for a harmonic diatomic molecule (A. Kratzer, Z. Phys. 3 (1920) 289). ν = 1150 cm⁻¹ (B/cm⁻¹)^0.3 was chosen on the
-library: it reproduces 40 of 41 D_J or ΔJ within a factor of 3 (tests/quantum/test_limits.py; the exception is glycolaldehyde). A free group
-has the levels F m², with m = 0 for A and m = ±1 for E species, F apart.
+library: it reproduces 40 of 41 D_J or ΔJ within a factor of 3 (tests/quantum/estimates/test_limits.py; the exception is glycolaldehyde).
+A free group has the levels F m², with m = 0 for A and m = ±1 for E species, F apart.
 """
 
 from __future__ import annotations

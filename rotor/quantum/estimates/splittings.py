@@ -8,8 +8,8 @@ To first order a level J = 1 with one nucleus of spin I lies at -χ_gg Y(F) with
 reported size is the distance of the outermost components for the largest of the three. If χ is not known, it is estimated from the typical
 gradient in covalent bonds of the element, `GRADIENTS`, in atomic units e/(4π ε0 a0³), chosen among those of these molecules: D 0.25 to 0.45
 (C-D of DCOOH, O-D of HCOOD and CH3OD), O 0.8 (HCO⁺), N 0.6 to 1 (HOCN, ICN, HCONH2, NH3, CH3CN, HCN), Cl 3.9 (CH3Cl, CH2BrCl), Br 7
-to 12 (2-bromopropane, CH3CH2Br, CH3Br, CH2Br2, HOBr), I 12 to 17 (CH3I, CH2ICN, CF3I, ICN, IN3); tests/quantum/test_limits.py has them and
-where they were read. Other elements count with 1. In ionic molecules such as KCl the halogens have far less.
+to 12 (2-bromopropane, CH3CH2Br, CH3Br, CH2Br2, HOBr), I 12 to 17 (CH3I, CH2ICN, CF3I, ICN, IN3); tests/quantum/estimates/test_limits.py
+has them and where they were read. Other elements count with 1. In ionic molecules such as KCl the halogens have far less.
 
 A line between J' and J has components at E(J', F') - E(J, F), E = χ (3K²/J(J+1) - 1) Y of a linear (K = 0) or symmetric top, with the parts
 (2F'+1)(2F+1) {J' F' I; F J 1}² of its intensity. Their weighted mean is the line without coupling: the centre of gravity stays, and an
@@ -32,9 +32,8 @@ from rotor.tops.isotopes.isotopic_spins import chi_tensor
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-GRADIENT_MHZ_PER_BARN = (
-    234.964778  # eQV/h of a field gradient V of one atomic unit; CODATA 2022, checked in tests/quantum/test_limits.py
-)
+# eQV/h of a field gradient V of one atomic unit; CODATA 2022, checked in tests/quantum/estimates/test_limits.py
+GRADIENT_MHZ_PER_BARN = 234.964778
 GRADIENTS = {"H": 0.35, "N": 0.8, "O": 0.8, "Cl": 3.9, "Br": 8.0, "I": 13.0}
 
 
