@@ -2,7 +2,7 @@
 
 Blocks follow from the elements of the operators. For a molecule with one axis they are (M, k), with even and odd J separate where nothing
 connects them (M = 0 or k = 0, no dipole). For all others they are sets of solved blocks, divided at M = 0 by the reflection. In fields
-along Z, M is a good quantum number; for other directions see `rotor.quantum.fields.tilted_blocks`.
+along Z, M is a good quantum number; other directions mix it (`rotor.quantum.fields.solved_space`).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +126,11 @@ class FieldSpace(ABC):
 
     levels: FreeLevels
     jmax: int
-    m_is_good: ClassVar[bool] = True
+
+    @property
+    def m_is_good(self) -> bool:
+        """Whether states have one M."""
+        return True
 
     @abstractmethod
     def blocks(self, m: float) -> list[FieldBlock]:

@@ -1,9 +1,18 @@
-"""Solved states of any Hamiltonian in a field along Z: sets of solved blocks that operators connect, for one M.
+"""Solved states of any Hamiltonian in a field: sets of solved blocks that operators connect, for one M or with all M mixed.
 
 A sector is a solved block of one total angular momentum, or its states of one torsional state. The matrix between two sectors is that of
 reduced elements (`rotor.quantum.fields.reduced_elements`) times a factor of M (`rotor.quantum.in_field`); reduced elements are computed
 once for all M and fields. No static field connects torsional species. Elements between states of different v_t, whose overlaps are small,
 are neglected: levels shift by less than (μE)²/ΔE, 0.1 MHz at 1 kV/cm for 1 D and 100 cm⁻¹.
+
+Fields of other directions than Z mix M as asymmetry mixes K. In the contraction Σ_pq S^K_p* T^K_q D^K*_pq of a body tensor T with a space
+tensor S, M and space play the part of k and body,
+
+    ⟨J'k'M'|...|J k M⟩ = ⟨J'k'‖T^K‖J k⟩ ⟨J'M'‖S^K*‖J M⟩ / √((2J'+1)(2J+1)),
+
+with the second factor from `rotor.quantum.tensors` over Wang functions of M. The matrix between two J is a Kronecker product, real in the
+phases of that module: for an odd rank both factors are i times real, and their product is -1 times real. Light polarized along principal
+axes X, Y, Z does not connect the D2 species of M, nor does a diagonal polarizability those of k: together up to 16 blocks.
 """
 
 from __future__ import annotations
@@ -25,26 +34,28 @@ from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.in_field import space_factor
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
 SPARSE_ABOVE = 600  # matrices over more states of mixed M are sparse
+NO_M = -1  # in place of M where it is mixed
+SPACE_AXES = "IIIr"  # x, y, z of a representation are a, b, c: those of space are X, Y, Z
 
 
 class FieldSector(NamedTuple):
     """States of a solved block: number of the block, places in it (None: all), rows among the levels, and twice F.
 
-    projections: Wang functions of M by which the states are multiplied where M is mixed, M varying more slowly than the states.
+    projections: Wang functions of M (a `WangBlock`) that multiply the states where M is mixed, M varying more slowly than the states.
     """
 
     block: int
     places: Ints | None
     rows: Ints
     twice_f: int
-    projections: WangBlock | None = None
+    projections: Any = None
 
 
 @dataclass(frozen=True)
@@ -188,7 +199,7 @@ def _turned(turns: int, matrix: NDArray[Any]) -> NDArray[Any]:
 
 @dataclass(frozen=True, eq=False)
 class SolvedSpace(FieldSpace):
-    """Solved blocks up to J max and the operators that act on them; with a magnet M and -M differ."""
+    """Solved blocks up to J max and the operators that act on them; with a magnet M and -M differ, sectors with `projections` mix M."""
 
     levels: FreeLevels = field(repr=False)
     jmax: int
@@ -196,16 +207,27 @@ class SolvedSpace(FieldSpace):
     elements: ReducedElements = field(repr=False)
     operators: tuple[FieldOperator, ...]
     _below: dict[Key, dict[int, list[tuple[int, int]]]] = field(default_factory=dict, repr=False)
+    _tensors: dict[Key, BodyTensor] = field(default_factory=dict, repr=False)
+
+    @property
+    def m_is_good(self) -> bool:
+        """Whether states have one M."""
+        return self.sectors[0].projections is None
 
     def blocks(self, m: float) -> list[FieldBlock]:
-        """Connected sets of sectors: in an electric field for ±M (M and -M apart where states are paired), in a magnetic one for M."""
+        """Connected sets of sectors: in an electric field for ±M (M and -M apart where states are paired), in a magnetic one for M.
+
+        Where M is mixed all blocks are those of m = 0, since each contains all M.
+        """
+        if m and not self.m_is_good:
+            return []
         twice_m = round(2 * m)
         edges = [
             (up, low, odd)
             for operator in self.operators
             for up, lows in self.below(operator).items()
             for low, odd in lows
-            if self.factor(operator, up, low, twice_m)
+            if not self.m_is_good or self.factor(operator, up, low, twice_m)
         ]
         magnetic = any(operator.time_odd for operator in self.operators)
         out: list[FieldBlock] = []
@@ -217,7 +239,7 @@ class SolvedSpace(FieldSpace):
             copies = 2 if paired or (twice_m and not magnetic) else 1
             rows = np.concatenate([self.sectors[i].rows for i in members])
             for sign in signs:
-                number = sign * twice_m / 2 if twice_m % 2 else sign * (twice_m // 2)
+                number = sign * twice_m / 2 if twice_m % 2 else sign * (twice_m // 2) if self.m_is_good else NO_M
                 out.append(
                     SolvedFieldBlock(number, copies, place, tuple(members), tuple(colours), real, paired, rows, self)
                 )
@@ -233,13 +255,18 @@ class SolvedSpace(FieldSpace):
         return self._below[operator.key_in_space]
 
     def _pairs(self, operator: FieldOperator) -> Iterator[tuple[int, int, int]]:
-        """Pairs of sectors that an operator connects, with 1 where elements lack a factor i, else 0."""
+        """Pairs of sectors that an operator connects, with 1 where elements lack a factor i, else 0; all are real where M is mixed."""
         for up, low in self.elements.connected(operator):
-            odd = int(operator.rank % 2 and not operator.time_odd and self.elements.combined[low])
+            odd = self.m_is_good and operator.rank % 2 and not operator.time_odd and self.elements.combined[low]
             for a in self._sectors_of[up]:
                 for b in self._sectors_of[low]:
-                    if self._same_torsion(a, b) and (up != low or a >= b):
-                        yield a, b, odd
+                    if self._same_torsion(a, b) and (up != low or a >= b) and self._connects_m(operator, a, b):
+                        yield a, b, int(odd)
+
+    def _connects_m(self, operator: FieldOperator, a: int, b: int) -> bool:
+        """Whether an operator connects the functions of M of two sectors; by the factor of M, in `blocks`, where M is good."""
+        first, second = self.sectors[a].projections, self.sectors[b].projections
+        return self.m_is_good or self._space_tensor(operator).between(first, second) is not None
 
     def _same_torsion(self, a: int, b: int) -> bool:
         """Whether two sectors belong to the same v_t."""
@@ -262,15 +289,27 @@ class SolvedSpace(FieldSpace):
         return factor if q else operator.size * factor
 
     def between(self, operator: FieldOperator, up: int, low: int, twice_m: int, q: int) -> NDArray[Any] | None:
-        """Elements of T_q from the states of M of a sector to those of another, F' ≥ F; None where all are 0."""
-        factor = self.factor(operator, up, low, twice_m, q)
+        """Elements of T_q from the states of M, or of all M, of a sector to those of another, F' ≥ F; None where all are 0."""
         first, second = self.sectors[up], self.sectors[low]
+        factor = self.factor(operator, up, low, twice_m, q) if self.m_is_good else 1.0
         elements = self.elements.between(operator, first.block, second.block) if factor else None
         if elements is None:
             return None
         if first.places is not None and second.places is not None:
             elements = elements[np.ix_(first.places, second.places)]
-        return np.asarray(factor * elements)
+        if self.m_is_good:
+            return np.asarray(factor * elements)
+        in_space = block_elements(first.projections, second.projections, self._space_tensor(operator))
+        root = np.sqrt((first.twice_f + 1.0) * (second.twice_f + 1))
+        return np.kron(in_space * ((-1.0 if operator.rank == 1 else 1.0) / root), elements)
+
+    def _space_tensor(self, operator: Any) -> BodyTensor:
+        """The complex conjugate of the space tensor, equal to the tensor of its mirror image y → -y."""
+        if operator.key_in_space not in self._tensors:
+            mirror = np.array([1.0, -1.0, 1.0])
+            space = operator.space * (mirror if operator.rank == 1 else np.outer(mirror, mirror))
+            self._tensors[operator.key_in_space] = body_tensor(space, operator.rank, SPACE_AXES)
+        return self._tensors[operator.key_in_space]
 
 
 def solved_space(

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from rotor.quantum.fields.axial import AxialSpace, axial_levels
-from rotor.quantum.fields.blocks import FieldSpace
-from rotor.quantum.fields.operators import FieldOperator
-from rotor.quantum.fields.solved_space import solved_levels, solved_space
-from rotor.quantum.fields.tilted_blocks import tilted_space
+from rotor.quantum.fields.blocks import FieldSpace, FreeLevels
+from rotor.quantum.fields.operators import Contraction, FieldOperator
+from rotor.quantum.fields.reduced_elements import ReducedElements
+from rotor.quantum.fields.solved_space import SPACE_AXES, FieldSector, SolvedSpace, solved_levels, solved_space
+from rotor.quantum.wang.basis import wang_blocks
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
@@ -38,3 +41,28 @@ def field_space(
         magnetic = any(operator.time_odd for operator in operators)
         return AxialSpace(axial_levels(top, jmax), jmax, axis, oriented, magnetic)
     return solved_space(top, solved_levels(top, jmax, effects), jmax, operators)
+
+
+def tilted_space(
+    top: Top, jmax: int, operators: Sequence[FieldOperator], effects: Sequence[QuantumEffect] = ()
+) -> SolvedSpace:
+    """The space of a top for fields of any direction; ValueError for a spherical top, spins, internal rotation and magnetic fields."""
+    if top.kind == "spherical":
+        raise ValueError(f"{top.name or 'this top'} is a spherical top: neither a dipole nor an anisotropy turns it")
+    if any(effect.spins(top) for effect in effects):
+        raise ValueError("a top with spins is solved in fields along Z alone; leave out the angle")
+    if top.internal_rotation is not None:
+        raise ValueError("a top with internal rotation is solved in fields along Z alone; leave out the angle")
+    if not all(isinstance(operator, Contraction) for operator in operators):
+        raise ValueError("a magnetic field is solved along Z only")
+    levels = solved_levels(top, jmax, effects)
+    elements = ReducedElements(levels)
+    projections = {j: wang_blocks(j, SPACE_AXES) for j in range(jmax + 1)}
+    sectors = tuple(
+        FieldSector(
+            number, None, np.tile(block.start + np.arange(len(block.energies_mhz)), wang.size), block.twice_total, wang
+        )
+        for number, block in enumerate(elements.blocks)
+        for wang in projections[block.twice_total // 2]
+    )
+    return SolvedSpace(FreeLevels.of(levels), jmax, sectors, elements, tuple(operators))
