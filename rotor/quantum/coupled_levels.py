@@ -9,7 +9,7 @@ too, with one parameter: H itself.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.levels import Levels, SolvedBlock, levels_of_blocks, placed
 from rotor.quantum.one_to_one import match_names
 from rotor.quantum.states import Coupling, OperatorOfJ
-from rotor.quantum.wang.basis import Part, WangBlock, limited, names_of, parts_of, wang_blocks
+from rotor.quantum.wang.basis import Part, blocks_within, names_of, parts_of
 from rotor.quantum.wang.j_operators import JOperator
 from rotor.tops.operators import Operators
 
@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Model:
-    """What a coupled calculation consists of: operators of every state by v, couplings with their values in MHz, and the representation."""
+    """What a coupled calculation consists of: operators of every state by v, couplings with their values in MHz by states, limits of K."""
 
     states: dict[int, Operators]
-    couplings: tuple[tuple[float, Coupling], ...]
+    couplings: dict[tuple[int, int], list[tuple[float, Coupling]]]
     representation: str
     limits: dict[int, tuple[int, int]] = field(default_factory=dict)
 
@@ -47,17 +47,18 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
 
     Raises ValueError for a coupling to a state that no effect defines, and for two effects that define the same state.
     """
-    states, couplings = {0: operators}, []
+    states, couplings = {0: operators}, dict[tuple[int, int], list[tuple[float, Coupling]]]()
     for effect in effects:
         values = effect.parameters(top)
-        couplings += [(values[coupling.name], coupling) for coupling in couplings_of(top, [effect], representation)]
+        for coupling in couplings_of(top, [effect], representation):
+            couplings.setdefault((coupling.bra, coupling.ket), []).append((values[coupling.name], coupling))
         states |= {state.v: state.operators(values) for state in effect.states(top)}
     _refuse_equal_numbers([0, *(state.v for effect in effects for state in effect.states(top))])
-    for _, coupling in couplings:
-        for v in (coupling.bra, coupling.ket):
+    for pair, linked in couplings.items():
+        for v in pair:
             if v not in states:
-                raise ValueError(f"coupling {coupling.name}: state {v} is not defined; known are {sorted(states)}")
-    return Model(states, tuple(couplings), representation, k_limits_of(top, effects))
+                raise ValueError(f"coupling {linked[0][1].name}: state {v} is not defined; known are {sorted(states)}")
+    return Model(states, couplings, representation, k_limits_of(top, effects))
 
 
 def _refuse_equal_numbers(numbers: list[int]) -> None:
@@ -85,7 +86,7 @@ def coupled_levels(
     quanta = {"v": labels[:, 0]} if len(model.states) > 1 else {}
     j = np.repeat([block.j for block in blocks], [len(block.energies_mhz) for block in blocks])
     quanta |= {"j": j, "ka": labels[:, 1], "kc": labels[:, 2]}
-    levels = levels_of_blocks(top, effects, blocks, quanta, jmax, model.representation, multiplicity=2 * j + 1)
+    levels = levels_of_blocks(top, effects, blocks, quanta, jmax, model.representation)
     _refuse_mixed_weights(levels)
     return levels
 
@@ -110,7 +111,10 @@ def _refuse_mixed_weights(levels: Levels) -> None:
 
 def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
     """The coupled blocks of some J, in the order of J."""
-    vertices = {j: [(v, b) for v in sorted(model.states) for b in blocks_of_state(model, v, j)] for j in all_j}
+    limits, frame = model.limits, model.representation
+    vertices = {
+        j: [(v, b) for v in sorted(model.states) for b in blocks_within(j, frame, limits.get(v))] for j in all_j
+    }
     terms = StateTerms.with_values(model.states, _links(model), model.representation)
     elements = StateElements(terms, 1, model.representation, vertices)
     by_j: dict[int, list[SolvedBlock]] = {}
@@ -146,23 +150,10 @@ def _links(model: Model) -> list[tuple[int, int, OperatorOfJ, list[tuple[str, Op
 
         return operator
 
-    by_states = _by_states(model.couplings).items()
     return [
-        (*v, summed(pairs), [(coupling.name, coupling.operator) for _, coupling in pairs]) for v, pairs in by_states
+        (*v, summed(pairs), [(coupling.name, coupling.operator) for _, coupling in pairs])
+        for v, pairs in model.couplings.items()
     ]
-
-
-def blocks_of_state(model: Model, v: int, j: int) -> list[WangBlock]:
-    whole = wang_blocks(j, model.representation)
-    return [part for b in whole if (part := limited(b, *model.limits[v]))] if v in model.limits else whole
-
-
-def _by_states(couplings: Iterable[tuple[float, Coupling]]) -> dict[tuple[int, int], list[tuple[float, Coupling]]]:
-    """Couplings by the states that they connect."""
-    by_states: dict[tuple[int, int], list[tuple[float, Coupling]]] = {}
-    for value, coupling in couplings:
-        by_states.setdefault((coupling.bra, coupling.ket), []).append((value, coupling))
-    return by_states
 
 
 def names_of_states(

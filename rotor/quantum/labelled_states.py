@@ -17,7 +17,7 @@ from rotor.quantum.connected import connected_parts
 from rotor.quantum.coupled_levels import names_of_functions, names_of_states
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.label_tracking import Follows, LabelledBlocks, NamedBlock, NamedFunctions, Naming, tracked_blocks
-from rotor.quantum.wang.basis import WangBlock, limited, parts_of, wang_blocks
+from rotor.quantum.wang.basis import blocks_within, parts_of
 from rotor.quantum.wang.rotation import representation_of
 
 if TYPE_CHECKING:
@@ -40,9 +40,8 @@ def labelled_states(
     representation, limits, named = representation_of(top), k_limits_of(top, effects), naming or by_overlaps
     rows_of_j = {j: np.flatnonzero(labels[:, 0] == j) for j in distinct(labels[:, 0][labels[:, 0] >= 0]).tolist()}
     states = sorted({0, *(state.v for effect in effects for state in effect.states(top))})
-    whole = {j: wang_blocks(j, representation) for j in rows_of_j}
     vertices = {
-        j: [(v, cut) for v in states for block in whole[j] if (cut := _within(block, limits.get(v)))] for j in rows_of_j
+        j: [(v, block) for v in states for block in blocks_within(j, representation, limits.get(v))] for j in rows_of_j
     }
     terms = StateTerms.of(top, effects, names, representation)
     elements = StateElements(terms, len(names), representation, vertices)
@@ -63,10 +62,6 @@ def labelled_states(
         return rows[states >= 0], states[states >= 0]
 
     return tracked_blocks(blocks, len(labels), find, values_mhz)
-
-
-def _within(block: WangBlock, limits: tuple[int, int] | None) -> WangBlock | None:
-    return limited(block, *limits) if limits else block
 
 
 def by_overlaps(blocks: Sequence[Vertex], representation: str) -> NamedFunctions:

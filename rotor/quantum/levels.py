@@ -396,6 +396,26 @@ def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
     return _rotational_weights(levels, weights)
 
 
+def levels_table(
+    top: Top,
+    effects: tuple[QuantumEffect, ...],
+    jmax: int,
+    energy_mhz: Floats,
+    quanta: dict[str, NDArray[Any]],
+    representation: str | None = None,
+    **others: Any,
+) -> Levels:
+    """Levels with the spin weights of the top or of their state; by default of one component and 2J+1 projections. others: see `Levels`."""
+    ones = np.ones(len(energy_mhz), dtype=np.int64)
+    others = {"multiplicity": 2 * quanta["j"] + 1 if "j" in quanta else ones, "components": ones, **others}
+    levels = Levels(top.kind, representation, jmax, energy_mhz, quanta, weight=ones, effects=effects, **others)
+    weight = weights_of_levels(levels, top.spin_weights)
+    for state in (state for effect in effects for state in effect.states(top)):
+        if state.spin_weights is not None:
+            weight = np.where(quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
+    return replace(levels, weight=weight)
+
+
 def levels_of_blocks(
     top: Top,
     effects: tuple[QuantumEffect, ...],
@@ -405,25 +425,9 @@ def levels_of_blocks(
     representation: str,
     **others: Any,
 ) -> Levels:
-    """The levels of blocks of several states or with spins, with the spin weights of the top or of the state; others: see `Levels`."""
-    ones = np.ones(sum(len(block.energies_mhz) for block in blocks), dtype=np.int64)
-    levels = Levels(
-        kind=top.kind,
-        representation=representation,
-        jmax=jmax,
-        energy_mhz=np.concatenate([block.energies_mhz for block in blocks]),
-        quanta=quanta,
-        weight=ones,
-        effects=effects,
-        blocks=blocks,
-        mixing=np.concatenate([block.mixing for block in blocks]),
-        **{"components": ones, **others},
-    )
-    weight = weights_of_levels(levels, top.spin_weights)
-    for state in (state for effect in effects for state in effect.states(top)):
-        if state.spin_weights is not None:
-            weight = np.where(quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
-    return replace(levels, weight=weight)
+    """The levels of blocks of several states or with spins; others: see `Levels`."""
+    energies, mixing = (np.concatenate([getattr(b, name) for b in blocks]) for name in ("energies_mhz", "mixing"))
+    return levels_table(top, effects, jmax, energies, quanta, representation, blocks=blocks, mixing=mixing, **others)
 
 
 def _rotational_weights(levels: Levels, weights: SpinWeights) -> Ints:

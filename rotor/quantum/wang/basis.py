@@ -127,6 +127,12 @@ def limited(block: WangBlock, kmin: int, kmax: int) -> WangBlock | None:
     return block._replace(first_k=first, size=size) if size > 0 else None
 
 
+def blocks_within(j: int, representation: str, limits: tuple[int, int] | None) -> list[WangBlock]:
+    """The blocks of `j`, or their parts within the least and the largest K."""
+    whole = wang_blocks(j, representation)
+    return whole if limits is None else [part for block in whole if (part := limited(block, *limits))]
+
+
 def names_of(block: WangBlock, representation: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Ka and Kc of the states of a block in order of energy; some K may be left out of the block.
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled_levels import Model, coupled_levels, model_of
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.levels import Levels, SolvedBlock, single_block, weights_of_levels
-from rotor.quantum.wang.basis import WangBlock, limited, names_of, wang_blocks
+from rotor.quantum.levels import Levels, SolvedBlock, levels_table, single_block
+from rotor.quantum.wang.basis import WangBlock, blocks_within, names_of
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
 from rotor.quantum.wang.wang_matrix import (
     JMatrix,
@@ -26,7 +24,6 @@ from rotor.quantum.wang.wang_matrix import (
     scalar_energy,
 )
 from rotor.tops.operators import AXIAL_REPRESENTATION, Operators, added
-from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -72,15 +69,15 @@ def solve_rotation(
         representation = representation_of(top)
         model = model_of(top, effects, operators, representation)
         if _axial_states(top, model) and not in_blocks:
-            return _symmetric_states(top, effects, model, jmin, jmax)
+            return _symmetric(top, effects, model.states, jmin, jmax)
         if len(model.states) > 1 or model.couplings:
             return coupled_levels(top, effects, model, jmin, jmax, executor)
         if top.kind == "asymmetric" or in_blocks or limits or not _closed_form_holds(top.kind, operators):
             return _in_wang_blocks(top, effects, operators, jmin, jmax, vectors, executor, limits.get(0), below_mhz)
     if top.kind in ("prolate", "oblate"):
-        return _symmetric(top, effects, operators, jmin, jmax)
+        return _symmetric(top, effects, {0: operators}, jmin, jmax)
     if top.kind == "spherical":
-        return _spherical(top.spin_weights, effects, operators, jmin, jmax)
+        return _spherical(top, effects, operators, jmin, jmax)
     return _linear(top, effects, operators, jmin, jmax, in_blocks)
 
 
@@ -112,28 +109,11 @@ def _linear(
             "leave the effect out"
         )
     j, energy = _scalar_energies(operators, jmin, jmax)
-    return Levels(
-        kind="linear",
-        representation="Ir" if in_blocks else None,
-        jmax=jmax,
-        energy_mhz=energy,
-        quanta={"j": j},
-        multiplicity=2 * j + 1,
-        components=np.ones_like(j),
-        weight=top.spin_weights.linear_weights(j),
-        effects=effects,
-        blocks=tuple(
-            _single_function(int(number), e, row) for row, (number, e) in enumerate(zip(j, energy, strict=True))
-        )
-        if in_blocks
-        else (),
-    )
-
-
-def _single_function(j: int, energy: float, row: int) -> SolvedBlock:
-    """A block of the single function K = 0."""
-    basis = WangBlock(j, "eo" if j % 2 else "ee", 0, 1, 1)
-    return single_block(basis, np.array([energy]), np.ones((1, 1)), row)
+    if not in_blocks:
+        return levels_table(top, effects, jmax, energy, {"j": j})
+    functions = [WangBlock(number, "eo" if number % 2 else "ee", 0, 1, 1) for number in j.tolist()]
+    blocks = tuple(single_block(basis, energy[[i]], np.ones((1, 1)), i) for i, basis in enumerate(functions))
+    return levels_table(top, effects, jmax, energy, {"j": j}, "Ir", blocks=blocks)
 
 
 def _has_j_operator(effect: QuantumEffect, top: Top) -> bool:
@@ -141,76 +121,39 @@ def _has_j_operator(effect: QuantumEffect, top: Top) -> bool:
     return any(effect.j_operator(top, name, 1, "Ir") is not None for name in effect.parameters(top))
 
 
-def _spherical(
-    weights: SpinWeights, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int
-) -> Levels:
+def _spherical(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int) -> Levels:
     """Spherical tops: E = Σ c X^p with one row of 2J+1 components for each J, or with one row for each level that D_t splits."""
     scalars, dt = scalar_and_tensor(operators)
     j, energy = _scalar_energies(scalars, jmin, jmax)
     if not dt:
-        weight = weights.spherical_weights(j)
-        return Levels("spherical", None, jmax, energy, {"j": j}, 2 * j + 1, 2 * j + 1, weight, effects=effects)
-
+        return levels_table(top, effects, jmax, energy, {"j": j}, components=2 * j + 1)
     split = [tensor_eigenvalues(int(value), 1 if dt > 0 else -1) for value in j]
     sizes = [len(irreps) for irreps, _ in split]
-    irreps = np.concatenate([irreps for irreps, _ in split])
-    return Levels(
-        kind="spherical",
-        representation=None,
-        jmax=jmax,
-        energy_mhz=np.repeat(energy, sizes) + dt * np.concatenate([omega for _, omega in split]),
-        quanta={"j": np.repeat(j, sizes), "irrep": irreps},
-        multiplicity=2 * np.repeat(j, sizes) + 1,
-        components=np.array([DIMENSION[irrep] for irrep in irreps]),
-        weight=np.array([weights.irrep_weight(irrep) for irrep in irreps]),
-        effects=effects,
-    )
+    irreps, omega = (np.concatenate(column) for column in zip(*split, strict=True))
+    quanta, components = {"j": np.repeat(j, sizes), "irrep": irreps}, np.array([DIMENSION[irrep] for irrep in irreps])
+    return levels_table(top, effects, jmax, np.repeat(energy, sizes) + dt * omega, quanta, components=components)
 
 
-def _symmetric(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int) -> Levels:
-    """Symmetric tops: E(J, K) = Σ c X^p K^2q, with one row for ±K."""
-    j = np.repeat(np.arange(jmin, jmax + 1), np.arange(jmin, jmax + 1) + 1)
-    k = np.concatenate([np.arange(value + 1) for value in range(jmin, jmax + 1)])
-    x, squares = (j * (j + 1)).astype(float), (k * k).astype(float)
-    energy = np.zeros(j.shape)
-    for (p, q, _), c in operators.items():
-        energy += c * x**p * squares**q
-
-    weight = top.spin_weights.symmetric_weights(j, k, oblate=top.kind == "oblate")
-    components = np.where(k == 0, 1, 2)
-    return Levels(top.kind, None, jmax, energy, {"j": j, "k": k}, 2 * j + 1, components, weight, effects=effects)
+def _symmetric(
+    top: Top, effects: tuple[QuantumEffect, ...], states: dict[int, Operators], jmin: int, jmax: int
+) -> Levels:
+    """Symmetric tops: E(J, K) = Σ c X^p K^2q of each state, with one row for ±K; ordered by J, state and K."""
+    all_j = np.arange(jmin, jmax + 1)
+    j, k = np.repeat(all_j, all_j + 1), np.concatenate([np.arange(value + 1) for value in all_j])
+    x, squares, numbers = (j * (j + 1)).astype(float), (k * k).astype(float), sorted(states)
+    energies = [sum((c * x**p * squares**q for (p, q, _), c in states[v].items()), np.zeros(j.shape)) for v in numbers]
+    energy, quanta = np.concatenate(energies), {"j": j, "k": k}
+    if len(numbers) > 1:
+        v, j, k = np.repeat(numbers, len(j)), np.tile(j, len(numbers)), np.tile(k, len(numbers))
+        order = np.lexsort((k, v, j))
+        energy, quanta = energy[order], {"v": v[order], "j": j[order], "k": k[order]}
+    return levels_table(top, effects, jmax, energy, quanta, components=np.where(quanta["k"] == 0, 1, 2))
 
 
 def _axial_states(top: Top, model: Model) -> bool:
     """Whether several states of a symmetric top have closed forms: they are uncoupled, and K is good in each."""
     alone = len(model.states) > 1 and not model.couplings and not model.limits
     return top.kind in ("prolate", "oblate") and alone and all(n == 0 for o in model.states.values() for _, _, n in o)
-
-
-def _symmetric_states(top: Top, effects: tuple[QuantumEffect, ...], model: Model, jmin: int, jmax: int) -> Levels:
-    """Closed forms of all states, with the spin weights of each, ordered by J, state and K."""
-    weights = {state.v: state.spin_weights for effect in effects for state in effect.states(top)}
-    numbers = sorted(model.states)
-
-    def weighted(v: int) -> Top:
-        return replace(top, spin_weights=weights.get(v) or top.spin_weights, symmetry_checked=False)
-
-    by_state = [_symmetric(weighted(v), effects, model.states[v], jmin, jmax) for v in numbers]
-    quanta = {"v": np.repeat(numbers, len(by_state[0]))}
-    quanta |= {name: np.concatenate([levels.quanta[name] for levels in by_state]) for name in ("j", "k")}
-    order = np.lexsort((quanta["k"], quanta["v"], quanta["j"]))
-
-    def joined(name: str) -> NDArray[Any]:
-        return np.concatenate([getattr(levels, name) for levels in by_state])[order]
-
-    return replace(
-        by_state[0],
-        energy_mhz=joined("energy_mhz"),
-        quanta={name: column[order] for name, column in quanta.items()},
-        multiplicity=joined("multiplicity"),
-        components=joined("components"),
-        weight=joined("weight"),
-    )
 
 
 def _in_wang_blocks(
@@ -241,30 +184,8 @@ def _in_wang_blocks(
         np.concatenate([column[:size] for column, size in zip(columns, sizes, strict=True)])
         for columns in zip(*labels, strict=True)
     )
-    quanta = {"j": j, "ka": ka, "kc": kc}
-    return Levels(
-        kind=top.kind,
-        representation=representation,
-        jmax=jmax,
-        energy_mhz=np.concatenate([b.energies_mhz for b in blocks]),
-        quanta=quanta,
-        multiplicity=2 * j + 1,
-        components=np.ones(sum(sizes), dtype=np.int64),
-        weight=_weights_of_blocks(top, blocks, quanta),
-        effects=effects,
-        blocks=blocks if vectors else (),
-    )
-
-
-def _weights_of_blocks(top: Top, blocks: tuple[SolvedBlock, ...], quanta: dict[str, NDArray[np.int64]]) -> Ints:
-    """Spin weights of levels in blocks; all levels of an asymmetric block have the same."""
-    if top.kind == "asymmetric":
-        return np.repeat(
-            [top.spin_weights.asymmetric_weight(b.basis.species) for b in blocks], [len(b.energies_mhz) for b in blocks]
-        )
-    ones = np.ones(len(quanta["j"]), dtype=np.int64)
-    bare = Levels(top.kind, None, int(quanta["j"].max()), ones.astype(float), dict(quanta), ones, ones, ones)
-    return weights_of_levels(bare, top.spin_weights)
+    energies, quanta = np.concatenate([b.energies_mhz for b in blocks]), {"j": j, "ka": ka, "kc": kc}
+    return levels_table(top, effects, jmax, energies, quanta, representation, blocks=blocks if vectors else ())
 
 
 def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[SolvedBlock]:
@@ -298,8 +219,5 @@ def _blocks_of_j(
     operators: Operators, j: int, matrix: JMatrix, representation: str, limits: tuple[int, int] | None
 ) -> list[tuple[WangBlock, float, list[Floats]]]:
     """The Wang blocks of one J: (block, scalar part of the energy, diagonals of the rest)."""
-    scalar, out = scalar_energy(operators, j), []
-    whole = wang_blocks(j, representation)
-    for block in whole if limits is None else [part for b in whole if (part := limited(b, *limits))]:
-        out.append((block, scalar, block_bands(matrix, block)))
-    return out
+    scalar, blocks = scalar_energy(operators, j), blocks_within(j, representation, limits)
+    return [(block, scalar, block_bands(matrix, block)) for block in blocks]
