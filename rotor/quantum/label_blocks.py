@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, runs_of_similar_size
+from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size
 from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
 
 _MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
@@ -144,6 +144,18 @@ def unit_diagonals(
             folded = sign * _element(j, np.full_like(k, -low), q, n)
             out[n - low][:, :, place] += np.where(here, folded, 0.0)
     return out
+
+
+def expectations(diagonals: Sequence[Floats], vectors: Floats, space: Workspace) -> Floats:
+    """⟨unit⟩ (blocks, states, units) of states (blocks, size, states) by `unit_diagonals`."""
+    size = vectors.shape[1]
+    products = np.multiply(vectors, vectors, out=space.array("products", *vectors.shape))
+    total = np.matmul(products.transpose(0, 2, 1), diagonals[0])
+    for d, unit in enumerate(diagonals[1:size], 1):
+        products = space.array("products", len(vectors), size - d, vectors.shape[2])
+        np.multiply(vectors[:, :-d, :], vectors[:, d:, :], out=products)
+        total += 2.0 * np.matmul(products.transpose(0, 2, 1), unit[:, :-d])
+    return np.asarray(total)
 
 
 def _element(j: Floats, k: Floats, q: int, n: int) -> Floats:

@@ -24,8 +24,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, Workspace
 from rotor.quantum.effects.watson import operators_by_name
-from rotor.quantum.label_blocks import Chunk, chunks_of, occurring_blocks
-from rotor.quantum.wang.tridiagonal import vectors_of_values
+from rotor.quantum.label_blocks import Chunk, chunks_of, expectations, occurring_blocks
+from rotor.quantum.solvers.tridiagonal import vectors_of_values
 from rotor.quantum.wang.turn import order_beyond_the_turn, turned
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
@@ -160,7 +160,8 @@ class WangBlocks(LevelModel):
             solved, vectors = self._labelled(chunk, coefficients)
             energies[chunk.rows] = solved[chunk.block, chunk.rank]
             expected = np.ones((len(chunk.rows), chunk.units[0].shape[2] + 1))
-            expected[:, :-1] = _expectations(chunk, vectors, self._space)
+            means = expectations(chunk.units, vectors, self._space)
+            expected[:, :-1] = means[chunk.block, chunk.rank if chunk.states is None else chunk.slot]
             slopes[chunk.rows] = (expected[:, places] * chunk.powers) @ self.factors
         alone = [i for i, place in enumerate(places) if place < 0]
         for chunk in self.chunks:
@@ -284,16 +285,3 @@ def _banded(bands: Sequence[Floats], chunk: Chunk, space: Workspace, vectors: Fl
         else:
             energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(matrices)
     return energies
-
-
-def _expectations(chunk: Chunk, vectors: Floats, space: Workspace) -> Floats:
-    """⟨unit⟩ (labels, units) of the labelled states."""
-    size = vectors.shape[1]
-    products = np.multiply(vectors, vectors, out=space.array("products", *vectors.shape))
-    total = np.matmul(products.transpose(0, 2, 1), chunk.units[0])
-    for d, unit in enumerate(chunk.units[1:], 1):
-        if d < size:
-            products = space.array("products", len(vectors), size - d, vectors.shape[2])
-            np.multiply(vectors[:, :-d, :], vectors[:, d:, :], out=products)
-            total += 2.0 * np.matmul(products.transpose(0, 2, 1), unit[:, :-d])
-    return np.asarray(total[chunk.block, chunk.rank if chunk.states is None else chunk.slot])

@@ -19,7 +19,7 @@ from rotor.arrays import Floats, Workspace, distinct, runs_of_similar_size
 from rotor.quantum.basis.state_elements import linear_blocks_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
-from rotor.quantum.label_blocks import unit_diagonals
+from rotor.quantum.label_blocks import expectations, unit_diagonals
 from rotor.quantum.levels import Levels, MomentBlock
 from rotor.quantum.linear_stacks import LinearStack, stack_numbers
 from rotor.quantum.wang.rotation import hamiltonian
@@ -161,7 +161,7 @@ def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], ro
     starts = np.array([block.start for block in levels.blocks])
     numbers = distinct(np.searchsorted(starts, rows, side="right") - 1)
     blocks = sorted((levels.blocks[i] for i in numbers.tolist()), key=lambda block: block.basis.size)
-    out = np.empty((len(levels), len(terms)))
+    out, space = np.empty((len(levels), len(terms))), Workspace()
     for run in runs_of_similar_size([block.basis.size for block in blocks], _LIKE, _SMALL, _AT_ONCE):
         alike = blocks[run]
         sizes = [block.basis.size for block in alike]
@@ -169,10 +169,7 @@ def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], ro
         vectors = np.zeros((len(alike), sizes[-1], sizes[-1]))
         for place, block in enumerate(alike):
             vectors[place, : sizes[place], : sizes[place]] = block.vectors
-        total = np.zeros((len(alike), sizes[-1], len(terms)))
-        for d, diagonal in enumerate(diagonals[: sizes[-1]]):
-            pairs = vectors[:, : sizes[-1] - d] * vectors[:, d:]
-            total += (2.0 if d else 1.0) * np.matmul(pairs.swapaxes(1, 2), diagonal[:, : sizes[-1] - d])
+        total = expectations(diagonals, vectors, space)
         for place, block in enumerate(alike):
             out[block.start : block.start + sizes[place]] = total[place, : sizes[place]]
     return out[rows]

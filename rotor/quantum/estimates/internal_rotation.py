@@ -24,6 +24,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.quantum.internal_rotation.frames import RhoAxis
 from rotor.quantum.torsion import TorsionalPotential, torsional_states
 
 A_SPECIES, E_SPECIES = 0, 1  # σ
@@ -73,16 +74,6 @@ def _same_signs(vectors: Floats) -> Floats:
     return np.asarray(vectors * np.cumprod(np.concatenate([[1.0], turned]))[:, None])
 
 
-def _rho_frame(rho: tuple[float, float, float]) -> Floats:
-    """Axes x, y, z (rows) over a, b, c, with z along ρ, or along a if ρ = 0."""
-    length = float(np.linalg.norm(rho))
-    z = np.array(rho) / length if length else np.array([1.0, 0.0, 0.0])
-    x = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = x - (x @ z) * z
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z])
-
-
 def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRotor, j: int, species: int) -> Floats:
     """Energies (2J+1,) in MHz of one species of the torsional ground state, above the minimum of the potential.
 
@@ -92,7 +83,8 @@ def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRot
     >>> (levels - levels[0]).round(6).tolist()  # above 1(0,1): B - C of 1(1,1) with A - B
     [0.0, 5.0, 6.0]
     """
-    frame = _rho_frame(rotor.rho)
+    axes = RhoAxis(rotor.f_mhz, np.array(rotor.rho)).axes if any(rotor.rho) else np.eye(3)
+    frame = axes[[1, 2, 0]]  # x, y, z with z along ρ
     tensor = frame @ np.diag(constants_mhz) @ frame.T
     k = np.arange(-j, j + 1.0)
     step = 0.5 * np.sqrt(j * (j + 1) - k[:-1] * (k[:-1] + 1))

@@ -4,14 +4,12 @@ Energies at some fields, from LAPACK, are interpolated by quintics through energ
 
     E' = ⟨i|H'|i⟩,   E'' = ⟨i|H''|i⟩ + 2 Σ_j |⟨j|H'|i⟩|²/(E_i - E_j).
 
-At all other fields they are improved with eigenvectors from a twisted factorisation, T - λ = N D N^T with N lower triangular above row k
-and upper triangular below it,
+At all other fields they are improved with eigenvectors z from a twisted factorisation (`rotor.quantum.solvers.tridiagonal`),
 
-    z_k = 1,   z_i = -b_i z_(i+1)/d⁺_i (i < k),   z_i = -b_(i-1) z_(i-1)/d⁻_i (i > k),   λ ← λ + γ_k/|z|²,
+    λ ← λ + γ_k/|z|².
 
-k where γ_k = d⁺_k + d⁻_k - (a_k - λ) is smallest. This is Rayleigh quotient iteration, which converges cubically (derived by multiplying
-out). The number of negative d⁺ equals the number of energies below λ (Sylvester), which reveals convergence to a wrong state; LAPACK
-then solves all fields.
+This is Rayleigh quotient iteration, which converges cubically (derived by multiplying out). The number of negative d⁺ equals the number of
+energies below λ (Sylvester), which reveals convergence to a wrong state; LAPACK then solves all fields.
 """
 
 from __future__ import annotations
@@ -21,7 +19,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, Workspace
+from rotor.quantum.solvers.tridiagonal import twisted
 
 Chain = tuple[tuple[Floats, ...], int]  # H_n (n, n) of a chain, and the number of its lowest states to solve
 
@@ -71,17 +70,15 @@ def _swept(main: Floats, beside: Floats, energies: Floats, rank: Ints, gaps: Flo
     shape, flat = energies.shape, energies.reshape(-1)
     bands = main.reshape(len(main), -1), beside.reshape(len(beside), -1)
     ranks, least = np.tile(rank, shape[0]), np.tile(CONVERGED * gaps, shape[0]) + 2 * OFF_ZERO * scale
-    vectors, moving = np.empty_like(bands[0]), np.arange(flat.size)
+    vectors, moving, space = np.empty_like(bands[0]), np.arange(flat.size), Workspace()
     for sweep in range(SWEEPS):
         moved = flat[moving] - OFF_ZERO * scale
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            moving_bands = tuple(band[:, moving] for band in bands) if sweep else bands
-            turned, change, below = twisted(moving_bands[0], moving_bands[1], moved)
+        diagonal, next_to_it = (band[:, moving] for band in bands) if sweep else bands
+        with np.errstate(invalid="ignore"):
+            turned, squares, gamma, below = twisted(diagonal - moved, next_to_it, space)
+            change = gamma / squares
         flat[moving] = moved + change
-        if sweep:
-            vectors[:, moving] = turned
-        else:
-            vectors = turned
+        vectors[:, moving] = turned
         still = np.abs(change - OFF_ZERO * scale) <= least[moving]
         if not ((below == ranks[moving]) | (below == ranks[moving] + 1) | ~still).all():
             return None
@@ -157,37 +154,3 @@ def _joined(at: Floats, values: Floats, slopes: Floats, bends: Floats, fields: F
     fourth = 7 * steeper - 15 * rise - 2 * rounder
     fifth = 6 * rise - 3 * steeper + rounder
     return np.asarray(values[place] + t * (start + t * (bend + t * (third + t * (fourth + t * fifth)))))
-
-
-def twisted(main: Floats, beside: Floats, energies: Floats) -> tuple[Floats, Floats, Ints]:
-    """Normalised vectors (n, s), corrections of energies (s,), and number of energies below each (s,).
-
-    main: (n, s). beside: (n - 1, s). energies: (s,), approximate; a pivot is 0 at the exact energy of a free state.
-    """
-    size, step = len(main), np.empty_like(energies)
-    shifted = main - energies
-    down, up = shifted.copy(), shifted.copy()
-    to_lower, to_upper = np.empty_like(beside), np.empty_like(beside)  # -z_i/z_(i+1) and -z_(i+1)/z_i
-    for i in range(size - 1):
-        np.divide(beside[i], down[i], out=to_lower[i])
-        down[i + 1] -= np.multiply(to_lower[i], beside[i], out=step)
-        k = size - 2 - i
-        np.divide(beside[k], up[k + 1], out=to_upper[k])
-        up[k] -= np.multiply(to_upper[k], beside[k], out=step)
-    gamma = np.subtract(np.add(down, up, out=up), shifted, out=up)
-    place, states = np.abs(gamma, out=shifted).argmin(axis=0), np.arange(len(energies))
-    change = gamma[place, states]
-
-    vectors, lower = up, shifted  # memory is reused, since clearing new arrays would take as long as a sweep
-    vectors.fill(0.0)
-    lower.fill(0.0)
-    vectors[place, states] = lower[place, states] = 1.0
-    for i in range(size - 1):
-        vectors[i + 1] -= np.multiply(to_upper[i], vectors[i], out=step)
-        k = size - 2 - i
-        lower[k] -= np.multiply(to_lower[k], lower[k + 1], out=step)
-    vectors += lower
-    vectors[place, states] = 1.0
-    lengths = np.einsum("ns,ns->s", vectors, vectors)
-    vectors /= np.sqrt(lengths)
-    return vectors, change / lengths, np.count_nonzero(down < 0, axis=0)

@@ -59,26 +59,17 @@ def named_by_overlap(numbers: Ints, t: Ints, vectors: NDArray[np.generic]) -> In
     return names
 
 
-def counted_k(j: Ints, v: Ints, energies: Floats) -> Ints:
-    """K of levels with σ = 0 as BELGI counts it: 0, 1, 1, 2, 2, ... by energy inside each v_t of each J."""
-    order = np.lexsort([energies, v, j])
-    first = np.concatenate([[True], (np.diff(j[order]) != 0) | (np.diff(v[order]) != 0)])
-    starts = np.flatnonzero(first)
-    rank = np.arange(len(order)) - np.repeat(starts, np.diff(np.append(starts, len(order))))
-    k = np.empty(len(order), dtype=np.int64)
-    k[order] = (rank + 1) // 2
-    return k
-
-
 def counted_ka_kc(j: Ints, v: Ints, energies: Floats) -> tuple[Ints, Ints]:
-    """Ka and Kc by energy inside each v_t of each J, as in a rigid prolate top: J(0,J), J(1,J), J(1,J-1), ... for either species."""
-    ka = counted_k(j, v, energies)
+    """Ka and Kc by energy inside each v_t of each J, as in a rigid prolate top: J(0,J), J(1,J), J(1,J-1), ... for either species.
+
+    Ka is K of levels with σ = 0 as BELGI counts it.
+    """
     order = np.lexsort([energies, v, j])
-    second = np.zeros(len(j), dtype=bool)
-    second[order[1:]] = (
-        (ka[order][1:] == ka[order][:-1]) & (v[order][1:] == v[order][:-1]) & (j[order][1:] == j[order][:-1])
-    )
-    return ka, np.where((ka > 0) & ~second, j - ka + 1, j - ka)
+    starts = np.flatnonzero((np.diff(j[order], prepend=-1) != 0) | (np.diff(v[order], prepend=-1) != 0))
+    rank = np.empty(len(order), dtype=np.int64)
+    rank[order] = np.arange(len(order)) - np.repeat(starts, np.diff(np.append(starts, len(order))))
+    ka = (rank + 1) // 2
+    return ka, j - ka + rank % 2
 
 
 def kc_of_parity(j: Ints, k: Ints, parity: Ints) -> Ints:

@@ -9,7 +9,7 @@ from places import ORACLES
 
 import rotor
 from rotor.formats.belgi import read_belgi_levels
-from rotor.quantum.internal_rotation.labels import counted_k
+from rotor.quantum.internal_rotation.labels import counted_ka_kc
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.torsion import TorsionalPotential, torsional_states
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
@@ -50,7 +50,7 @@ def compare_with_belgi(barrier, reference):
     for sigma in (0, 1):
         ours = solved(ram, sigma, 6)
         quanta = ours.quanta
-        k = counted_k(quanta["j"], quanta["vt"], ours.energies) if sigma == 0 else quanta["k"]
+        k = counted_ka_kc(quanta["j"], quanta["vt"], ours.energies)[0] if sigma == 0 else quanta["k"]
         names = list(zip(quanta["j"].tolist(), quanta["vt"].tolist(), k.tolist(), strict=True))
         for j, vt, number in {row[1:4] for row in reference if row[0] == sigma}:
             expected = np.sort([row[4] for row in reference if row[:4] == (sigma, j, vt, number)]) * CM

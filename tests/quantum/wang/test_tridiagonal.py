@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotor.arrays import Workspace
-from rotor.quantum.wang.tridiagonal import vectors_of_values
+from rotor.quantum.solvers.tridiagonal import vectors_of_values
 
 
 def matrices(rng: np.random.Generator, size: int, count: int):

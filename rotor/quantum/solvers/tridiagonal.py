@@ -40,23 +40,34 @@ def vectors_of_values(
     if (near & inside[:, 1:]).any():
         return None
     full = np.where(inside, diagonal, 4.0 * largest[:, None]).T.copy()
-    shifted, off, ratio, above, below, other = space.array("twisted", 6, size, len(matrix))
+    shifted, off = space.array("shifted", 2, size, len(matrix))
     full.take(matrix, axis=1, out=shifted, mode="clip")
     shifted -= values[matrix, state] + _ASIDE * largest[matrix]
     beside.T.copy().take(matrix, axis=1, out=off, mode="clip")
+    vectors, squares, gamma, _ = twisted(shifted, off[:-1], space)
+    lengths = np.sqrt(squares)
+    right = np.abs(gamma) <= _RESIDUAL * size * largest[matrix] * lengths
+    return vectors if right.all() and np.isfinite(lengths).all() else None
+
+
+def twisted(shifted: Floats, beside: Floats, space: Workspace) -> tuple[Floats, Floats, Floats, Ints]:
+    """Normalised z (size, n) of T - λ, their squared lengths before, γ in the row where z = 1, and how many D⁺ are below 0 (n,).
+
+    shifted: elements of T - λ on the diagonal (size, n), overwritten. beside: next to it (size - 1, n).
+    """
+    ratio, above, below, other = space.array("twisted", 4, *shifted.shape)
     with np.errstate(all="ignore"):
-        np.multiply(off, off, out=ratio)
+        np.multiply(beside, beside, out=ratio[:-1])
         _pivots(shifted, ratio, above, below)
         np.add(above, below, out=other)
         other -= shifted
-        meeting = np.abs(other, out=other)
-        row, least = meeting.argmin(axis=0), meeting.min(axis=0)
-        down, up = np.divide(off[:-1], below[1:], out=ratio[:-1]), np.divide(off[:-1], above[:-1], out=off[:-1])
+        row, columns = np.abs(other, out=shifted).argmin(axis=0), np.arange(shifted.shape[1])
+        gamma, negative = other[row, columns], np.count_nonzero(above < 0, axis=0)
+        down, up = np.divide(beside, below[1:], out=ratio[:-1]), np.divide(beside, above[:-1], out=above[:-1])
         vectors = _products(row, down, up, shifted, other)
-        lengths = np.sqrt(np.einsum("il,il->l", vectors, vectors))
-        right = least <= _RESIDUAL * size * largest[matrix] * lengths
-        vectors /= lengths
-    return vectors if right.all() and np.isfinite(lengths).all() else None
+        squares = np.einsum("il,il->l", vectors, vectors)
+        vectors /= np.sqrt(squares)
+    return vectors, squares, gamma, negative
 
 
 def _pivots(shifted: Floats, squared: Floats, above: Floats, below: Floats) -> None:
