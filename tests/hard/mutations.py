@@ -69,8 +69,8 @@ MUTATIONS = (
     ),
     Mutation(
         3, "rotor/quantum/wang/rotation.py",
-        "    whole = wang_blocks(j, representation)\n",
-        "    whole = wang_blocks(j, representation)\n" + WHOLE_MATRIX,
+        "    return [(block, scalar, block_bands(matrix, block)) for block in blocks]\n",
+        "    whole, out = blocks, []\n" + WHOLE_MATRIX,
         "tests/hard/test_safeguards.py::test_vectors_of_near_degenerate_partners_lie_in_one_block",
     ),
     Mutation(
@@ -99,8 +99,9 @@ MUTATIONS = (
     ),
     Mutation(
         7, "rotor/quantum/wang/rotation.py",
-        "        out.append((block, scalar, block_bands(matrix, block)))",
-        "        bands = block_bands(matrix, block)\n        bands[0] += scalar\n        out.append((block, 0.0, bands))",
+        "    return [(block, scalar, block_bands(matrix, block)) for block in blocks]\n",
+        "    pieces = [(block, block_bands(matrix, block)) for block in blocks]\n    for _, bands in pieces:\n        bands[0] += scalar\n"
+        "    return [(block, 0.0, bands) for block, bands in pieces]\n",
         "tests/quantum/test_safeguards.py::test_the_scalar_part_stays_out_of_the_matrix",
     ),
     Mutation(
