@@ -77,7 +77,7 @@ def _state_levels(begin: TopConstants, columns: dict[str, Ints], labels: Ints, n
     blocks = labelled_states(begin.top, begin.effects, names, labels_by_row, values)
     parts = [AssignedLevels(np.arange(len(labels)), np.arange(len(names)), blocks)]
     _refuse(begin, labels, without_level(parts, len(labels)))
-    return BlockLevels.of(names, parts, len(labels))
+    return BlockLevels.from_parts(names, parts, len(labels))
 
 
 def _levels_with_spins(
@@ -95,7 +95,7 @@ def _levels_with_spins(
     values = np.array(list(begin.values.values()))
     parts = assigned_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
     _refuse(begin, labels, without_level(parts, len(labels)))
-    return BlockLevels.of(names, parts, len(labels))
+    return BlockLevels.from_parts(names, parts, len(labels))
 
 
 def _in_closed_form(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:

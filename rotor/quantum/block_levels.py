@@ -47,7 +47,7 @@ class BlockLevels(LevelModel):
     contracted: tuple[AssignedLevels, ...]
 
     @classmethod
-    def of(cls, names: tuple[str, ...], parts: Sequence[AssignedLevels], count: int) -> BlockLevels:
+    def from_parts(cls, names: tuple[str, ...], parts: Sequence[AssignedLevels], count: int) -> BlockLevels:
         """The model of `count` labels; labelled blocks of all parts are one set, so that blocks of equal size are solved together."""
         tracked = [
             block

@@ -88,7 +88,7 @@ def tracked_blocks(
     """
     tracked, space = list[Tracked](), Workspace()
     for numbers in stack_numbers([block for block, _ in blocks]):
-        stack = LinearStack.of([blocks[i][0] for i in numbers.tolist()])
+        stack = LinearStack.from_blocks([blocks[i][0] for i in numbers.tolist()])
         members = _members([blocks[i][1].sub_blocks for i in numbers.tolist()], stack.size)
         solved = stack.solved(values_mhz, space)
         state_names = [blocks[i][1].namer(*stack.states(solved, place)) for place, i in enumerate(numbers.tolist())]
@@ -159,8 +159,9 @@ class _Labelled:
     leading: Ints
 
     @classmethod
-    def of(cls, tracked: Sequence[Tracked]) -> _Labelled:
-        stack = LinearStack.of([each.block for each in tracked])
+    def from_tracked(cls, tracked: Sequence[Tracked]) -> _Labelled:
+        """Blocks of like size side by side."""
+        stack = LinearStack.from_blocks([each.block for each in tracked])
         members = _members([each.named.sub_blocks for each in tracked], stack.size)
         rows, states = _padded([each.rows for each in tracked], -1), _padded([each.states for each in tracked], 0)
         return cls(stack, members, tuple(tracked), rows, states, _padded([each.start.leading for each in tracked], 0))
@@ -290,7 +291,9 @@ class LabelledBlocks:
     @cached_property
     def _labelled(self) -> list[_Labelled]:
         numbers = stack_numbers([block.block for block in self.tracked])
-        return [_Labelled.of([self.tracked[i] for i in numbers_of_stack.tolist()]) for numbers_of_stack in numbers]
+        return [
+            _Labelled.from_tracked([self.tracked[i] for i in numbers_of_stack.tolist()]) for numbers_of_stack in numbers
+        ]
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies (count,) and derivatives (count, parameters); nan for labels that are not in these blocks."""

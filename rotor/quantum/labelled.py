@@ -71,12 +71,12 @@ def level_model(constants: Constants, labels: Ints, *, kmax: int | None = None) 
         raise ValueError(f"{labels.shape[1]} quantum numbers for each state; a {constants.kind} top has {what}")
     _refuse_labels(constants.kind, labels)
     if constants.kind == "asymmetric":
-        return WangBlocks.of(constants, labels, kmax)
+        return WangBlocks.from_labels(constants, labels, kmax)
     if "Dt" in constants.values:
         raise ValueError(
             "D_t splits the levels of a spherical top, which J alone does not label; it cannot be fitted here"
         )
-    return ClosedForm.of(constants, labels)
+    return ClosedForm.from_labels(constants, labels)
 
 
 def _refuse_labels(kind: str, labels: Ints) -> None:
@@ -101,7 +101,7 @@ class ClosedForm(LevelModel):
     slopes: Floats
 
     @classmethod
-    def of(cls, constants: Constants, labels: Ints) -> ClosedForm:
+    def from_labels(cls, constants: Constants, labels: Ints) -> ClosedForm:
         """Σ c X^p K^2q of every named constant."""
         by_name = operators_by_name(constants)
         x = (labels[:, 0] * (labels[:, 0] + 1)).astype(float)
@@ -135,7 +135,7 @@ class WangBlocks(LevelModel):
     rise: int
 
     @classmethod
-    def of(cls, constants: Constants, labels: Ints, kmax: int | None) -> WangBlocks:
+    def from_labels(cls, constants: Constants, labels: Ints, kmax: int | None) -> WangBlocks:
         """The model for labels (J, Ka, Kc) of a set of constants."""
         by_name = operators_by_name(constants)
         hamiltonian = sorted({powers for terms in by_name.values() for powers in terms})

@@ -43,7 +43,7 @@ def labelled_states(
     vertices = {
         j: [(v, block) for v in states for block in blocks_within(j, representation, limits.get(v))] for j in rows_of_j
     }
-    terms = StateTerms.of(top, effects, names, representation)
+    terms = StateTerms.from_effects(top, effects, names, representation)
     elements = StateElements(terms, len(names), representation, vertices)
     blocks, inside = list[NamedBlock](), list[Ints]()
     for j, rows in sorted(rows_of_j.items(), reverse=True):

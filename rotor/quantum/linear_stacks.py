@@ -84,7 +84,8 @@ class LinearStack:
     parameters: Ints
 
     @classmethod
-    def of(cls, blocks: Sequence[LinearBlock]) -> LinearStack:
+    def from_blocks(cls, blocks: Sequence[LinearBlock]) -> LinearStack:
+        """Blocks side by side, in order of size."""
         sizes = np.array([block.size for block in blocks])
         count, offsets = len(blocks), np.cumsum([0, *(sizes**2).tolist()])
         most, units = max(len(b.rows) for b in blocks), max(b.factors.shape[1] for b in blocks)

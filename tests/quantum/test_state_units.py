@@ -180,7 +180,7 @@ def test_linear_blocks_have_the_energies_and_slopes_of_the_solved_blocks(name):
     linear = linear_blocks_of(group.top, levels, tuple(values), levels.blocks)
     energies = np.empty(len(levels))
     for numbers in stack_numbers(linear):
-        solved = LinearStack.of([linear[i] for i in numbers.tolist()]).solved(
+        solved = LinearStack.from_blocks([linear[i] for i in numbers.tolist()]).solved(
             np.array(list(values.values())), Workspace()
         )
         for place, block in enumerate(levels.blocks[i] for i in numbers.tolist()):

@@ -69,7 +69,10 @@ class StateTerms(NamedTuple):
     links: tuple[_Link, ...]
 
     @classmethod
-    def of(cls, top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], representation: str) -> StateTerms:
+    def from_effects(
+        cls, top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], representation: str
+    ) -> StateTerms:
+        """The terms of named parameters of effects."""
         place = {name: i for i, name in enumerate(names)}
         states = [state for effect in effects for state in (State(0, effect.operators(top)), *effect.states(top))]
         occurring = {(q, n) for state in states for operators in state.terms.values() for _, q, n in operators}
@@ -283,7 +286,7 @@ def linear_blocks_of(
     top: Top, levels: Levels, names: Sequence[str], blocks: Sequence[SolvedBlock]
 ) -> list[LinearBlock]:
     """The linear blocks of solved blocks of levels, over the functions that their vectors have."""
-    terms = StateTerms.of(top, levels.effects, names, str(levels.representation))
+    terms = StateTerms.from_effects(top, levels.effects, names, str(levels.representation))
     return blocks_of_terms(terms, len(names), str(levels.representation), blocks)
 
 

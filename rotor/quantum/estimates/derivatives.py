@@ -111,7 +111,7 @@ def _derivatives_of_coupled(top: Top, levels: Levels, names: Sequence[str], rows
     out = np.zeros((len(levels) + 1, len(names) + 1))  # the last row and column take the padding
     space = Workspace()
     for numbers in stack_numbers(linear):
-        stack = LinearStack.of([linear[i] for i in numbers.tolist()])
+        stack = LinearStack.from_blocks([linear[i] for i in numbers.tolist()])
         vectors = np.zeros((len(numbers), stack.size, stack.size))
         rows_of_states = np.full((len(numbers), stack.size), len(levels))
         for place, block in enumerate(blocks[i] for i in numbers.tolist()):

@@ -39,7 +39,7 @@ class FreeLevels:
     family: Ints | None = field(default=None, repr=False)
 
     @classmethod
-    def of(cls, levels: Levels) -> FreeLevels:
+    def from_levels(cls, levels: Levels) -> FreeLevels:
         """The free levels of a table of solved levels."""
         rotation = "n" if "n" in levels.quanta else "j"
         quanta = {name: column for name, column in levels.quanta.items() if name != rotation}

@@ -323,7 +323,7 @@ def solved_space(
     _refuse_across_axis(top, elements, operators)
     _refuse_unknown_nuclei(elements, operators)
     sectors = tuple(_sectors(levels, not together))
-    free = FreeLevels.of(levels)
+    free = FreeLevels.from_levels(levels)
     space = SolvedSpace(free, jmax, sectors, elements, tuple(operators))
     if not set(BEFORE_J) & set(free.quanta):
         return space

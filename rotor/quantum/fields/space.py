@@ -65,4 +65,4 @@ def tilted_space(
         for number, block in enumerate(elements.blocks)
         for wang in projections[block.twice_total // 2]
     )
-    return SolvedSpace(FreeLevels.of(levels), jmax, sectors, elements, tuple(operators))
+    return SolvedSpace(FreeLevels.from_levels(levels), jmax, sectors, elements, tuple(operators))

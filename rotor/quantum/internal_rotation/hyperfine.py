@@ -92,7 +92,7 @@ def hyperfine_levels(
     """
     refuse_axes(top)
     model = turning_tops(top, constants)
-    degeneracies = Degeneracies.of(model, constants)
+    degeneracies = Degeneracies.from_model(model, constants)
     nuclei = Nuclei.of(top, effects)
     if degeneracies.equivalent and len(nuclei.spins) > 1:
         raise ValueError(

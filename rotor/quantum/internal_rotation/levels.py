@@ -111,7 +111,7 @@ def torsion_rotation_levels(
     """
     refuse_axes(top)
     model = turning_tops(top, constants)
-    degeneracies = Degeneracies.of(model, constants)
+    degeneracies = Degeneracies.from_model(model, constants)
     blocks, pieces = list[MomentBlock](), list[Columns]()
     for name in model.species:
         species = species_blocks(model, name, jmin, jmax, constants.functions).solve_once(
@@ -145,7 +145,7 @@ def energies_alone(
     """  # fmt: skip
     refuse_axes(top)
     model, pieces, energies = turning_tops(top, constants), [], []
-    degeneracies = Degeneracies.of(model, constants)
+    degeneracies = Degeneracies.from_model(model, constants)
     for name in model.species:
         blocks = species_blocks(model, name, jmin, jmax, constants.functions)
         # low levels need all torsional functions, so the highest one of K = 0 is the least limit
@@ -266,7 +266,7 @@ class Degeneracies:
     equivalent: bool = False
 
     @classmethod
-    def of(cls, model: TurningTops, constants: InternalRotationConstants) -> Degeneracies:
+    def from_model(cls, model: TurningTops, constants: InternalRotationConstants) -> Degeneracies:
         """Degeneracies of a model."""
         equivalent = isinstance(model, SeveralTops) and bool(model.axis)
         if constants.exchanged and not equivalent:

@@ -79,7 +79,7 @@ def _unit_tables(
     top: Top, levels: Levels, names: Sequence[str], shared: Shared, frame: Frame
 ) -> Iterator[tuple[Channel, dict[Kinds, UnitTables]]]:
     """Elements of all parameters by channel: powers of N, operators of spins, other operators of N."""
-    terms = StateTerms.of(top, levels.effects, names, shared.representation)
+    terms = StateTerms.from_effects(top, levels.effects, names, shared.representation)
     yield ALONE, _power_tables(terms, shared, frame)
     by_parameter = parameter_channels(top, levels.effects, names, shared.scheme)
     channels = dict.fromkeys(channel for by_channel in by_parameter for channel in by_channel)
@@ -88,7 +88,7 @@ def _unit_tables(
         yield from zip(same_rank, _spin_tables(by_parameter, same_rank, shared, frame), strict=True)
     if terms.linked:
         linked = [name if column in terms.linked else "" for column, name in enumerate(names)]
-        linked_terms = StateTerms.of(top, levels.effects, linked, shared.representation)
+        linked_terms = StateTerms.from_effects(top, levels.effects, linked, shared.representation)
         yield ALONE, _link_tables(linked_terms, len(names), terms.linked, levels.blocks, frame)
 
 

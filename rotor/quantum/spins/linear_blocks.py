@@ -63,7 +63,7 @@ def unit_matrices(
     """∂H/∂c of parameters over the functions of rotational blocks, by their numbers."""
     numbers = sorted(rotors)
     blocks = [replace(rotors[i], vectors=np.eye(len(rotors[i].energies_mhz))) for i in numbers]
-    terms = StateTerms.of(top, effects, names, shared.representation)
+    terms = StateTerms.from_effects(top, effects, names, shared.representation)
     rotations = dict(zip(numbers, _rotations(terms, len(names), blocks, shared.representation), strict=True))
     couplings: dict[tuple[int, int], dict[Channel, Unit]] = {}
     for channel, columns, contracted in _by_channel(

@@ -83,7 +83,7 @@ class FileLevels(LevelModel):
         if len(reduced):
             refuse_far_f(labels, reduced, form, quanta_names(form), max(sum(group.spins) for group in groups))
         names, parts = line_names(file), _searched(file, groups, form, labels, reduced)
-        return cls(names, BlockLevels.of(names, parts, len(labels)), reduced, excluded_parameters(file))
+        return cls(names, BlockLevels.from_parts(names, parts, len(labels)), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies and derivatives, see `LevelModel`."""
