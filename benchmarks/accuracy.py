@@ -27,8 +27,8 @@ PAGE, PICTURES = ROOT / "docs" / "accuracy.md", ROOT / "docs" / "pictures"
 HEAD = """# Accuracy and what it costs
 
 Made by `python benchmarks/accuracy.py`, from the functions behind [`rotor accuracy`](verbs/accuracy.md), which does the
-same for a scene of yours. Every picture shows error against processor time, without start-up and compilation; a setting stands
-beside its point, the usual one has a ring, and an open point shows no difference from the reference. Times are medians of five rounds
+same for a scene of yours. Every picture shows error against processor time, without start-up and compilation. A setting stands
+beside its point; the usual setting has a ring. An open point has no difference from the reference. Times are medians of five rounds
 where they are short; neighbours whose times differ by less than their scatter have one time. Errors are numerical: the
 constants are taken as given, except where measured lines are named. Times are of one core of a shared machine: their ratios
 inside one picture mean something, no more.

@@ -386,8 +386,8 @@ SUBJECTS: Sequence[Subject] = (
         "Ewald's sum and cutoffs",
         "Root mean square error of the forces, beside Ewald's sum to 1e-10; for cutoffs, with Lennard-Jones to half of the box. "
         "A short cutoff of Ewald's sum needs more waves, which cost more than the pairs that it saves.",
-        "Take Ewald's sum where forces matter to better than some percent: its tolerance of 1e-5 is 0.01 % of the force, while the "
-        "reaction field and shifted charges at 9 Å differ by 3 to 4 %.",
+        "Take Ewald's sum if forces matter to better than some percent. Its tolerance of 1e-5 is 0.01 % of the force; the reaction "
+        "field and shifted charges at 9 Å differ by 3 to 4 %.",
         ewald,
     ),
     Subject(

@@ -84,11 +84,11 @@ def without_checks(notebook: Any) -> Any:
 
 
 def _is_bare_object(output: Any) -> bool:
-    """Whether an output is what the last call of a cell on matplotlib returns beside its picture: objects, or limits and titles set."""
+    """Whether an output is an object without content: what matplotlib returns beside a picture, or the page of `rotor view`."""
     text = output.get("data", {}).get("text/plain", "")
     return (
         len(output.get("data", {})) == 1
-        and re.match(r"\[?(<matplotlib\.|Text\()|\[\(.*\bText\(", text, re.DOTALL) is not None
+        and re.match(r"\[?(<matplotlib\.|<rotor\.viewer\.|Text\()|\[\(.*\bText\(", text, re.DOTALL) is not None
     )
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 
 import rotor
 from rotor.api import agreement, compare
@@ -21,7 +22,7 @@ from rotor.api import agreement, compare
 
 rotor.api.use_style()
 
-published = Path("../tests/oracles/catalogues")  # measured lines of JPL and CDMS, in this repository
+published = Path("data/catalogues")  # measured lines of JPL and CDMS, beside this notebook
 
 
 def beside(lines, file):
@@ -40,7 +41,7 @@ def beside(lines, file):
 water = rotor.read("water")
 lines = rotor.api.line_list(water, temperature_k=300, jmax=20)
 print(f"{water.name}: {water.kind} top, κ = {water.kappa:.3f}, {len(lines)} lines, Q(300 K) = {lines.q:.2f}")
-lines.strongest(5).to_pandas()
+lines.strongest(5).to_pandas()[["frequency_mhz", "lgint", "energy_lower_cm", "einstein_a_per_s", "strength_debye2"]]
 
 # %%
 up, low = lines.levels.find(j=1, ka=1, kc=0), lines.levels.find(j=1, ka=0, kc=1)
@@ -63,11 +64,6 @@ matched = beside(lines, "c018003_part.cat")
 found = agreement(matched)
 shift, strength = matched.differences("frequency_mhz"), matched.differences("lgint")
 measured = matched.reference.take(matched.reference_rows)
-print(
-    f"{found.lines} measured lines: median |calculated - measured| {found.median_mhz:.2f} MHz, rms {found.rms_mhz:.2f} MHz"
-)
-print(f"intensities: median ratio {10 ** np.median(strength):.4f}, largest |Δ log10| {np.abs(strength).max():.4f}")
-
 figure, (spectrum, residuals) = plt.subplots(2, 1, figsize=(8, 6), height_ratios=(2, 1), layout="constrained")
 spectrum.vlines(lines.frequency_mhz / 1e6, 0, lines.intensity_nm2_mhz, color="C0", lw=1, label="calculated")
 spectrum.vlines(measured.frequency_mhz / 1e6, 0, -(10.0**measured.lgint), color="C1", lw=1, label="JPL, measured")
@@ -77,6 +73,15 @@ spectrum.legend()
 residuals.plot(measured.frequency_mhz / 1e6, shift, "o", ms=4, color="C0")
 residuals.axhline(0, color="black", lw=0.5)
 residuals.set(xlim=(0, 10), xlabel="Frequency (THz)", ylabel="Calculated - measured (MHz)")
+pd.DataFrame(
+    {
+        "measured lines": [found.lines],
+        "median difference (MHz)": [found.median_mhz],
+        "rms (MHz)": [found.rms_mhz],
+        "median ratio of intensities": [10 ** np.median(strength)],
+        "largest |Δ log₁₀|": [np.abs(strength).max()],
+    }
+).round(4)
 
 # %%
 assert found.lines == 110
@@ -119,18 +124,14 @@ assert found.within_3_sigma > 0.99
 
 # %%
 tables = tomllib.loads((published / "partition.toml").read_text())
-differences = {}
+differences, computed = {}, {}
 for table in tables.values():
     kelvin = np.array(table["temperature_k"])
     for name in [key for key in table if key not in ("source", "temperature_k")]:
         top = rotor.read(name)
         ours = np.array([math.log10(float(rotor.api.partition_function(top, t).q)) for t in kelvin.tolist()])
         differences[name] = ours - np.array(table[name])
-        print(
-            f"{name:5}",
-            " ".join(f"{value:7.4f}" for value in ours),
-            f"  largest difference {np.abs(differences[name]).max():.4f}",
-        )
+        computed[name] = [*ours, np.abs(differences[name]).max()]
 
 excess = 10.0 ** -differences["SO2"] - 1  # population of the excited state
 bending_cm = -np.log(excess[:3]) * kelvin[:3] / 1.438777  # hc/k in cm K
@@ -148,6 +149,7 @@ axes.set(
     title="Q against JPL and CDMS; dashed: last digit",
 )
 axes.legend(ncols=4, fontsize=8)
+pd.DataFrame.from_dict(computed, orient="index", columns=[*(f"{t:g} K" for t in kelvin), "largest difference"]).round(4)
 
 # %%
 for name, values in differences.items():
@@ -176,12 +178,14 @@ assert abs(rigid.constants["B"] / ground_state.constants["B"] - 1) < 0.006
 
 # %%
 sketch, real = rotor.read("SMILES:C=O"), rotor.read("H2CO")
-for name, ours in zip("ABC", sketch.rotational_constants_mhz, strict=True):
-    print(
-        f"{name}: {ours:10.1f} MHz from SMILES, {real.constants[name]:10.1f} MHz measured, {ours / real.constants[name] - 1:+.1%}"
-    )
 for note in sketch.notes:
     print("note:", note)
+table = pd.DataFrame(
+    {"from SMILES (MHz)": sketch.rotational_constants_mhz, "measured (MHz)": [real.constants[name] for name in "ABC"]},
+    index=list("ABC"),
+)
+table["difference (%)"] = 100 * (table.iloc[:, 0] / table.iloc[:, 1] - 1)
+table.round(1)
 
 estimated = np.array(sketch.rotational_constants_mhz) / [real.constants[name] for name in "ABC"]
 assert np.abs(estimated - 1).max() < 0.04

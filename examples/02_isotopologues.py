@@ -20,7 +20,7 @@ from rotor.api import isotopologue, isotopologues
 
 rotor.api.use_style()
 
-published = Path("../tests/oracles/catalogues")  # measured lines of JPL and CDMS, in this repository
+published = Path("data/catalogues")  # measured lines of JPL and CDMS, beside this notebook
 
 # %% [markdown]
 # ## Water at natural abundance
@@ -63,14 +63,19 @@ assert family[0].top.spin_weights.to_mapping() == {"ee": 1, "eo": 3, "oe": 3, "o
 # the hardest case there is.
 
 # %%
+off_percent = {}
 for changes, name in (("2=2H", "HDO"), ("H=2H", "D2O")):
     scaled = np.array(isotopologue(water, changes).top.constants.rigid)
     measured = rotor.read(name)
     off = scaled / np.array(measured.constants.rigid) - 1
     bare = np.array(rotor.Top.from_molecule(measured.molecule).constants.rigid) / measured.constants.rigid - 1
-    print(f"{name}: scaled off by {np.abs(off).max():.2%}, the geometry by {np.abs(bare).max():.2%}")
+    off_percent[name] = {
+        "scaled constants (%)": 100 * np.abs(off).max(),
+        "rigid geometry (%)": 100 * np.abs(bare).max(),
+    }
     assert np.abs(off).max() < 0.008
     assert np.abs(off).max() < np.abs(bare).max()
+pd.DataFrame(off_percent).T.round(2)
 
 # %% [markdown]
 # ## Carbon-13 in natural abundance: 2,3,4-trifluorotoluene
@@ -91,7 +96,6 @@ for change, constants in paper["isotopologues"].items():
     ratio = np.array(isotopologue(sketch, change).top.rotational_constants_mhz) / from_geometry
     shifts.append(parent * ratio - parent)
     seen.append(np.array(constants) - parent)
-    print(f"atom {change}: measured change {np.round(seen[-1], 2)}, predicted {np.round(shifts[-1], 2)} MHz")
 shifts, seen = np.array(shifts), np.array(seen)
 
 figure, axes = plt.subplots(figsize=(5, 4.5), layout="constrained")
@@ -102,6 +106,8 @@ axes.set(
     xlabel="Measured change (MHz)", ylabel="Predicted change (MHz)", title="Seven ¹³C isotopologues of trifluorotoluene"
 )
 axes.legend()
+columns = [f"Δ{name} {kind} (MHz)" for name in "ABC" for kind in ("measured", "predicted")]
+pd.DataFrame(np.stack([seen, shifts], axis=2).reshape(len(seen), 6), list(paper["isotopologues"]), columns).round(2)
 
 # %%
 assert np.abs(from_geometry / parent - 1).max() > 0.01  # the geometry alone would miss lines by tens of MHz
@@ -126,13 +132,10 @@ for file in ("c050007_part.cat", "c052009_part.cat"):
 
 grid = np.linspace(25.9e3, 26.9e3, 4001)
 parts, places = [], []
-for one, centre in zip(chlorides, centres, strict=True):
+for one in chlorides:
     lines = rotor.api.line_list(one.top, temperature_k=300, jmax=2)
     places.append(float(lines.frequency_mhz[lines.levels.quanta["j"][lines.upper] == 1][0]))
     parts.append(one.abundance * rotor.Spectrum.from_lines(lines, grid, fwhm_mhz=5.0).intensity)
-    print(
-        f"{one.formula:10} abundance {one.abundance:.4f}: J = 1 - 0 at {places[-1]:.2f} MHz, centre of JPL's {centre:.2f} MHz"
-    )
 areas = [np.trapezoid(part, grid) for part in parts]
 
 figure, axes = plt.subplots(figsize=(8, 3.5), layout="constrained")
@@ -143,6 +146,14 @@ for one, place, centre in zip(chlorides, places, centres, strict=True):
     axes.annotate(f"{one.formula}, {one.abundance:.0%}", (place / 1e3 + 0.02, height), va="top")
 axes.set(ylim=(0, 1.2 * sum(parts).max()), xlabel="Frequency (GHz)", ylabel="Cross section (nm²), natural abundance")
 axes.set_title("J = 1 - 0 of methyl chloride (orange: centres of JPL's components)")
+pd.DataFrame(
+    {
+        "abundance": [one.abundance for one in chlorides],
+        "J = 1 - 0 (MHz)": places,
+        "centre of JPL's components (MHz)": centres,
+    },
+    index=[one.formula for one in chlorides],
+).round(4)
 
 # %%
 assert abs(places[0] - centres[0]) < 0.5  # MHz; the library's own constants

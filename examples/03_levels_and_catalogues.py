@@ -20,7 +20,7 @@ from rotor.api import MHZ_PER_CM, read_egy
 
 rotor.api.use_style()
 
-oracles = Path("../tests/oracles")  # reference values, in this repository
+data = Path("data")  # reference values, beside this notebook
 
 # %% [markdown]
 # ## From prolate to oblate
@@ -69,7 +69,7 @@ for block in levels.blocks:
 cases = ("abc_sred", "abc_ared6", "h2co", "so2", "h2o_sextic", "h2o_octic", "pyridine_oblate_s", "hard_nearsym_j150")
 off, by_case = {}, {}
 for case in cases:
-    top, printed = rotor.read(oracles / case / f"{case}.var"), read_egy(oracles / case / "sample.egy")
+    top, printed = rotor.read(data / "levels" / f"{case}.var"), read_egy(data / "levels" / f"{case}.egy")
     j, ka, kc = printed.quanta.T
     levels = rotor.api.solve_levels(top, int(j.max()))
     rows = levels.rows_of(j=j, ka=ka, kc=kc)
@@ -99,7 +99,7 @@ assert all(np.abs(values).max() < 5.1e-7 for values in off.values())  # half of 
 # point is how much of the spectrum each order carries.
 
 # %%
-measured = rotor.read(oracles / "catalogues" / "c018003_part.cat")
+measured = rotor.read(data / "catalogues" / "c018003_part.cat")
 upper, lower = (
     dict(zip(("j", "ka", "kc"), q.T, strict=False)) for q in (measured.quanta_upper, measured.quanta_lower)
 )  # v = 0
@@ -161,7 +161,7 @@ axis.set(xlabel="Ka (J grows to the right within each group)", ylabel="Energy (c
 # %%
 assert ((levels.quanta["ka"] + levels.quanta["kc"]) % 2 == 0)[exists].all()
 assert abs(exists.mean() - 0.5) < 0.03
-published = rotor.read(oracles / "spcat" / "c064502_part.cat")
+published = rotor.read(data / "catalogues" / "c064502_part.cat")
 assert ((published.quanta_upper[:, 1] + published.quanta_upper[:, 2]) % 2 == 0).all()
 
 # %% [markdown]

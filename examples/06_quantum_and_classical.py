@@ -40,7 +40,7 @@ from rotor.api import (
 
 rotor.api.use_style()
 
-oracles = Path("../tests/oracles")  # reference values, in this repository
+data = Path("data")  # reference values, beside this notebook
 tops = {name: rigid(rotor.read(name)) for name in ("water", "OCS")}  # distortion left out on both sides
 
 # %% [markdown]
@@ -183,7 +183,7 @@ assert abs(float(np.interp(70, kelvin, water.cv_over_r)) - 1.5) < 0.03
 # mixture has: it is the heat of conversion from para to ortho.
 
 # %%
-known = tomllib.loads((oracles / "heat_capacity.toml").read_text(encoding="utf-8"))
+known = tomllib.loads((data / "heat_capacity.toml").read_text(encoding="utf-8"))
 janaf = {table["molecule"]: table for table in known["table"]}
 leachman = {formula["species"]: formula for formula in known["einstein"] if "Leachman" in formula["source"]}
 

@@ -32,7 +32,7 @@ from rotor.api import (
 
 rotor.api.use_style()
 
-samples = Path("../tests/oracles/fits")  # measured lines, in this repository
+data = Path("data/fits")  # measured lines, beside this notebook
 
 # %% [markdown]
 # ## OCS: 61 measured lines up to J = 90
@@ -40,7 +40,7 @@ samples = Path("../tests/oracles/fits")  # measured lines, in this repository
 # B alone does not describe them, and the fit says so: it has found its minimum, and the minimum is no result.
 
 # %%
-lines, _ = read_assigned_lines(samples / "ocs.csv", ("j",))
+lines, _ = read_assigned_lines(data / "ocs.csv", ("j",))
 start = Constants(B=6000.0)
 rigid = fit_lines(lines, start, parameters(start, ["B"]))
 print(rigid.reason)
@@ -109,7 +109,7 @@ pd.DataFrame(
 # CO in SPFIT's own input: the same minimum, and the .var file that SPCAT reads.
 
 # %%
-asked = read_fit(samples / "co.par")
+asked = read_fit(data / "co.par")
 co = fit_lines(asked.lines, asked.constants, asked.parameters, asked.options)
 print(report_text(co, "CO").splitlines()[1])
 assert abs(co.weighted_rms - 0.90566) < 5e-6  # as SPFIT prints it

@@ -25,7 +25,7 @@ from rotor.api import (
 
 rotor.api.use_style()
 
-samples = Path("../tests/oracles/fits")  # measured lines, in this repository
+data = Path("data/fits")  # measured lines, beside this notebook
 
 # %% [markdown]
 # ## OCS
@@ -33,7 +33,7 @@ samples = Path("../tests/oracles/fits")  # measured lines, in this repository
 # The family file names a list of measured lines for each isotopologue (CDMS); B of each is fitted on the way.
 
 # %%
-file = read_family(samples / "ocs.toml")
+file = read_family(data / "ocs.toml")
 pd.DataFrame(
     {
         one.name: {

@@ -32,7 +32,7 @@ from rotor.api import (
 
 rotor.api.use_style()
 
-oracles = Path("../tests/oracles")  # reference values, in this repository
+data = Path("data")  # reference values, beside this notebook
 ocs = Top.from_constants("B=6081.492 MHz", dipole_abc_debye=(0.71519, 0, 0)).with_polarizability(
     np.diag([4.04, 0.0, 0.0]), "the anisotropy alone, which is all that turns"
 )
@@ -62,7 +62,7 @@ for kelvin, expected in ((0.0, 0.8870), (1.0, 0.7121), (10.0, 0.4875)):
     axes.plot(times, trace.cosines["cos2theta"], lw=0.9, label=f"{kelvin:.0f} K")
     axes.axhline(expected, color=axes.lines[-1].get_color(), lw=0.6, ls=":")
 for kelvin, file in ((0.0, "alignment_ocs_0k.csv"), (10.0, "alignment_ocs_10k.csv")):
-    t, expected = np.loadtxt(oracles / "fields" / file, delimiter=",").T
+    t, expected = np.loadtxt(data / "fields" / file, delimiter=",").T
     off = np.abs(align(ocs, pulse, t, temperature_k=kelvin).cosines["cos2theta"] - expected).max()
     axes.plot(t, expected, "k.", ms=3)
     table[f"{kelvin:.0f} K"]["difference from the independent program"] = f"{off:.1e}"

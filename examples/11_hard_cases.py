@@ -22,7 +22,7 @@ from rotor.api import MHZ_PER_CM, RotationSplitting, growth_rate, integrate, rea
 
 rotor.api.use_style()
 
-oracles = Path("../tests/oracles")  # reference values, in this repository
+data = Path("data/levels")  # reference values, beside this notebook
 
 # %% [markdown]
 # ## B - C → 0: the asymmetric top becomes a symmetric one
@@ -80,8 +80,8 @@ assert joined[-1] < 4 * round_off  # at δ = 0 the closed form of the symmetric 
 # The reference program's case: B - C = 10⁻⁶ B to J = 150. Sixty-one of its printed energies, to the last digit.
 
 # %%
-near_symmetric = rotor.read(oracles / "hard_nearsym_j150" / "hard_nearsym_j150.var")
-printed = read_egy(oracles / "hard_nearsym_j150" / "sample.egy")
+near_symmetric = rotor.read(data / "hard_nearsym_j150.var")
+printed = read_egy(data / "hard_nearsym_j150.egy")
 j, ka, kc = printed.quanta.T
 levels = rotor.api.solve_levels(near_symmetric, 150)
 worst = np.abs(levels.energy_mhz[levels.rows_of(j=j, ka=ka, kc=kc)] / MHZ_PER_CM - printed.energy_cm).max()

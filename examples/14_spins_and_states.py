@@ -22,7 +22,7 @@ from rotor.api import used_method
 
 rotor.api.use_style()
 
-oracles = Path("../tests/oracles")  # reference values, in this repository
+data = Path("data")  # reference values, beside this notebook
 
 
 def components(top, jmax, method="exact", temperature_k=300.0):
@@ -35,7 +35,7 @@ def components(top, jmax, method="exact", temperature_k=300.0):
 
 def measured(sample):
     """Components (MHz) of a file of measured lines by their quanta."""
-    rows = (oracles / "hyperfine" / f"{sample}.csv").read_text(encoding="utf-8").splitlines()[1:]
+    rows = (data / "hyperfine" / f"{sample}.csv").read_text(encoding="utf-8").splitlines()[1:]
     cells = [row.split(",") for row in rows]
     return {tuple(tuple(map(int, side.split())) for side in row[2:]): float(row[0]) for row in cells}
 
@@ -140,7 +140,7 @@ assert abs(sum(share * shift for _, _, shift, _, _, share in rows)) < 1e-4  # th
 # %%
 targets = {"formamide": ("hconh2", "1(1,0) - 1(1,1)"), "vinyl cyanide": ("ch2chcn", "2(1,1) - 2(1,2)")}
 figure, panels = plt.subplots(1, 2, figsize=(10, 4), layout="constrained")
-off_khz = {}
+off_khz, rows = {}, []
 for panel, (name, (sample, label)) in zip(panels, targets.items(), strict=True):
     laboratory = measured(sample)
     lines, quanta = components(rotor.read(name), 2)
@@ -148,7 +148,6 @@ for panel, (name, (sample, label)) in zip(panels, targets.items(), strict=True):
     inside = [row for row, (up, low) in enumerate(quanta) if (up[:-1], low[:-1]) == (upper[:-1], lower[:-1])]
     strongest = lines.strength_debye2[inside].max()
     off_khz[name] = []
-    print(f"{name} {label}\n F' - F''   measured, MHz   computed, MHz   obs - calc, kHz   relative strength")
     for row in sorted(inside, key=lambda one: lines.frequency_mhz[one]):
         frequency, share = lines.frequency_mhz[row], lines.strength_debye2[row] / strongest
         tag = f"{quanta[row][0][-1]} - {quanta[row][1][-1]}"
@@ -157,7 +156,7 @@ for panel, (name, (sample, label)) in zip(panels, targets.items(), strict=True):
         if quanta[row] in laboratory:
             seen = laboratory[quanta[row]]
             off_khz[name].append(1e3 * (seen - frequency))
-            print(f"  {tag} {seen:17.3f} {frequency:15.4f} {off_khz[name][-1]:14.2f} {share:20.3f}")
+            rows.append((name, tag, seen, frequency, round(off_khz[name][-1], 2), share))
             panel.plot(
                 seen,
                 0,
@@ -168,7 +167,7 @@ for panel, (name, (sample, label)) in zip(panels, targets.items(), strict=True):
                 label="measured" if len(off_khz[name]) == 1 else None,
             )
         else:
-            print(f"  {tag}   not in the list {frequency:14.4f} {'':14} {share:20.3f}")
+            rows.append((name, tag, "not in the list", frequency, "", share))
     panel.set(
         xlabel="Frequency (MHz)", ylabel="Strength, strongest = 1", ylim=(0, 1.15), title=f"{name} {label}, F' - F''"
     )
@@ -177,6 +176,8 @@ for panel, (name, (sample, label)) in zip(panels, targets.items(), strict=True):
     panel.margins(x=0.08)
     panel.legend(loc="upper left")
     assert len(off_khz[name]) == len(laboratory)  # each measured component is in the computed list
+heading = ["molecule", "F' - F''", "measured (MHz)", "computed (MHz)", "obs - calc (kHz)", "relative strength"]
+pd.DataFrame(rows, columns=heading).round(4)
 
 # %%
 for name, off in off_khz.items():
@@ -212,9 +213,6 @@ for name, top in tops.items():
         off = [abs(nu - exact[key]) for key, nu in zip(own, cheaper.frequency_mhz, strict=True) if key in exact]
         stated = used_method(cheaper.levels).estimate_mhz
         found.append((name, method, max(off), stated, len(off)))
-        print(
-            f"{name:14} {method:11} {len(off):5} lines, largest difference {max(off):.2e} MHz, stated {stated:.2e} MHz"
-        )
 
 figure, axes = plt.subplots(figsize=(8, 3.8), layout="constrained")
 for method, marker, shift in (("N-diagonal", "o", -0.1), ("first-order", "s", 0.1)):
@@ -231,6 +229,8 @@ axes.set(
     title="Lines to J = 5: difference from exact",
 )
 axes.legend(fontsize=8)
+heading = ["molecule", "method", "largest difference (MHz)", "stated (MHz)", "lines"]
+pd.DataFrame(found, columns=heading).style.format(precision=2).format("{:.2e}", subset=heading[2:4])
 
 # %%
 assert all(largest <= stated for _, _, largest, stated, _ in found)
@@ -257,12 +257,10 @@ for kind, top in {"table": ammonia, "constants": replace(ammonia, level_table=No
     for j, k in LAB:
         pair = [levels.energy_mhz[levels.find(v=v, j=j, k=k)] for v in (0, 1)]
         inversion[kind, j, k] = pair[1] - pair[0]
-print("(J, K)   measured, MHz   by table   obs - calc, kHz   by constants   obs - calc, kHz")
+rows = []
 for (j, k), seen in LAB.items():
     table, alone = inversion["table", j, k], inversion["constants", j, k]
-    print(
-        f"({j}, {k}) {seen:14.4f} {table:13.4f} {1e3 * (seen - table):11.2f} {alone:18.4f} {1e3 * (seen - alone):12.1f}"
-    )
+    rows.append((f"({j}, {k})", seen, table, 1e3 * (seen - table), alone, 1e3 * (seen - alone)))
     assert abs(seen - table) < 5e-4  # MHz: rounding of two energies of the table
     assert abs(seen - alone) < 0.2  # MHz: what the file says of the constants
 
@@ -285,6 +283,15 @@ axes.set(xlabel="Frequency (GHz)", ylabel="Intensity at 300 K (10⁻⁴ nm² MHz
 axes.set_ylim(bottom=0)
 axes.margins(y=0.1)
 axes.legend()
+heading = [
+    "(J, K)",
+    "measured (MHz)",
+    "by table (MHz)",
+    "obs - calc (kHz)",
+    "by constants (MHz)",
+    "obs - calc of these (kHz)",
+]
+pd.DataFrame(rows, columns=heading).round(4)
 
 # %% [markdown]
 # ## Two states that cross

@@ -30,7 +30,7 @@ from rotor.api import (
 rotor.api.use_style()
 
 CM = rotor.units.MHZ_PER_CM
-samples = Path("../tests/oracles")  # measured lines, in this repository
+data = Path("data")  # measured lines, beside this notebook
 
 # %% [markdown]
 # ## The barrier by itself
@@ -89,7 +89,7 @@ assert 1.0 < abs(splittings[barriers == 408][0]) < 10.0  # measured: 19265.1 and
 # group are off by per cent. Free in turn: constants of the rigid top with V3 and the angle, then centrifugal distortion.
 
 # %%
-rows = np.loadtxt(samples / "ch3cho_low.txt")
+rows = np.loadtxt(data / "ch3cho_low.txt")
 names = ("j", "ka", "kc", "species", "vt")
 lines = assignments(names, rows[:, :5].astype(int), rows[:, 5:10].astype(int), rows[:, 10], 0.1)
 start = TopConstants(with_barrier(407.6))

@@ -37,7 +37,7 @@ from rotor.api import (
 
 rotor.api.use_style()
 
-folder = Path("../tests/oracles/observed")  # observed spectra, in this repository
+folder = Path("data/observed")  # observed spectra, beside this notebook
 
 # %% [markdown]
 # ## The spectrum and the lines

@@ -29,7 +29,7 @@ from rotor.api import (
 
 rotor.api.use_style()
 
-folder = Path("../tests/oracles/observed/five_species")  # in this repository
+folder = Path("data/observed/five_species")  # beside this notebook
 
 # %% [markdown]
 # ## Spectrum and lines

@@ -22,6 +22,15 @@ def counted(count: int, singular: str, plural: str = "") -> str:
     return f"{count} {singular if count == 1 else plural or singular + 's'}"
 
 
+def with_article(noun: str) -> str:
+    """A noun behind its indefinite article.
+
+    >>> with_article("asymmetric top"), with_article("prolate top")
+    ('an asymmetric top', 'a prolate top')
+    """
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+
+
 class Table(ABC):
     """An object with columns of equal length, by their names with unit.
 

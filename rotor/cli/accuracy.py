@@ -91,7 +91,8 @@ def draw(answer: AccuracyAnswer, path: Path, report: Report) -> None:
     from rotor.scenes.accuracy_panels import panels_of
 
     facts = {name: report.content[name] for name in ("command", "scene", "references")}
-    plot_work_precision(panels_of(answer.table), path, title=answer.scene.heading, facts=facts)
+    title = answer.scene.title or f"Accuracy and time: {answer.scene.kind}"
+    plot_work_precision(panels_of(answer.table), path, title=title, facts=facts)
 
 
 def write_rows(answer: AccuracyAnswer, path: Path, report: Report) -> None:

@@ -30,7 +30,7 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import LevelModel
 from rotor.requests.budget import ErrorBudget
 from rotor.statistics.least_squares import Progress
-from rotor.table import Table, counted
+from rotor.table import Table, counted, with_article
 from rotor.tops.top import Top
 from rotor.version import version
 
@@ -271,8 +271,9 @@ def _dipole_for(top: Top, free: Sequence[str]) -> tuple[str, ...]:
     values = dict(zip(DIPOLES, top.dipole_abc_debye or (0.0, 0.0, 0.0), strict=True))
     names = tuple(name for name in DIPOLES if values[name] or name in free)
     if wrong := [name for name in names if name[-1] not in possible]:
+        known = ", ".join(f"mu_{a}" for a in possible) or "none"
         raise ValueError(
-            f"{', '.join(wrong)}: lines in a field of a {top.kind} top are fitted with {', '.join(f'mu_{a}' for a in possible) or 'none'}"
+            f"{', '.join(wrong)}: lines in a field of {with_article(top.kind)} top are fitted with {known}"
         )
     if not names:
         raise ValueError(

@@ -216,7 +216,7 @@ def plot_rotational_diagram(diagram: RotationalDiagram, axes: Any) -> None:
         diagram.error,
         linestyle="",
         marker="o",
-        markersize=3,
+        markersize=4,
         label="corrected",
     )
     axes.plot(
@@ -225,8 +225,8 @@ def plot_rotational_diagram(diagram: RotationalDiagram, axes: Any) -> None:
         linestyle="",
         marker="o",
         markerfacecolor="none",
-        markersize=3,
-        label="as if thin",
+        markersize=4,
+        label="optically thin",
     )
     slope = -1 / diagram.excitation_k
     centre = float(np.average(diagram.energy_upper_k, weights=diagram.error**-2))
@@ -242,4 +242,4 @@ def plot_rotational_diagram(diagram: RotationalDiagram, axes: Any) -> None:
     )
     axes.set_xlabel("Energy of the upper level $E_u/k$ (K)")
     axes.set_ylabel(r"Population ln($N_u/g_u$ cm²)")
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend()

@@ -122,14 +122,6 @@ def _log_probability(values: Floats, fit: SourceFit) -> float:
     return -0.5 * chi
 
 
-def plot_corner(sample: SourceSample, path: Any) -> None:
-    """Draw a corner plot of a sample (extra `sampling`)."""
-    figure = load_corner().corner(
-        sample.draws, labels=list(sample.names), quantiles=(0.1587, 0.5, 0.8413), show_titles=True, title_fmt=".3g"
-    )
-    figure.savefig(path)
-
-
 def load_corner() -> Any:
     """The package corner; ImportError that names the extra if it is not installed."""
     try:

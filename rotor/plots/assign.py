@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ def assignment_figure(answer: AssignAnswer, title: str = "", view: View = WHOLE)
         without_signs(upper)
         lower.set_ylabel("Unexplained")
         lower.set_xlabel("Frequency (MHz)")
-        count = f"{answer.request.peaks.source or 'spectrum'}: {len(answer.species)} species"
+        count = f"{os.path.basename(answer.request.peaks.source) or 'Spectrum'}: {len(answer.species)} species"
         upper.set_title(title or count, loc="left")
         figure.legend(*upper.get_legend_handles_labels(), fontsize=9, loc="outside lower right", ncols=2)
         show_part(upper, view)

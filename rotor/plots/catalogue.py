@@ -40,7 +40,7 @@ def catalogue_figure(lines: Catalogue, *, title: str = "", least: float = math.i
                     frequency[chosen] / 1e3, bottom, lines.lgint[chosen], colors=colour, lw=0.7,
                     label=f"{name} ({np.count_nonzero(chosen)})", rasterized=len(lines) > MOST_VECTOR_STICKS,
                 )  # fmt: skip
-        axes.set(xlabel="Frequency (GHz)", ylabel="log₁₀ intensity (nm² MHz)", title=title)
+        axes.set(xlabel="Frequency (GHz)", ylabel="Intensity, log₁₀ (nm² MHz)", title=title)
         axes.set_ylim(bottom=bottom)
         legend_below(figure, axes, ncols=2)
     return figure

@@ -80,7 +80,7 @@ def _draw_mirror(axes: Any, comparison: Comparison, names: tuple[str, str]) -> N
     step = max(1, round(height / 4))
     ticks = np.arange(np.floor(both.max()), bottom + 0.3 * step, -step)
     axes.set_yticks(np.concatenate([-(ticks - bottom), ticks - bottom]), [f"{x:.0f}" for x in (*ticks, *ticks)])
-    axes.set_ylabel("log₁₀ intensity (nm² MHz)")
+    axes.set_ylabel("Intensity, log₁₀ (nm² MHz)")
     for name, place, va in ((names[0], 0.98, "top"), (names[1], 0.02, "bottom")):
         axes.text(0.005, place, name_text(name), transform=axes.transAxes, va=va, ha="left", color=GREY)
     axes.figure.legend(loc="outside upper right", ncols=2, frameon=False, fontsize=9)

@@ -14,6 +14,7 @@ from rotor.plots.view import WHOLE, View, show_part
 from rotor.units import KJ_PER_MOL_EV
 
 TIME = "Time (ps)"
+ENSEMBLES = {"nve": "constant energy", "langevin": "Langevin thermostat", "nose-hoover": "Nosé-Hoover thermostat"}
 
 
 def picture(answer: FluidAnswer, *, title: str | None = None, view: View = WHOLE, centres: Any = None) -> Picture:
@@ -23,7 +24,8 @@ def picture(answer: FluidAnswer, *, title: str | None = None, view: View = WHOLE
     """
     settings, molecules = answer.request.settings, len(np.unique(answer.atoms.arrays["molecule"]))
     shells = None if centres is None else _shells(answer.atoms, centres)
-    default = f"{molecules} molecules, {settings.model}, {settings.ensemble}, by {answer.request.engine}"
+    engine = "" if answer.request.engine == "rotor" else f", {answer.request.engine}"
+    default = f"{molecules} molecules, {settings.model}, {ENSEMBLES[settings.ensemble]}{engine}"
     if shells is not None:
         default += f"; g(r) of {len(centres)} frame{'s' if len(centres) > 1 else ''}"
     title = (default if title is None else title) if view.title is None else view.title

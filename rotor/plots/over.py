@@ -16,6 +16,7 @@ from rotor.plots.picture import (
     GREY,
     WIDTH_INCHES,
     checked_suffix,
+    legend_below,
     new_figure,
     save,
     styled,
@@ -46,7 +47,7 @@ def plot_over(
 ) -> None:
     """Draw peaks with the lines mirrored below them; heights (lines,) in units of the peaks."""
     checked_suffix(path)
-    title = view.title or f"{peaks.source or 'spectrum'} and {top_title(lines.top)}"
+    title = view.title or f"{os.path.basename(peaks.source) or 'Spectrum'} and {top_title(lines.top)}"
     save(over_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
 
 
@@ -73,7 +74,7 @@ def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view
         axes.set_ylabel("Intensity: measured up, lines down")
         without_signs(axes)
         axes.set_title(title, loc="left")
-        axes.legend(frameon=False, fontsize=9, loc="upper left")
+        legend_below(figure, axes, ncols=2)
         axes.set_xlim(*peaks.band_mhz)
         axes.set_ylim(-1.05 * float(heights.max(initial=0.0)), SPACE * float(peaks.intensity.max()))
         show_part(axes, view)
@@ -122,7 +123,7 @@ def plot_loomis_wood(
 ) -> None:
     """Draw Loomis-Wood rows of the strongest lines."""
     checked_suffix(path)
-    title = view.title or f"{peaks.source or 'spectrum'} about lines of {top_title(lines.top)}"
+    title = view.title or f"{os.path.basename(peaks.source) or 'Spectrum'} about lines of {top_title(lines.top)}"
     save(loomis_wood_figure(lines, heights, peaks, title, view), path, title, dict(provenance or {}))
 
 

@@ -13,7 +13,7 @@ from rotor.observed.model import Component, Sight
 from rotor.observed.overlay_table import line_table, modelled
 from rotor.observed.spectrum import ABSORBANCE, KELVIN, ObservedSpectrum
 from rotor.plots.names import SPACE, Peak, name_peaks
-from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, checked_suffix, new_figure, save, styled
+from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, WIDTH_INCHES, checked_suffix, new_figure, save, styled
 
 PANELS = 6  # on a page
 CHANNELS = 1500  # default number in a panel
@@ -21,6 +21,7 @@ _MOST_NAMES = 14
 _GAP = 20.0  # channels
 POINTS_PER_LETTER = 5.5  # mean width of a letter of 9 points
 PAGE_INCHES = (8.3, 11.7)
+FEW_PANELS = 2  # these have the width of other pictures, more have that of a page
 
 
 def plot_overlay(
@@ -95,7 +96,7 @@ def overlay_figure(
     names = list(dict.fromkeys(component.species.name for component in components))
     with styled():
         size = (
-            PAGE_INCHES[0],
+            WIDTH_INCHES if count <= FEW_PANELS else PAGE_INCHES[0],
             min(PAGE_INCHES[1], 1.2 + 2.6 * len(page)) if len(page) <= PANELS else 1.2 + 1.9 * len(page),
         )
         figure = new_figure(size)

@@ -61,8 +61,8 @@ def checked_suffix(path: str | os.PathLike[str]) -> str:
     return suffix
 
 
-def new_figure(size: tuple[float, float] = SIZE_INCHES) -> Any:
-    """An empty matplotlib figure with its canvas; size in inches. Draw on it inside `styled()`.
+def new_figure(size: tuple[float, float] = SIZE_INCHES, layout: Any = "constrained") -> Any:
+    """An empty matplotlib figure with its canvas; size in inches, layout of matplotlib. Draw on it inside `styled()`.
 
     The user's style may set size and resolution (figure.figsize, figure.dpi).
     """
@@ -70,7 +70,7 @@ def new_figure(size: tuple[float, float] = SIZE_INCHES) -> Any:
     from matplotlib.figure import Figure
 
     users = _USERS.get() or {}
-    figure = Figure(figsize=users.get("figure.figsize", size), dpi=users.get("figure.dpi", DPI), layout="constrained")
+    figure = Figure(figsize=users.get("figure.figsize", size), dpi=users.get("figure.dpi", DPI), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 

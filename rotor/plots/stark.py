@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import Any
 
@@ -22,7 +21,7 @@ NARROW_INCHES = 5.0
 SIZE_INCHES = (WIDTH_INCHES, 6.0)
 LEAST_DRAWN = 1e-4  # relative to the strongest line
 MOST_LABELS = 27  # on the axis of energies; a name takes 1/27 of its height
-LETTER = 0.016  # width of a letter, relative to the range of fields; of a subscript 0.7 of it
+WIDEST = 0.5  # part of the width that names may take
 GAP_OF_PANELS = 10.0  # of lines in a field: gap to the next panel, relative to the widest shift
 MOST_PANELS = 4
 SAME_HEIGHT = 0.1  # part of the height of a name; nearer levels share one
@@ -123,20 +122,23 @@ def _labels(axes: Any, fields: tuple[float, float], ends: list[tuple[float, str]
     height = (high - low) / MOST_LABELS
     named = _grouped(sorted({(energy, label) for energy, label in ends if low <= energy <= high}), height)
     places = _apart(np.array([energy for energy, _ in named]), height, low, high - height / 2)
-    longest = max((_letters(label) for _, label in named), default=0.0)
-    axes.set_xlim(first - (0.045 + LETTER * longest) * (end - first), end + 0.02 * (end - first))
-    for (energy, label), place in zip(named, places.tolist(), strict=True):
+    axes.set_xlim(first - 0.045 * (end - first), end + 0.02 * (end - first))
+    texts = [
         axes.annotate(
             label, (first, energy), (first - 0.035 * (end - first), place), ha="right", va="center", fontsize=9,
-            arrowprops={"arrowstyle": "-", "linewidth": 0.4, "color": GREY, "shrinkA": 0.0, "shrinkB": 2.0, "relpos": (1.0, 0.5)},
-        )  # fmt: skip
-
-
-def _letters(label: str) -> float:
-    """Width of a label in letters, subscripts at 0.7 of a letter."""
-    below = "".join(re.findall(r"_\{([^}]*)\}", label))
-    plain = re.sub(r"_\{[^}]*\}|[${}\\]", "", label)
-    return len(plain) + 0.7 * len(below)
+            arrowprops={
+                "arrowstyle": "-", "linewidth": 0.4, "color": GREY, "shrinkA": 0.0, "shrinkB": 2.0, "relpos": (1.0, 0.5),
+            },
+        )
+        for (energy, label), place in zip(named, places.tolist(), strict=True)
+    ]  # fmt: skip
+    axes.figure.canvas.draw()  # computes the layout, so that pixel sizes are valid
+    share = min(
+        max((text.get_bbox_patch() or text).get_window_extent().width for text in texts) / axes.bbox.width, WIDEST
+    )
+    axes.set_xticks([tick for tick in axes.get_xticks() if first <= tick <= end])
+    end += 0.02 * (end - first)
+    axes.set_xlim((first - 0.04 * (end - first) - share * end) / (1.0 - share), end)  # a name keeps its width in pixels
 
 
 def _grouped(levels: list[tuple[float, str]], height: float) -> list[tuple[float, str]]:

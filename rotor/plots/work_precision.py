@@ -223,8 +223,8 @@ def setting_text(setting: str) -> str:
     """
     if power := re.fullmatch(r"1e([+-]?\d+)", setting):
         return f"$10^{{{int(power[1])}}}$"
-    if power := re.fullmatch(r"([A-Z])\^(\d+)", setting):
-        return f"${power[1]}^{{{power[2]}}}$"
+    if power := re.fullmatch(r"(.*)\b([A-Z])\^(\d+)", setting):
+        return f"{power[1]}${power[2]}^{{{power[3]}}}$"
     return setting.replace("$", r"\$")
 
 

@@ -27,6 +27,7 @@ from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.label_blocks import Chunk, chunks_of, expectations, occurring_blocks
 from rotor.quantum.solvers.tridiagonal import vectors_of_values
 from rotor.quantum.wang.turn import order_beyond_the_turn, turned
+from rotor.table import with_article
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
 
@@ -68,7 +69,9 @@ def level_model(constants: Constants, labels: Ints, *, kmax: int | None = None) 
     width = {"linear": 1, "spherical": 1, "prolate": 2, "oblate": 2}.get(constants.kind, 3)
     if labels.shape[1] != width:
         what = {1: "J", 2: "J, K", 3: "J, Ka, Kc"}[width]
-        raise ValueError(f"{labels.shape[1]} quantum numbers for each state; a {constants.kind} top has {what}")
+        raise ValueError(
+            f"{labels.shape[1]} quantum numbers for each state; {with_article(constants.kind)} top has {what}"
+        )
     _refuse_labels(constants.kind, labels)
     if constants.kind == "asymmetric":
         return WangBlocks.from_labels(constants, labels, kmax)

@@ -23,7 +23,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Quantity, Whole
-from rotor.table import Table, TextOf
+from rotor.table import Table, TextOf, with_article
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class LevelsRequest:
         require_whole("jmax", self.jmax, self.jmin)
         require_whole("kmax", self.kmax, self.kmin or 0)
         if (self.kmin is not None or self.kmax is not None) and self.top.kind in ("linear", "spherical"):
-            raise ValueError(f"kmax: the levels of a {self.top.kind} top have no K; give J alone")
+            raise ValueError(f"kmax: the levels of {with_article(self.top.kind)} top have no K; give J alone")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

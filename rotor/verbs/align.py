@@ -179,16 +179,35 @@ def _facts(trace: AlignmentTrace, content: Mapping[str, Any]) -> list[tuple[str,
         ("J max", str(trace.jmax)),
         ("method", f"{trace.method}, {counted(sum(trace.steps), 'step')}"),
         ("numerical error", accuracy),
-        ("samples", _samples_text(trace.t_ps)),
+        ("samples", _samples_text(trace)),
     ]
 
 
-def _samples_text(times: Floats) -> str:
-    """The number of times and their step, and that max and min are samples."""
+def _samples_text(trace: AlignmentTrace) -> str:
+    """The number of times and their step, that max and min are samples, and how far the cosines go between them."""
     import numpy as np
 
-    longest = float(np.diff(times).max(initial=0.0))
-    return f"{counted(len(times), 'time')}, at most {longest:.3g} ps apart; max and min are the largest and the smallest sample"
+    longest = float(np.diff(trace.t_ps).max(initial=0.0))
+    beyond = max(beyond_samples(trace.t_ps, sign * values) for values in trace.cosines.values() for sign in (1.0, -1.0))
+    text = f"{counted(len(trace.t_ps), 'time')}, at most {longest:.3g} ps apart; max and min are samples"
+    return f"{text}, the cosines between them go about {beyond:.1g} further" if beyond > 0 else text
+
+
+def beyond_samples(times: Floats, values: Floats) -> float:
+    """How far a curve rises above its largest sample: the vertex of the parabola through this sample and its neighbours.
+
+    >>> import numpy as np
+    >>> t = np.linspace(0.0, 1.0, 11)
+    >>> round(beyond_samples(t, -((t - 0.53) ** 2)), 6)  # (0.53 - 0.5)²
+    0.0009
+    """
+    import numpy as np
+
+    top = int(np.argmax(values))
+    if not 0 < top < len(values) - 1:
+        return 0.0
+    bend, slope, _ = np.polyfit(times[top - 1 : top + 2] - times[top], values[top - 1 : top + 2], 2).tolist()
+    return -(slope**2) / (4 * bend) if bend < 0 else 0.0
 
 
 def _pulse_text(pulse: Pulse) -> str:

@@ -153,11 +153,11 @@ def draw_diagrams(answer: Observed, path: Path, report: Report) -> None:
     plot_diagrams(answer.diagrams, path, report.command)
 
 
-def draw_corner(answer: Observed, path: Path, _: Report) -> None:
+def draw_corner(answer: Observed, path: Path, report: Report) -> None:
     """Draw the sample of every pair of parameters."""
-    from rotor.observed.sampling import plot_corner
+    from rotor.plots.diagrams import plot_corner
 
-    plot_corner(answer.chain, path)
+    plot_corner(answer.chain, path, report.command)
 
 
 def show(answer: Observed | Mapped, _: Report) -> Iterable[Part | None]:

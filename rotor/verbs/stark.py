@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.fields.stark_request import StarkAnswer, StarkRequest, answer_stark
 from rotor.reports import top_facts
-from rotor.reports.field_maps import accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
-from rotor.reports.screen import Part, Table
+from rotor.reports.field_maps import SHOWN, accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
+from rotor.reports.screen import Part, Table, record_table
 from rotor.requests.field import changed_fields
 from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
@@ -22,6 +22,7 @@ from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, picture, tab
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
+    from rotor.spectra.fields.stark_coefficients import StarkCoefficients
     from rotor.tops.top import Top
 
 EXAMPLES = """\b
@@ -99,7 +100,23 @@ def show(answer: StarkAnswer, report: Report) -> Iterable[Part | None]:
     """The conditions and the first states."""
     top, content = answer.request.top, report.content
     table = _table(answer.states, mixed=bool(content["field_direction"][0] or content["field_direction"][1]))
-    return top_facts.top_parts(top, _facts(top, content), (table,), ("constants", "dipole"), report)
+    further = [_coefficient_table(report.cache["coefficients"])] if "coefficients" in report.cache else []
+    return top_facts.top_parts(top, _facts(top, content), (table, *further), ("constants", "dipole"), report)
+
+
+def _coefficient_table(coefficients: StarkCoefficients) -> Table:
+    """The first rows of the file of --coefficients."""
+    columns = {name.replace("_m", " M").replace("label", "state"): f"{{{name}}}" for name in coefficients.names}
+    columns = {name.upper() if name == "m" else name: form for name, form in columns.items()}
+    units = ("kV/cm", *(f"(kV/cm){power}" for power in "²³⁴"))
+    columns |= {f"c{p} (MHz/{unit})": f"{{c{p}:z.6g}}" for p, unit in enumerate(units, 1)}
+    columns["valid to (kV/cm)"] = "{valid:.3g}"
+    values = {f"c{p}": column for p, column in enumerate(coefficients.coefficients.T, 1)}
+    cells = {**coefficients.names, **values, "valid": coefficients.valid_to_kv_per_cm}
+    count = len(coefficients)
+    rows = [{name: column[row] for name, column in cells.items()} for row in range(min(count, SHOWN))]
+    title = f"Stark coefficients, {SHOWN} of {count} rows" if count > SHOWN else "Stark coefficients"
+    return record_table(title, columns, rows, set(columns) & {"state", "upper", "lower"})
 
 
 def _table(states: FieldMap, mixed: bool) -> Table:

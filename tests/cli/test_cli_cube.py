@@ -187,9 +187,16 @@ def test_corner_of_a_sample(call, folder, monkeypatch):
     assert min(image.imread(picture).shape[:2]) > 300  # pixels
     (draws, given) = drawn[0]
     fitted = {row["name"]: row for row in json.loads(out)["parameters"]}
-    assert given["labels"] == list(fitted)
-    assert draws.shape[1] == len(fitted) == 4
-    for name, values in zip(given["labels"], draws.T, strict=True):  # few steps: the middle within two errors
+    symbols = [r"$\log_{10} N$ (cm$^{-2}$)", r"$T_\mathrm{ex}$ (K)", "$v$ (km/s)", r"$\Delta v$ (km/s)"]
+    assert given["labels"] == symbols  # all of one species, which is the title
+    assert [name.rpartition(" ")[2] for name in fitted] == [
+        "column_per_cm2",
+        "excitation_k",
+        "velocity_km_s",
+        "fwhm_km_s",
+    ]
+    draws = np.column_stack([10 ** draws[:, 0], draws[:, 1:]])
+    for name, values in zip(fitted, draws.T, strict=True):  # few steps: the middle within two errors
         assert abs(np.median(values) - fitted[name]["value"]) < 2 * fitted[name]["error"], name
 
 

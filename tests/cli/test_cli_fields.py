@@ -70,6 +70,18 @@ def test_stark_with_light_labels_and_chosen_m(call):
     assert {row["diabatic_label"] for row in content["states"]} == {"0", "1"}
 
 
+def test_stark_coefficients_stand_on_the_screen_too(call):
+    """OCS: c2 = -μ²/6(B - 2D) for J = 0 (docs/stark.md), and the rows of the file in their order."""
+    code, out, _ = call("stark", "OCS", "--field", "0:10kV/cm:3", "--states", "J<=1", "--coefficients", "c.csv")
+    printed = [line.split() for line in out.split("Stark coefficients\n")[1].splitlines()[1:4]]
+    written = rows("c.csv")[1:]
+    assert code == 0
+    assert printed[0][:4] == ["0", "0", "0", "-3.55285"]
+    for cells, row in zip(printed, written, strict=True):
+        assert cells[:2] == row[:2]
+        assert np.allclose([float(x) for x in cells[2:6]], [float(x) for x in row[2:6]], rtol=1e-5)  # six digits
+
+
 def test_stark_writes_lines_spectra_mixtures_and_tables(call):
     """Every further file; lines as the library has them, and two processes as one."""
     code, _, err = call(

@@ -40,6 +40,27 @@ def test_every_subject_has_its_notebook():
     assert not [subject for subject in SUBJECTS if subject not in names]
 
 
+def test_notebooks_read_their_own_data():
+    assert not [script.name for script in SCRIPTS if re.search(r"tests/|\.\./", script.read_text(encoding="utf-8"))]
+    data, originals = PROJECT / "examples" / "data", PROJECT / "tests" / "oracles"
+    for path in (path for path in data.rglob("*") if path.is_file() and path.name != "README.md"):
+        original = originals / path.relative_to(data)
+        if path.parent.name == "levels":
+            original = originals / path.stem / ("sample.egy" if path.suffix == ".egy" else path.name)
+        elif path.name == "c064502_part.cat":
+            original = originals / "spcat" / path.name
+        assert path.read_bytes() == original.read_bytes(), path
+
+
+def test_notebooks_import_two_modules_of_the_package():
+    """Everything comes from `rotor` and `rotor.api`, which the documentation describes."""
+    pattern = r"^(?:from|import) (rotor[\w.]*)"
+    modules = {
+        name for script in SCRIPTS for name in re.findall(pattern, script.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    assert modules == {"rotor", "rotor.api"}
+
+
 @needs_extra
 @pytest.mark.parametrize("script", SCRIPTS, **named)
 def test_the_notebook_is_its_script_executed(script):

@@ -1,10 +1,18 @@
 """--style: matplotlib's styles and .mplstyle files over the style of the package; wrong ones are refused before anything is computed."""
 
+import json
+
 import matplotlib as mpl
+import numpy as np
 import pytest
 from matplotlib.image import imread
+from places import PROJECT
 
 import rotor
+from rotor.observed.model import Sight
+from rotor.observed.spectrum import ObservedSpectrum
+from rotor.plots.overlay import overlay_figure
+from rotor.plots.work_precision import Panel, Point, work_precision_figure
 
 COLUMN = "figure.figsize: 3.35, 2.4\nfigure.dpi: 100\nfont.size: 7\n"
 
@@ -88,24 +96,53 @@ def test_a_short_title_stays_as_it_is(folder):
     assert (figure.axes[0].get_title(loc="left"), figure.axes[0]._left_title.get_size()) == ("OCS", 10.0)
 
 
+def _costs(subject):
+    """The picture of a subject of docs/accuracy.md, from its stored figures."""
+    stored = json.loads((PROJECT / "benchmarks" / "results" / "accuracy.json").read_text(encoding="utf-8"))[subject]
+    return work_precision_figure([
+        Panel(panel["title"], panel["of"], {name: [Point(**point) for point in curve] for name, curve in panel["curves"].items()})
+        for panel in stored
+    ])  # fmt: skip
+
+
+def _overlay():
+    frequency = np.linspace(1e5, 1.001e5, 400)
+    spectrum = ObservedSpectrum(frequency, np.zeros(400), np.ones(400))
+    return overlay_figure(spectrum, (), Sight(), (), 1, [0])
+
+
 @pytest.mark.parametrize(
-    "answer",
+    "drawn",
     [
-        lambda: rotor.spectrum("water", jmax=5),
-        lambda: rotor.levels("NH3", jmax=3),
-        lambda: rotor.stark("OCS", fields_kv_per_cm="0:100kV/cm:5"),
-        lambda: rotor.thermo("H2", temperatures_k="10:300:5"),
-        lambda: rotor.gas("water", molecules=200, seed=1),
+        lambda: rotor.spectrum("water", jmax=5).plot(),
+        lambda: rotor.levels("NH3", jmax=3).plot(),
+        lambda: rotor.stark("OCS", fields_kv_per_cm="0:100kV/cm:5").plot(),
+        lambda: rotor.plot(rotor.api.field_lines(rotor.read("OCS"), [0.0, 0.5, 1.0])),
+        lambda: rotor.thermo("H2", temperatures_k="10:300:5").plot(),
+        lambda: rotor.gas("water", molecules=200, seed=1).plot(),
+        lambda: _costs("driven"),
+        lambda: _costs("ewald"),
+        _overlay,
     ],
-    ids=["spectrum", "levels", "stark", "thermo", "gas"],
+    ids=["spectrum", "levels", "stark", "lobes", "thermo", "gas", "costs", "four costs", "overlay"],
 )
-def test_letters_have_five_points_in_a_column(answer):
+def test_letters_have_five_points_in_a_column(drawn):
     """Scaled to a column of 8.5 cm every letter is legible: 5 points or more."""
     from matplotlib.text import Text
 
-    figure = answer().plot()
+    figure = drawn()
     figure.canvas.draw()
     texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
     assert len(texts) > 5
     smallest = min(texts, key=Text.get_fontsize)
     assert smallest.get_fontsize() * (8.5 / 2.54) / figure.get_figwidth() >= 5.0, smallest.get_text()
+
+
+@pytest.mark.parametrize("subject", ["driven", "pulse", "free", "orders"])
+def test_names_of_settings_do_not_touch(subject):
+    from matplotlib.text import Annotation
+
+    figure = _costs(subject)
+    boxes = [text.get_window_extent() for text in figure.findobj(Annotation)]
+    assert len(boxes) > 5 or subject == "free"
+    assert not [1 for i, box in enumerate(boxes) for other in boxes[:i] if box.overlaps(other)]

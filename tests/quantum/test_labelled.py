@@ -74,7 +74,7 @@ def test_levels_that_do_not_exist_are_refused(label, rule):
 
 
 def test_other_quantum_numbers_are_refused():
-    with pytest.raises(ValueError, match="1 quantum numbers for each state; a asymmetric top has J, Ka, Kc"):
+    with pytest.raises(ValueError, match="1 quantum numbers for each state; an asymmetric top has J, Ka, Kc"):
         level_model(Constants(**RIGID), np.array([[1]]))
     with pytest.raises(ValueError, match="at most J"):
         level_model(Constants(A=9.0, B=3.0), np.array([[2, 3]]))

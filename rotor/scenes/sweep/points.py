@@ -237,15 +237,30 @@ def named(text: str, words: Mapping[str, str]) -> str:
 
 
 def put(content: dict[str, Any], name: str, value: Any) -> None:
-    """Set the value of a dotted name; for a key of the molecule, its name becomes a table."""
+    """Set the value of a dotted name; for a key of the molecule, its name becomes a table. Tables of a list count from 1.
+
+    >>> scene = {"pulses": [{"peak": 1.0}, {"peak": 2.0}]}
+    >>> put(scene, "pulses.2.peak", 3.0)
+    >>> scene
+    {'pulses': [{'peak': 1.0}, {'peak': 3.0}]}
+    """
     *path, last = name.split(".")
-    table = content
+    table: Any = content
     for part in path:
-        inner = table.get(part, {})
-        table[part] = inner = {"source": inner} if isinstance(inner, str) else inner
-        if not isinstance(inner, dict):
+        if isinstance(table, list):
+            if not (part.isdecimal() and 1 <= int(part) <= len(table)):
+                raise ValueError(f"sweep.{name}: {part} is no table of this list; expected 1 to {len(table)}")
+            place: Any = int(part) - 1
+            inner = table[place]
+        else:
+            place, inner = part, table.get(part, {})
+        inner = {"source": inner} if isinstance(inner, str) else inner
+        if not isinstance(inner, dict | list):
             raise ValueError(f"sweep.{name}: {part} is no table of the scene")
+        table[place] = inner = inner.copy()  # points share the scene
         table = inner
+    if isinstance(table, list):
+        raise ValueError(f"sweep.{name}: expected the number of a table and its key, such as {'.'.join(path)}.1.KEY")
     table[last] = value
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.geometry.inertia import PrincipalFrame
+from rotor.table import with_article
 from rotor.tops.components import symmetric_tensor
 from rotor.tops.constants import Constants
 from rotor.tops.operators import distortion_terms, spelled_powers
@@ -233,7 +234,7 @@ def _powers(constants: Constants, names: list[str]) -> dict[str, tuple[int, int,
 
 def _why_rigid(old: Constants, constants: Constants, axes: str, angle: float) -> str:
     if constants.kind != old.kind:
-        why = f"it is a {constants.kind} top, the parent a {old.kind} one"
+        why = f"it is {with_article(constants.kind)} top, the parent {with_article(old.kind)} one"
     elif axes != "abc":
         why = f"its axes a, b, c are nearest to the parent's {', '.join(axes)}"
     else:

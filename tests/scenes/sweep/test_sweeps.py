@@ -690,3 +690,40 @@ def test_notes_on_the_molecules_of_a_list_are_told_once(call, folder):
         assert estimate.endswith("(2 of 3 points)")
     Path("list.csv").write_text("name\nCO\nOCS\n")
     assert "note:" not in call("run", "s.toml")[2]
+
+
+# Tables of a list
+
+TWO_PULSES = """schema = 1
+kind = "align"
+molecule = "N2"
+[[pulses]]
+shape = "gaussian"
+peak = "1e13 W/cm2"
+fwhm = "0.1 ps"
+[[pulses]]
+shape = "gaussian"
+peak = "1e13 W/cm2"
+fwhm = "0.1 ps"
+centre = "2 ps"
+"""
+
+
+def test_a_key_of_the_second_pulse_is_swept():
+    """Only the second pulse moves, and the points do not share it."""
+    scene = parse_scene(TWO_PULSES + '[sweep]\n"pulses.2.centre" = ["4 ps", "8.4 ps"]\n')
+    pulses = [point.scene.pulses for point in points(scene)]
+    assert [(first.centre, second.centre) for first, second in pulses] == [("0 ps", "4 ps"), ("0 ps", "8.4 ps")]
+
+
+@pytest.mark.parametrize(
+    ("name", "rule"),
+    [
+        ("pulses.3.centre", "3 is no table of this list; expected 1 to 2"),
+        ("pulses.centre", r"expected the number of a table and its key, such as pulses\.1\.KEY"),
+    ],
+)
+def test_a_table_of_a_list_that_is_not_there_is_refused(name, rule):
+    scene = parse_scene(TWO_PULSES + f'[sweep]\n"{name}" = ["4 ps"]\n')
+    with pytest.raises(ValueError, match=rule):
+        list(points(scene))
