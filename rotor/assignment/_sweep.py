@@ -58,12 +58,12 @@ def _linear(difference: Floats, jj: Floats, kappa: Floats) -> Floats:
     """At each κ (κ, 6): factors of the first two lines of a family in ½(A+C), 1/determinant, factors in the third line, and κ."""
     out = np.empty((len(kappa), 6))
     for k in range(len(kappa)):
-        one, two, three = difference[0, k], difference[1, k], difference[2, k]
-        determinant = jj[0] * two - jj[1] * one
+        first, second, third = difference[0, k], difference[1, k], difference[2, k]
+        determinant = jj[0] * second - jj[1] * first
         inverse = 0.0 if abs(determinant) < 1e-6 else 1 / determinant
-        mean_a, mean_b = two * inverse, -one * inverse
+        mean_a, mean_b = second * inverse, -first * inverse
         out[k, 0], out[k, 1], out[k, 2], out[k, 5] = mean_a, mean_b, inverse, kappa[k]
-        out[k, 3], out[k, 4] = jj[2] * mean_a - three * jj[1] * inverse, jj[2] * mean_b + three * jj[0] * inverse
+        out[k, 3], out[k, 4] = jj[2] * mean_a - third * jj[1] * inverse, jj[2] * mean_b + third * jj[0] * inverse
     return out
 
 
@@ -86,8 +86,8 @@ def _narrowed(low: float, high: float, value: float, slope: float, least: float,
     if slope == 0.0:
         return (low, high) if least <= value <= most else (1.0, 0.0)
     inverse = 1 / slope
-    one, two = (least - value) * inverse, (most - value) * inverse
-    return max(low, min(one, two)), min(high, max(one, two))
+    at_least, at_most = (least - value) * inverse, (most - value) * inverse  # in reverse order for a negative slope
+    return max(low, min(at_least, at_most)), min(high, max(at_least, at_most))
 
 
 @njit(cache=True, nogil=True)
@@ -139,6 +139,15 @@ def _seconds_within(
         begin[k], end[k] = bottom, top
 
 
+@njit(cache=True, nogil=True)
+def _kappa_ranges(begin: Ints, end: Ints, opening: Ints, closing: Ints) -> None:
+    """Write for each seed the first κ, and the last plus 1, at which it lies in the range of second lines."""
+    opening[:], closing[:] = len(begin), 0
+    for step in range(len(begin)):
+        for b in range(begin[step], end[step]):
+            opening[b], closing[b] = min(opening[b], step), step + 1
+
+
 @njit(cache=True, nogil=True, fastmath=True)
 def sweep(
     difference: Floats, jj: Floats, kappa: Floats, companions: Floats, companion_jj: Floats, seeds: Floats, log_seeds: Floats,
@@ -161,10 +170,7 @@ def sweep(
     for a in range(n):
         sa = seeds[a]
         _seconds_within(sa, jj, looks, largest, seeds, bounds, begin, end)
-        opening[:], closing[:] = len(coarse), 0
-        for step in range(len(coarse)):
-            for b in range(begin[step], end[step]):
-                opening[b], closing[b] = min(opening[b], step), step + 1
+        _kappa_ranges(begin, end, opening, closing)
         for b in range(n):
             if a == b or abs(log_seeds[a] - log_seeds[b]) > ratio:
                 continue

@@ -9,7 +9,7 @@ describes the lines; a weighted rms far above 1 is reported as a failure.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.fitting.assignment import Assignments, duplicates, levels_in
+from rotor.fitting.assignment import Assignments, levels_in
+from rotor.fitting.fit_notes import fit_notes
 from rotor.fitting.parameters import Parameters
 from rotor.fitting.search import FitOptions as FitOptions
 from rotor.fitting.search import Search, line_errors, round_off, too_few
@@ -26,7 +27,7 @@ from rotor.fitting.top_constants import DIPOLES, ConstantSet
 from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.requests.budget import ROUNDING
-from rotor.statistics.least_squares import BENT, EXHAUSTED, Minimum, Progress
+from rotor.statistics.least_squares import EXHAUSTED, Minimum, Progress
 from rotor.statistics.regression import Regression, regression
 from rotor.table import counted
 from rotor.tops.covariance import Covariance
@@ -302,7 +303,7 @@ def _finished(
         notes=(),
     )
     converged, reason = _verdict(fit, order, search.options)
-    return replace(fit, converged=converged, reason=reason, notes=tuple(_notes(fit)))
+    return replace(fit, converged=converged, reason=reason, notes=tuple(fit_notes(fit)))
 
 
 def _constants(
@@ -377,75 +378,3 @@ def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
         named = "; ".join(combination.text for combination in fit.statistics.undetermined)
         return True, f"{reason}; not determined by these lines and left at the start: {named}"
     return True, reason
-
-
-def _repeated_text(lines: Assignments, pairs: Sequence[tuple[int, int]]) -> str:
-    """A note on lines that occur twice."""
-    first, second = np.array(pairs).T
-    apart = np.abs(lines.frequency_mhz[first] - lines.frequency_mhz[second])
-    worst = int(np.argmax(apart))
-    return (
-        f"{counted(len(pairs), 'line stands', 'lines stand')} twice in the list, "
-        f"the first: {lines.text(int(second[0]))}; the largest difference is "
-        f"{apart[worst]:.4g} MHz, of {lines.text(int(second[worst]))}"
-    )
-
-
-def _unlikely(lines: Assignments) -> list[str]:
-    """Notes on lines that break dipole selection rules (one state, no spins, no fields): ΔJ > 1, or ΔKa and ΔKc both even."""
-    if lines.names[:1] != ("j",) or "v" in lines.names or lines.names[-1] in ("f", "field"):
-        return []
-    is_transition = ~lines.from_zero
-    change = np.abs(lines.upper - lines.lower)
-    far = is_transition & (change[:, 0] > 1)
-    even = (
-        is_transition & (change[:, 1:] % 2 == 0).all(axis=1) if lines.names == ("j", "ka", "kc") else np.zeros_like(far)
-    )
-    out = []
-    for rows, why in ((far, "J changes by more than 1"), (even & ~far, "Ka and Kc both change by even numbers")):
-        unlikely = np.flatnonzero(rows)
-        if len(unlikely):
-            first = f"line {lines.number(int(unlikely[0]))}, {lines.text(int(unlikely[0]))}"
-            out.append(
-                f"{counted(len(unlikely), 'line')} that no dipole moment makes, {first}: {why}; are the labels right?"
-            )
-    return out
-
-
-def _bent(fit: Fit) -> list[str]:
-    """Parameters with the largest steps left in the linear model, in units of the lengths of their columns."""
-    statistics = fit.statistics
-    moved = np.abs((fit.residuals @ statistics.left) @ statistics.inverse) * statistics.scale
-    return [fit.parameters.names[i] for i in np.flatnonzero(moved > moved.max(initial=0.0) / 2)]
-
-
-def _notes(fit: Fit) -> list[str]:
-    lines, notes = fit.lines, list[str]()
-    for i, why in fit.left_out.items():
-        notes.append(
-            f"line {lines.number(i)}, {lines.text(i)} at {lines.frequency_mhz[i]:.4f} MHz, does not count: {why}"
-        )
-    if fit.changed_states:
-        changed = ", ".join(fit.changed_states[:5]) + (", ..." if len(fit.changed_states) > 5 else "")
-        notes.append(
-            f"{counted(len(fit.changed_states), 'level is', 'levels are')} mostly another state than at the start (by overlap): {changed}"
-        )
-    twice = duplicates(lines)
-    if twice:
-        notes.append(_repeated_text(lines, twice))
-    notes += _unlikely(lines)
-    reversed_ = np.flatnonzero(
-        fit.used & (np.abs(lines.frequency_mhz + fit.calculated_mhz) < 1e-3 * np.abs(lines.frequency_mhz))
-    )
-    for i in reversed_.tolist():
-        notes.append(
-            f"line {lines.number(i)}, {lines.text(i)}: calculated with the opposite sign; are upper and lower exchanged?"
-        )
-    if fit.minimum.converged and fit.minimum.distance > BENT * max(1.0, fit.minimum.rms):
-        notes.append(
-            f"χ² is not quadratic within the standard errors, which are those of the linear model: {', '.join(_bent(fit))} may be "
-            "known better or worse than they say; hold one of these, or add lines"
-        )
-    if np.isfinite(fit.statistics.condition) and fit.statistics.condition > 1e5:
-        notes.append(f"condition number {fit.statistics.condition:.1e}: some constants are nearly interchangeable")
-    return notes

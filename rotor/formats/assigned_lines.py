@@ -30,8 +30,8 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.formats.assigned_catalogue import catalogue_lines, whole_catalogue_lines
-from rotor.formats.assigned_lin import as_lin, with_excluded_lines
-from rotor.formats.atomic_write import open_atomic
+from rotor.formats.assigned_lin import with_excluded_lines
+from rotor.formats.assigned_lines_writer import write_assigned_lines as write_assigned_lines
 from rotor.formats.spcat.text.lin import (
     default_note,
     like_line_before,
@@ -40,11 +40,10 @@ from rotor.formats.spcat.text.lin import (
     with_defaults,
     without_v,
     without_zeros_behind,
-    write_lin,
 )
 from rotor.formats.species_columns import species_number, with_species
 from rotor.formats.westerfit import read_line_table
-from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, value_text
+from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM
 from rotor.table import counted
 from rotor.units import MHZ_PER_CM
 
@@ -407,50 +406,3 @@ def _blends(texts: Sequence[str]) -> list[int]:
     """Numbers of blends: lines with equal text form one; a line without text is separate."""
     places: dict[str, int] = {}
     return [places.setdefault(text or f"\0{i}", len(places)) for i, text in enumerate(texts)]
-
-
-def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> None:
-    """Write assigned lines as .lin or .csv; an existing file is replaced at the end or not at all.
-
-    In a .lin a blend is lines of one frequency behind each other, so that the lines of a blend are put together, and others of one
-    frequency apart; see `rotor.formats.assigned_lin`. Excluded lines stand behind a blank line, where SPFIT reads nothing. Wavenumbers
-    stand with a negative error.
-    """
-    text = os.fspath(path).lower()
-    if text.endswith(".lin"):
-        return write_lin(as_lin(lines), path)
-    if not text.endswith(".csv"):
-        raise ValueError(f"{path}: assigned lines are written as .lin or .csv")
-    names = [name for name in lines.names if name != "field"]
-    labels = [f"{name}_{side}" for side in ("upper", "lower") for name in names]
-    wave = bool(lines.wavenumber.all()) and len(lines) > 0
-    unit = MHZ_PER_CM if wave else 1.0
-    in_field = "field" in lines.names
-    heads = [
-        *labels,
-        *(["field_kv_per_cm"] if in_field else []),
-        "wavenumber_cm" if wave else "frequency_mhz",
-        "error_cm" if wave else "error_mhz",
-        "weight",
-        "blend",
-        *(["width_mhz"] if lines.widths_mhz else []),
-        *(["excluded"] if lines.is_excluded.any() else []),
-    ]
-    halves = [name in lines.halves for name in lines.names]
-    with open_atomic(path, "w", encoding="utf-8", newline="") as handle:
-        writer = csv.writer(handle, lineterminator="\n")
-        writer.writerow([*heads, *(["comment"] if lines.comments else [])])
-        for i in range(len(lines)):
-            numbers = [lines.frequency_mhz[i] / unit, lines.error_mhz[i] / unit, lines.weight[i]]
-            sides = zip((*lines.upper[i].tolist(), *lines.lower[i].tolist()), halves * 2, strict=True)
-            quanta = [value_text(value, half) for value, half in sides]
-            if in_field:  # the last number of both states is the field
-                del quanta[len(names)]
-                quanta[-1] = repr(float(lines.lower[i, -1]) * FIELD_STEP_KV_PER_CM)
-            row = [*quanta, *map(float, numbers), int(lines.blend[i])]
-            if lines.widths_mhz:
-                row.append(lines.widths_mhz.get(int(lines.blend[i]), ""))
-            if "excluded" in heads:
-                row.append("yes" if lines.is_excluded[i] else "")
-            writer.writerow([*row, *([lines.comments[i]] if lines.comments else [])])
-    return None

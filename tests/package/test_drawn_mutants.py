@@ -189,10 +189,10 @@ def test_moments_by_time_need_rising_times(times):
 def test_lines_that_no_dipole_makes_are_named_and_others_are_not():
     """Moments along a, b and c change Kc, both, or Ka by odd numbers (1_01, 1_11 and 1_10 from 0_00), and J by 0 or 1."""
     from rotor.fitting.assignment import assignments
-    from rotor.fitting.fit import _unlikely
+    from rotor.fitting.fit_notes import unlikely_lines
 
     def said(upper, lower):
-        return _unlikely(assignments(("j", "ka", "kc"), [upper], [lower], [1e4], 0.1))
+        return unlikely_lines(assignments(("j", "ka", "kc"), [upper], [lower], [1e4], 0.1))
 
     for upper in ([1, 0, 1], [1, 1, 1], [1, 1, 0]):
         assert said(upper, [0, 0, 0]) == []
@@ -241,10 +241,10 @@ def test_a_sum_of_cosines_at_even_times_is_the_plain_sum_without_its_exponential
 
 def test_lines_that_stand_twice_are_named_with_how_far_they_are_apart():
     from rotor.fitting.assignment import assignments
-    from rotor.fitting.fit import _repeated_text
+    from rotor.fitting.fit_notes import repeated_text
 
     lines = assignments(("j",), [[1], [2], [1], [2]], [[0], [1], [0], [1]], [100.0, 200.0, 100.25, 200.5], 0.1)
-    assert "the largest difference is 0.5 MHz, of 2 - 1" in _repeated_text(lines, [(0, 2), (1, 3)])
+    assert "the largest difference is 0.5 MHz, of 2 - 1" in repeated_text(lines, [(0, 2), (1, 3)])
 
 
 def test_bodies_that_rotate_freely_are_written_in_a_line():

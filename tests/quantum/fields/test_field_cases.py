@@ -80,11 +80,13 @@ def gaussian(size: float, fwhm: float, centre: float = 0.0, thz: float = 0.0, ph
     )
 
 
-def agree(trace, reference: np.ndarray) -> None:
-    """To the error that the trace states, and to what DOP853 leaves."""
+DOP853 = 1e-8  # error of the slow solution, at a tolerance of 1e-11 and with the J max of its matrix
+
+
+def deviation(trace, reference: np.ndarray) -> float:
+    """The largest deviation of the cosines beyond the error that the trace states; inf for cosines that hardly move."""
     computed = np.array(list(trace.cosines.values()))
-    assert np.abs(computed - reference).max() <= trace.error_estimate + 1e-8  # DOP853 at 1e-11, J max of the matrix
-    assert np.ptp(computed) > 0.01  # something happens
+    return np.abs(computed - reference).max() - trace.error_estimate if np.ptp(computed) > 0.01 else np.inf
 
 
 def test_elliptical_light_on_an_asymmetric_top():
@@ -98,7 +100,12 @@ def test_elliptical_light_on_an_asymmetric_top():
         rigid(basis, 2600.0, 1900.0, 4700.0), [(light, gaussian(LIGHT_MHZ * 5e10, 0.8))], 0, times, (-2.8, 2.8), seen
     )
     state, names = {"j": 0, "ka": 0, "kc": 0}, ("cos2_aZ", "cos2_bX", "cos2_cY")
-    agree(align(top, GaussianPulse(5e10, 0.8, axis=axis), times, state=state, observables=names, tolerance=1e-6), slow)
+    assert (
+        deviation(
+            align(top, GaussianPulse(5e10, 0.8, axis=axis), times, state=state, observables=names, tolerance=1e-6), slow
+        )
+        <= DOP853
+    )
 
 
 def rod_matrices(m: int = 0, k: int = 0, highest: int = 16):
@@ -117,7 +124,7 @@ def test_a_terahertz_field_and_a_laser_pulse_at_once():
     slow = evolved(rigid(basis, 6100.0, 6100.0, 0.0), acting, 0, times, (-4.5, 4.5), [cosine, squared])
     pulses = [DipolePulse(60.0, 1.5, frequency_thz=0.25), GaussianPulse(3e11, 0.5, 1.0)]
     names = ("costheta", "cos2theta")
-    agree(align(top, pulses, times, state={"j": 0}, m=0, observables=names, tolerance=1e-6), slow)
+    assert deviation(align(top, pulses, times, state={"j": 0}, m=0, observables=names, tolerance=1e-6), slow) <= DOP853
 
 
 def test_a_long_pulse_near_resonance():
@@ -130,7 +137,12 @@ def test_a_long_pulse_near_resonance():
     )
     slow = evolved(rigid(basis, 57635.968, 57635.968, 0.0), acting, 0, times, (-120, 120), [cosine, squared])
     pulse = DipolePulse(30.0, 40.0, frequency_thz=0.1153, phase_rad=0.4)
-    agree(align(top, pulse, times, state={"j": 0}, m=0, observables=("costheta", "cos2theta"), tolerance=1e-6), slow)
+    assert (
+        deviation(
+            align(top, pulse, times, state={"j": 0}, m=0, observables=("costheta", "cos2theta"), tolerance=1e-6), slow
+        )
+        <= DOP853
+    )
 
 
 def test_a_half_cycle_orients_an_oblate_top_of_m_1():
@@ -146,7 +158,7 @@ def test_a_half_cycle_orients_an_oblate_top_of_m_1():
         parts.append(evolved(rigid(basis, 9000.0, 9000.0, 4800.0), acting, 1, times, (-1.8, 1.8), [cosine, squared]))
     names = ("costheta", "cos2theta")
     trace = align(top, DipolePulse(120.0, 0.6), times, state={"j": 2, "k": 1}, m=1, observables=names, tolerance=1e-6)
-    agree(trace, np.mean(parts, axis=0))
+    assert deviation(trace, np.mean(parts, axis=0)) <= DOP853
 
 
 @pytest.mark.parametrize("m", [1, 2])
