@@ -66,7 +66,7 @@ def iteration_ms(lines: Assignments, free: Parameters, model: LevelModel, repeat
     def round_() -> None:
         point = next(points)
         state = _State.at(point, *search.evaluate(point))
-        _Linear.of(state, state.norms, np.zeros(len(free.start))).step(0.0)
+        _Linear.at_state(state, state.norms, np.zeros(len(free.start))).step(0.0)
 
     return 1e3 * fastest(round_, repeats)
 

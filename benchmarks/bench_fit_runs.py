@@ -210,7 +210,7 @@ def iteration(folder: Path) -> float:
     def iterate() -> None:
         point = next(points)
         state = _State.at(point, *search.evaluate(point))
-        _Linear.of(state, state.norms, np.zeros(len(start))).step(0.0)
+        _Linear.at_state(state, state.norms, np.zeros(len(start))).step(0.0)
 
     return 1e3 * fastest(iterate, 9)
 

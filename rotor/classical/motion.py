@@ -32,7 +32,7 @@ class MotionTable(Table):
         return len(self.times)
 
     @classmethod
-    def of(cls, motion: Motion) -> MotionTable:
+    def from_motion(cls, motion: Motion) -> MotionTable:
         """The table of a motion that an integrator made, of one body."""
         if motion.momentum.ndim != 2:
             raise ValueError(

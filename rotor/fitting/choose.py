@@ -132,7 +132,7 @@ def _with(fit: Fit, constants: ConstantSet, name: str, options: FitOptions | Non
 
 def _without(fit: Fit, name: str, options: FitOptions | None) -> Trial | None:
     rest = fit.parameters.moved(fit.values).without(name)
-    constants = dict(zip(rest.constant_names, rest.constants_of(rest.start).tolist(), strict=True))
+    constants = dict(zip(rest.constant_names, rest.to_constants(rest.start).tolist(), strict=True))
     try:
         trial_fit = fit_lines(fit.lines, fit.named.replace(**constants), rest, options)
     except ValueError:
@@ -375,7 +375,7 @@ def suggest_lines(
     labels, places = np.unique(np.concatenate([upper, lower]), axis=0, return_inverse=True)
     places = places.reshape(-1)
     level_model = model(labels) if model else label_model(fit.named, labels)
-    energies, slopes = level_model.levels(fit.parameters.constants_of(fit.values))
+    energies, slopes = level_model.levels(fit.parameters.to_constants(fit.values))
     slopes = slopes @ fit.parameters.matrix
     up, low = places[: len(upper)], places[len(upper) :]
     rows = slopes[up] - slopes[low]

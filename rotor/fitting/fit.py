@@ -277,7 +277,7 @@ def _finished(
     search: Search, minimum: Minimum, constants: ConstantSet | None, left_out: dict[int, str], labels: Ints
 ) -> Fit:
     values, parameters = minimum.parameters, search.parameters
-    calculated, jacobian, slopes, largest = search.lines_of(values)
+    calculated, jacobian, slopes, largest = search.line_values(values)
     residuals, _ = search.weighted(values)
     statistics = regression(minimum.jacobian, parameters.names, round_off(search, slopes))
     fitted, order = _constants(constants, parameters, values, statistics)
@@ -312,7 +312,7 @@ def _constants(
     """The fitted set with standard errors and an empty text; if the fitted values are invalid, the start and the error text."""
     if constants is None:
         return None, ""
-    new = dict(zip(parameters.constant_names, parameters.constants_of(values).tolist(), strict=True))
+    new = dict(zip(parameters.constant_names, parameters.to_constants(values).tolist(), strict=True))
     touched = np.asarray(parameters.matrix.any(axis=1)).tolist()
     covariance = statistics.covariance
     errors = {}
@@ -343,8 +343,8 @@ def _prediction_errors(jacobian: Floats, statistics: Regression) -> Floats:
 
 def _changed(search: Search, values: Floats, labels: Ints) -> tuple[str, ...]:
     """Labels of levels that are mostly another state than with the start constants."""
-    start = search.parameters.constants_of(search.parameters.start)
-    overlap = search.model.overlaps(start, search.parameters.constants_of(values))
+    start = search.parameters.to_constants(search.parameters.start)
+    overlap = search.model.overlaps(start, search.parameters.to_constants(values))
     return tuple(search.lines.label_text(labels[i].tolist()) for i in np.flatnonzero(overlap < CHANGED_STATE))
 
 

@@ -56,11 +56,11 @@ class Parameters:
         """The number of a-priori values."""
         return int(np.isfinite(self.prior).sum())
 
-    def constants_of(self, parameters: Floats) -> Floats:
+    def to_constants(self, parameters: Floats) -> Floats:
         """The constants (c,) in MHz."""
         return np.asarray(self.base + self.matrix @ parameters)
 
-    def slopes_of(self, slopes: Floats) -> Floats:
+    def to_parameter_slopes(self, slopes: Floats) -> Floats:
         """Derivatives by the parameters (..., n) from those by the constants (..., c)."""
         if self._constants is None:
             return np.asarray(slopes @ self.matrix)
@@ -151,7 +151,7 @@ def parameters(
     --------
     >>> from rotor.tops.constants import Constants
     >>> set_ = Constants(A=9.0, B=3.0, C=2.0)
-    >>> parameters(set_, ["A", "B"], ties=["C = B - 1"]).constants_of(np.array([9.5, 3.5])).tolist()
+    >>> parameters(set_, ["A", "B"], ties=["C = B - 1"]).to_constants(np.array([9.5, 3.5])).tolist()
     [9.5, 3.5, 2.5]
     """
     names, values = tuple(constants.values), np.array(list(constants.values.values()))

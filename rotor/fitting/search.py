@@ -78,11 +78,11 @@ def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
     return residuals, np.ones_like(residuals)
 
 
-class Grouping(NamedTuple):
+class Blends(NamedTuple):
     """The measured frequencies that count, with the lines of each.
 
     first : index of the first line of each frequency. order : lines sorted by frequency; starts : where each frequency begins in
-    `order`; shares : weights within blends. plain : no blends. each : all lines count, in their original order
+    `order`; shares : weights within blends. plain : no blends. in_order : all lines count, in their original order
     blended, members, bounds : indices of the blends, of their lines in `order`, and where each blend begins among `members`
     """
 
@@ -91,13 +91,14 @@ class Grouping(NamedTuple):
     starts: Ints
     shares: Floats
     plain: bool
-    each: bool
+    in_order: bool
     blended: Ints
     members: Ints
     bounds: Ints
 
     @classmethod
-    def of(cls, lines: Assignments, used: NDArray[np.bool_]) -> Grouping:
+    def from_lines(cls, lines: Assignments, used: NDArray[np.bool_]) -> Blends:
+        """The blends among the lines that are used; without weights the lines of a blend count equally."""
         rows = np.flatnonzero(used)
         order = rows[np.argsort(lines.blend[rows], kind="stable")]
         blend = lines.blend[order]
@@ -117,7 +118,7 @@ class Grouping(NamedTuple):
 
     def mean(self, values: Floats) -> Floats:
         """The weighted mean of values (lines, ...) over each measured frequency."""
-        if self.plain and self.each:
+        if self.plain and self.in_order:
             return values
         out = values[self.first]
         if not self.plain:
@@ -154,7 +155,7 @@ class Search:
     sigma: Floats
     used: NDArray[np.bool_]
 
-    def lines_of(self, values: Floats) -> LineValues:
+    def line_values(self, values: Floats) -> LineValues:
         """Calculated frequencies, and the derivatives of lines and levels.
 
         The last point is cached, because the search ends at a point that it has evaluated.
@@ -162,12 +163,12 @@ class Search:
         point = values.tobytes()
         before: tuple[bytes, LineValues] | None = self.__dict__.get("_last")
         if before is None or before[0] != point:
-            before = self.__dict__["_last"] = (point, self._lines_of(values))
+            before = self.__dict__["_last"] = (point, self._line_values(values))
         return before[1]
 
-    def _lines_of(self, values: Floats) -> LineValues:
-        energies, slopes = self.model.levels(self.parameters.constants_of(values))
-        slopes = self.parameters.slopes_of(slopes)
+    def _line_values(self, values: Floats) -> LineValues:
+        energies, slopes = self.model.levels(self.parameters.to_constants(values))
+        slopes = self.parameters.to_parameter_slopes(slopes)
         if self.from_zero:  # their lower level has index -1, which selects the last row
             energies, slopes = np.append(energies, 0.0), np.vstack([slopes, np.zeros(slopes.shape[1])])
         derivatives = slopes[self.upper]
@@ -181,15 +182,16 @@ class Search:
         return bool((self.lower < 0).any())
 
     @property
-    def grouping(self) -> Grouping:
-        return Grouping.of(self.lines, self.used)
+    def grouping(self) -> Blends:
+        return Blends.from_lines(self.lines, self.used)
 
     def evaluate(self, values: Floats) -> tuple[Floats, Floats]:
         """Weighted residuals, followed by those of a-priori values, and the Jacobian."""
         return self.bent(*self.weighted(values))
 
     def weighted(self, values: Floats) -> tuple[Floats, Floats]:
-        calculated, jacobian = self.lines_of(values)[:2]
+        """(obs - calc)/σ, spreads of blends, deviations from a-priori values; and the derivatives of their negatives."""
+        calculated, jacobian = self.line_values(values)[:2]
         group = self.group
         sigma = self.sigma[group.first]
         residuals = (self.lines.frequency_mhz[group.first] - group.mean(calculated)) / sigma
@@ -226,8 +228,8 @@ class Search:
         return np.flatnonzero(np.isin(numbers, list(self.lines.widths_mhz))) if self.lines.widths_mhz else _NONE
 
     @property
-    def group(self) -> Grouping:
-        cached: Grouping | None = self.__dict__.get("_group")
+    def group(self) -> Blends:
+        cached: Blends | None = self.__dict__.get("_group")
         if cached is None:
             cached = self.grouping
             self.__dict__["_group"] = cached

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.fitting.search import FitOptions, Grouping, Search, round_off, too_few
+from rotor.fitting.search import Blends, FitOptions, Search, round_off, too_few
 from rotor.statistics.least_squares import EXHAUSTED, INTERRUPTED, STALLED, Iteration, Minimum, Progress, minimise
 from rotor.statistics.regression import regression
 
@@ -79,8 +79,8 @@ def _passed_on(minimum: Minimum, options: FitOptions) -> Minimum:
 
 def _near(search: Search, may: NDArray[np.bool_], values: Floats) -> NDArray[np.bool_]:
     """Which lines are at most `reject_above` errors off; blends are judged by their means."""
-    calculated = search.lines_of(values).calculated
-    group = Grouping.of(search.lines, may)
+    calculated = search.line_values(values).calculated
+    group = Blends.from_lines(search.lines, may)
     means = group.spread_back(group.mean(calculated), calculated)
     off = np.abs(search.lines.frequency_mhz - means) / search.sigma
     return np.asarray(off <= (search.options.reject_above or math.inf))
@@ -192,7 +192,7 @@ def _with_a_reset_parameter(search: Search, first: Minimum, progress: Progress |
     parameters that changed by more than half their size and by many standard errors are tried.
     """
     start, moved = search.parameters.start, first.parameters - search.parameters.start
-    floor = round_off(search, search.lines_of(first.parameters).slopes)
+    floor = round_off(search, search.line_values(first.parameters).slopes)
     errors = regression(first.jacobian, search.parameters.names, floor).errors
     far = (start != 0) & (np.abs(moved) > _FURTHER * np.abs(start)) & (np.abs(moved) > _MANY_ERRORS * errors)
     order = np.argsort(np.where(far, -np.abs(moved) / np.maximum(np.abs(start), _AT_ZERO_MHZ), 0.0), kind="stable")
@@ -300,7 +300,7 @@ def _minimised(
         start,
         tolerance=search.options.tolerance,
         most_iterations=limit,
-        floor=round_off(search, search.lines_of(start).slopes),
+        floor=round_off(search, search.line_values(start).slopes),
         progress=progress,
         hopeless=hopeless,
     )

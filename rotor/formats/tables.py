@@ -78,7 +78,7 @@ def write_motion(motion: Any, path: str | os.PathLike[str], settings: Settings) 
     from rotor.classical.motion import MotionTable
     from rotor.formats.registry import find_writer
 
-    table = MotionTable.of(motion)
+    table = MotionTable.from_motion(motion)
     find_writer(table, path)(table, path, settings)
 
 

@@ -159,7 +159,7 @@ def minimise(
     try:
         while True:
             scale = np.maximum(scale, state.norms)
-            linear = _Linear.of(state, scale, blind)
+            linear = _Linear.at_state(state, scale, blind)
             if _is_enough(linear.distance, before, tolerance, state):
                 return state.ended(CONVERGED, linear, taken)
             if len(taken) >= most_iterations or (hopeless and hopeless(taken)):
@@ -194,7 +194,7 @@ def minimise(
                 else:
                     return state.ended(_without_decrease(linear, state, taken, refused), linear, taken)
     except KeyboardInterrupt:
-        return state.ended(INTERRUPTED, _Linear.of(state, scale, blind), taken)
+        return state.ended(INTERRUPTED, _Linear.at_state(state, scale, blind), taken)
 
 
 def _judged(number: int, state: _State, trial: _State | None, damping: float, predicted: float) -> Iteration:
@@ -335,7 +335,7 @@ class _Linear(NamedTuple):
     gradient: float
 
     @classmethod
-    def of(cls, state: _State, scale: Floats, blind: Floats) -> _Linear:
+    def at_state(cls, state: _State, scale: Floats, blind: Floats) -> _Linear:
         safe = np.where(scale > 0, scale, 1.0)
         columns: Floats = np.where(state.norms > blind, state.triangle[:, :-1], 0.0)
         last: Floats = state.triangle[:, -1]

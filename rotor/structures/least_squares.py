@@ -123,7 +123,7 @@ def fit_structure(
     Symmetry is preserved exactly. Coordinates that are neither fitted nor held move as little as possible.
     """
     _refuse_settings(method, weights, coordinates, held)
-    problem = _Problem.of(family, method, coordinates, held, weights, leave_out)
+    problem = _Problem.from_family(family, method, coordinates, held, weights, leave_out)
     count = problem.count
     if len(problem.observed) < count:
         raise TooFewMomentsError(
@@ -169,7 +169,7 @@ class _Problem:
     terms: tuple[str, ...]  # c_a, ... d_a, ...
 
     @classmethod
-    def of(
+    def from_family(
         cls,
         family: Family,
         method: str,
@@ -178,6 +178,7 @@ class _Problem:
         weights: str,
         leave_out: Sequence[str],
     ) -> _Problem:
+        """The equations of a family for a method, with weights by errors or equal weights."""
         rows, observed, errors = _observations(family, method, leave_out)
         if weights == "errors" and not (errors > 0).all():
             first = family.species[rows[int(np.argmin(errors))][0]].name

@@ -62,7 +62,7 @@ def refits(state: State, numbers: Collection[int], model: ModelOf) -> tuple[dict
         waiting -= set(group)
         try:
             if len(group) == 1:
-                records[group[0]] = refitted(model(state.species[group[0]]), state.lines_of(group[0]))
+                records[group[0]] = refitted(model(state.species[group[0]]), state.species_lines(group[0]))
             else:
                 records |= refitted_together({number: model(state.species[number]) for number in group}, state)
         except ValueError as error:
@@ -121,7 +121,7 @@ def refitted_together(models: Mapping[int, Model], state: State) -> dict[int, Sp
 
     Raises ValueError as `rotor.viewer.fits.refitted` does.
     """
-    parts = [_part(number, model, state.lines_of(number)) for number, model in models.items()]
+    parts = [_part(number, model, state.species_lines(number)) for number, model in models.items()]
     names = " and ".join(part.model.record.name for part in parts)
     if not any(part.free.names for part in parts):
         raise ValueError(f"{names}: no constant is free; mark those that the lines should determine")
@@ -205,7 +205,7 @@ def _joined_lines(parts: Sequence[Part], source: str) -> Assignments:
 def _record(part: Part, fit: Fit, columns: slice, names: str, wrong: WrongLines) -> Species:
     """The record of a species after the fit: constants, errors and the summary of the fit."""
     free, record = part.free, part.model.record
-    values = dict(zip(free.constant_names, free.constants_of(fit.values[columns]).tolist(), strict=True))
+    values = dict(zip(free.constant_names, free.to_constants(fit.values[columns]).tolist(), strict=True))
     covariance = fit.statistics.covariance[columns, columns]
     errors = {name: value for name, value in part.begin.uncertainties.items() if name not in values}
     for name, row in zip(free.constant_names, free.matrix, strict=True):
@@ -255,7 +255,7 @@ def line_residuals(models: Mapping[int, Model], state: State) -> dict[int, dict[
     labels: dict[int, str] = {}
     calculated: dict[int, float] = {}
     for number, model in models.items():
-        lines = state.lines_of(number)
+        lines = state.species_lines(number)
         if lines:
             assigned = fit_assignments(model, lines)
             labels |= {n: assigned.text(i) for i, n in enumerate(lines)}
@@ -291,7 +291,7 @@ def _blends(state: State) -> dict[int, dict[int, float]]:
 
 def lines_alone(number: int, models: Mapping[int, Model], state: State) -> dict[int, Line]:
     """Lines of a species for its files; contributions of other species to a blend are subtracted, with a comment."""
-    lines, shared = state.lines_of(number), shared_blends(state)
+    lines, shared = state.species_lines(number), shared_blends(state)
     blends, session_lines = _blends(state), state.lines
     for n, line in list(lines.items()):
         if line.rejected or number not in shared.get(line.blend, ()):

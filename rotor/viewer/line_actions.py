@@ -82,7 +82,7 @@ def _refuse_label(model: Model, upper: tuple[int, ...], lower: tuple[int, ...]) 
 
 def _assigned_before(state: State, line: Line) -> list[str]:
     """Keys of lines with this species and these labels; the new assignment replaces them."""
-    lines = state.lines_of(line.species)
+    lines = state.species_lines(line.species)
     return [line_key(n) for n, other in lines.items() if (other.upper, other.lower) == (line.upper, line.lower)]
 
 
@@ -200,7 +200,7 @@ def import_lines(state: State, number: int, path: str, context: Context) -> Chan
     read, remarks = read_assigned_lines(path, model.quanta, model.halves)
     context.notes.extend(remarks)
     file_lines = lines_from(read, number, free_blend(state), state.settings.default_error_mhz)
-    known = {(line.upper, line.lower, line.frequency_mhz) for line in state.lines_of(number).values()}
+    known = {(line.upper, line.lower, line.frequency_mhz) for line in state.species_lines(number).values()}
     lines = [line for line in file_lines if (line.upper, line.lower, line.frequency_mhz) not in known]
     if len(lines) < len(file_lines):
         repeated = counted(len(file_lines) - len(lines), "line is", "lines are")

@@ -159,7 +159,7 @@ class State:
         """Assigned lines by number."""
         return {int(key.partition("/")[2]): record for key, record in self.records.items() if isinstance(record, Line)}
 
-    def lines_of(self, species: int) -> dict[int, Line]:
+    def species_lines(self, species: int) -> dict[int, Line]:
         """The lines of a species by number."""
         return {number: line for number, line in self.lines.items() if line.species == species}
 

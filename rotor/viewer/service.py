@@ -249,7 +249,7 @@ class Service:
         points = row_points(chosen, self.pyramid, half, min(int(read_number(message, "pixels", above=0)), MOST_PIXELS))
         assigned = {
             (line.upper, line.lower): (number, line)
-            for number, line in self.session.state.lines_of(series.species or -1).items()
+            for number, line in self.session.state.species_lines(series.species or -1).items()
         }
         rows = []
         for i, (x, y) in enumerate(points):
@@ -296,7 +296,7 @@ class Service:
         lines, model = predicted.lines.where(rows), predicted.model
         labels = [model.labels(lines.levels, side).tolist() for side in (lines.upper, lines.lower)]
         heights = predicted.intensity[rows] / (predicted.strongest or 1.0)
-        assigned = {(line.upper, line.lower) for line in self.session.state.lines_of(number).values()}
+        assigned = {(line.upper, line.lower) for line in self.session.state.species_lines(number).values()}
         return [
             {
                 "species": number,
@@ -335,7 +335,7 @@ class Service:
         predicted, shared = self.predictions.lines(record), shared_blends(self.session.state)
         lines = {
             n: msgspec.structs.replace(line, rejected=line.rejected or line.blend in shared)  # measures no difference
-            for n, line in self.session.state.lines_of(number).items()
+            for n, line in self.session.state.species_lines(number).items()
         }
         return assigned_levels(predicted.model, lines, predicted.lines.levels)
 

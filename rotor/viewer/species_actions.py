@@ -79,7 +79,7 @@ def _changed_fields(message: Message, name: str) -> dict[str, Any]:
 
 def refuse_other_labels(state: State, number: int, record: Species, context: Context) -> None:
     """ValueError where assigned lines have other quantum numbers than the changed species."""
-    names, lines = context.predictions.model(record).quanta, state.lines_of(number)
+    names, lines = context.predictions.model(record).quanta, state.species_lines(number)
     before = context.predictions.model(state.species[number]).quanta
     if lines and names != before:
         count = counted(len(lines), "line is", "lines are")
@@ -113,7 +113,7 @@ def add_species(state: State, message: Message, context: Context) -> Change:
 def remove_species(state: State, message: Message, context: Context) -> Change:
     """Remove a species and its lines."""
     number, record = read_species(state, message)
-    changes: dict[str, Record | None] = {line_key(n): None for n in state.lines_of(number)}
+    changes: dict[str, Record | None] = {line_key(n): None for n in state.species_lines(number)}
     changes[species_key(number)] = None
     series = state.settings.series
     if series is not None and series.species == number:

@@ -228,7 +228,7 @@ def test_names_of_shared_levels_do_not_depend_on_where_the_fit_began():
         np.array([[49, 15, 34, 0], [49, 14, 35, 2]]),
         np.array([parameter.value for parameter in after.parameters]),
     )
-    fresh, from_before = FileLevels.of(after, labels), FileLevels.of(before, labels)
+    fresh, from_before = FileLevels.from_labels(after, labels), FileLevels.from_labels(before, labels)
     energies = fresh.levels(values)[0]
     assert from_before.levels(values)[0] == pytest.approx(energies, abs=1e-3)  # MHz, round-off of 1e7
     assert abs(energies[0] - energies[1]) > 1e4
@@ -325,8 +325,8 @@ def test_lines_of_unresolved_structure_leave_out_the_last_parameters():
     file = parameter_file(TWO_CHLORINES)
     values = np.array([p.value for p in file.parameters])
     labels = np.array([[4, 0, 4, 4, -4], [5, 1, 5, 5, -5], [4, 0, 4, 4, 4], [5, 1, 5, 5, 5], [4, 0, 4, 4, -1]])
-    energies, slopes = FileLevels.of(file, labels).levels(values)
-    whole, whole_slopes = FileLevels.of(file, labels[2:4]).levels(values)
+    energies, slopes = FileLevels.from_labels(file, labels).levels(values)
+    whole, whole_slopes = FileLevels.from_labels(file, labels[2:4]).levels(values)
     assert energies[:2] == pytest.approx(whole - whole_slopes[:, 4:] @ values[4:], rel=1e-14)  # round-off
     assert energies[4] == energies[0]  # F = -1 is minus F1
     assert not slopes[[0, 1, 4], 4:].any()
@@ -334,7 +334,7 @@ def test_lines_of_unresolved_structure_leave_out_the_last_parameters():
     assert excluded_parameters(file).tolist() == [4, 5, 6, 7]
 
     plain = read_par(b"x\n 4 1 1\na 1 1 0 20\n10000 9500.5\n20000 3600.1\n30000 2780.2\n200 -1e-3\n")
-    alone, other = FileLevels.of(plain, labels[:2, :3]).levels(values[:4])
+    alone, other = FileLevels.from_labels(plain, labels[:2, :3]).levels(values[:4])
     assert 0 < np.abs(alone - energies[:2]).max() < 0.1  # χ²/(4B) is 0.3 MHz, times squares of angular factors
     assert other[:, :3] == pytest.approx(slopes[:2, :3], rel=1e-3)  # the second order of the same
 
@@ -349,11 +349,11 @@ def test_levels_of_large_blocks_are_those_of_the_whole_matrix(monkeypatch):
     values = np.array([p.value for p in file.parameters])
     labels = np.array([[n, ka, n - ka, v, n + 1, n + 2] for n in (13,) for ka in (0, 1, 9) for v in (0, 1)])
     monkeypatch.setattr(contracted, "_LARGE", 100)
-    model = FileLevels.of(file, labels)
+    model = FileLevels.from_labels(file, labels)
     assert isinstance(model.whole.contracted[0].blocks, contracted.ContractedLevels)
     computed, slopes = model.levels(values)
     monkeypatch.setattr(contracted, "_LARGE", 10**9)
-    whole, whole_slopes = FileLevels.of(file, labels).levels(values)
+    whole, whole_slopes = FileLevels.from_labels(file, labels).levels(values)
     assert computed == pytest.approx(whole, abs=contracted.TOLERANCE_MHZ)  # what is left out is below it
     assert np.abs(slopes - whole_slopes).max(axis=0) == pytest.approx(0, abs=1e-6 * np.abs(whole_slopes).max())  # v²/W²
 
@@ -368,11 +368,11 @@ def test_a_file_with_resolved_and_unresolved_lines_is_fitted(tmp_path):
     quanta, frequency = lines_of(TWO_CHLORINES, file, rng)
     high = np.array([[n, 0, n, n, -n, n - 1, 0, n - 1, n - 1, 1 - n] for n in range(4, 16)])
     labels = np.concatenate([high[:, :5], high[:, 5:]])
-    energies = FileLevels.of(file, labels).levels(np.array([p.value for p in file.parameters]))[0]
+    energies = FileLevels.from_labels(file, labels).levels(np.array([p.value for p in file.parameters]))[0]
     above = energies[: len(high)] - energies[len(high) :] + ERROR_MHZ * rng.normal(size=len(high))
     text = lin_text(np.concatenate([quanta, high]), np.concatenate([frequency, above]), rng, plain=True)
     values = np.array([p.value for p in file.parameters])
-    low = FileLevels.of(file, np.array([[2, 0, 2, 2, -2]])).levels(values)[0][0]
+    low = FileLevels.from_labels(file, np.array([[2, 0, 2, 2, -2]])).levels(values)[0][0]
     zero = f"{'  2  0  2  2 -2 -1':<36} {low:.4f} 0.02\n"
     start = start_of(replace(file, header=replace(file.header, nline=200)), 1e-3, rng)
     fit_input = spfit_input(start, read_lin((text + zero).encode(), 5))

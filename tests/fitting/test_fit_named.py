@@ -258,7 +258,7 @@ def test_ties_of_names_with_brackets():
     ties = ["A[1] = A - 10", "chi_bb-cc(14N)=-0.25*chi_aa(14N)", "G_a[0,1] = 2*G_c[1,0]"]
     tied_parameters = parameters(constants, ["A", "chi_aa(14N)", "G_c[0,1]"], ties=ties)
     by_name = dict(
-        zip(tied_parameters.constant_names, tied_parameters.constants_of(np.array([9.0, 4.0, 3.0])), strict=True)
+        zip(tied_parameters.constant_names, tied_parameters.to_constants(np.array([9.0, 4.0, 3.0])), strict=True)
     )
     assert (by_name["A[1]"], by_name["chi_bb-cc(14N)"], by_name["G_a[0,1]"]) == (-1.0, -1.0, 6.0)
 

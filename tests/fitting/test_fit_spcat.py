@@ -168,7 +168,7 @@ def test_the_linear_blocks_are_the_cores_levels_and_derivatives():
     labels = np.array(
         [[2, 1, 1, 0, 3], [2, 1, 1, 0, 1], [3, 0, 3, 1, 3], [3, 2, 2, 0, 2], [1, 1, 0, 1, 1], [4, 2, 3, 1, 4]]
     )
-    model = FileLevels.of(file, labels)
+    model = FileLevels.from_labels(file, labels)
     values = np.array([p.value for p in file.parameters])
     energies, slopes = model.levels(values)
 
@@ -192,7 +192,7 @@ def test_labels_follow_their_states_where_energies_cross():
     """Levels of one F block change their order as A grows; the labelled one stays the same function."""
     file = read_par(TWO_STATES)
     labels = np.array([[3, 0, 3, 0, 3], [2, 2, 1, 0, 3], [4, 0, 4, 0, 3]])
-    model = FileLevels.of(file, labels)
+    model = FileLevels.from_labels(file, labels)
     values = np.array([p.value for p in file.parameters])
     energies, _ = model.levels(values)
     moved = values.copy()
@@ -206,9 +206,9 @@ def test_labels_follow_their_states_where_energies_cross():
 
 def test_levels_that_a_file_does_not_have_are_refused():
     with pytest.raises(ValueError, match=r"there is no level 2 1 1 0 9 \(n, ka, kc, v, f\)"):
-        FileLevels.of(read_par(TWO_STATES), np.array([[2, 1, 1, 0, 9]]))
+        FileLevels.from_labels(read_par(TWO_STATES), np.array([[2, 1, 1, 0, 9]]))
     with pytest.raises(ValueError, match="there is no level 2 1 1 5 2"):
-        FileLevels.of(read_par(TWO_STATES), np.array([[2, 1, 1, 5, 2]]))
+        FileLevels.from_labels(read_par(TWO_STATES), np.array([[2, 1, 1, 5, 2]]))
 
 
 @pytest.mark.oracle
@@ -321,7 +321,7 @@ def test_levels_of_two_chlorines_and_two_states_are_spfits():
     labels, places = np.unique(
         np.concatenate([fit_input.lines.upper, fit_input.lines.lower]), axis=0, return_inverse=True
     )
-    energies, _ = model.levels(fit_input.parameters.constants_of(fit_input.parameters.start))
+    energies, _ = model.levels(fit_input.parameters.to_constants(fit_input.parameters.start))
     calculated = (
         energies[places.reshape(-1)[: len(fit_input.lines)]] - energies[places.reshape(-1)[len(fit_input.lines) :]]
     )

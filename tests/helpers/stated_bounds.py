@@ -347,7 +347,7 @@ def curves_apart(answer) -> float:
     (source,) = np.random.default_rng([request.seed, 1]).spawn(1)
     momenta, probe = (
         thermal_momenta(moments, request.kt, request.molecules, rng=source),
-        Probe.of(probes.vector, probes.tensor),
+        Probe.from_tensors(probes.vector, probes.tensor),
     )
     with mpmath.workdps(DIGITS):
         late = mpmath.mpf(request.times_ps[1]) / mpmath.mpf(units.ASE_TIME_PS)

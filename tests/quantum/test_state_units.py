@@ -53,10 +53,10 @@ def models(
     options: str, labels: np.ndarray, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[FileLevels, FileLevels, np.ndarray]:
     file = read_par(THREE.format(options=options).encode())
-    direct = FileLevels.of(file, labels)
+    direct = FileLevels.from_labels(file, labels)
     with monkeypatch.context() as patched:
         patched.setattr(fit_states, "_direct", lambda group, form: False)
-        solved = FileLevels.of(file, labels)
+        solved = FileLevels.from_labels(file, labels)
     return direct, solved, np.array([p.value for p in file.parameters])
 
 
@@ -85,7 +85,7 @@ def test_levels_that_a_state_does_not_have_are_named():
     for label in ([5, 1, 5, 2], [5, 6, 0, 0], [5, 1, 2, 0], [5, 1, 5, 3]):
         text = " ".join(map(str, label))
         with pytest.raises(ValueError, match=f"there is no level {text} "):
-            FileLevels.of(file, np.array([[3, 1, 3, 0], label]))
+            FileLevels.from_labels(file, np.array([[3, 1, 3, 0], label]))
 
 
 def test_blocks_of_many_sizes_give_what_each_gives_alone(monkeypatch):
@@ -98,9 +98,9 @@ def test_blocks_of_many_sizes_give_what_each_gives_alone(monkeypatch):
     file = read_par(without.replace("  17 ", "  14 ").encode())
     values = np.array([p.value for p in file.parameters])
     other = values * (1 + 1e-9)
-    together = FileLevels.of(file, labels).levels(other)
+    together = FileLevels.from_labels(file, labels).levels(other)
     monkeypatch.setattr(linear_stacks, "_AT_ONCE", 1)
-    model = FileLevels.of(file, labels)
+    model = FileLevels.from_labels(file, labels)
     blocks = model.whole.labelled
     assert isinstance(blocks, LabelledBlocks)
     alone = model.levels(other)
@@ -148,7 +148,7 @@ def test_mixed_levels_have_the_names_of_the_prediction(diag, sign, start, monkey
         with monkeypatch.context() as patched:
             if not direct:
                 patched.setattr(fit_states, "_direct", lambda group, form: False)
-            model = FileLevels.of(replace(file, parameters=tuple(moved)), labels)
+            model = FileLevels.from_labels(replace(file, parameters=tuple(moved)), labels)
         assert model.levels(values)[0] == pytest.approx(levels.energy_mhz, abs=1e-4)  # MHz, round-off of 1e6
 
 

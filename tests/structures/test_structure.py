@@ -439,7 +439,7 @@ def test_derivatives_of_moments_are_those_of_differences(method):
     water = rotor.read("H2O").molecule
     hydrogen = 1 + water.symbols.index("H")
     together = rigid_family(water, ["", f"{hydrogen}=2H", "H=2H", "O=18O"])
-    problem = _Problem.of(together, method, (), (), "equal", ())
+    problem = _Problem.from_family(together, method, (), (), "equal", ())
     at = np.concatenate([[0.01, -0.02], np.full(problem.count - 2, 0.3)])
     _, jacobian = problem.model(at)
     for i, step in enumerate(1e-5 * np.eye(problem.count)):
@@ -452,7 +452,7 @@ def test_an_atom_that_would_leave_the_molecule_ends_a_fit():
     from rotor.structures.least_squares import _Problem
 
     water = rotor.read("H2O").molecule
-    problem = _Problem.of(rigid_family(water, ["", "O=18O"]), "r0", (), (), "equal", ())
+    problem = _Problem.from_family(rigid_family(water, ["", "O=18O"]), "r0", (), (), "equal", ())
     direction = np.eye(problem.count)[0]
     largest = np.abs(problem.positions(direction * 1e-3) - water.positions_angstrom).max() / 1e-3
     assert np.isfinite(problem.positions(direction * 0.9 / largest)).all()

@@ -21,7 +21,7 @@ from rotor.geometry.error_free import two_product, two_sum
 class DoubleDouble:
     """The number hi + lo, |lo| at most half a unit in the last place of hi; arrays of one shape.
 
-    >>> third = DoubleDouble.of(1.0) / 3.0
+    >>> third = DoubleDouble.exact(1.0) / 3.0
     >>> float((third * 3.0 - 1.0).hi)
     0.0
     """
@@ -30,7 +30,7 @@ class DoubleDouble:
     lo: Floats
 
     @classmethod
-    def of(cls, value: Floats | float) -> DoubleDouble:
+    def exact(cls, value: Floats | float) -> DoubleDouble:
         """A double, exactly."""
         hi = np.asarray(value, dtype=np.float64)
         return cls(hi, np.zeros_like(hi))
@@ -122,7 +122,7 @@ def exact_sum(terms: list[Floats], passes: int = 4) -> DoubleDouble:
     for _ in range(passes):
         for i in range(1, len(vector)):
             vector[i], vector[i - 1] = two_sum(vector[i], vector[i - 1])
-    total = DoubleDouble.of(vector[0])
+    total = DoubleDouble.exact(vector[0])
     for term in vector[1:]:
         total = total + term
     return total
@@ -140,4 +140,4 @@ def _fast_two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
 
 
 def _lift(value: DoubleDouble | Floats | float) -> DoubleDouble:
-    return value if isinstance(value, DoubleDouble) else DoubleDouble.of(value)
+    return value if isinstance(value, DoubleDouble) else DoubleDouble.exact(value)

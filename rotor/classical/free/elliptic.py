@@ -32,10 +32,10 @@ def complete(mc: DoubleDouble, p: DoubleDouble) -> Complete:
     With a, g the two means, p_0 = √p, p_{n+1} = (p_n² + a_n g_n)/(2 p_n), ε_n = (p_n² - a_n g_n)/(p_n² + a_n g_n) and
     Q_0 = 1, Q_{n+1} = ½ Q_n ε_n:  Π(n)/K = 1 + n/(2(1 - n)) Σ Q  (NIST DLMF 19.8.5 to 19.8.7), p = 1 - n.
 
-    >>> round(float(complete(DoubleDouble.of(0.5), DoubleDouble.of(2.0)).mean.hi), 12)  # π / (2 · 1.854074677301)
+    >>> round(float(complete(DoubleDouble.exact(0.5), DoubleDouble.exact(2.0)).mean.hi), 12)  # π / (2 · 1.854074677301)
     0.847213084794
     """
-    a, g, root = DoubleDouble.of(np.ones_like(mc.hi)), mc.sqrt(), p.sqrt()
+    a, g, root = DoubleDouble.exact(np.ones_like(mc.hi)), mc.sqrt(), p.sqrt()
     q = total = a
     for _ in range(MAX_ROUNDS):
         square, product = root * root, a * g
@@ -56,8 +56,8 @@ def carlson_rf(x: DoubleDouble, y: DoubleDouble, z: DoubleDouble) -> DoubleDoubl
     B. C. Carlson, Numer. Algorithms 10, 13 (1995); the remainder series NIST DLMF 19.36.1 to the fifth order, whose
     neglected terms of the sixth order are below 1e-32 when the arguments agree to 2e-6.
 
-    >>> one = DoubleDouble.of(1.0)
-    >>> float(carlson_rf(DoubleDouble.of(0.0), one, one).hi) == np.pi / 2
+    >>> one = DoubleDouble.exact(1.0)
+    >>> float(carlson_rf(DoubleDouble.exact(0.0), one, one).hi) == np.pi / 2
     True
     """
     for _ in range(MAX_ROUNDS):

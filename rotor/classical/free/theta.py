@@ -118,7 +118,7 @@ def momentum_frame(moments: Floats, momentum: Floats) -> Frame:
 
 def theta_constants(frame: Frame) -> Constants:
     """Amplitudes, moduli, phase rates and the initial phase; about 30 digits for those that determine phases."""
-    j1, j2, j3 = (DoubleDouble.of(j) for j in frame.moments)
+    j1, j2, j3 = (DoubleDouble.exact(j) for j in frame.moments)
     j21, j31, j32 = (DoubleDouble.difference(frame.moments[a], frame.moments[b]) for a, b in ((1, 0), (2, 0), (2, 1)))
     s1, s2, s3 = (DoubleDouble.product(m, m) for m in frame.momentum)
     d1 = s2 * j21 / j2 + s3 * j31 / j3
@@ -129,7 +129,7 @@ def theta_constants(frame: Frame) -> Constants:
 
     wide = np.abs(j3.hi * j21.hi) > np.abs(j1.hi * j32.hi)  # |n| > 1
     n = -(j3 * j21) / (j1 * j32)
-    usable = choose(frame.separatrix, DoubleDouble.of(np.ones_like(mc.hi)), mc)
+    usable = choose(frame.separatrix, DoubleDouble.exact(np.ones_like(mc.hi)), mc)
     integrals = complete(usable, choose(wide, g * g / (b3 * b3), j2 * j31 / (j1 * j32)))
     outer = g / j3 - d3 * g * integrals.third / (j3 * b3 * b3)
     bracket = g * n * integrals.third - integrals.mean * b3 / (j2 * j31 / (j1 * j32)).sqrt()
@@ -137,7 +137,7 @@ def theta_constants(frame: Frame) -> Constants:
 
     speed = (d1 * j32 / (j1 * j2 * j3)).sqrt()
     speed = choose(frame.moments[2] > frame.moments[0], speed, -speed)
-    per_half_period = choose(frame.separatrix, DoubleDouble.of(np.ones_like(mc.hi)), integrals.mean / PI)
+    per_half_period = choose(frame.separatrix, DoubleDouble.exact(np.ones_like(mc.hi)), integrals.mean / PI)
     start = _first_integral(frame, s1 * j31 / -(j1 * d3), s2 * j32 / -(j2 * d3), mc) * per_half_period
     b = ((-(j1 * d3) / j31).sqrt().hi, (-(j2 * d3) / j32).sqrt().hi, b3.hi)
     start = choose(frame.momentum[0] < 0.0, _sign(frame.momentum[1]) - start, start)
@@ -182,7 +182,7 @@ def steady_rows(moments: Floats, momentum: Floats) -> Rows:
     divisors = [np.where(j > 0.0, j, 1.0) for j in moments.T]  # where a moment is zero, so is the square above it
     total = squares[0] + squares[1] + squares[2]
     moves = total.hi > 0.0
-    g = choose(moves, total.sqrt(), DoubleDouble.of(np.ones_like(total.hi)))
+    g = choose(moves, total.sqrt(), DoubleDouble.exact(np.ones_like(total.hi)))
     twice_energy = squares[0] / divisors[0] + squares[1] / divisors[1] + squares[2] / divisors[2]
     half_turns = twice_energy / g / (PI * 4.0)
     n, zero = len(moments), np.zeros_like(total.hi)
@@ -202,14 +202,14 @@ def steady_rows(moments: Floats, momentum: Floats) -> Rows:
 def _d2_j1_j3(moments: tuple[Floats, Floats, Floats], momentum: tuple[Floats, Floats, Floats]) -> DoubleDouble:
     """D2 J1 J3 = L3² (J3 - J2) J1 + L1² (J1 - J2) J3, summed exactly: it may be 1e-16 of its terms, or zero."""
     (j1, j2, j3), (m1, _, m3) = moments, momentum
-    plus = products(DoubleDouble.product(m3, m3), DoubleDouble.difference(j3, j2), DoubleDouble.of(j1))
-    minus = products(DoubleDouble.product(m1, m1), DoubleDouble.difference(j1, j2), DoubleDouble.of(j3))
+    plus = products(DoubleDouble.product(m3, m3), DoubleDouble.difference(j3, j2), DoubleDouble.exact(j1))
+    minus = products(DoubleDouble.product(m1, m1), DoubleDouble.difference(j1, j2), DoubleDouble.exact(j3))
     return exact_sum(plus + minus)
 
 
 def _first_integral(frame: Frame, cn2: DoubleDouble, sn2: DoubleDouble, mc: DoubleDouble) -> DoubleDouble:
     """F of the initial amplitude, |F| <= K, from cn² and sn²; without forming an angle, whose cosine would lose digits."""
-    value = sn2.sqrt() * carlson_rf(cn2, cn2 + mc * sn2, DoubleDouble.of(np.ones_like(mc.hi)))
+    value = sn2.sqrt() * carlson_rf(cn2, cn2 + mc * sn2, DoubleDouble.exact(np.ones_like(mc.hi)))
     return choose(frame.momentum[1] < 0.0, -value, value)
 
 
@@ -280,4 +280,4 @@ def _identities(n: int) -> Floats:
 
 
 def _sign(values: Floats) -> DoubleDouble:
-    return DoubleDouble.of(np.where(values < 0.0, -1.0, 1.0))
+    return DoubleDouble.exact(np.where(values < 0.0, -1.0, 1.0))

@@ -115,7 +115,7 @@ class Probe:
     has_tensor: bool
 
     @classmethod
-    def of(cls, vector: ArrayLike | None, tensor: ArrayLike | None) -> Probe:
+    def from_tensors(cls, vector: ArrayLike | None, tensor: ArrayLike | None) -> Probe:
         """From a vector and a symmetric tensor in principal axes, of any size; of the tensor its anisotropic part counts."""
         if vector is None and tensor is None:
             raise ValueError("expected a vector or a tensor fixed in the molecule, or both; got neither")
@@ -260,7 +260,7 @@ def free_gas_correlations(
     >>> [round(float(x), 2) for x in gas.c1]  # 1 - √2 D(1/√2) = 0.275
     [1.0, 0.28]
     """
-    inertia, grid, probe = checked_moments(moments), _checked_times(times), Probe.of(vector, tensor)
+    inertia, grid, probe = checked_moments(moments), _checked_times(times), Probe.from_tensors(vector, tensor)
 
     def piece(size: int, source: np.random.Generator) -> Floats:
         from rotor.classical.gas._correlation_kernels import add_bodies
@@ -315,7 +315,7 @@ def stepped_gas_correlations(
     The error of an attitude grows as step² times the time; with the same `rng` the molecules are the same as in
     `free_gas_correlations`, so that the difference of both is the error of stepping alone.
     """
-    inertia, probe = checked_moments(moments), Probe.of(vector, tensor)
+    inertia, probe = checked_moments(moments), Probe.from_tensors(vector, tensor)
     if count < 1 or steps < 1:
         raise ValueError(f"{count} times with {steps} steps between them: expected whole numbers of 1 or more")
     grid = _checked_times(interval * np.arange(count))

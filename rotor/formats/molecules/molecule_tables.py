@@ -246,6 +246,7 @@ def _atoms(table: TableReader) -> tuple[tuple[str, ...], NDArray[np.float64]]:
 
 
 def read_constants(table: TableReader | None) -> Constants | None:
+    """The rotational constants of a table with their errors and sources; None without the table."""
     if table is None:
         return None
     settings = {key: table.text(key) for key in ("reduction", "representation", "kind") if key in table.content}
@@ -350,6 +351,7 @@ def file_kind(constants: Constants | None, molecule: Molecule | None) -> str:
 
 
 def read_spin_weights(table: TableReader | None, constants: Constants | None) -> SpinWeights:
+    """The nuclear-spin weights of a table, equal without one; ValueError for classes that do not suit the kind of the constants."""
     if table is None:
         return SpinWeights()
     classes = {key: value for key, value in table.content.items() if key != "source"}
@@ -380,6 +382,7 @@ def uncertain_number(table: TableReader, key: str, unit: str) -> tuple[float, fl
 
 
 def read_measured_lines(table: TableReader | None) -> MeasuredLines | None:
+    """The catalogue with which the constants were compared: its tag, lines, rms and range."""
     if table is None:
         return None
     table.refuse_unknown(("tag", "source", "lines", "rms_mhz", "j_max", "k_max"))
@@ -395,6 +398,7 @@ def read_measured_lines(table: TableReader | None) -> MeasuredLines | None:
 
 
 def read_served(table: TableReader | None) -> Served | None:
+    """The range of J, K and frequency in which predictions hold, with their error."""
     if table is None:
         return None
     table.refuse_unknown(("j_max", "k_max", "max_ghz", "error_mhz", "source"))

@@ -97,6 +97,7 @@ def run_sweep(
         keys: list[str] = []
 
         def missing() -> Iterator[Job]:
+            """Jobs of the points without a result; finished points are counted on the way."""
             nonlocal finished
             hashes = InputHashes(folder)
             for point in sweep:

@@ -132,7 +132,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         from rotor.formats.spcat.fits.fit_states import FileLevels
 
         matrix, names = np.eye(len(file.parameters)), line_names(file)
-        model = partial(FileLevels.of, file)
+        model = partial(FileLevels.from_labels, file)
     values = np.array([p.value for p in file.parameters])
     parameters = Parameters(
         names=_distinct([file.parameters[i] for i in free]),

@@ -72,7 +72,7 @@ class FileLevels(LevelModel):
     excluded: Ints
 
     @classmethod
-    def of(cls, file: ParameterFile, labels: Ints) -> FileLevels:
+    def from_labels(cls, file: ParameterFile, labels: Ints) -> FileLevels:
         """The model for labels as the file lists them.
 
         Raises ValueError for labels without a level, with the first of them, and for unsupported parameters.

@@ -151,7 +151,7 @@ def test_parameters_at_zero_that_move_no_level_to_first_order_stay_out(w: str, l
     assert {file.parameters[i].label for i in left_at_zero(file)} == left
     labels = np.array([[j, ka, j - ka, v] for j in (8, 20) for ka in (0, 2, 5) for v in (0, 1)])
     small = replace(file, parameters=tuple(replace(p, value=p.value or 1e-7, error=1.0) for p in file.parameters))
-    model = FileLevels.of(small, labels)
+    model = FileLevels.from_labels(small, labels)
     _, slopes = model.levels(np.array([p.value for p in small.parameters]))
     for i, parameter in enumerate(file.parameters):
         if parameter.value == 0:
