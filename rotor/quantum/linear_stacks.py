@@ -44,6 +44,22 @@ class LinearBlock(NamedTuple):
         lower[:, self.rows, self.columns] = (self.factors @ self.mix).T
         return symmetric_from_lower(lower)
 
+    def elements(self, values_mhz: Floats) -> Floats:
+        """The elements of H, lower triangle, at values (parameters,)."""
+        return np.asarray(self.factors @ (self.mix @ values_mhz[self.parameters]))
+
+    def matrix(self, values_mhz: Floats) -> Floats:
+        """H, whole, at values (parameters,)."""
+        lower = np.zeros((self.size, self.size))
+        lower[self.rows, self.columns] = self.elements(values_mhz)
+        return symmetric_from_lower(lower)
+
+    def slopes(self, vectors: Floats) -> Floats:
+        """⟨n|O_i|n⟩ (n, parameters of the block) of vectors (size, n)."""
+        weights = vectors[self.rows] * vectors[self.columns]
+        weights *= np.where(self.rows == self.columns, 1.0, 2.0)[:, None]
+        return np.asarray(weights.T @ self.factors @ self.mix)
+
     def turned(self, functions: Floats) -> LinearBlock:
         """The block over other functions, given in rows over those of this one."""
         elements = list[WeightedElements]()

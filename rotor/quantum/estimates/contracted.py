@@ -15,19 +15,20 @@ column of V; W is chosen so that this is below `TOLERANCE_MHZ`. Where V is too l
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.state_elements import StateTerms
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import Plan, SpinBlock, coefficients_by_f
-from rotor.quantum.spins.linear_blocks import Unit, unit_matrices
+from rotor.quantum.linear_stacks import LinearBlock
+from rotor.quantum.spins.blocks import SpinBlock
+from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins, rotation_blocks
 from rotor.quantum.spins.parts import SpinPart, assigned, named_states
-from rotor.quantum.spins.rotor import Channel
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -48,78 +49,89 @@ class _Target(NamedTuple):
     name: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class _Block:
-    """One block of an F: its parts, coupling coefficients c(p', p), and the labels in it."""
-
-    parts: tuple[SpinPart, ...]
-    coefficients: dict[Channel, Floats]
-    targets: tuple[_Target, ...]
-
-
-class _Solved(NamedTuple):
-    """The rotation at given constants: energies and vectors by block, and X between its states by pair of blocks and channel."""
+class _Rotation(NamedTuple):
+    """The rotation at given constants: energies and vectors by block."""
 
     energies: dict[int, Floats]
     vectors: dict[int, Floats]
-    operators: dict[tuple[int, int], dict[Channel, Floats]]
+
+
+@dataclass(frozen=True)
+class LabelledBlock:
+    """One block of an F: its parts, the matrices over basis functions that parameters multiply, and the labels in it."""
+
+    parts: tuple[SpinPart, ...]
+    linear: LinearBlock
+    targets: tuple[_Target, ...]
+
+    def over_functions(self, vectors: Floats, rotation: _Rotation) -> Floats:
+        """Columns over rotational states times patterns as columns over basis functions."""
+        return self._turned(vectors, rotation.vectors)
+
+    def over_states(self, vectors: Floats, rotation: _Rotation) -> Floats:
+        """Columns over basis functions as columns over rotational states times patterns."""
+        return self._turned(vectors, {part.number: rotation.vectors[part.number].T for part in self.parts})
+
+    def _turned(self, vectors: Floats, matrices: Mapping[int, Floats]) -> Floats:
+        """Columns, each part of which is multiplied by the matrix of its rotational block."""
+        out = np.empty_like(vectors)
+        for part in self.parts:
+            rows = vectors[part.place].reshape(part.repeats, -1, vectors.shape[1])
+            out[part.place] = np.matmul(matrices[part.number], rows).reshape(-1, vectors.shape[1])
+        return out
+
+
+class _Coupled(NamedTuple):
+    """A block at given constants: E_r and the diagonal of H of each function, and H over basis functions as a sparse matrix."""
+
+    rotation: _Rotation
+    energies: Floats
+    diagonal: Floats
+    matrix: Any
 
 
 @dataclass(frozen=True)
 class ContractedLevels:
-    """Labelled levels as functions of the parameters; rotations, couplings: see `spins.linear_blocks.Units`."""
+    """Labelled levels as functions of the parameters; rotations: linear blocks of rotational blocks by their numbers."""
 
     count: int
     rotors: dict[int, SolvedBlock]
-    rotations: dict[int, Unit]
-    couplings: dict[tuple[int, int], dict[Channel, Unit]]
-    blocks: tuple[_Block, ...]
+    rotations: dict[int, LinearBlock]
+    blocks: tuple[LabelledBlock, ...]
     window_mhz: float
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies (count,) in MHz and derivatives (count, parameters) at values (parameters,) in MHz."""
         if not np.isfinite(values_mhz).all():
             raise ValueError("a block of the Hamiltonian is not finite with these constants")
-        solved = self._solved(values_mhz)
+        rotation = self.rotation(values_mhz)
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(values_mhz)))
-        names: dict[int, dict[tuple[int, ...], int]] = {}
         for block in self.blocks:
-            for number in {block.parts[target.part].number for target in block.targets} - set(names):
-                names[number] = _states_by_name(self.rotors[number], solved.vectors[number])
             rows = np.array([target.row for target in block.targets])
-            level_energies, vectors = _levels_of(block, _functions_of(block, names), solved, self.window_mhz)
-            energies[rows] = level_energies
-            slopes[rows] = self._slopes(block, vectors, solved, len(values_mhz))
+            functions = self.functions(block, rotation)
+            energies[rows], vectors = _levels_of(
+                block, functions, _coupled(block, rotation, values_mhz), self.window_mhz
+            )
+            slopes[rows[:, None], block.linear.parameters] = block.linear.slopes(
+                block.over_functions(vectors, rotation)
+            )
         return energies, slopes
 
-    def _solved(self, values_mhz: Floats) -> _Solved:
+    def rotation(self, values_mhz: Floats) -> _Rotation:
         """The rotation solved at values (parameters,) in MHz."""
-        energies, vectors = {}, {}
-        for number in self.rotors:
-            energies[number], vectors[number] = _eigen(self.rotations[number].matrix(values_mhz))
-        operators = {
-            (i, k): {channel: vectors[i].T @ unit.matrix(values_mhz) @ vectors[k] for channel, unit in units.items()}
-            for (i, k), units in self.couplings.items()
-        }
-        return _Solved(energies, vectors, operators)
+        solved = {number: _eigen(linear.matrix(values_mhz)) for number, linear in self.rotations.items()}
+        return _Rotation(*({number: pair[i] for number, pair in solved.items()} for i in range(2)))
 
-    def _slopes(self, block: _Block, vectors: Floats, solved: _Solved, count: int) -> Floats:
-        """⟨n|∂H/∂c|n⟩ (targets, parameters) of vectors (functions, targets)."""
-        out = np.zeros((vectors.shape[1], count))
-        turned = []
-        for part in block.parts:
-            part_vectors = vectors[part.place].reshape(part.repeats, -1, vectors.shape[1])
-            turned.append(np.matmul(solved.vectors[part.number], part_vectors))
-            unit = self.rotations[part.number]
-            pairs = np.einsum("pet,pet->te", turned[-1][:, unit.rows], turned[-1][:, unit.columns])
-            out[:, unit.parameters] += pairs @ unit.factors
-        for a, up in enumerate(block.parts):
-            for b, low in enumerate(block.parts[: a + 1]):
-                for channel, unit in self.couplings.get((up.number, low.number), {}).items():
-                    moved = np.tensordot(block.coefficients[channel][up.patterns, low.patterns], turned[b], axes=1)
-                    pairs = np.einsum("pet,pet->te", turned[a][:, unit.rows], moved[:, unit.columns])
-                    out[:, unit.parameters] += (1.0 if a == b else 2.0) * (pairs @ unit.factors)
-        return out
+    def functions(self, block: LabelledBlock, rotation: _Rotation) -> Ints:
+        """Places of the functions that the labels of a block name."""
+        numbers = {block.parts[target.part].number for target in block.targets}
+        names = {number: _states_by_name(self.rotors[number], rotation.vectors[number]) for number in numbers}
+        functions = []
+        for target in block.targets:
+            part = block.parts[target.part]
+            state = names[part.number][target.name]
+            functions.append(part.place.start + target.pattern * len(part.rotor.energies_mhz) + state)
+        return np.array(functions, dtype=np.int64)
 
 
 def _eigen(matrix: Floats) -> tuple[Floats, Floats]:
@@ -134,46 +146,42 @@ def _states_by_name(rotor: SolvedBlock, vectors: Floats) -> dict[tuple[int, ...]
     return {tuple(name): state for state, name in enumerate(named_states(rotor, vectors).tolist())}
 
 
-def _functions_of(block: _Block, names: dict[int, dict[tuple[int, ...], int]]) -> Ints:
-    """Places of the functions that the labels name."""
-    functions = []
-    for target in block.targets:
-        part = block.parts[target.part]
-        state = names[part.number][target.name]
-        functions.append(part.place.start + target.pattern * len(part.rotor.energies_mhz) + state)
-    return np.array(functions, dtype=np.int64)
+def _coupled(block: LabelledBlock, rotation: _Rotation, values_mhz: Floats) -> _Coupled:
+    """A block at values (parameters,) in MHz."""
+    from scipy.sparse import coo_array  # loaded in fits of large blocks only
+
+    linear = block.linear
+    rows, columns, elements = linear.rows, linear.columns, linear.elements(values_mhz)
+    off = rows != columns
+    places = np.append(rows, columns[off]), np.append(columns, rows[off])
+    matrix = coo_array((np.append(elements, elements[off]), places), shape=(linear.size, linear.size)).tocsr()
+    energies, diagonal = [], []
+    for part in block.parts:
+        vectors = rotation.vectors[part.number]
+        energies.append(np.tile(rotation.energies[part.number], part.repeats))
+        for start in range(part.place.start, part.place.stop, len(vectors)):
+            inside = matrix[start : start + len(vectors), start : start + len(vectors)]
+            diagonal.append(np.einsum("ij,ij->j", vectors, inside @ vectors))
+    return _Coupled(rotation, np.concatenate(energies), np.concatenate(diagonal), matrix)
 
 
-def _levels_of(block: _Block, functions: Ints, solved: _Solved, window_mhz: float) -> tuple[Floats, Floats]:
+def _levels_of(block: LabelledBlock, functions: Ints, coupled: _Coupled, window_mhz: float) -> tuple[Floats, Floats]:
     """Energies (targets,) and vectors (functions, targets) of the levels dominated by these functions."""
-    rotation, diagonal = _diagonal(block, solved)
+    diagonal = coupled.diagonal
     energies, vectors = np.empty(len(functions)), np.empty((len(diagonal), len(functions)))
     groups = list(_groups(diagonal[functions], _SPREAD * window_mhz))
     centres = [float(diagonal[functions[group]].mean()) for group in groups]
     near = [np.flatnonzero(np.abs(diagonal - centre) < window_mhz) for centre in centres]
     chosen = np.unique(np.concatenate(near))
-    columns = coupling_columns(block, chosen, solved)
+    columns = coupling_columns(block, chosen, coupled)
     for group, centre, inside in zip(groups, centres, near, strict=True):
         inside_columns = columns[:, np.searchsorted(chosen, inside)]
-        eliminated, states = _eliminated(rotation, diagonal, inside_columns, inside, centre)
+        eliminated, states = _eliminated(coupled.energies, diagonal, inside_columns, inside, centre)
         function_of_state = assigned(states[inside] ** 2, np.ones(len(inside), dtype=np.int64))
         state_of = np.argsort(function_of_state)
         states_here = state_of[np.searchsorted(inside, functions[group])]
         energies[group], vectors[:, group] = eliminated[states_here], states[:, states_here]
     return energies, vectors
-
-
-def _diagonal(block: _Block, solved: _Solved) -> tuple[Floats, Floats]:
-    """E_r, and E_r plus the diagonal of V, of each function."""
-    rotation, coupled = [], []
-    for part in block.parts:
-        energies = np.tile(solved.energies[part.number], part.repeats)
-        rotation.append(energies)
-        coupled.append(energies.copy())
-        for channel, operator in solved.operators.get((part.number, part.number), {}).items():
-            pattern = np.diag(block.coefficients[channel][part.patterns, part.patterns])
-            coupled[-1] += np.outer(pattern, np.diag(operator)).ravel()
-    return np.concatenate(rotation), np.concatenate(coupled)
 
 
 def _groups(energies: Floats, spread_mhz: float) -> Iterator[Ints]:
@@ -186,22 +194,14 @@ def _groups(energies: Floats, spread_mhz: float) -> Iterator[Ints]:
             start = stop
 
 
-def coupling_columns(block: _Block, chosen: Ints, solved: _Solved) -> Floats:
+def coupling_columns(block: LabelledBlock, chosen: Ints, coupled: _Coupled) -> Floats:
     """Columns of V (functions, chosen)."""
-    out = np.zeros((block.parts[-1].place.stop, len(chosen)))
-    bounds = np.searchsorted(chosen, [0, *(part.place.stop for part in block.parts)])
-    for b, ket in enumerate(block.parts):
-        where = slice(bounds[b], bounds[b + 1])
-        patterns, states = np.divmod(chosen[where] - ket.place.start, len(ket.rotor.energies_mhz))
-        if not len(states):
-            continue
-        for a, bra in enumerate(block.parts):
-            up, low = (bra, ket) if a >= b else (ket, bra)
-            for channel, operator in solved.operators.get((up.number, low.number), {}).items():
-                c = block.coefficients[channel][up.patterns, low.patterns]
-                c, x = (c, operator) if a >= b else (c.T, operator.T)
-                out[bra.place, where] += (c[:, None, patterns] * x[None, :, states]).reshape(-1, len(states))
-    return out
+    places = np.arange(len(chosen))
+    units = np.zeros((len(coupled.energies), len(chosen)))
+    units[chosen, places] = 1.0
+    columns = block.over_states(coupled.matrix @ block.over_functions(units, coupled.rotation), coupled.rotation)
+    columns[chosen, places] -= coupled.energies[chosen]
+    return columns
 
 
 def _eliminated(
@@ -224,54 +224,32 @@ def _eliminated(
 
 
 def contracted_levels(
-    top: Top,
-    effects: tuple[QuantumEffect, ...],
-    plan: Plan,
-    levels: Levels,
-    rows: Ints,
-    names: Sequence[str],
-    values_mhz: Floats,
+    top: Top, effects: tuple[QuantumEffect, ...], levels: Levels, rows: Ints, names: Sequence[str], values_mhz: Floats
 ) -> ContractedLevels | None:
-    """Labelled levels as functions of the parameters; None where whole blocks are solved faster or V is too large.
+    """Labelled levels, rows of `spins.levels.unmixed_levels` in the order of the answer, as functions of the parameters.
 
-    Parameters
-    ----------
-    top : Top
-        Constants and kind.
-    effects : tuple of QuantumEffect
-        Effects of the Hamiltonian.
-    plan : Plan
-        The rotation and the operators between its blocks.
-    levels : Levels
-        Basis functions with labels, from `unmixed_levels`.
-    rows : (n,) array
-        Rows of these levels, in the order of the answer.
-    names : sequence of str
-        Parameters of the effects, in the order of the values.
-    values_mhz : (parameters,) array
-        Approximate values of the parameters.
-
-    Returns
-    -------
-    ContractedLevels or None
+    None where whole blocks are solved faster or V is too large at approximate values of the parameters.
     """
-    blocks = _blocks_with(plan, levels, rows)
-    if max(len(block.energies_mhz) for block, _ in blocks) < _LARGE:
+    chosen = _blocks_with(levels, rows)
+    if max(len(block.energies_mhz) for block, _ in chosen) < _LARGE:
         return None
-    used = {number for block, _ in blocks for number in (part.number for part in block.parts)}
-    rotors = {i: plan.blocks[i] for i in sorted(used)}
-    rotations, couplings = unit_matrices(top, effects, names, plan.shared, rotors)
-    coefficients = coefficients_by_f(plan, {block.twice_f: block.patterns for block, _ in blocks})
-    known_blocks = tuple(_Block(block.parts, coefficients[block.twice_f], targets) for block, targets in blocks)
-    contracted = ContractedLevels(len(rows), rotors, rotations, couplings, known_blocks, 0.0)
+    shared = levels.blocks[0].shared
+    rotors = {part.number: part.rotor for block, _ in chosen for part in block.parts}
+    terms = StateTerms.from_effects(top, effects, names, shared.representation)
+    rotations = rotation_blocks(terms, len(names), list(rotors.values()), shared.representation)
+    linear = linear_blocks_of_spins(top, effects, names, [block for block, _ in chosen])
+    blocks = tuple(
+        LabelledBlock(b.parts, matrices, targets) for (b, targets), matrices in zip(chosen, linear, strict=True)
+    )
+    contracted = ContractedLevels(len(rows), rotors, dict(zip(rotors, rotations, strict=True)), blocks, 0.0)
     window = _window(contracted, values_mhz)
-    spread = min(float(np.ptp(block.energies_mhz)) for block, _ in blocks)
+    spread = min(float(np.ptp(block.energies_mhz)) for block, _ in chosen)
     if window > _WIDE * spread:
         return None
     return replace(contracted, window_mhz=window)
 
 
-def _blocks_with(plan: Plan, levels: Levels, rows: Ints) -> list[tuple[SpinBlock, tuple[_Target, ...]]]:
+def _blocks_with(levels: Levels, rows: Ints) -> list[tuple[SpinBlock, tuple[_Target, ...]]]:
     """The blocks that contain the rows, with the labels in each."""
     starts = np.array([block.start for block in levels.blocks])
     block_of_row = np.searchsorted(starts, rows, side="right") - 1
@@ -292,11 +270,9 @@ def _blocks_with(plan: Plan, levels: Levels, rows: Ints) -> list[tuple[SpinBlock
 
 def _window(levels: ContractedLevels, values_mhz: Floats) -> float:
     """W from the largest norm of a column of V of a labelled function."""
-    solved = levels._solved(values_mhz)
-    longest = 0.0
+    rotation, longest = levels.rotation(values_mhz), 0.0
     for block in levels.blocks:
-        states = {number: _states_by_name(levels.rotors[number], solved.vectors[number])
-                  for number in {block.parts[target.part].number for target in block.targets}}  # fmt: skip
-        columns = coupling_columns(block, np.unique(_functions_of(block, states)), solved)
+        functions = np.unique(levels.functions(block, rotation))
+        columns = coupling_columns(block, functions, _coupled(block, rotation, values_mhz))
         longest = max(longest, float(np.sqrt(np.einsum("ij,ij->j", columns, columns)).max()))
     return max(_LEAST_RATIO * longest, float(np.sqrt(longest**3 / TOLERANCE_MHZ)))

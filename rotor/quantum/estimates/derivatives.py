@@ -57,7 +57,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     if levels.blocks and isinstance(levels.blocks[0], MomentBlock):
         return np.concatenate([block.moments.slopes(block, names) for block in levels.blocks])[rows]
     if "f" in levels.quanta or are_with_spins(levels):
-        from rotor.quantum.spins.derivatives import derivatives
+        from rotor.quantum.spins.linear_blocks import derivatives
 
         return derivatives(top, levels, names, np.asarray(rows, dtype=np.int64))
     if "irrep" in levels.quanta:

@@ -64,18 +64,18 @@ def assigned_with_spins(
     if products and size * int(all_f.max() + 1) > _LARGE:
         from rotor.quantum.estimates.contracted import contracted_levels
 
-        levels, plan = unmixed_levels(top, effects, all_f.tolist())
+        levels = unmixed_levels(top, effects, all_f.tolist())
         rows = rows_of(levels, np.arange(len(twice_f)))
         here = np.flatnonzero(rows >= 0)
         if not len(here):
             return []
-        contracted = contracted_levels(top, effects, plan, levels, rows[here], names, values_mhz)
+        contracted = contracted_levels(top, effects, levels, rows[here], names, values_mhz)
         if contracted is not None:
             return [AssignedLevels(here, columns, contracted)]
     out = list[AssignedLevels]()
     for chunk in np.split(all_f, np.flatnonzero(np.diff(np.cumsum((size * (all_f + 1.0)) ** 2) // _MOST_ELEMENTS)) + 1):
         places, angular = np.flatnonzero(np.isin(twice_f, chunk)), chunk.tolist()
-        levels = unmixed_levels(top, effects, angular)[0] if products else levels_of_f(top, effects, angular)
+        levels = unmixed_levels(top, effects, angular) if products else levels_of_f(top, effects, angular)
         rows = rows_of(levels, places)
         has_level = rows >= 0
         if has_level.any():

@@ -10,7 +10,7 @@ a Kronecker product for each pair of solved blocks. Blocks that no channel conne
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -26,9 +26,9 @@ from rotor.quantum.levels import Block, SolvedBlock, Used
 from rotor.quantum.spins.axial import are_axial, contracted_operators
 from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stacks_of
 from rotor.quantum.spins.families import families_of, links_of_stacks
-from rotor.quantum.spins.many_f import Frame, Group
+from rotor.quantum.spins.many_f import Frame, Group, frame_of, groups_of
 from rotor.quantum.spins.parts import SpinPart, named_states
-from rotor.quantum.spins.pattern_tables import couplings_of
+from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
@@ -91,9 +91,9 @@ class SpinBlock(Block):
     labels: Ints
     mixing: Floats
     shared: Shared
+    group: Group = field(repr=False, compare=False)
     start: int = 0
     allowed: Allowed | None = None
-    group: Group | None = field(default=None, repr=False, compare=False)
 
     @property
     def twice_total(self) -> int:
@@ -251,16 +251,19 @@ def parts_of_f(plan: Plan, patterns: Ints) -> Iterator[tuple[SpinPart, ...]]:
         yield _parts(plan, sorted(families[number]))
 
 
-def functions_of_blocks(plan: Plan, all_f: Iterable[int]) -> list[SpinBlock]:
+def functions_of_blocks(plan: Plan, all_f: Sequence[int]) -> list[SpinBlock]:
     """Basis functions of the blocks of all F, without vectors: labels and energies are those of the rotational states."""
+    table = pattern_table(plan.shared.scheme, all_f[0], all_f[-1])
+    frame = plan.shared.cache["frame"] = frame_of(plan.shared.stacks, table)
+    members = [(f, parts) for f in all_f if f in table.patterns for parts in parts_of_f(plan, table.patterns[f])]
+    groups = {number: group for group, numbers in groups_of(members, frame) for number in numbers}
     out = []
-    for twice_f in all_f:
-        patterns = plan.shared.scheme.patterns(twice_f)
-        for parts in parts_of_f(plan, patterns):
-            energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
-            labels = np.concatenate([_labels_of_functions(part, patterns[part.patterns]) for part in parts])
-            ones = np.ones(len(energies))
-            out.append(SpinBlock(twice_f, patterns, parts, energies, np.zeros((0, 0)), labels, ones, plan.shared))
+    for number, (twice_f, parts) in enumerate(members):
+        patterns = table.patterns[twice_f]
+        energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
+        labels = np.concatenate([_labels_of_functions(part, patterns[part.patterns]) for part in parts])
+        results = energies, np.zeros((0, 0)), labels, np.ones(len(energies))
+        out.append(SpinBlock(twice_f, patterns, parts, *results, plan.shared, groups[number]))
     return out
 
 
@@ -268,13 +271,6 @@ def _labels_of_functions(part: SpinPart, part_patterns: Ints) -> Ints:
     """Labels of the functions of a part, pattern by pattern."""
     names = named_states(part.rotor, part.rotor.vectors)
     return np.concatenate([np.column_stack([names, np.tile(pattern, (len(names), 1))]) for pattern in part_patterns])
-
-
-def coefficients_by_f(plan: Plan, tables: dict[int, Ints]) -> dict[int, dict[Channel, Floats]]:
-    """c(p', p) of all channels by F, then by channel."""
-    acting = {channel for by_channel in plan.operators.values() for _, channels in by_channel for channel in channels}
-    by_channel = {channel: couplings_of(plan.shared.scheme, channel, tables) for channel in acting}
-    return {f: {channel: by_f[f] for channel, by_f in by_channel.items()} for f in tables}
 
 
 def _parts(plan: Plan, members: list[tuple[int, int, int, int]]) -> tuple[SpinPart, ...]:
@@ -285,9 +281,3 @@ def _parts(plan: Plan, members: list[tuple[int, int, int, int]]) -> tuple[SpinPa
         parts.append(SpinPart(i, blocks[i], slice(first, last), slice(start, stop)))
         start = stop
     return tuple(parts)
-
-
-def product(left: Floats, right: Floats) -> Floats:
-    """The Kronecker product of two matrices."""
-    rows, columns = left.shape[0] * right.shape[0], left.shape[1] * right.shape[1]
-    return (left[:, None, :, None] * right[None, :, None, :]).reshape(rows, columns)

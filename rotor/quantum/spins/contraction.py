@@ -16,7 +16,7 @@ from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.operators import Basis, Rotor
 from rotor.quantum.spins.rotor import Piece, acts
-from rotor.quantum.spins.stack_elements import Pairs, Section, power_matrices, rotor_elements, tensor_elements_of_pairs
+from rotor.quantum.spins.stack_elements import Pairs, Section, rotor_elements, tensor_elements_of_pairs
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 from rotor.quantum.wang.basis import WangBlock
 
@@ -27,14 +27,14 @@ class Stack(NamedTuple):
     """Solved blocks of rising N with the same states and kinds of Wang functions.
 
     kind: number of this combination. numbers, n, sizes: number, N and states of each block. vectors: (blocks, rows, states), zero beyond a
-    block. single: blocks that are contracted one by one.
+    block; None where functions take the place of eigenstates. single: blocks that are contracted one by one.
     """
 
     kind: int
     numbers: Ints
     n: Ints
     sections: tuple[Section, ...]
-    vectors: Floats
+    vectors: Floats | None
     sizes: list[int]
     blocks: list[SolvedBlock]
     single: list[bool]
@@ -57,8 +57,11 @@ class Contracted(NamedTuple):
         return Contracted(self.low, self.up, self.pairs.turned(), sign * self.matrices.transpose(0, 2, 1))
 
 
-def stacks_of(blocks: Sequence[SolvedBlock]) -> list[Stack]:
-    """Stacks of blocks with the same states v and kinds of Wang functions (for |N K⟩ the same v) and similar size."""
+def stacks_of(blocks: Sequence[SolvedBlock], contract: bool = True) -> list[Stack]:
+    """Stacks of blocks with the same states v and kinds of Wang functions (for |N K⟩ the same v) and similar size.
+
+    contract: False for stacks of functions, one for each kind.
+    """
     alike: dict[tuple[tuple[int, ...], ...], list[int]] = {}
     for number, block in enumerate(blocks):
         alike.setdefault(tuple((part.v, *_kind(part.basis)) for part in block.parts), []).append(number)
@@ -66,7 +69,8 @@ def stacks_of(blocks: Sequence[SolvedBlock]) -> list[Stack]:
     for kind, members in enumerate(alike.values()):
         rising = sorted(members, key=lambda number: blocks[number].j)
         sizes = [len(blocks[number].energies_mhz) for number in rising]
-        stacks += [_stack(blocks, kind, rising[run]) for run in runs_of_similar_size(sizes, _LIKE, _SMALL)]
+        runs = runs_of_similar_size(sizes, _LIKE, _SMALL) if contract else [slice(None)]
+        stacks += [_stack(blocks, kind, rising[run], contract) for run in runs]
     return stacks
 
 
@@ -75,7 +79,7 @@ def _kind(basis: Basis) -> tuple[int, ...]:
     return (basis.first_k, basis.sign) if isinstance(basis, WangBlock) else ()
 
 
-def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: list[int]) -> Stack:
+def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: list[int], contract: bool) -> Stack:
     """The stack of these blocks."""
     members = [blocks[number] for number in numbers]
     sections, start = [], 0
@@ -94,7 +98,7 @@ def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: list[int]) -> Stac
         np.array(numbers),
         np.array([block.j for block in members]),
         tuple(sections),
-        vectors,
+        vectors if contract else None,
         sizes,
         members,
         [len(block.energies_mhz) == 1 or any(part.basis.size == 1 for part in block.parts) for block in members],
@@ -122,20 +126,6 @@ def operators_of_stacks(
                 )
             if elements is not None:
                 contracted.append(elements)
-    return out
-
-
-def powers_of_stacks(stacks: Sequence[Stack], units: Sequence[tuple[int, int, int]]) -> list[tuple[Stack, Floats]]:
-    """½[Nz^2q, N₊^2n + N₋^2n]₊ within the state v of each unit (v, q, n) over eigenstates: (blocks, units, states, states)."""
-    out = []
-    for stack in stacks:
-        elements = np.zeros((len(stack.numbers), len(units), stack.vectors.shape[2], stack.vectors.shape[2]))
-        for section in stack.sections:
-            units_of_state = [place for place, (v, _, _) in enumerate(units) if v == section.v]
-            vectors = stack.vectors[:, None, section.rows]
-            matrices = power_matrices(section, [units[place][1:] for place in units_of_state])
-            elements[:, units_of_state] += np.matmul(vectors.transpose(0, 1, 3, 2), np.matmul(matrices, vectors))
-        out.append((stack, elements))
     return out
 
 
@@ -224,9 +214,14 @@ def _contracted(up: Stack, low: Stack, pairs: Pairs, elements: Sequence[Element]
     """The sum of elements between the states of each pair of blocks; None without elements."""
     if not elements:
         return None
+    if up.vectors is None or low.vectors is None:
+        matrices = np.zeros((len(pairs.up), up.sections[-1].rows.stop, low.sections[-1].rows.stop))
+        for left, right, x in elements:
+            matrices[:, left.rows, right.rows] += x
+        return Contracted(up, low, pairs, matrices)
     bra, ket = up.vectors[pairs.up].transpose(0, 2, 1), low.vectors[pairs.low]
     total = sum(np.matmul(np.matmul(bra[:, :, left.rows], x), ket[:, right.rows]) for left, right, x in elements)
-    matrices: Floats = np.asarray(total)
+    matrices = np.asarray(total)
     for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
         if up.single[a] or low.single[b]:
             block = _one_contracted(up, low, (a, b), [(left, right, x[place]) for left, right, x in elements])

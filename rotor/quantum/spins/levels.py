@@ -11,7 +11,7 @@ import numpy as np
 from rotor.arrays import hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, levels_of_blocks, placed
-from rotor.quantum.spins.blocks import Plan, Shared, SpinBlock, contracted_plan, functions_of_blocks
+from rotor.quantum.spins.blocks import Shared, SpinBlock, contracted_plan, functions_of_blocks
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.rotor import Exist
 from rotor.quantum.spins.scheme import scheme_of
@@ -59,10 +59,10 @@ def levels_of_f(
     return _table(top, effects, plan.shared, blocks, highest if n_range is None else n_range[1])
 
 
-def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence[int]) -> tuple[Levels, Plan]:
+def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence[int]) -> Levels:
     """Basis functions of all F in `all_f`, rotational states times coupling patterns, as levels without spin splitting.
 
-    They are labelled as solved levels are, without vectors; the plan has the operators and the coupling coefficients of these F.
+    They are labelled as solved levels are, without vectors.
     """
     lowest, highest = _range_of_n(top, effects, all_f)
     plan = contracted_plan(top, effects, lowest, highest, None)
@@ -71,7 +71,7 @@ def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence
             "functions of three equivalent nuclei are not products of a rotational state and a coupling pattern"
         )
     blocks = tuple(placed(functions_of_blocks(plan, all_f)))
-    return _table(top, effects, plan.shared, blocks, highest), plan
+    return _table(top, effects, plan.shared, blocks, highest)
 
 
 def _range_of_n(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence[int]) -> tuple[int, int]:

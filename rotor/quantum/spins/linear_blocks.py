@@ -1,168 +1,300 @@
 """Matrices ∂H/∂c of each parameter over rotational functions times coupling patterns, of which H is a linear combination,
 
-    ∂H/∂c = Σ_channels c(p', p) ⟨r'|X_c|r⟩.
+    ∂H/∂c = Σ_channels c(p', p) ⟨r'|X_c|r⟩,     ∂E_i/∂c = ⟨i|∂H/∂c|i⟩     (Hellmann and Feynman, see `estimates.derivatives`).
 
 Elements of the rotation alone come from `basis.state_elements`, all others from `contraction` with basis functions in place of eigenstates.
-Both are computed once for all F. Fits use these matrices, for large blocks too (`estimates.contracted`).
+They are sparse, and tables by row (`many_f`), since functions of one kind have elements at the same places for all N. Fits and derivatives
+of levels use these matrices, `estimates.contracted` for large blocks too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import SolvedBlock
+from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
 from rotor.quantum.spins.axial import are_axial, contracted_operators, powers_of_axial
 from rotor.quantum.spins.blocks import Shared, SpinBlock
-from rotor.quantum.spins.contraction import Contracted, stacks_of
-from rotor.quantum.spins.pattern_tables import couplings_of
-from rotor.quantum.spins.rotor import Channel, Channels, parameter_channels
+from rotor.quantum.spins.contraction import Contracted, Stack, stacks_of
+from rotor.quantum.spins.many_f import Frame, Group
+from rotor.quantum.spins.many_f_lines import groups_of_blocks
+from rotor.quantum.spins.pattern_tables import couplings_by_f
+from rotor.quantum.spins.rotor import ALONE, Piece, parameter_channels
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
+_PADDED, _LIKE, _SMALL = (
+    1 << 18,
+    1.5,
+    24,
+)  # most numbers in an array of vectors (2 MB), ratio of sizes in it, sizes that all share one
+Kinds = tuple[int, int, int]  # kinds of both blocks and the distance of their rows
 
 
-class Unit(NamedTuple):
-    """Unit matrices of several parameters between two rotational blocks, as sparse elements.
+class UnitElements(NamedTuple):
+    """Elements of ∂H/∂c between functions of two kinds of rotational blocks.
 
-    factors: (elements, parameters). parameters: their numbers. size: rows and columns.
+    rows, columns: (elements,) functions, as those of the largest block of a kind are counted. values: (table rows, elements, parameters).
     """
 
     rows: Ints
     columns: Ints
-    factors: Floats
+    values: Floats
     parameters: Ints
-    size: tuple[int, int]
 
-    def matrix(self, values_mhz: Floats) -> Floats:
-        """Σ value · unit matrix."""
-        out = np.zeros(self.size)
-        out[self.rows, self.columns] = self.factors @ values_mhz[self.parameters]
+
+class Acting(NamedTuple):
+    """Elements between two columns of a group, by their places among its rotations.
+
+    twice: 2 where the elements in the other order are left out, else 1. coefficients: (blocks, patterns', patterns). values: (blocks,
+    elements, parameters).
+    """
+
+    left: int
+    right: int
+    twice: float
+    coefficients: Floats
+    unit: UnitElements
+    values: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FunctionTables:
+    """Elements of all parameters by channel.
+
+    functions: by number of a rotational block, its functions as those of the largest block of its kind are counted. vectors: (table rows,
+    functions, states) of solved blocks by kind. channels: coefficients by F, and elements by kinds.
+    """
+
+    frame: Frame
+    functions: list[Ints]
+    vectors: dict[int, Floats]
+    channels: list[tuple[Floats, dict[Kinds, UnitElements]]]
+
+    def acting(self, group: Group, at: Ints) -> Iterator[Acting]:
+        """Elements between the columns of blocks of a group; of columns of different kinds or N in one order only."""
+        rows_of_f = self.frame.rows_of_f(group.twice_f[at])
+        rows = [self.frame.rows_of(group.twice_rows[at], rotation) for rotation in group.rotations]
+        places: dict[tuple[int, int], list[int]] = {}
+        for place, rotation in enumerate(group.rotations):
+            places.setdefault((rotation.kind, rotation.rise), []).append(place)
+        for coefficients, by_kinds in self.channels:
+            coefficients_of_f = coefficients[rows_of_f]
+            for (up, low, step), unit in by_kinds.items():
+                twice = 1.0 if up == low and not step else 2.0
+                for k, right in enumerate(group.rotations):
+                    for i in places.get((up, right.rise + 2 * step), ()) if right.kind == low else ():
+                        between = coefficients_of_f[:, group.rotations[i].patterns, right.patterns]
+                        yield Acting(i, k, twice, between, unit, unit.values[rows[k]])
+
+    def over_functions(self, group: Group, at: Ints, vectors: Floats) -> list[Floats]:
+        """Vectors (blocks, columns, states, n) over functions, (blocks, patterns, functions, n) for each rotation of a group."""
+        out = []
+        for rotation in group.rotations:
+            turned = self.vectors[rotation.kind][self.frame.rows_of(group.twice_rows[at], rotation)]
+            states = min(turned.shape[2], vectors.shape[2])
+            out.append(np.matmul(turned[:, None, :, :states], vectors[:, rotation.columns, :states]))
         return out
 
 
-class Units(NamedTuple):
-    """Unit matrices over rotational functions: the rotation alone by block, the couplings by pair of blocks (i ≥ k) and channel."""
-
-    rotations: dict[int, Unit]
-    couplings: dict[tuple[int, int], dict[Channel, Unit]]
-
-
-def unit_matrices(
-    top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], shared: Shared, rotors: Mapping[int, SolvedBlock]
-) -> Units:
-    """∂H/∂c of parameters over the functions of rotational blocks, by their numbers."""
-    numbers = sorted(rotors)
-    blocks = [replace(rotors[i], vectors=np.eye(len(rotors[i].energies_mhz))) for i in numbers]
+def function_tables(top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], shared: Shared) -> FunctionTables:
+    """Elements of parameters over the functions of all rotational blocks of a calculation."""
+    frame: Frame = shared.cache["frame"]
+    rotors = {
+        i: block for stack in shared.stacks for i, block in zip(stack.numbers.tolist(), stack.blocks, strict=True)
+    }
+    blocks = [rotors[i] for i in range(len(rotors))]
+    stacks = stacks_of(blocks, contract=False)
+    functions = _functions(stacks, len(blocks))
+    first, last = frame.twice_f[0], frame.twice_f[-1]
     terms = StateTerms.from_effects(top, effects, names, shared.representation)
-    rotations = dict(zip(numbers, _rotations(terms, len(names), blocks, shared.representation), strict=True))
-    couplings: dict[tuple[int, int], dict[Channel, Unit]] = {}
-    for channel, columns, contracted in _by_channel(
-        parameter_channels(top, effects, names, shared.scheme), blocks, shared
-    ):
-        for pair, unit in _by_pairs(columns, contracted):
-            couplings.setdefault((numbers[pair[0]], numbers[pair[1]]), {})[channel] = unit
-    return Units(rotations, couplings)
+    rotation = _rotation_elements(terms, len(names), blocks, functions, shared)
+    channels = [(couplings_by_f(shared.scheme, ALONE, first, last), rotation)]
+    by_parameter = parameter_channels(top, effects, names, shared.scheme)
+    channels_of_spins = dict.fromkeys(channel for by_channel in by_parameter for channel in by_channel)
+    for rank in {channel.rank for channel in channels_of_spins}:
+        pieces = {
+            channel: [by_channel.get(channel, []) for by_channel in by_parameter]
+            for channel in channels_of_spins
+            if channel.rank == rank
+        }
+        units = dict.fromkeys(_unit(piece) for of_channel in pieces.values() for each in of_channel for piece in each)
+        alone = [[unit] for unit in units]
+        contracted = contracted_operators(stacks, min(_REACH, rank), alone, shared.representation)
+        by_unit = dict(zip(units, contracted, strict=True))
+        for channel, of_channel in pieces.items():
+            elements = _spin_elements(of_channel, by_unit, frame)
+            channels.append((couplings_by_f(shared.scheme, channel, first, last), elements))
+    return FunctionTables(frame, functions, _vectors(blocks, stacks, functions, frame), channels)
 
 
-def _rotations(terms: StateTerms, count: int, blocks: Sequence[SolvedBlock], representation: str) -> list[Unit]:
-    """Unit matrices of the rotation alone for each block, with both triangles."""
+def _functions(stacks: Sequence[Stack], count: int) -> list[Ints]:
+    """The functions of each block, as those of the largest block of its kind are counted."""
+    out = [np.zeros(0, dtype=np.int64)] * count
+    for stack in stacks:
+        for place, number in enumerate(stack.numbers.tolist()):
+            pieces = [section.rows.start + np.arange(section.parts[place].basis.size) for section in stack.sections]
+            out[number] = np.concatenate(pieces)
+    return out
+
+
+def _vectors(
+    blocks: Sequence[SolvedBlock], stacks: Sequence[Stack], functions: Sequence[Ints], frame: Frame
+) -> dict[int, Floats]:
+    """Eigenvectors of the rotational blocks by kind, (table rows, functions, states)."""
+    out = {}
     if are_axial(blocks):
+        return {kind: np.ones((len(energies), 1, 1)) for kind, energies in frame.energies_mhz.items()}
+    for stack in stacks:
+        count, states = frame.energies_mhz[stack.kind].shape
+        out[stack.kind] = np.zeros((count, stack.sections[-1].rows.stop, states))
+        for number in stack.numbers.tolist():
+            vectors = blocks[number].vectors
+            out[stack.kind][frame.rows[number], functions[number], : vectors.shape[1]] = vectors
+    return out
+
+
+def rotation_blocks(
+    terms: StateTerms, count: int, blocks: Sequence[SolvedBlock], representation: str
+) -> list[LinearBlock]:
+    """Linear blocks of the rotation alone, `count` parameters, over the functions of rotational blocks."""
+    if not are_axial(blocks):
+        return blocks_of_terms(terms, count, representation, blocks)
+    first, parameters = np.zeros(1, dtype=np.int64), np.arange(count)
+    rows = powers_of_axial(terms, count, blocks)
+    return [LinearBlock(1, first, first, np.ones((1, 1)), row[None], parameters) for row in rows]
+
+
+def _rotation_elements(
+    terms: StateTerms, count: int, blocks: Sequence[SolvedBlock], functions: Sequence[Ints], shared: Shared
+) -> dict[Kinds, UnitElements]:
+    """Elements of the rotation alone, with both triangles."""
+    frame: Frame = shared.cache["frame"]
+    if shared.axial:
+        whole = {kind: np.zeros((len(frame.n_of_rows), 1, count)) for kind in frame.energies_mhz}
+        numbers = np.array(frame.kinds)
+        for kind, values in whole.items():
+            values[frame.rows[numbers == kind], 0] = powers_of_axial(terms, count, blocks)[numbers == kind]
         first, parameters = np.zeros(1, dtype=np.int64), np.arange(count)
-        return [Unit(first, first, row[None], parameters, (1, 1)) for row in powers_of_axial(terms, count, blocks)]
-    return [_mirrored(block) for block in blocks_of_terms(terms, count, representation, blocks)]
+        return {(kind, kind, 0): UnitElements(first, first, values, parameters) for kind, values in whole.items()}
+    of_kind: dict[int, list[tuple[int, Ints, Ints, LinearBlock]]] = {}
+    for number, linear in enumerate(rotation_blocks(terms, count, blocks, shared.representation)):
+        places = functions[number][linear.rows], functions[number][linear.columns]
+        of_kind.setdefault(frame.kinds[number], []).append((number, *places, linear))
+    out = {}
+    for kind, linears in of_kind.items():
+        size = 1 + max(int(rows.max()) for _, rows, _, _ in linears)
+        occurring = np.unique(np.concatenate([rows * size + columns for _, rows, columns, _ in linears]))
+        values = np.zeros((len(frame.n_of_rows), len(occurring), count))
+        for number, rows, columns, linear in linears:
+            at = np.searchsorted(occurring, rows * size + columns)[:, None]
+            values[frame.rows[number], at, linear.parameters] = linear.factors @ linear.mix
+        parameters = np.flatnonzero(values.any(axis=(0, 1)))
+        rows, columns = np.divmod(occurring, size)
+        off = np.flatnonzero(rows != columns)
+        values = np.concatenate([values, values[:, off]], axis=1)[:, :, parameters]
+        places = np.append(rows, columns[off]), np.append(columns, rows[off])
+        out[kind, kind, 0] = UnitElements(*places, values, parameters)
+    return out
 
 
-def _mirrored(block: LinearBlock) -> Unit:
-    """Unit matrices of a linear block with both triangles."""
-    off = np.flatnonzero(block.rows != block.columns)
-    rows, columns = np.append(block.rows, block.columns[off]), np.append(block.columns, block.rows[off])
-    factors = block.factors @ block.mix
-    return Unit(rows, columns, np.concatenate([factors, factors[off]]), block.parameters, (block.size, block.size))
+def _spin_elements(
+    pieces: Sequence[Sequence[Piece]], by_unit: Mapping[Piece, Sequence[Contracted]], frame: Frame
+) -> dict[Kinds, UnitElements]:
+    """Elements of a channel by kinds: those of each operator of N, times ½(N'^2p + N^2p) and the value of each parameter."""
+    units = list(dict.fromkeys(_unit(piece) for pieces_of_parameter in pieces for piece in pieces_of_parameter))
+    parameters = np.array([column for column, pieces_of_parameter in enumerate(pieces) if pieces_of_parameter])
+    alike: dict[Kinds, list[tuple[int, Ints, Contracted]]] = {}
+    for place, unit in enumerate(units):
+        for entry in by_unit[unit]:
+            up, rows = frame.rows[entry.up.numbers[entry.pairs.up]], frame.rows[entry.low.numbers[entry.pairs.low]]
+            alike.setdefault((entry.up.kind, entry.low.kind, int(up[0] - rows[0])), []).append((place, rows, entry))
+    n, out = frame.n_of_rows.astype(float), {}
+    for kinds, members in alike.items():
+        left, right = np.nonzero(np.any([entry.matrices.any(axis=0) for _, _, entry in members], axis=0))
+        elements = np.zeros((len(n), len(left), len(units)))
+        for place, rows, entry in members:
+            elements[rows, :, place] = entry.matrices[:, left, right]
+        m = n + members[0][2].pairs.rise
+        mix = np.zeros((len(n), len(units), len(parameters)))
+        for at, column in enumerate(parameters.tolist()):
+            for piece in pieces[column]:
+                powers = ((m * (m + 1)) ** piece.n2 + (n * (n + 1)) ** piece.n2) / 2
+                mix[:, units.index(_unit(piece)), at] += piece.value * powers
+        out[kinds] = UnitElements(left, right, elements @ mix, parameters)
+    return out
 
 
-def _by_channel(
-    channels: Sequence[Channels], blocks: Sequence[SolvedBlock], shared: Shared
-) -> Iterator[tuple[Channel, list[int], list[list[Contracted]]]]:
-    """Each channel with the parameters that act in it and their elements between the functions of all blocks."""
-    stacks = stacks_of(blocks)
-    for channel in dict.fromkeys(channel for by_channel in channels for channel in by_channel):
-        columns = [column for column, by_channel in enumerate(channels) if channel in by_channel]
-        pieces = [channels[column][channel] for column in columns]
-        yield channel, columns, contracted_operators(stacks, min(_REACH, channel.rank), pieces, shared.representation)
+def _unit(piece: Piece) -> Piece:
+    """A piece with value 1 and no power of N²."""
+    return replace(piece, value=1.0, n2=0)
 
 
-def _by_pairs(
-    columns: Sequence[int], by_parameter: Sequence[Sequence[Contracted]]
-) -> Iterator[tuple[tuple[int, int], Unit]]:
-    """Unit matrices of one channel by pairs of blocks; columns: the parameter of each list of elements."""
-    alike: dict[tuple[int, int, int], list[tuple[int, Contracted]]] = {}
-    for column, contracted in zip(columns, by_parameter, strict=True):
-        for entry in contracted:
-            alike.setdefault((int(entry.up.numbers[0]), int(entry.low.numbers[0]), entry.pairs.rise), []).append(
-                (column, entry)
-            )
-    for members in alike.values():
-        (_, first), parameters = members[0], np.array([column for column, _ in members])
-        table = np.stack([entry.matrices for _, entry in members], axis=3)  # (pairs, functions', functions, parameters)
-        nonzero = np.asarray(table.any(axis=3))
-        for place in np.flatnonzero(nonzero.any(axis=(1, 2))).tolist():
-            a, b = int(first.pairs.up[place]), int(first.pairs.low[place])
-            rows, places = np.nonzero(nonzero[place])
-            size = first.up.sizes[a], first.low.sizes[b]
-            yield (
-                (int(first.up.numbers[a]), int(first.low.numbers[b])),
-                Unit(rows, places, table[place, rows, places], parameters, size),
-            )
+def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> Floats:
+    """∂E/∂c (rows, names) of levels with spins, MHz per MHz; ValueError for levels without vectors."""
+    if not levels.blocks:
+        raise ValueError("these levels have no vectors; solve them with their spins anew")
+    tables = function_tables(top, levels.effects, names, levels.blocks[0].shared)
+    out = np.zeros((len(levels) + 1, len(names)))  # the last row takes the padding
+    for states in groups_of_blocks(levels.blocks, len(levels)):
+        group, sizes = states.group, [len(block.vectors) for block in states.blocks]
+        for run in runs_of_similar_size(sizes, _LIKE, _SMALL, _PADDED):
+            places = np.arange(run.start, run.stop)
+            at, vectors = states.in_group[places], states.vectors(places)
+            over_functions = tables.over_functions(group, at, vectors)
+            total = np.zeros((len(places), vectors.shape[3], len(names)))
+            for acting in tables.acting(group, at):
+                total[:, :, acting.unit.parameters] += acting.twice * _slopes(acting, over_functions)
+            out[states.rows[run, : vectors.shape[3]]] = total
+    return np.asarray(out[:-1][rows])
+
+
+def _slopes(acting: Acting, vectors: Sequence[Floats]) -> Floats:
+    """Σ_p'r'pr V_p'r' c(p', p) X_c(r', r) V_pr of acting elements, (blocks, n, parameters)."""
+    bra, ket = vectors[acting.left], vectors[acting.right]
+    blocks, _, functions, n = ket.shape
+    moved = np.matmul(acting.coefficients, ket.reshape(blocks, -1, functions * n)).reshape(blocks, -1, functions, n)
+    weights = bra[:, :, acting.unit.rows]
+    weights *= moved[:, :, acting.unit.columns]
+    total = weights[:, 0] if weights.shape[1] == 1 else weights.sum(axis=1)
+    return np.asarray(np.matmul(total.transpose(0, 2, 1), acting.values))
 
 
 def linear_blocks_of_spins(
     top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], blocks: Sequence[SpinBlock]
 ) -> list[LinearBlock]:
-    """Linear blocks of the solved blocks of one calculation, over basis functions or the functions that exchange allows."""
-    shared = blocks[0].shared
-    units = unit_matrices(
-        top, effects, names, shared, {part.number: part.rotor for block in blocks for part in block.parts}
-    )
-    channels = dict.fromkeys(channel for by_channel in units.couplings.values() for channel in by_channel)
-    tables = {block.twice_f: block.patterns for block in blocks}
-    coefficients = {channel: couplings_of(shared.scheme, channel, tables) for channel in channels}
+    """Linear blocks of the blocks of one calculation, over basis functions or the functions that exchange allows."""
+    tables = function_tables(top, effects, names, blocks[0].shared)
     out = []
     for block in blocks:
-        linear = linear_block(block.parts[-1].place.stop, list(_pieces(block, units, coefficients)))
+        linear = linear_block(block.parts[-1].place.stop, list(_elements(block, tables)))
         out.append(linear.turned(block.allowed.products.T) if block.allowed else linear)
     return out
 
 
-def _pieces(
-    block: SpinBlock, units: Units, coefficients_by_f: Mapping[Channel, Mapping[int, Floats]]
-) -> Iterator[WeightedElements]:
-    """Elements of the lower triangle of a block, part by part and channel by channel."""
-    size = block.parts[-1].place.stop
-    for a, up in enumerate(block.parts):
-        yield _product(np.eye(up.repeats), units.rotations[up.number], (up.place.start, up.place.start), size)
-        for low in block.parts[: a + 1]:
-            for channel, unit in units.couplings.get((up.number, low.number), {}).items():
-                coefficients = coefficients_by_f[channel][block.twice_f][up.patterns, low.patterns]
-                yield _product(coefficients, unit, (up.place.start, low.place.start), size)
-
-
-def _product(coefficients: Floats, unit: Unit, start: tuple[int, int], size: int) -> WeightedElements:
-    """Coupling coefficients times unit matrices, at their places in a block of `size` functions."""
-    up, low = np.nonzero(coefficients)
-    rows = (start[0] + up[:, None] * unit.size[0] + unit.rows).ravel()
-    columns = (start[1] + low[:, None] * unit.size[1] + unit.columns).ravel()
-    factors = (coefficients[up, low][:, None, None] * unit.factors).reshape(len(rows), unit.factors.shape[1])
-    if start[0] == start[1]:
-        lower = rows >= columns
-        rows, columns, factors = rows[lower], columns[lower], factors[lower]
-    return WeightedElements(rows * size + columns, factors, unit.parameters)
+def _elements(block: SpinBlock, tables: FunctionTables) -> Iterator[WeightedElements]:
+    """Elements of the lower triangle of a block."""
+    group, size = block.group, block.parts[-1].place.stop
+    at = group.places[block.twice_row(tables.frame)]
+    functions = np.concatenate([np.tile(tables.functions[part.number], part.repeats) for part in block.parts])
+    place = np.full((group.columns, 1 + int(functions.max())), -1)
+    place[group.functions[at][0], functions] = np.arange(size)
+    for acting in tables.acting(group, np.array([at])):
+        up, low = np.nonzero(acting.coefficients[0])
+        last = np.maximum(acting.unit.rows, acting.unit.columns)
+        inside = np.flatnonzero(acting.values[0].any(axis=1) & (last < place.shape[1]))
+        rows = place[group.rotations[acting.left].columns.start + up[:, None], acting.unit.rows[inside]]
+        columns = place[group.rotations[acting.right].columns.start + low[:, None], acting.unit.columns[inside]]
+        factors = acting.coefficients[0][up, low][:, None, None] * acting.values[0][inside]
+        present = (rows >= 0) & (columns >= 0) & ((rows >= columns) | (acting.twice > 1))
+        places = np.maximum(rows, columns) * size + np.minimum(rows, columns)
+        yield WeightedElements(places[present], factors[present], acting.unit.parameters)

@@ -151,7 +151,6 @@ def _states_of_group(blocks: list[SpinBlock], frame: Frame, levels: int) -> Grou
     starts, numbers = np.array([block.start for block in blocks], dtype=np.int32), np.arange(max(sizes), dtype=np.int32)
     rows = np.where(numbers < sizes[:, None], starts[:, None] + numbers, np.int32(levels))
     group = blocks[0].group
-    assert group is not None
     return GroupStates(group, blocks, {block.twice_row(frame): place for place, block in enumerate(blocks)}, rows)
 
 

@@ -41,9 +41,7 @@ def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) 
         for i, energies, vectors, labels, mixing in _named(states, [members[i] for i in states.numbers]):
             f, parts, _, _, allowed = members[i]
             results = energies, vectors, labels, mixing
-            out[i] = SpinBlock(
-                f, patterns[f], parts, *results, plan.shared, starts[i], allowed, states.groups.get(i)
-            )  # fmt: skip
+            out[i] = SpinBlock(f, patterns[f], parts, *results, plan.shared, states.groups[i], starts[i], allowed)
     return out
 
 

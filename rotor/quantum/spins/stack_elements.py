@@ -11,7 +11,6 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.spins.operators import (
-    AxialState,
     Cosines,
     CosinesWithN,
     Rotor,
@@ -56,10 +55,7 @@ class Pairs(NamedTuple):
 
 def power_matrices(section: Section, units: Sequence[tuple[int, int]]) -> Floats:
     """½[Nz^2q, N₊^2n + N₋^2n]₊ over the functions of a section: (blocks, units, functions, functions)."""
-    bases = [part.basis for part in section.parts]
-    if isinstance(section.basis, AxialState):  # operators that change K do not contribute
-        k = np.array([basis.axial_k for basis in bases])
-        return np.stack([np.where(n == 0, k ** (2.0 * q), 0.0) for q, n in units], axis=1)[:, :, None, None]
+    bases = [part.basis for part in section.parts if isinstance(part.basis, WangBlock)]
     matrices = np.zeros((len(bases), len(units), section.basis.size, section.basis.size))
     for d, diagonal in enumerate(unit_diagonals(bases, [basis.size for basis in bases], units) if units else ()):
         places = np.arange(max(diagonal.shape[1] - d, 0))

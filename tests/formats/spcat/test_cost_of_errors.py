@@ -90,6 +90,7 @@ def test_an_axial_top_with_spins_is_solved_in_whole_arrays():
         "phase_with_spins",
         "ch3cn_quad",
         "h2coh",
+        "weights_of_states_i_tot",
     ],
 )
 def test_derivatives_are_differences(name: str):

@@ -72,7 +72,7 @@ def _group_labels(group: Group, form: Format, highest: int) -> tuple[Ints, Float
         total = sum(group.spins)
         if group.states[0].equivalent == 3:
             raise ValueError("no line is suggested with a total spin of three nuclei; leave --suggest out")
-        levels, _ = unmixed_levels(group.top, (group.effect,), list(range(total % 2, 2 * highest + total + 1, 2)))
+        levels = unmixed_levels(group.top, (group.effect,), list(range(total % 2, 2 * highest + total + 1, 2)))
     else:
         levels = levels_in_blocks(group, range(0, 2 * highest + 1, 2))
     tables = [

@@ -44,6 +44,6 @@ def _functions_as_states(block: SolvedBlock | SpinBlock, representation: str) ->
     vectors = (block.vectors @ functions.amplitudes.T)[:, order]
     names = functions.names[order]
     if isinstance(block, SpinBlock):
-        return replace(block, energies_mhz=diagonal[order], vectors=vectors, labels=names, group=None), names
+        return replace(block, energies_mhz=diagonal[order], vectors=vectors, labels=names), names
     labels = None if block.labels is None else names
     return replace(block, energies_mhz=diagonal[order], vectors=vectors, labels=labels), names
