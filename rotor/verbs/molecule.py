@@ -31,13 +31,25 @@ _GEOMETRY = {
 }  # inputs that need a geometry, and the error without one
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Source(Text):
+    """What names a molecule: a text or a path; in Python also a top, a molecule, ase.Atoms or an RDKit molecule."""
+
+    def read(self, raw: Any) -> Any:
+        """The text, or the object."""
+        if isinstance(raw, os.PathLike):
+            return os.fspath(raw)
+        plain = raw is None or isinstance(raw, str | bytes | int | float | complex | list | tuple | dict | set)
+        return super().read(raw) if plain else raw
+
+
 @dataclass(frozen=True)
 class MoleculeInput:
     """Inputs of a molecule; either `source` or `constants` is given."""
 
     source: Any = declared(
         None,
-        Text(),
+        Source(),
         "File, name, SMILES:... or - for standard input",
         "molecule.source",
         option="SOURCE",

@@ -206,3 +206,36 @@ def test_an_import_from_inside_is_seen(tmp_path):
 def root():
 
     return PROJECT
+
+
+def _sources(folder):
+    """The same geometry as nuclei, ase.Atoms, an RDKit molecule, a path and a text."""
+    from ase import Atoms
+    from rdkit import Chem
+
+    molecule = rotor.read("CO").molecule
+    atoms = Atoms(molecule.symbols, molecule.positions_angstrom)
+    path = folder / "co.xyz"
+    atoms.write(path)
+    drawn, places = Chem.MolFromSmiles("[C-]#[O+]"), Chem.Conformer(2)
+    for number, place in enumerate(molecule.positions_angstrom.tolist()):
+        places.SetAtomPosition(number, place)
+    drawn.AddConformer(places)
+    return [molecule, atoms, drawn, path, str(path)]
+
+
+def test_a_verb_takes_every_object_that_names_a_molecule(tmp_path):
+    """README: a name, a file, SMILES, ase.Atoms, an RDKit molecule; and a top or its nuclei. The same geometry gives the same levels."""
+    energies = [rotor.levels(source, jmax=2).table.energy_mhz for source in _sources(tmp_path)]
+    for other in energies[1:]:
+        np.testing.assert_allclose(other, energies[0], rtol=1e-6)  # an .xyz file has 15 decimals or fewer
+    top = rotor.read("CO")
+    np.testing.assert_array_equal(
+        rotor.levels(top, jmax=2).table.energy_mhz, rotor.levels("CO", jmax=2).table.energy_mhz
+    )
+
+
+@pytest.mark.parametrize("source", [3, ["CO"], {"source": "CO"}, b"CO"])
+def test_what_is_no_molecule_is_refused(source):
+    with pytest.raises(ValueError, match=r"source: .*: expected a text"):
+        rotor.levels(source, jmax=2)
