@@ -237,6 +237,7 @@ def _distinct_rows(rows: Ints) -> tuple[Ints, Ints]:
     """The distinct rows of an array, sorted, and the index of each original row among them."""
     # Rows of small integers are packed into one integer each: `np.unique` sorts these much faster than rows.
     spans = rows.max(axis=0, initial=0) - rows.min(axis=0, initial=0) + 1
+    # keys of this table would overflow int64: rows are compared as they are
     if not len(rows) or np.prod(spans.astype(float)) > 2.0**62:
         return np.unique(rows, axis=0, return_inverse=True)
     keys = np.ravel_multi_index(tuple((rows - rows.min(axis=0, initial=0)).T), tuple(spans.tolist()))
@@ -275,7 +276,7 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
 
 def appended(first: Assignments, second: Assignments) -> Assignments:
     """The lines of both sets, which have the same quantum numbers; blends stay blends."""
-    shift = int(first.blend.max(initial=-1)) + 1
+    shift = int(first.blend.max(initial=-1)) + 1  # blend numbers of the second list continue those of the first
     fields = ("upper", "lower", "frequency_mhz", "error_mhz", "weight", "wavenumber")
     joined: dict[str, Any] = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in fields}
     return Assignments(

@@ -88,8 +88,10 @@ def _misfit(fit: Fit, line: float) -> ErrorTerm:
     free = fit.degrees_of_freedom
     if not free:
         return ErrorTerm(None, UNCHECKED, LINES)
+    # reduced χ² of normal residuals has a standard deviation of √(2/free)
     excess, scatter = fit.reduced_chi**2 - 1.0, math.sqrt(2.0 / free)
     if excess <= SIGNIFICANT * scatter:
+        # the largest misfit that the scatter of χ² can hide
         hidden = math.sqrt(max(excess, 0.0) + SIGNIFICANT * scatter)
         return ErrorTerm(
             0.0,
@@ -110,8 +112,9 @@ def confidence_text(free: int) -> str:
     """
     from scipy.special import ndtri, stdtrit
 
-    stated = float(ndtri(0.5 + 0.5 * CONFIDENCE))
+    stated = float(ndtri(0.5 + 0.5 * CONFIDENCE))  # two-sided: half of the remaining probability lies on either side
     if not free:
         return f"at a confidence of {CONFIDENCE:g} within {stated:.3g} times this"
+    # Student's t, because the scatter comes from the same residuals
     scatter = float(stdtrit(free, 0.5 + 0.5 * CONFIDENCE))
     return f"at a confidence of {CONFIDENCE:g} within {stated:.3g} times this, {scatter:.3g} times the error from the scatter"

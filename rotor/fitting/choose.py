@@ -78,6 +78,7 @@ class Trial:
         """|constant|/standard error in the larger model; nan where it is not in the model tried."""
         if not self.added:
             return float("nan")
+        # a trial of a pair is named "first with second"
         i = self.fit.parameters.names.index(self.name.partition(" with ")[0])
         return float(abs(self.fit.values[i]) / self.fit.errors[i])
 
@@ -135,7 +136,7 @@ def _without(fit: Fit, name: str, options: FitOptions | None) -> Trial | None:
     constants = dict(zip(rest.constant_names, rest.to_constants(rest.start).tolist(), strict=True))
     try:
         trial_fit = fit_lines(fit.lines, fit.named.replace(**constants), rest, options)
-    except ValueError:
+    except ValueError:  # constants that the model refuses are no candidate
         return None
     ratio, chance = f_test(trial_fit, fit)
     return _trial(name, False, fit, trial_fit, ratio, chance)
@@ -240,6 +241,7 @@ def _steps(
         needless = [trial for trial in try_constants(fit, _weakest(fit, spare), options) if trial.better]
         if not needless:
             return
+        # the highest order first: its operators contain those of lower order
         least = min(needless, key=lambda trial: (-orders[trial.name], trial.f_ratio))
         fit = least.fit
         yield least
@@ -281,6 +283,7 @@ def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) 
     )  # a-priori values do not depend on other constants
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0, size, 1.0)
+    # unit columns, so that no unit of a constant decides the rank
     basis = np.linalg.qr(
         derivatives / np.where(np.linalg.norm(derivatives, axis=0) > 0, np.linalg.norm(derivatives, axis=0), 1.0)
     )[0]
@@ -292,6 +295,7 @@ def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) 
     alone = np.where(seen, along**2 / np.where(seen, squared_norms, 1.0), 0.0)
     determinant = np.outer(squared_norms, squared_norms) - products**2
     both = np.outer(along**2, squared_norms) + np.outer(squared_norms, along**2) - 2 * np.outer(along, along) * products
+    # the determinant of nearly parallel columns is round-off
     apart = determinant > 1e-6 * np.outer(squared_norms, squared_norms)
     apart &= np.outer(seen, seen)
     return alone, np.where(apart, both / np.where(apart, determinant, 1.0), 0.0)
@@ -305,6 +309,7 @@ def _weakest(fit: Fit, names: Sequence[str]) -> list[str]:
 
 def _patient(options: FitOptions | None) -> FitOptions:
     """Options of intermediate models: they may fit poorly, and an interrupt ends the whole choice."""
+    # a trial is judged by its F-ratio, not by its rms
     return replace(options or FitOptions(), poor_rms=1e12, pass_interrupt=True)
 
 
@@ -314,7 +319,7 @@ def _pair(fit: Fit, first: str, other: str, options: FitOptions) -> Trial | None
     try:
         free = fit.parameters.moved(fit.values).with_free(constants, [first, other])
         both = fit_lines(fit.lines, constants, free, options)
-    except ValueError:
+    except ValueError:  # constants that the model refuses are no candidate
         return None
     ratio, chance = f_test(fit, both)
     return _trial(f"{first} with {other}", True, fit, both, ratio, chance)
@@ -382,7 +387,7 @@ def suggest_lines(
     covariance = fit.statistics.covariance
     spread = np.einsum("ij,jk,ik->i", rows, covariance, rows)
     gained = (rows @ covariance[:, column]) ** 2 / (error_mhz**2 + spread)
-    ratio = np.sqrt(np.maximum(1 - gained / covariance[column, column], 0.0))
+    ratio = np.sqrt(np.maximum(1 - gained / covariance[column, column], 0.0))  # round-off may leave a negative rest
     frequency = energies[up] - energies[low]
     return [
         Suggestion(

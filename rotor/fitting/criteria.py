@@ -19,7 +19,7 @@ def chi_squared(fit: Fit) -> float:
 def aicc(fit: Fit) -> float:
     """Akaike's criterion, corrected for small samples; infinite if the lines are too few."""
     n, k = len(fit.residuals), fit.statistics.rank + 1  # the scale of the errors is a parameter too
-    if n - k - 1 <= 0:
+    if n - k - 1 <= 0:  # the correction for small samples diverges
         return math.inf
     scatter = max(chi_squared(fit) / n, ROUNDING**2)  # an exact fit has no scatter
     return n * math.log(scatter) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
@@ -28,7 +28,7 @@ def aicc(fit: Fit) -> float:
 def cross_validated_rms(fit: Fit) -> float:
     """Weighted rms of the leave-one-out residuals, to first order; infinite if a single line determines a constant."""
     left = 1.0 - fit.statistics.leverages[: len(fit.groups)]
-    if (left < 1e-9).any():
+    if (left < 1e-9).any():  # a line that alone determines a parameter cannot be predicted by the others
         return math.inf
     parts = fit.residuals[: len(fit.groups)] / left
     return float(np.sqrt(parts @ parts / len(parts)))

@@ -328,6 +328,7 @@ def _constants(
 
 
 def _line_errors(search: Search) -> Floats:
+    # without any error nothing weights the line; it is shown as 0
     without = (search.lines.error_mhz == 0) & (search.options.default_error_mhz is None)
     return np.where(without, 0.0, search.sigma)
 
@@ -336,8 +337,10 @@ def _prediction_errors(jacobian: Floats, statistics: Regression) -> Floats:
     """√(d C dᵀ) for rows d (lines, n); infinite if a line depends on an undetermined parameter."""
     open_ = ~np.isfinite(statistics.errors)
     closed = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)
+    # round-off may make a variance of 0 negative
     out = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", jacobian, closed, jacobian, optimize=True), 0.0))
     touched = (np.abs(jacobian[:, open_]) > 0).any(axis=1) if open_.any() else np.zeros(len(jacobian), dtype=bool)
+    # an undetermined parameter leaves the line unpredictable
     return np.where(touched & bool(len(statistics.undetermined)), np.inf, out)
 
 

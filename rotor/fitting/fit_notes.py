@@ -33,7 +33,8 @@ def unlikely_lines(lines: Assignments) -> list[str]:
         return []
     is_transition = ~lines.from_zero
     change = np.abs(lines.upper - lines.lower)
-    far = is_transition & (change[:, 0] > 1)
+    far = is_transition & (change[:, 0] > 1)  # a dipole changes J by at most 1
+    # every component of a dipole changes the parity of Ka or of Kc
     even = (
         is_transition & (change[:, 1:] % 2 == 0).all(axis=1) if lines.names == ("j", "ka", "kc") else np.zeros_like(far)
     )

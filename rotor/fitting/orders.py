@@ -25,7 +25,7 @@ def j_order(name: str, constants: ConstantSet) -> int:
             f"{name!r} is not a constant of the kind {constants.kind}; expected one such as {', '.join(list(terms_by_name)[:3])}"
         )
     terms = {spelled: 1.0} if spelled else terms_by_name[name]
-    return max(2 * (p + q + n) for p, q, n in terms)
+    return max(2 * (p + q + n) for p, q, n in terms)  # X^p Jz^2q J±^2n: each of p, q, n counts two powers of J
 
 
 def _named_order(name: str, constants: TopConstants) -> int:

@@ -69,6 +69,7 @@ class Parameters:
     @cached_property
     def _constants(self) -> Ints | None:
         """Indices of the parameters among the constants; None if a parameter is not a constant, or a constant is tied to several."""
+        # a constant without a factor takes its parameter directly, which saves a product of matrices
         rows = self.matrix.argmax(axis=0) if self.matrix.size else np.zeros(0, dtype=np.int64)
         plain = np.zeros(self.matrix.shape)
         plain[rows, np.arange(len(rows))] = 1.0
@@ -87,6 +88,7 @@ class Parameters:
     def moved(self, start: Floats) -> Parameters:
         """A copy with other start values; a-priori values do not change."""
         start = np.asarray(start, dtype=np.float64)
+        # a-priori values pull to what was expected, others count from the start
         centre = np.where(np.isfinite(self.prior), self.expected, start)
         return replace(self, start=start, centre=centre)
 
@@ -106,6 +108,7 @@ class Parameters:
         return Parameters(
             names=(*self.names, *full_names),
             start=np.append(self.start, [constants[name] for name in full_names]),
+            # an infinite a-priori error: no a-priori value
             prior=np.append(self.prior, np.full(len(full_names), np.inf)),
             centre=np.append(self.expected, [constants[name] for name in full_names]),
             constant_names=names,
@@ -230,4 +233,4 @@ def _priors(chosen: Sequence[str], priors_mhz: Mapping[str, float], constants: C
     for name, value in errors.items():
         if not (np.isfinite(value) and value > 0):
             raise ValueError(f"priors_mhz: a-priori error of {name}: {value!r} MHz; expected a standard error above 0")
-    return np.array([errors.get(name, np.inf) for name in chosen])
+    return np.array([errors.get(name, np.inf) for name in chosen])  # an infinite a-priori error: no a-priori value

@@ -59,7 +59,7 @@ def suitable_unit(value: float, error: float | None) -> tuple[str, float]:
     >>> suitable_unit(0.0013014, 3.7e-9), suitable_unit(0.0, 2e-6)
     (('kHz', 0.001), ('Hz', 1e-06))
     """
-    size = max(abs(value), 0.1 * (error or 0.0))
+    size = max(abs(value), 0.1 * (error or 0.0))  # a constant of 0 takes the unit of its error
     return next((unit for unit in _UNITS if size >= 0.1 * unit[1]), _UNITS[-1])
 
 
@@ -152,6 +152,7 @@ def _rows(fit: Fit) -> list[Row]:
         numbers = zip(fit.parameters.names, fit.values.tolist(), fit.errors.tolist(), strict=True)
         return [Row(name, value, error) for name, value, error in numbers]
     tied, moves = _tied(fit), np.atleast_1d(fit.parameters.matrix.any(axis=1))
+    # moved but undetermined: an infinite error
     lost = {name: math.inf for name, moved in zip(fit.parameters.constant_names, moves.tolist(), strict=True) if moved}
     errors = {**lost, **fit.constants.uncertainties}
     return [Row(name, value, errors.get(name), tied.get(name, "")) for name, value in fit.constants.values.items()]
@@ -195,6 +196,7 @@ def _cells(row: Row, factor: float, digits: int, form: str, with_states: bool) -
 
 
 def _facts(fit: Fit, scaled: bool) -> list[tuple[str, str]]:
+    # the first quantum number of a label is J or N
     j = max(int(fit.lines.upper[fit.used, 0].max(initial=0)), int(fit.lines.lower[fit.used, 0].max(initial=0)))
     form = "SPFIT's parameters" if fit.constants is None else fit.constants.kind
     if fit.constants is not None and fit.constants.reduction:

@@ -152,7 +152,7 @@ def _with_priors(fit: Fit) -> list[str]:
     if not priors:
         return []
     lines = len(fit.residuals) - priors
-    rms = math.sqrt(float(fit.residuals @ fit.residuals) / max(lines, 1))
+    rms = math.sqrt(float(fit.residuals @ fit.residuals) / max(lines, 1))  # a fit may have a-priori values alone
     counts = f"{counted(priors, 'a-priori value')}, counted in the degrees of freedom"
     return [f"{counts}; with their part in chi2 the weighted rms is {rms:.5f} (RMS ERROR of SPFIT)"]
 
@@ -276,7 +276,7 @@ def _lines(fit: Fit) -> list[str]:
     difference, error = fit.difference_mhz, fit.line_errors_mhz
     numbers = (lines.frequency_mhz, fit.calculated_mhz, difference, error, fit.calculated_errors_mhz)
     columns = [(column / unit).tolist() for column in numbers]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"):  # lines without an error have no ratio
         ratios = np.where(error > 0, difference / error, np.nan).tolist()
     marks = np.where(lines.wavenumber, "c", " ").tolist()
     for i, (seen, calculated, off, stated, estimated) in enumerate(zip(*columns, strict=True)):
@@ -289,7 +289,7 @@ def _lines(fit: Fit) -> list[str]:
             text += f" blend, mean {fit.blended_mhz[i] / unit[i]:.5f}, weight {lines.weight[i]:g}"
         if i in fit.left_out:
             text += f" DOES NOT COUNT: {fit.left_out[i]}"
-        elif leverages.get(i, 0.0) > 0.9:
+        elif leverages.get(i, 0.0) > 0.9:  # such a line determines a parameter nearly alone
             text += f" leverage {leverages[i]:.2f}"
         out.append(text.rstrip())
     return out
@@ -330,5 +330,6 @@ def _correlations(fit: Fit) -> list[str]:
     for i, row in enumerate(matrix):
         numbers = " ".join(f"{value:9.6f}" if np.isfinite(value) else "        -" for value in row[: i + 1])
         out.append(f"{i + 1:5d}  {names[i]:<16}{numbers}")
+    # below the diagonal each pair stands once
     strong = np.argwhere(np.tril(np.abs(np.nan_to_num(matrix)), -1) > _CORRELATED)
     return out + [f"strong: {names[i]} and {names[j]} {matrix[i, j]:+.5f}" for i, j in strong.tolist()]

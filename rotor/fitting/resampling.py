@@ -76,7 +76,7 @@ def bootstrap(
         return fit_lines(lines, fit.constants, at, lenient, model=model)
 
     try:
-        for _ in range(10 * samples):
+        for _ in range(10 * samples):  # samples of lower rank are drawn again, at most ten times as many
             fit_of_sample = sample()
             if fit_of_sample.statistics.rank != fit.statistics.rank:
                 fewer += 1
@@ -87,7 +87,7 @@ def bootstrap(
             if len(out) == samples:
                 break
     except KeyboardInterrupt:
-        if len(out) < 2:
+        if len(out) < 2:  # a standard deviation needs two samples
             raise
         samples = len(out)
     if len(out) < samples:
@@ -96,4 +96,5 @@ def bootstrap(
             "not converge); too few lines for a bootstrap, or a fit far from linear"
         )
     values = np.array(out)
+    # ddof=1: the mean comes from the same samples
     return values, np.where(np.isfinite(fit.errors), values.std(axis=0, ddof=1), np.inf)

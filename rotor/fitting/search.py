@@ -67,12 +67,13 @@ def robust(residuals: Floats, loss: str) -> tuple[Floats, Floats]:
     r, size = residuals, np.abs(residuals)
     if loss == "huber":
         far = size > _HUBER
+        # the square of the root is the loss, so that least squares minimizes it
         root = np.sqrt(np.where(far, 2 * _HUBER * size - _HUBER**2, r**2))
         slope = np.where(far, _HUBER / np.where(far, root, 1.0), 1.0)
         return np.sign(r) * root, slope
     if loss == "cauchy":
         root = _CAUCHY * np.sqrt(np.log1p((r / _CAUCHY) ** 2))
-        near = size < 1e-6
+        near = size < 1e-6  # the slope tends to 1 at r = 0, where its formula is 0/0
         slope = np.where(near, 1.0, size / (1 + (r / _CAUCHY) ** 2) / np.where(near, 1.0, root))
         return np.sign(r) * root, slope
     return residuals, np.ones_like(residuals)
@@ -100,14 +101,16 @@ class Blends(NamedTuple):
     def from_lines(cls, lines: Assignments, used: NDArray[np.bool_]) -> Blends:
         """The blends among the lines that are used; without weights the lines of a blend count equally."""
         rows = np.flatnonzero(used)
+        # stable: lines of a blend stay in the order of the list
         order = rows[np.argsort(lines.blend[rows], kind="stable")]
         blend = lines.blend[order]
         starts = np.flatnonzero(np.concatenate(([True], np.diff(blend) != 0))) if len(order) else np.zeros(0, np.int64)
         weights = np.where(lines.weight[order] > 0, lines.weight[order], 0.0)
-        totals = np.add.reduceat(weights, starts) if len(starts) else np.zeros(0)
+        totals = np.add.reduceat(weights, starts) if len(starts) else np.zeros(0)  # reduceat refuses an empty list
         counts = np.diff(np.append(starts, len(order)))
         each = np.repeat(np.arange(len(starts)), counts)
         equal = 1.0 / counts[each] if len(order) else weights
+        # a blend without weights is the plain mean
         shares = np.where(totals[each] > 0, weights / np.where(totals[each] > 0, totals[each], 1.0), equal)
         blended = np.flatnonzero(counts > 1)
         bounds = np.concatenate([[0], np.cumsum(counts[blended])[:-1]]).astype(np.int64)
@@ -271,4 +274,5 @@ def line_errors(lines: Assignments, options: FitOptions) -> tuple[dict[int, str]
     if options.default_error_mhz is not None:
         return excluded, np.where(zero, options.default_error_mhz, lines.error_mhz)
     left_out = {int(i): "its error is 0" for i in np.flatnonzero(zero)} | excluded
+    # any number above 0 will do: lines without an error do not count
     return left_out, np.where(zero, 1.0, lines.error_mhz)

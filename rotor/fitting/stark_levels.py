@@ -107,6 +107,7 @@ class StarkLevels(LevelModel):
                 raise ValueError(
                     "lines in a field of a symmetric top whose dipole is not along its axis are not fitted"
                 )
+            # the energy depends on the sign of K M alone: M is made positive
             turned = (m < 0) | ((m == 0) & (columns["k"] < 0))
             columns["k"] = np.where(turned, -columns["k"], columns["k"])
         m = np.abs(m)
@@ -158,6 +159,7 @@ def _request(constants: TopConstants, labels: Ints) -> MapRequest:
 def _expectation(block: LinearBlock, states: Floats) -> Floats:
     """Expectation values Σ O_i(r, c) v_r* v_c (states, parameters) of a block's operators in states (states, functions)."""
     density = (states[:, block.rows].conj() * states[:, block.columns]).real
+    # only one triangle is stored: elements off the diagonal count twice
     density = np.where(block.rows != block.columns, 2.0, 1.0) * density
     return np.asarray(density @ block.factors @ block.mix)
 

@@ -134,6 +134,7 @@ def _makes_no_way(options: FitOptions) -> Callable[[Sequence[Iteration]], bool]:
             return False
         now = min(iteration.rms_after for iteration in taken)
         lately = min(iteration.rms_after for iteration in taken[:-_LATELY])
+        # no way: twice the best rms of the last iterations ago is not reached
         return now > options.poor_rms and (now > _WAY * taken[0].rms_before or now > lately / 2)
 
     return hopeless
@@ -169,6 +170,7 @@ def _with_a_sign_turned(search: Search, first: Minimum, progress: Progress | Non
         )
 
     start, reached = search.parameters.start, first.parameters
+    # a parameter that begins at 0 has no relative change
     moved = np.abs(reached - start) / np.maximum(np.abs(start), _AT_ZERO_MHZ)
     for place in np.argsort(-moved, kind="stable")[:_TURNED].tolist():
         turned = reached.copy()
@@ -242,6 +244,7 @@ def _with_most_lines(search: Search, first: Minimum, progress: Progress | None) 
         last = _continued(last, _minimised(part, last.parameters, progress, left))
         if last.status == INTERRUPTED:  # `first` remains the best point with all lines
             return _better(first, last, replaced=False)
+        # the rms of this part has not halved
         if last.residuals @ last.residuals > before @ before / 4 and last.rms > search.options.poor_rms:
             return replace(first, iterations=last.iterations)
     left = max(limit - len(last.iterations), 0)
@@ -267,10 +270,11 @@ def _by_stages(search: Search, first: Minimum, progress: Progress | None, rough:
     """
     j = np.maximum(search.lines.upper[:, 0], search.lines.lower[:, 0])
     last, limit = replace(first, parameters=search.parameters.start), search.options.most_iterations
-    coarse = replace(search.options, tolerance=rough)
+    coarse = replace(search.options, tolerance=rough)  # a stage only prepares the next, so that it ends early
     try:
         for share in _STAGES:
-            cut = np.quantile(j[search.used], share)
+            cut = np.quantile(j[search.used], share)  # lines of low J first: they depend little on distortion
+            # what low J does not determine stays near its start
             soft = np.minimum(search.parameters.prior, np.maximum(np.abs(search.parameters.start), _AT_ZERO_MHZ))
             stage = replace(
                 search, options=coarse, used=search.used & (j <= cut), parameters=replace(search.parameters, prior=soft)

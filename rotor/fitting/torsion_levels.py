@@ -233,6 +233,7 @@ def _rows(table: Ints, keys: Ints) -> Ints:
     spans = np.maximum(table.max(axis=0), keys.max(axis=0)) + 1
     codes, needed = (np.ravel_multi_index(tuple(array.T), tuple(spans.tolist())) for array in (table, keys))
     order = np.argsort(codes)
+    # a key beyond the last meets the last row, and differs from it
     place = np.minimum(np.searchsorted(codes[order], needed), len(codes) - 1)
     rows = order[place]
     return np.asarray(np.where(codes[rows] == needed, rows, -1))

@@ -49,6 +49,7 @@ def _bright_top(top: Top, lines: Assignments, dipole_abc_debye: tuple[float, flo
         pairs = {
             (max(a, b), min(a, b)) for a, b in zip(lines.upper[:, v].tolist(), lines.lower[:, v].tolist(), strict=True)
         }
+        # nothing is known of these components: all are allowed
         between = {pair: (1.0, 1.0, 1.0) for pair in pairs if pair[0] != pair[1]}
         states = replace(states, dipoles=between)
     return replace(top, dipole_abc_debye=dipole_abc_debye, states=states, symmetry_checked=False)
@@ -59,6 +60,7 @@ def _components(fit: Fit) -> tuple[float, float, float]:
     kind = fit.named.kind
     if kind != "asymmetric":
         return (0.0, 0.0, 1.0) if kind == "oblate" else (1.0, 0.0, 0.0)
+    # parities: (0, 1) is an a-type, (1, 1) a b-type, (1, 0) a c-type line
     change = (fit.lines.upper[:, 1:3] - fit.lines.lower[:, 1:3]) % 2
     kinds = {(0, 1): 0, (1, 1): 1, (1, 0): 2}
     axes = {kinds.get((int(ka), int(kc)), 0) for ka, kc in change}

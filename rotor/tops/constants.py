@@ -27,6 +27,7 @@ from rotor.tops.operators import Powers, published_name, spelled_powers, spelled
 from rotor.tops.uncertain_numbers import parse_named, write_number
 from rotor.units import parse_quantity
 
+# letters that look alike: U+0394 and U+2206, φ and ϕ
 _GREEK = {"Δ": "Delta", "∆": "Delta", "δ": "delta", "Φ": "Phi", "φ": "phi", "ϕ": "phi"}
 _WITHOUT_K = {"DJ": "D", "HJ": "H", "LJ": "L"}  # names for linear and spherical tops
 LEAST_MHZ, MOST_MHZ = 1e-12, 1e12  # far below any molecule, far above H2 (1.8e6 MHz)
@@ -160,7 +161,7 @@ class Constants:
         """
         b = self.values["B"]
         if self.kind == "linear":
-            return math.inf, b, b
+            return math.inf, b, b  # no moment about the axis of a linear molecule
         return self.values.get("A", b), b, self.values.get("C", b)
 
     @property

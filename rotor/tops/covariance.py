@@ -91,7 +91,7 @@ class Covariance:
     def correlations(self) -> Floats:
         """Correlation coefficients (n, n); 0 for an exact constant."""
         sigma = np.sqrt(np.diag(self.matrix_mhz2))
-        safe = np.where(sigma > 0, sigma, 1.0)
+        safe = np.where(sigma > 0, sigma, 1.0)  # a constant without a variance has a row of zeros
         matrix = self.matrix_mhz2 / np.outer(safe, safe)
         np.fill_diagonal(matrix, 1.0)
         return np.asarray(matrix)
@@ -102,6 +102,7 @@ class Covariance:
         sigma = np.sqrt(np.diag(self.matrix_mhz2))
         safe = np.where(sigma > 0, sigma, 1.0)
         values, vectors = np.linalg.eigh(self.matrix_mhz2 / np.outer(safe, safe))
+        # eigenvalues below 0 are round-off
         return np.asarray(sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
@@ -116,6 +117,7 @@ def _refuse_impossible(names: Sequence[str], matrix: Floats) -> None:
     if not np.isfinite(matrix).all() or (variances < 0).any():
         raise ValueError("covariance: expected finite numbers, and variances of 0 or more")
     sigma = np.sqrt(variances)
+    # in units of the standard errors, so that the sizes of the constants do not matter
     scale = np.outer(np.where(sigma > 0, sigma, 1.0), np.where(sigma > 0, sigma, 1.0))
     if not np.allclose(matrix / scale, matrix.T / scale, rtol=0, atol=1e-9):
         raise ValueError("covariance: a covariance is symmetric, this matrix is not")

@@ -175,6 +175,7 @@ def distortion_constants(field: ForceField, *, reduction: str = "S", representat
     if rigid.kind == "linear":
         return rigid.replace(D=-float(tensor[1, 1] + tensor[2, 2]) / 2)
     if rigid.kind == "spherical":
+        # means over directions: n_i⁴ 1/5, n_i² n_j² 1/15
         return rigid.replace(D=-float(np.trace(tensor) / 5 + 2 * (tensor.sum() - np.trace(tensor)) / 30))
     if rigid.kind in ("prolate", "oblate"):
         quartic = cylindrical(tensor, (1, 2, 0) if rigid.kind == "prolate" else (0, 1, 2))

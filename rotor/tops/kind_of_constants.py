@@ -26,7 +26,7 @@ def ray_kappa(a: float, b: float, c: float) -> float:
     0.0
     """
     if math.isinf(a):
-        return -1.0
+        return -1.0  # the prolate limit, as C/A tends to 0
     if not a >= b >= c or a == c:
         raise ValueError(f"Ray's κ of A = {a!r}, B = {b!r}, C = {c!r}: expected A >= B >= C and A > C")
     return (2 * b - a - c) / (a - c)

@@ -138,7 +138,7 @@ def spelled_powers(name: str) -> Powers | None:
     if not match:
         return None
     exponents = [int(match[part] or 0) for part in "pqn"]
-    if any(exponent % 2 for exponent in exponents):
+    if any(exponent % 2 for exponent in exponents):  # terms are products of J², Jz² and J±²: only even powers occur
         return None
     p, q, n = (exponent // 2 for exponent in exponents)
     return p, q, n

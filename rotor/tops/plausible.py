@@ -49,13 +49,14 @@ def implausible(top: Top) -> tuple[str, ...]:
 def _far_apart(molecule: Molecule) -> list[str]:
     """A note if no two atoms are close enough for a bond, but all would be if the coordinates were in bohr."""
     distances = np.linalg.norm(molecule.positions_angstrom[:, None] - molecule.positions_angstrom, axis=2)
-    np.fill_diagonal(distances, np.inf)
+    np.fill_diagonal(distances, np.inf)  # an atom has no bond with itself
     if distances.min() < SHORTEST_BOND_TWICE:
         return []
     from ase.data import atomic_numbers, covalent_radii
 
     radii = covalent_radii[[atomic_numbers[symbol] for symbol in molecule.symbols]]
     longest = BOND_UP_TO * (radii[:, None] + radii)
+    # with coordinates in bohr every atom comes within the length of a bond
     if (distances < longest).any() or not (units.BOHR_RADIUS_ANGSTROM * distances < longest).any(axis=1).all():
         return []
     return [f"no two atoms are close enough for a bond, the closest are {distances.min():.3g} Å apart: coordinates are read in ångström; "

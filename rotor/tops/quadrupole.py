@@ -40,6 +40,7 @@ def computed_couplings(molecule: Molecule, frame: PrincipalFrame) -> SpinConstan
     for atom, chi in sorted(with_spin.items()):
         nucleus = molecule.nuclei[atom - 1]
         equal_nuclei = [other for other in sorted(with_spin) if molecule.nuclei[other - 1] == nucleus]
+        # numbers distinguish equal isotopes
         name = nucleus.label + (f"_{equal_nuclei.index(atom) + 1}" if len(equal_nuclei) > 1 else "")
         twice[name], atoms[name] = round(2 * nucleus.spin), atom
         values |= {f"{symbol}({name})": value for symbol, value in _named(frame.axes @ chi @ frame.axes.T).items()}

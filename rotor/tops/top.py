@@ -397,6 +397,7 @@ def _electrons(molecule: Molecule, weights: SpinWeights) -> str:
         return ""
     if molecule.electronic == "odd":
         return ", electrons in a state that half turns change in sign"
+    # a neutral atom has as many electrons as its nucleus has protons
     electrons = sum(nucleus.element_number for nucleus in molecule.nuclei) - molecule.charge
     odd = "; their number is odd, so that the state may differ" if electrons % 2 else ""
     return f", electrons assumed to form a closed shell{odd}"

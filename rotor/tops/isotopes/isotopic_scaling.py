@@ -51,6 +51,7 @@ def matched_axes(parent: Top, turned: Top) -> tuple[str, float]:
     for axes, other in itertools.product(map(list, _alike(turned.kind)), map(list, _alike(parent.kind))):
         block = np.ix_(axes, other)
         inside[block] = squares[block].sum() / min(len(axes), len(other))
+        # equal moments: only the overlap of the whole plane or space has a meaning
         squares[block] = squares[block].mean()
     ways = itertools.permutations(range(3))  # the identity comes first, so that it wins among equal overlaps
     best = max(ways, key=lambda way: round(sum(squares[i, j] for i, j in enumerate(way)), 9))
@@ -156,6 +157,7 @@ def _ratios(rigid: Top, turned: Top, axes: str) -> Floats:
     before = np.array(rigid.constants.rigid)[["abc".index(letter) for letter in axes]]
     after = np.array(turned.constants.rigid)
     finite = np.isfinite(before)
+    # a linear top has no A to scale
     return np.where(finite, np.where(finite, after, 1.0) / np.where(finite, before, 1.0), 1.0)
 
 
@@ -168,7 +170,7 @@ def _ratio_text(ratios: Floats, axes: str) -> str:
 
 def _in_order(values: Floats, turned: Top) -> tuple[Floats, Top]:
     """Constants in falling order, with frame and tensors in the same order; near a symmetric top, scaling may exchange axes."""
-    order = np.argsort(-values, kind="stable")
+    order = np.argsort(-values, kind="stable")  # stable: equal constants keep their axes
     if turned.kind != "asymmetric" or (order == np.arange(3)).all():
         return values, turned
     assert turned.frame is not None  # a top of a geometry has one

@@ -150,6 +150,7 @@ def chi_tensor(chi: Mapping[str, float]) -> Floats:
             tensor[i, i] += value / 2
             tensor[j, j] -= value / 2
         elif i == k:
+            # axial about one axis, without a trace: (3 n nᵀ - 1)/2
             tensor += value * (1.5 * np.outer(np.eye(3)[i], np.eye(3)[i]) - 0.5 * np.eye(3))
         else:
             tensor[i, k] = tensor[k, i] = value
@@ -199,6 +200,7 @@ def _turned_rotation(constants: Mapping[str, float], change: _Change, g_ratio: f
             tensor[k, i] += -value if "-" in name else value
     electrons = change.rotation @ (tensor * change.moments) @ change.rotation.T
     with np.errstate(divide="ignore", invalid="ignore"):
+        # a linear top does not rotate about its axis
         new = np.where(change.new_moments > 0, electrons / change.new_moments, 0.0) * g_ratio
     new = without_rounding(new)
     mean, half = (new + new.T) / 2, (new - new.T) / 2

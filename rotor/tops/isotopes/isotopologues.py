@@ -99,6 +99,7 @@ def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopol
     ancestor = _Ancestor(parent)
     molecule, permutations = ancestor.molecule, ancestor.permutations
     placements: dict[tuple[int, ...], tuple[float, int]] = {}
+    # equivalent placements add up, at most as many as there are permutations
     for numbers, abundance in _placements(molecule, min_abundance / len(permutations)):
         alike = {tuple(image) for image in _images(numbers, permutations)}
         placements[max(alike, key=lambda image: _earliest(molecule, image))] = (abundance * len(alike), len(alike))
@@ -141,6 +142,7 @@ def single_substitutions(parent: Top, element: str, name: str) -> tuple[Isotopol
     atoms = [atom for atom, symbol in enumerate(molecule.symbols) if symbol == element]
     if not atoms:
         raise ValueError(f"element {element!r} to substitute is not in {molecule.formula}")
+    # the first atom of each set of equivalent ones
     first = sorted({min(int(p[atom]) for p in permutations) for atom in atoms})
     return tuple(ancestor.isotopologue(molecule.with_isotopes({atom + 1: name}).mass_numbers) for atom in first)
 
@@ -278,6 +280,7 @@ def _doubts(parent: Top, overlap: float, angle: float) -> list[str]:
     if overlap < _DOUBTFUL_OVERLAP:
         notes.append(f"the axes are turned by {angle:.0f}°: their assignment to the parent's axes is doubtful")
     dipole = parent.dipole_abc_debye
+    # the sign of a single component has no effect
     if dipole is not None and sum(abs(mu) > 1e-3 for mu in dipole) > 1 and angle > 0.1:
         notes.append("the dipole along the new axes depends on the signs of the parent's components; check them")
     return notes

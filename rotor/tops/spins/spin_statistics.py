@@ -214,6 +214,7 @@ def inverting_symmetry(
     heights = (points - points.mean(axis=0)) @ normal
     if rigid.linear or np.ptp(heights) <= rigid.tolerance_angstrom:
         raise ValueError(f"the molecule is flat within {rigid.tolerance_angstrom:.2g} Å: there is no inversion")
+    # an axis of order 3 or more across the plane's normal makes axes equivalent
     if any(order > 2 and abs(axis @ normal) < 0.9 for order, axis in rigid.axes):
         raise ValueError("no plane to invert through: the b and c axes, or all three, are alike by symmetry")
     flat_points = points - np.outer(heights, normal)
@@ -229,6 +230,7 @@ def _cycle_character(spin: float, length: int) -> int:
     """Spin character of a cycle, with the sign of the permutation for fermions."""
     states = round(2 * spin) + 1
     fermions = states % 2 == 0
+    # a cycle of even length is an odd permutation: fermions change sign
     return -states if fermions and length % 2 == 0 else states
 
 
@@ -319,6 +321,7 @@ def _by_k(symmetry: Symmetry, characters: Sequence[int]) -> dict[str, int]:
 
 def _ramanujan_sum(q: int, k: int) -> int:
     """Σ cos(2πkm/q) over m = 1 ... q that are coprime to q; a whole number."""
+    # an integer; the sum of cosines has round-off
     return round(sum(math.cos(2 * math.pi * k * m / q) for m in range(1, q + 1) if math.gcd(m, q) == 1))
 
 

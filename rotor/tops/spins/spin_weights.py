@@ -91,6 +91,7 @@ class SpinWeights:
         >>> SpinWeights.from_mapping({"even": 1, "odd": 0}).with_pair(1).to_mapping()  # two protons
         {'even': 1, 'odd': 3}
         """
+        # bosons (2i even): i + 1 parts of even functions to i of odd ones; fermions the reverse
         even, odd = (twice + 2, twice) if twice % 2 == 0 else (twice, twice + 2)
         both = zip(self.classes, self.values, self.exchanged().values, strict=True)
         return SpinWeights.from_mapping({name: even * weight + odd * other for name, weight, other in both})
@@ -134,11 +135,12 @@ class SpinWeights:
         """
         j, k = np.broadcast_arrays(np.asarray(j), np.asarray(k))
         if self.rule == "none":
-            return np.asarray(np.where(k == 0, 1, 2))
+            return np.asarray(np.where(k == 0, 1, 2))  # both signs of K
         self._require(("K", "KaKc"), "a symmetric top")
         if self.rule == "KaKc":
             table = self._whole_numbers().reshape(2, 2)
             table = table.T if oblate else table
+            # a pair ±K has both parities of the other quantum number
             return np.asarray(np.where(k == 0, table[0, j % 2], table[k % 2].sum(axis=-1)))
         doubled = np.rint(2 * self._by_residue()).astype(np.int64)
         alone = self._whole_numbers()[j % 2 if "0odd" in self.classes else np.zeros_like(j)]
@@ -255,8 +257,10 @@ def irreps_in_j(j: NDArray[np.int64], irreps: tuple[str, ...]) -> NDArray[np.int
     characters = []
     for n, k, _ in classes:
         angle = np.pi * k / n
+        # periodic in J: the reduced argument keeps the sine exact at high J
         characters.append(2 * j + 1 if n == 1 else np.sin((2 * (j % n) + 1) * angle) / np.sin(angle))
     counts = np.tensordot(np.array(table) * sizes, np.array(characters, dtype=float), axes=1) / sizes.sum()
+    # E of T is a pair of conjugate irreps, whose character counts twice in the sum
     halves = np.array([2 if name == "E" and len(irreps) == 3 else 1 for name in irreps])
     return np.asarray(np.rint(counts / halves.reshape((-1,) + (1,) * np.ndim(j))), dtype=np.int64)
 

@@ -53,6 +53,7 @@ def without_trace(
         if len(elements) < 2:
             continue
         difference = [n for n in values if n.startswith(f"{tensor}_") and "-" in n and n.endswith(f"({spins}")]
+        # of two elements the third follows, of three the sum is checked
         trace = sum(elements.values()) if len(elements) == 3 else 0.0
         if abs(trace) > 1e-3 * max(map(abs, elements.values())):
             raise ValueError(

@@ -74,7 +74,9 @@ class LevelTable(Table):
         order, keys, sizes = self._sorted
         labels = np.stack([np.asarray(quanta[name], dtype=np.int64) for name in self.quanta])
         inside = ((labels >= 0) & (labels < sizes[:, None])).all(axis=0)
+        # any valid label in place of one outside the table; it is discarded below
         key = np.ravel_multi_index(tuple(np.where(inside, labels, 0)), tuple(sizes.tolist()))
+        # a label beyond the last meets the last row, and differs from it
         place = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
         return np.where(inside & (keys[place] == key), order[place], -1)
 

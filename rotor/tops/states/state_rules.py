@@ -69,6 +69,7 @@ def _even_rotations(symmetry: Symmetry, frame: PrincipalFrame) -> tuple[str, str
     for operation in (*symmetry.rotations, *symmetry.improper):
         matrix = frame.axes @ operation.matrix @ frame.axes.T
         if np.abs(matrix - np.diag(np.diag(matrix))).max() < _ALONG:
+            # angular momenta are axial vectors: reflections act with the opposite sign
             signs = np.diag(matrix) * np.linalg.det(matrix)
             even_axes = "".join(axis for axis, sign in zip("abc", signs, strict=True) if sign > 0 and axis in even_axes)
     return symmetry.point_group, even_axes
