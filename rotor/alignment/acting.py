@@ -39,6 +39,7 @@ def acted_on(top: Top, acts_on: str) -> Floats:
         raise ValueError(f"the polarizability of {name} is not known: give one, in principal axes (Å³)")
     whole = np.array(top.polarizability_abc_angstrom3, dtype=float)
     tensor = _traceless(whole)
+    # the rounding of an isotropic tensor is no anisotropy
     if not np.abs(tensor).max() > ISOTROPIC * np.abs(whole).max():
         raise ValueError(f"the polarizability of {name} is isotropic: no light turns it")
     return tensor
@@ -84,6 +85,7 @@ def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: flo
     -----
     The population of the highest J must be checked after the propagation.
     """
+    # a linear molecule has an infinite A
     smallest = RAD_PER_PS_MHZ * min(x for x in top.rotational_constants_mhz if math.isfinite(x))
     reached = float(highest)
     for pulse in pulses:
@@ -92,6 +94,7 @@ def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: flo
             reached += size * pulse.area
             continue
         strength, area = _peak_and_area(pulse)
+        # J grows by the area of a short pulse, at most to where rotation balances a long one
         reached += min(size * area, math.sqrt(reached**2 + size * strength / smallest) - reached)
     return int(reached + max(6.0, 6 - 1.5 * math.log10(tolerance) - highest / 5))
 
@@ -107,9 +110,10 @@ def _spread(body: Floats) -> float:
 def _peak_and_area(pulse: Pulse) -> tuple[float, float]:
     if isinstance(pulse, GaussianPulse):
         peak = RAD_PER_PS_ANGSTROM3_W_PER_CM2 * pulse.peak_w_per_cm2
+        # ∫ of a Gaussian with this full width at half maximum
         return peak, peak * pulse.fwhm_ps * math.sqrt(math.pi / (4 * math.log(2)))
     first, last = pulse.window_ps
-    times = np.linspace(first, last, 1001)
+    times = np.linspace(first, last, 1001)  # a plain sum over a fine grid: an estimate needs no more
     strength = np.abs(pulse.strength(times))
     return float(strength.max()), float(strength.sum() * (times[1] - times[0]))
 

@@ -221,6 +221,7 @@ def align(
         jmax = lowest_jmax(problem, jmax)
     while True:
         pilot = run_pilot(problem, jmax)
+        # a whole run is started only if the block that spreads most stays clear of the edge
         if pilot.edge <= 0.3 * tolerance:
             trace = carried(problem, pilot, executor, progress)
             if trace.edge_population <= tolerance:

@@ -69,13 +69,14 @@ def _symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
 
     first = max(abs(k), abs(m))
     plus, minus = abs(k + m), abs(k - m)
+    # ln of the norm: factorials would overflow
     log_norm = gammaln(plus + minus + 2) - gammaln(plus + 1) - gammaln(minus + 1) - (plus + minus + 1) * np.log(2.0)
     with np.errstate(divide="ignore"):
         lowest = np.exp(0.5 * (log_norm + plus * np.log1p(x) + minus * np.log1p(-x)))
     out = np.zeros((jmax - first + 1, len(x)))
     out[0] = lowest
     diagonal, beside = cosine_bands(np.arange(first, jmax + 1), k, m)
-    for n in range(jmax - first):
+    for n in range(jmax - first):  # the three-term recurrence of Wigner functions in J
         before = beside[n - 1] * out[n - 1] if n else 0.0
         out[n + 1] = ((x - diagonal[n]) * out[n] - before) / beside[n]
     return out
@@ -95,7 +96,7 @@ def asymmetric_elements(block: SolvedFieldBlock, axis: int, function: EvenFuncti
         solved = elements.blocks[block.space.sectors[number].block]
         columns = 1j**colour * _turned(solved.basis, axis, elements.representation) @ solved.vectors
         for k, row in zip(range(-solved.basis.j, solved.basis.j + 1), columns, strict=True):
-            if np.abs(row).max() > 0:
+            if np.abs(row).max() > 0:  # K that symmetry excludes stays empty
                 by_k.setdefault(k, []).append((solved.basis.j, start, row))
         start += solved.basis.size
     total = np.zeros((start, start), dtype=np.complex128)
@@ -115,7 +116,7 @@ def _turned(basis: Any, axis: int, representation: str) -> Complexes:
     j = basis.j
     functions = np.zeros((2 * j + 1, basis.size), dtype=np.complex128)
     for column, k in enumerate(basis.k.tolist()):
-        functions[j + k, column] += 1.0 if k == 0 else np.sqrt(0.5)
+        functions[j + k, column] += 1.0 if k == 0 else np.sqrt(0.5)  # Wang functions are (|K⟩ ± |-K⟩)/√2
         if k:
             functions[j - k, column] += basis.sign * np.sqrt(0.5)
     functions *= 1j ** phase_exponent(basis)

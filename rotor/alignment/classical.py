@@ -90,6 +90,7 @@ def classical_trace(
 
 def scaled_moments(top: Top) -> Floats:
     """Principal moments along a, b, c in ħ² per rad/ps·ħ, 1/(2B); 0 for the axis of a linear top."""
+    # ħ/(4π B) in rad/ps; 0 for the axis of a linear molecule
     return np.array([0.0 if math.isinf(x) else 1 / (2 * RAD_PER_PS_MHZ * x) for x in top.rotational_constants_mhz])
 
 

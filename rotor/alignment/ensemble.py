@@ -48,6 +48,7 @@ class Ensemble:
         if self.chosen is not None:
             return self._chosen_state(levels)
         kelvin = (levels.energy_mhz - self.ground_mhz) / units.MHZ_PER_K
+        # levels below the ground have weight 0; their exponential must not overflow
         population = levels.weight * np.exp(-np.maximum(kelvin / self.temperature_k, -1.0)) / self.q
         return np.where((population >= self.least) & (levels.j <= self.jmax), population, 0.0)
 
@@ -56,6 +57,7 @@ class Ensemble:
         for name, value in (self.chosen or {}).items():
             column = levels.j if name == "j" else np.abs(levels.quanta[name]) if name == "k" else levels.quanta[name]
             here &= column == value
+        # all M of a level are equal if none is chosen
         states = here.sum() * (1 if self.m is not None else 2 * int(levels.j[here][0]) + 1)
         return np.where(here, 1.0 / states, 0.0)
 
@@ -104,9 +106,10 @@ def thermal(top: Top, temperature_k: float, cut: float) -> Ensemble:
     factor = levels.weight * np.exp(-(levels.energy_mhz - ground) / (units.MHZ_PER_K * temperature_k))
     factor[~exists] = 0.0
     whole = (2 * levels.j + 1) * factor
-    order = np.argsort(-factor, kind="stable")
+    order = np.argsort(-factor, kind="stable")  # stable: equal populations keep the order of levels
     share = np.cumsum(whole[order]) / whole.sum()
     last = min(int(np.searchsorted(share, 1.0 - cut)), int(exists.sum()) - 1)
+    # a factor below 1 keeps levels of equal population together
     least = float(factor[order[last]] / whole.sum()) * (1 - 1e-9)
     populated = factor / whole.sum() >= least
     return Ensemble(
@@ -124,6 +127,7 @@ def _levels_for(top: Top, temperature_k: float, cut: float) -> FreeLevels:
     from rotor.quantum.solve import solve_levels
 
     least = min(x for x in top.rotational_constants_mhz if math.isfinite(x))
+    # levels at 12 kT beyond the cut are empty
     reach = temperature_k * units.MHZ_PER_K * (math.log(1 / cut) + 12) / least
     jmax = int(math.sqrt(reach)) + 3
     if jmax > 2 * MOST_J:

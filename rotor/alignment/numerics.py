@@ -110,8 +110,10 @@ def _least_basis(request: Any, tolerance: float, trace: Any, allowed: float) -> 
 
 def plan_align(request: Any) -> Plan:
     """The plan of a gas under pulses: timed with a coarse tolerance; the number of steps grows with its fourth root."""
+    # the pilot of a plan is coarse
     coarse = replace(request, tolerance=max(request.tolerance, 1e-3), points=11, classical_molecules=0)
     trace = answer_align(coarse).trace
+    # steps of a method of order 4 grow with tolerance^(-1/4)
     seconds = timed(lambda: answer_align(coarse)) * (coarse.tolerance / request.tolerance) ** 0.25
     described = plan_fields(request.top, max(trace.ensemble.jmax, 1), SEMI_RIGID)
     basis = f"J to {trace.jmax} at least, for a tolerance of {coarse.tolerance:g}"

@@ -121,9 +121,10 @@ def harmonic_sum(amplitudes: Complexes, omegas: Floats, times: Floats) -> Floats
     """
     count = len(times)
     step = (times[-1] - times[0]) / (count - 1) if count > 8 else 0.0
+    # an even grid factors into √n times √n phases
     if step == 0 or np.abs(times - times[0] - step * np.arange(count)).max() > _EVEN_WITHIN * abs(step):
         return _plain_sum(amplitudes, omegas, times)
-    side = int(np.ceil(np.sqrt(count)))
+    side = int(np.ceil(np.sqrt(count)))  # two short tables of phases in place of one long one
     total = np.zeros((-(-count // side), side))
     chunk = max(1, _CHUNK // (2 * side))
     for first in range(0, len(omegas), chunk):

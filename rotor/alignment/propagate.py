@@ -128,6 +128,7 @@ def step_grid(window: Window, longest_step_ps: float, times_ps: Floats) -> Grid:
     inside = times_ps[first:last]
     edges = np.unique(np.concatenate([[window.start_ps, window.stop_ps], window.breaks_ps, inside]))
     lengths = np.diff(edges)
+    # a quotient that is whole but for round-off makes no further step
     counts = np.maximum(1, np.ceil(lengths / longest_step_ps - 1e-9)).astype(np.int64)
     return Grid(edges[:-1], lengths / counts, counts, _among(edges[1:], inside))
 
@@ -179,11 +180,12 @@ def kick_plan(window: Window, grid: Grid, rule: Splitting) -> KickPlan:
     areas = _merged(strength * rule.kicks * steps[:, None])
     gradients = _merged(strength**2 * rule.gradients * steps[:, None] ** 3) if rule.gradients.any() else None
 
+    # 13 decimals: equal steps that round differently share one drift
     lengths, kind = _different(np.round(grid.steps, 13))
     shares, share = rule.different_drifts
     durations = np.multiply.outer(lengths, shares).ravel()
     which = np.add.outer(np.repeat(kind, grid.counts) * len(shares), share).ravel()
-    piece = max(1, len(steps) // CHECKS) * stages
+    piece = max(1, len(steps) // CHECKS) * stages  # whole steps stay in one piece
     marks, observed = np.zeros((2, len(areas) - 1), dtype=bool)
     observed[last[grid.sampled] * stages - 1] = True
     marks[piece - 1 :: piece] = True
@@ -370,6 +372,7 @@ def magnus_through(
     leaked : (m,) array
         Largest population at the edge.
     """
+    # Gauss points of order 4, as Magnus expansions use them
     first, second = 0.5 - math.sqrt(3) / 6, 0.5 + math.sqrt(3) / 6
     large, small = 0.25 + math.sqrt(3) / 6, 0.25 - math.sqrt(3) / 6
     reach = [_norm_bound(operator) for operator in operators]
@@ -389,7 +392,7 @@ def magnus_through(
 
 def _norm_bound(operator: Any) -> float:
     """The largest row sum of absolute values, an upper bound of the eigenvalues."""
-    return float(np.max(abs(operator).sum(axis=1)))
+    return float(np.max(abs(operator).sum(axis=1)))  # the row sum bounds the norm of a Hermitian operator
 
 
 def _chebyshev(
@@ -398,10 +401,12 @@ def _chebyshev(
     """exp(-i (diagonal + Σ factor operator)) states by Σ (2 - δ_n0) (-i)^n J_n(R) T_n(H/R), with H shifted to its centre."""
     from scipy.special import jv
 
+    # the spectrum is moved to the middle of [-1, 1] for Chebyshev polynomials
     centre = (diagonal.max() + diagonal.min()) / 2
     radius = (diagonal.max() - diagonal.min()) / 2 + sum(abs(f) * r for f, r in zip(factors, reach, strict=True))
     if radius == 0:
         return np.asarray(np.exp(-1j * centre) * states)
+    # Bessel functions fall steeply beyond order R + some R^(1/3)
     terms = int(radius + 12 + 8 * radius ** (1 / 3)) + 8
     coefficients = jv(np.arange(terms), radius)
     last = int(np.flatnonzero(np.abs(coefficients) > CHEBYSHEV_BELOW)[-1])

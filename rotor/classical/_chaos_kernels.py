@@ -61,6 +61,7 @@ def _stepped(form: Any, tableau: Any, table: Floats, h: float, k: Floats, work: 
             scale = tolerance * (1.0 + abs(table[i, c]))
             fifth += (five / scale) ** 2
             third += (three / scale) ** 2
+    # DOP853's error: the estimate of order 5, damped by that of order 3 (Hairer, Nørsett and Wanner)
     both = math.sqrt(fifth + 0.01 * third)
     error = h * fifth / both if both > 0.0 else 0.0
     if error <= 1.0:
@@ -84,7 +85,7 @@ def _orthogonal(table: Floats, grown: Floats) -> None:
         square = 0.0
         for i in range(d):
             square += table[i, c] ** 2
-        grown[c - 1] += 0.5 * math.log(square)
+        grown[c - 1] += 0.5 * math.log(square)  # ln of the length: half of the ln of its square
         for i in range(d):
             table[i, c] /= math.sqrt(square)
 
@@ -104,10 +105,12 @@ def follow(
             if error <= 1.0:
                 left = left - h if h < left else 0.0
                 steps += 1
+            # the error grows with h⁸: h is scaled by error^(-1/8), with a margin of 0.9
             grow = 0.9 * max(error, 1e-8) ** (-0.125)
             if error > 1.0 or h == step:
+                # grow is nan after an overflow: a much shorter step
                 step = h * min(5.0, max(0.2, grow)) if grow == grow else 0.2 * h
-            if step < 1e-12 * interval:
+            if step < 1e-12 * interval:  # the step no longer advances: the flow diverges
                 return 0.0, steps
         _orthogonal(table, grown)
     return step, steps

@@ -149,6 +149,7 @@ class DrivenAnswer:
         energy = self.motion.energy
         conserved = all(effect.conserves_energy for effect in self.request.effects)
         names = self.request.units
+        # ½ I ω² of the largest rotation
         size = 0.5 * float(np.max(np.sum(np.array(self.request.moments) * self.motion.omega**2, axis=-1)))
         return {
             "units": {"time": names.time, "angular_momentum": names.angular_momentum, "energy": names.energy},

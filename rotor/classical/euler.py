@@ -138,6 +138,7 @@ def attitude_rate(attitude: ArrayLike, omega: ArrayLike) -> Floats:
     array([0., 0., 0., 1.])
     """
     omega = np.asarray(omega, dtype=np.float64)
+    # q' = ½ q ω, ω as a quaternion without a scalar part
     return 0.5 * multiply(attitude, np.concatenate([np.zeros_like(omega[..., :1]), omega], axis=-1))
 
 
@@ -196,4 +197,4 @@ def binet_semiaxes(moments: ArrayLike, energy: ArrayLike) -> Floats:
 def _semiaxes(moments: ArrayLike, scale: ArrayLike, rule: Callable[[Floats, Floats], Floats]) -> Floats:
     moments = checked_moments(moments)
     axes = rule(np.asarray(scale, dtype=np.float64)[..., None], inverse_moments(moments))
-    return np.where(moments == 0.0, np.inf, axes)
+    return np.where(moments == 0.0, np.inf, axes)  # an axis without inertia has no finite semiaxis

@@ -85,6 +85,7 @@ class Exponents:
     @property
     def kaplan_yorke(self) -> float:
         """Kaplan-Yorke dimension of the full spectrum; exponents within three errors of zero count as zero."""
+        # an exponent within three errors of 0 counts as 0: a flow always has one such
         return kaplan_yorke(np.where(np.abs(self.values) <= 3.0 * self.errors, 0.0, self.values))
 
     @property
@@ -118,14 +119,16 @@ class Exponents:
 def mean_exponents(growth: Growth, settings: Settings) -> Exponents:
     """Means over segments with their errors, the largest exponent first."""
     rates = growth.rates
-    spread = np.std(rates, axis=0, ddof=1) / math.sqrt(len(rates))
+    spread = np.std(rates, axis=0, ddof=1) / math.sqrt(len(rates))  # errors of a mean of independent segments
     mean = np.mean(rates, axis=0)
     order = np.argsort(-mean, kind="stable")
     values, spread = mean[order], spread[order]
     first, tau = max(float(values[0]), 0.0), settings.interval
     integration = growth.steps * settings.tolerance * (1.0 + math.exp(first * tau)) * np.exp(-values * tau)
+    # what rounds off within an interval grows along the first exponent before the next orthogonalization
     rounding = ROUNDING * (growth.steps + np.exp((first - values) * tau) / tau)
     if not growth.exact_slopes:
+        # central differences: the difference of two values of 8 ε over the step
         rounding = rounding + 8 * sys.float_info.epsilon / DIFFERENCE * (1.0 + np.abs(values).max())
     return Exponents(
         values=values,
@@ -141,6 +144,7 @@ def mean_exponents(growth: Growth, settings: Settings) -> Exponents:
 
 def _finite_time(values: Floats, spread: Floats, settings: Settings, whole: bool) -> Floats:
     """Error of exponents from a finite time, by the gap to the nearest other exponent; without a gap for one that was not computed."""
+    # gaps beyond three errors, else the exponents are taken as equal
     gaps = np.maximum(-np.diff(values) - 3.0 * np.hypot(spread[1:], spread[:-1]), 0.0)
     nearest = np.minimum(np.append(gaps, np.inf if whole else 0.0), np.append(np.inf, gaps))
     nearest = np.clip(nearest * settings.before, 1e-12, 1e3) / settings.before  # from ln(t1/t0) to twelve digits, to 0
@@ -160,6 +164,6 @@ def kaplan_yorke(exponents: ArrayLike) -> float:
     values = np.sort(np.asarray(exponents, dtype=np.float64))[::-1]
     sums = np.cumsum(values)
     if sums[-1] >= 0.0:
-        return float(values.size)
+        return float(values.size)  # all sums are positive: the dimension is that of the space
     j = int(np.argmax(sums < 0.0))
     return float(j + (sums[j - 1] / abs(values[j]) if j else 0.0))

@@ -110,6 +110,7 @@ class TurningTop:
         """V at angles."""
         alpha, total = np.asarray(angle, dtype=float), np.zeros(np.shape(angle))
         for n, v in self.barriers.items():
+            # ½ V_n (1 - cos nα), as potentials of torsions are written
             total = total + 0.5 * v * (1 - np.cos(n * alpha))
         for n, w in self.sines.items():
             total = total + 0.5 * w * np.sin(n * alpha)
@@ -150,6 +151,7 @@ class TurningTop:
         """L (n, 3), p (n,) and α (n,) of a gas at kT: L - pλ and p are Gaussian, α is drawn from exp(-V/kT) on a grid of 4096 angles."""
         p = rng.normal(scale=np.sqrt(self.top_moment * kt), size=count)
         relative = rng.normal(size=(count, 3)) * np.sqrt(self.rest_moments * kt)
+        # the density is even on a fine grid, and uniform within its cells
         angles = 2 * np.pi * np.arange(4096) / 4096
         weight = np.exp(-self.potential(angles) / kt)
         alpha = rng.choice(angles, size=count, p=weight / weight.sum()) + rng.uniform(0, 2 * np.pi / 4096, count)
@@ -223,6 +225,7 @@ def turning_motion(
     carry, moments = np.zeros_like(state), np.broadcast_to(body.rest_moments, (len(start), 3)).copy()
     path = [(state.copy(), torsion.copy(), alpha.copy())]
     for interval in np.diff(t).tolist():
+        # a quotient that is whole but for round-off makes no further step
         count = int(np.ceil(interval / step - 1e-9))
         _advance(body, moments, state, carry, torsion, alpha, interval / count, count)
         path.append((state.copy(), torsion.copy(), alpha.copy()))
@@ -241,6 +244,7 @@ def _advance(
         _turn(body, state, p, alpha, 0.5 * step)
         euler.drift(moments, state, carry, step, 1, True)
         _turn(body, state, p, alpha, 0.5 * step)
+        # half kicks at both ends, whole ones between
         p += (1.0 if i + 1 < count else 0.5) * step * body.torque(alpha)
 
 

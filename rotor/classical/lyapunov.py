@@ -46,6 +46,7 @@ class Flow:
         if self.jacobian is not None:
             return self.jacobian(time, y)
         k, d = y.shape
+        # relative to the state, so that rounding and truncation balance
         step = DIFFERENCE * (1.0 + np.max(np.abs(y)))
         shifted = y[:, None, :] + step * np.eye(d)
         opposite = y[:, None, :] - step * np.eye(d)
@@ -188,14 +189,16 @@ def quadratic_form(flow: Flow) -> tuple[Floats, Floats, Floats] | None:
     unit = np.eye(d)
     constant, plus, minus = flow.rate(0.0, np.zeros((1, d)))[0], flow.rate(0.0, unit), flow.rate(0.0, -unit)
     pairs = flow.rate(0.0, (unit[:, None] + unit).reshape(-1, d)).reshape(d, d, d)
+    # of a quadratic flow the even and odd parts give constant, linear and square terms exactly
     linear, squares = 0.5 * (plus - minus), 0.5 * (plus + minus) - constant
     mixed = 0.5 * (pairs - plus[:, None] - plus + constant)
     mixed[np.arange(d), np.arange(d)] = squares
     quadratic = np.moveaxis(mixed, -1, 0)
+    # a check at points that did not enter
     y = np.random.default_rng(0).normal(size=(16, d)) * (1.0 + np.max(np.abs(flow.start)))
     expected = flow.rate(0.0, y)
     predicted = constant + y @ linear + np.einsum("ijk,nj,nk->ni", quadratic, y, y)
-    if np.max(np.abs(predicted - expected)) > 1e-12 * np.max(np.abs(expected)):
+    if np.max(np.abs(predicted - expected)) > 1e-12 * np.max(np.abs(expected)):  # not a quadratic flow
         return None
     return constant, np.ascontiguousarray(linear.T), np.ascontiguousarray(quadratic)
 
@@ -212,6 +215,7 @@ def orbit(flow: Flow, times: ArrayLike, tolerance: float = 1e-10) -> Floats:
     times = np.asarray(times, dtype=np.float64)
     solution = solve_ivp(
         lambda t, y: flow.rate(t, y[None])[0],
+        # an interval of 0 is refused by solve_ivp
         (0.0, max(float(times[-1]), np.finfo(float).tiny)),
         flow.start,
         method="DOP853",
@@ -297,7 +301,7 @@ class _Plan:
 
     def intervals(self, part: float) -> tuple[int, float]:
         """Number and length of the intervals in `part`."""
-        number = max(1, round(part / self.interval))
+        number = max(1, round(part / self.interval))  # at least one interval, of equal length
         return number, part / number
 
 
@@ -313,6 +317,7 @@ def _along(flow: Flow, form: tuple[Floats, Floats, Floats], count: int, plan: _P
     table = np.zeros((d + 1, 1 + count))
     table[:d, 0], table[:d, 1:] = flow.start, np.eye(d)[:, :count]
     grown, divergence = np.zeros((plan.segments, count)), np.zeros(plan.segments)
+    # a short first step; the controller lengthens it
     step, before, steps = 1e-3 * plan.interval, plan.transient + plan.aligning, 0
     number, length = plan.intervals(before)
     step = _checked_step(follow(form, tableau, table, length, number, step, np.zeros(count))[0])

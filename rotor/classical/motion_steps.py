@@ -65,7 +65,7 @@ def first_share(request: DrivenRequest) -> float:
     span, enough, fastest = abs(request.times[-1] - request.times[0]), 5 * ENOUGH_STEPS, _fastest_rate(request)
     share = min(1 / BEGINNINGS, 1.0 / (fastest * span) if fastest > 0.0 else SHORTEST_SHARE)
     while share < 1 / BEGINNINGS and count_first_steps(request, share) < enough:
-        share = min(4.0 * share, 1 / BEGINNINGS)
+        share = min(4.0 * share, 1 / BEGINNINGS)  # four times as long, until the steps are many enough for a rate
     return share
 
 
@@ -73,13 +73,13 @@ def _fastest_rate(request: DrivenRequest) -> float:
     """The largest initial angular velocity about an axis, or relative rate of change of a component of L by a torque."""
     system = flatten_system(np.array([request.moments]), request.effects)
     momentum, attitude, time = np.array([request.momentum]), np.array([request.attitude]), request.times[0]
-    with np.errstate(over="ignore", invalid="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):  # absurd torques may overflow: the rate is then limited below
         omega = system.omega(time, momentum, attitude)
         rates = np.abs(omega)
         if system.torques:
             torque = np.broadcast_to(system.torque(time, attitude, omega), momentum.shape)
             change = np.divide(torque, momentum, out=np.zeros_like(momentum), where=momentum != 0.0)
-            rates = np.maximum(rates, np.abs(change))
+            rates = np.maximum(rates, np.abs(change))  # a torque that changes L quickly also shortens steps
     return float(np.nan_to_num(rates, posinf=np.finfo(float).max).max())
 
 

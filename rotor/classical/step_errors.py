@@ -44,6 +44,7 @@ def finer_tolerances(tolerance: float) -> list[float]:
     >>> finer_tolerances(1e-10)
     [1e-12, 1e-14]
     """
+    # finer by 100 until close to double precision, which is the last
     return [*(tolerance / 100**k for k in range(1, 8) if tolerance / 100**k > 1.5 * FINEST), FINEST]
 
 
@@ -58,6 +59,7 @@ def error_by_finer(coarse: Motion, finer: Sequence[float], at: Callable[[float],
     for place, tolerance in enumerate(finer):
         more = at(tolerance).steps / coarse.steps
         if more >= MORE_STEPS:
+            # where the number of steps scales as usual, one finer motion suffices
             is_usual = place == 0 and more < USUAL_STEPS and coarse.steps > DENSE * len(coarse.times)
             beyond = tolerance if is_usual else finer[min(place + 1, len(finer) - 1)]
             return OF_REFERENCE * max(apart(coarse, at(tolerance)), apart(coarse, at(beyond))), True

@@ -198,4 +198,5 @@ def acting_inverse(moments: Floats) -> Floats:
     rotates about it.
     """
     largest = np.max(moments, axis=-1, keepdims=True)
+    # an axis without inertia: any finite number, as its momentum is 0
     return np.ascontiguousarray(1.0 / np.where(moments == 0.0, largest, moments))

@@ -45,6 +45,7 @@ class _Motions:
         if decade not in self.computed:
             looser = [each for each in self.computed if each < decade]
             finer = [each for each in self.computed if each > decade]
+            # equal numbers of steps on both sides: a run between has the same steps
             alike = looser and finer and self.computed[max(looser)].steps == self.computed[min(finer)].steps
             request = replace(self.request, tolerance=decade_tolerance(decade))
             self.computed[decade] = self.computed[max(looser)] if alike else answer_driven(request).motion
@@ -141,6 +142,7 @@ def _pilot_decade(request: DrivenRequest, allowed: float) -> tuple[int, str]:
     motions = _Motions(beginning(request, 1 / BEGINNINGS, 0.5))
     likely = likely_decade(allowed)
     apart = distance(motions.at(likely).attitude, motions.at(min(likely + FINER, FINEST_REFERENCE)).attitude)
+    # the half of the part that is compared with its end
     middle = int(np.searchsorted(np.abs(np.array(motions.request.times) - request.times[0]), 0.5 * _span(motions)))
     grown = math.log10(_growth(float(np.max(apart[: middle + 1])), float(np.max(apart))))
     part = f"from the first {100 / BEGINNINGS:g} % of the time, in which errors grow {{}}"
@@ -163,7 +165,7 @@ def _growth(middle: float, end: float) -> float:
     >>> _growth(1e-9, 4e-9), _growth(0.0, 0.0)  # as the square, 20² times
     (400.0, 400.0)
     """
-    if middle > 0.0 and end > middle * 2.0**CHAOTIC:
+    if middle > 0.0 and end > middle * 2.0**CHAOTIC:  # faster than any power: errors grow exponentially
         return float(min((end / middle) ** (2.0 * (BEGINNINGS - 1)), 1e300))
     return float(BEGINNINGS**REGULAR)
 

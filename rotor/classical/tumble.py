@@ -125,7 +125,7 @@ class TumbleRequest:
         if self.named is not None:
             return ()
         low, middle, high = sorted(self.moments)
-        if low + middle >= high * (1 - 1e-12):
+        if low + middle >= high * (1 - 1e-12):  # a plane body has I1 + I2 = I3; written moments round
             return ()
         return (
             f"no real body has these moments: {low:g} + {middle:g} is less than {high:g}; the motion is computed all the same",

@@ -16,6 +16,7 @@ def fill_pair(
     amplitude: NDArray[np.float64],
     start_up: int,
     start_low: int,
+    # int32 halves the memory of rows
     frequency: NDArray[np.float64],
     strength: NDArray[np.float64],
     upper: NDArray[np.int32],

@@ -43,6 +43,7 @@ def steepness(depth: float) -> float:
     >>> round(steepness(1e-3) / 1e-3, 3), round(steepness(100.0), 3)
     (1.428, 4.493)
     """
+    # a saturated line is flat at the top and steep at its edges, √ln τ widths away
     return STEEPEST * min(depth, 1 + math.sqrt(math.log(max(depth, 1.0))))
 
 
@@ -91,6 +92,7 @@ def _model(answer: Any, number: int, per_mhz: float, opaque: float) -> ErrorTerm
         return split if complete else replace(split, source=f"{split.source}; {shifts.source} not estimated")
     shift = _shifted(shifts, per_mhz, abs(peak.brightness_k))
     larger, smaller = sorted((shift, split), key=lambda term: -(term.value or 0.0))
+    # an error cannot exceed the brightness
     whole = min((larger.value or 0.0) + (smaller.value or 0.0), abs(peak.brightness_k))
     return ErrorTerm(whole, f"{larger.source}; {smaller.source}", larger.remedy)
 
@@ -100,6 +102,7 @@ def _shifted(term: ErrorTerm, per_mhz: float, brightness: float) -> ErrorTerm:
     if term.value is None:
         return term
     text = f"lines shifted by {term.value:.2g} MHz: {term.source}"
+    # an error cannot exceed the brightness
     return ErrorTerm(min(term.value * per_mhz, brightness), text, term.remedy)
 
 

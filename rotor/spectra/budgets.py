@@ -66,6 +66,7 @@ def frequencies_budget(
 def _strong_line_error(intensities: Floats, errors_mhz: Floats | None, source: str | None) -> ErrorTerm:
     if errors_mhz is None or not len(intensities):
         return data_term(None, source)
+    # errors of weak lines do not describe the list
     strong = np.abs(intensities) >= STRONG * np.abs(intensities).max()
     errors = errors_mhz[strong & np.isfinite(errors_mhz)]
     return data_term(errors, f"{source}; largest of the lines above a tenth of the strongest")

@@ -222,6 +222,7 @@ def band_from_correlation(
     if correction == "egelstaff":
         c1 = _at_later_times(times, c1, 1.0 / (4.0 * math.pi * kt_mhz * HZ_PER_MHZ_PS))
     fine, nu2_density = _second_moment_density(times, c1, WINDOW_SHARE * fwhm_mhz, fwhm_mhz / POINTS_PER_WIDTH)
+    # beyond the grid four widths suffice for the wings of the window
     shown = fine <= grid.max(initial=0.0) + 4.0 * fwhm_mhz
     fine, nu2_density = fine[shown], nu2_density[shown]
     sigma = INTENSITY_NM2_MHZ * dipole2_debye2 / kt_mhz * _balance(fine / kt_mhz, correction) * nu2_density
@@ -240,7 +241,7 @@ def compare_bands(ours: Spectrum, theirs: Spectrum) -> BandComparison:
     nu, a, b = ours.frequency_mhz, ours.intensity, theirs.intensity
     if not np.array_equal(nu, theirs.frequency_mhz):
         raise ValueError("the two spectra are on different grids; compute both on one")
-    areas = [float(np.trapezoid(y, nu)) for y in (a, b)]
+    areas = [float(np.trapezoid(y, nu)) for y in (a, b)]  # areas by the trapezoidal rule on the common grid
     means = [float(np.trapezoid(y * nu, nu)) / area for y, area in zip((a, b), areas, strict=True)]
     at = int(np.argmax(np.abs(a - b)))
     peak = float(b.max())
@@ -268,6 +269,7 @@ def _dipole(top: Top) -> Floats:
 
 def _even(times: Floats) -> bool:
     step = np.diff(times)
+    # steps computed by linspace differ by round-off
     return bool(np.isfinite(times).all() and step[0] > 0 and np.ptp(step) < 1e-6 * step[0])
 
 
@@ -283,7 +285,7 @@ def _closing(fwhm_mhz: float) -> float:
 
 def _balance(x: Floats, correction: Correction) -> Floats:
     """(1 - e^-x) F(x)/x."""
-    half = np.maximum(0.5 * x, 1e-9)
+    half = np.maximum(0.5 * x, 1e-9)  # x/tanh x and its like are 0/0 at 0
     if correction == "harmonic":
         return np.ones_like(x)
     return np.asarray((np.tanh(half) if correction == "standard" else np.sinh(half)) / half)
@@ -299,9 +301,10 @@ def _second_moment_density(times_ps: Floats, c1: Floats, fwhm_mhz: float, step_m
 
     a, dt = _closing(fwhm_mhz), times_ps[1]
     window = np.exp(-a * times_ps**2)
+    # zeros behind the function give the finer grid of frequencies
     size = next_fast_len(max(math.ceil(1.0 / (step_mhz * HZ_PER_MHZ_PS * dt)), 2 * len(times_ps)), real=True)
     weights = np.full(len(times_ps), 2.0 * dt)
-    weights[[0, -1]] *= 0.5
+    weights[[0, -1]] *= 0.5  # the trapezoidal rule: half weights at both ends
     even, odd, curved = (
         rfft(weights * c1 * shape, size)
         for shape in (window, -2.0 * a * times_ps * window, (4.0 * a * a * times_ps**2 - 2.0 * a) * window)
@@ -316,7 +319,7 @@ def _at_later_times(times: Floats, c1: Floats, shift: float) -> Floats:
     from scipy.interpolate import CubicSpline
 
     later = np.minimum(np.hypot(times, shift), times[-1])
-    return np.asarray(CubicSpline(times, c1, bc_type=((1, 0.0), "not-a-knot"))(later))
+    return np.asarray(CubicSpline(times, c1, bc_type=((1, 0.0), "not-a-knot"))(later))  # even in time: no slope at 0
 
 
 def _smoothed(grid: Floats, values: Floats, fwhm: float) -> Floats:

@@ -237,7 +237,7 @@ def require_layer(sources: Sequence[Source], count: int) -> None:
 
 
 def _refuse_other_temperature(lines: LinesAtRest, source: Source) -> None:
-    if not math.isclose(lines.temperature_k, source.excitation_k, rel_tol=1e-12):
+    if not math.isclose(lines.temperature_k, source.excitation_k, rel_tol=1e-12):  # the same number but for round-off
         raise ValueError(
             f"lines at {lines.temperature_k:g} K for an excitation temperature of {source.excitation_k:g} K: make the list at "
             "the temperature of the source"

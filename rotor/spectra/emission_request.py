@@ -175,6 +175,7 @@ class EmissionRequest:
         first, last = self.range_mhz
         if not 0 < first < last or math.isinf(last):
             raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a finite, rising range above 0")
+        # eight channels a width over a range in ln ν
         count = math.log(last / first) * 8 * KM_PER_S / self.narrowest.fwhm_km_s
         if count > MOST_POINTS:
             raise ValueError(
@@ -274,7 +275,7 @@ class EmissionAnswer(TextOf):
         centres, position = np.unique(observed, return_inverse=True)
         at = emission(self.emitted, self.request.sources, centres)
         size = np.abs(at.brightness_k)[position]
-        most = np.flatnonzero(size == size.max())
+        most = np.flatnonzero(size == size.max())  # lines that overlap at one frequency: the most opaque is named
         row = int(most[np.argmax(self.lines.optical_depth[most])])
         k = position[row]
         return Peak(row, float(observed[row]), float(at.brightness_k[k]), float(at.optical_depth[k]))
@@ -373,6 +374,7 @@ def _across(depth: float) -> float:
 
 def _joined(tables: Sequence[EmissionLines]) -> EmissionLines:
     """All lines in one table, in order of observed frequency."""
+    # stable: lines of one frequency keep the order of the molecules
     order = np.argsort(np.concatenate([table.observed_mhz for table in tables]), kind="stable")
     columns: dict[str, Any] = {"names": tables[0].names}
     for name in EmissionLines.__dataclass_fields__.keys() - columns:

@@ -71,7 +71,7 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
         If more than J = 600 would be needed.
     """
     constants = top.rotational_constants_mhz
-    a, c = max(x for x in constants if math.isfinite(x)), constants[2]
+    a, c = max(x for x in constants if math.isfinite(x)), constants[2]  # a linear molecule has an infinite A
     kt_mhz = temperature_k * units.MHZ_PER_K
     dipole2 = sum(mu * mu for mu in dipole_abc) or 1.0
     weight = max(top.spin_weights.values)
@@ -182,6 +182,6 @@ def intensity_cut(
         None for -inf (no cut).
     """
     if math.isinf(least_lgint):
-        return None
+        return None  # no cut keeps every line
     scaled = LGINT_NM2_MHZ * population(levels, temperature_k, q, ground_mhz)
     return IntensityCut(scaled, temperature_k * units.MHZ_PER_K, 10.0**least_lgint)

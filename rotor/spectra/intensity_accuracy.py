@@ -22,6 +22,7 @@ FINER = 2  # decades between a cut and its reference
 def intensity_error(answer: Any) -> float:
     """Error of the intensity of a line in percent, from Q and from rounding of the strengths."""
     lines = answer.lines
+    # rounding of a strength grows with the steps in J
     return 100.0 * (
         float(lines.partition.relative_error) + ROUNDING * max(1, int(lines.levels.rotational.max(initial=0)))
     )

@@ -350,7 +350,7 @@ def line_list(
     if not first < last:
         raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a range that rises")
     dipole = _top_dipole(top)
-    least = -math.inf if min_lgint is None else min_lgint
+    least = -math.inf if min_lgint is None else min_lgint  # no cut: log10 of 0
     stated = line_partition(top, temperature_k, q, vibrational_factor, vibrations, effects)
     if stated is None and (jmax is None or math.isfinite(least)):
         stated = partition_function(top, temperature_k, effects=effects)
@@ -359,6 +359,7 @@ def line_list(
 
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
     trusted = np.ones(len(levels), dtype=np.bool_) if untrusted else are_trusted(top, levels)
+    # without a level the ground is infinite and nothing is cut
     ground = float(levels.energy_mhz[trusted & (levels.weight > 0)].min(initial=math.inf))
     cut = intensity_cut(levels, temperature_k, stated.q, least, ground) if stated and math.isfinite(ground) else None
     others = [moment for effect in levels.effects for moment in effect.other_moments(top)]
@@ -366,6 +367,7 @@ def line_list(
     inside = None if trusted.all() else trusted[transitions.upper] & trusted[transitions.lower]
     lines = Lines(
         top=top,
+        # a weight of 0 leaves a level in the table without lines
         levels=levels if inside is None else replace(levels, weight=np.where(trusted, levels.weight, 0)),
         frequency_mhz=transitions.frequency_mhz,
         strength_debye2=transitions.strength_debye2,
@@ -435,6 +437,7 @@ def line_partition(
         if value is not None and not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} = {value}: expected a finite number above 0")
     if q is not None:
+        # the error of a stated Q is unknown
         source = "given" if vibrational_factor == 1.0 else f"given, times {named}"
         return PartitionFunction(temperature_k, q * vibrational_factor, None, math.nan, source)
     if vibrational_factor == 1.0:

@@ -137,7 +137,7 @@ def allowed_lines(top: Top, jmax: int) -> int:
     for j, level in enumerate(blocks):
         for up in (level, blocks[j + 1]) if j < jmax else (level,):
             pairs = sum(size * up.get(_flipped(species, flip), 0) for species, size in level.items() for flip in flips)
-            total += pairs // 2 if up is level else pairs
+            total += pairs // 2 if up is level else pairs  # within a J each pair would count twice
     return total
 
 
@@ -158,6 +158,7 @@ def plan_spectrum(request: Any) -> Plan:
         lambda j: answer_spectrum(replace(request, jmax=j)),
         jmax,
         (max(SHORT_J[0], jmax // 3), max(SHORT_J[1], jmax // 2)),
+        # levels of an asymmetric top cost the cube of J, of closed forms its first power
         lambda j: (j + 1.0) ** (3 if top.kind == "asymmetric" else 1),
         lambda j: (j + 1.0) ** (1 if top.kind == "linear" else 2),
     )

@@ -37,7 +37,7 @@ def column_density_per_cm2(pressure_bar: float, path_cm: float, temperature_k: f
     ):  # fmt: skip
         if not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} {value} {unit}: expected a finite number above 0")
-    per_m3 = pressure_bar * PASCAL_PER_BAR / (units.BOLTZMANN_J_PER_K * temperature_k)
+    per_m3 = pressure_bar * PASCAL_PER_BAR / (units.BOLTZMANN_J_PER_K * temperature_k)  # n = p/kT
     return per_m3 * 1e-6 * path_cm
 
 

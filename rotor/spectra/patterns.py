@@ -61,18 +61,19 @@ def patterns(lines: Lines, resolution_mhz: float) -> Patterns:
     quanta = rotational_quanta(lines.levels.quanta).values()
     names = np.stack([column[rows] for rows in (lines.upper, lines.lower) for column in quanta], axis=1)
     line_of_row = np.unique(names, axis=0, return_inverse=True)[1].ravel()
-    order = np.lexsort((lines.frequency_mhz, line_of_row))
+    order = np.lexsort((lines.frequency_mhz, line_of_row))  # by line, then by frequency
     frequency, intensity = lines.frequency_mhz[order], lines.intensity_nm2_mhz[order]
     new = (np.diff(line_of_row[order], prepend=-1) != 0) | (np.diff(frequency, prepend=-np.inf) >= resolution_mhz)
     starts = np.flatnonzero(new)
     stops = np.append(starts[1:], len(order)) - 1
     total = np.add.reduceat(intensity, starts)
+    # components without intensity have a plain mean
     weights = np.where(total[np.cumsum(new) - 1] > 0, intensity, 1.0)
     offset = frequency - frequency[starts][np.cumsum(new) - 1]  # relative to the first component, to save digits
     mean = frequency[starts] + np.add.reduceat(offset * weights, starts) / np.add.reduceat(weights, starts)
     by_strength = np.lexsort((-intensity, np.cumsum(new)))
     strongest = order[by_strength[starts]]
-    rising = np.argsort(mean, kind="stable")
+    rising = np.argsort(mean, kind="stable")  # stable: lines of one frequency keep their order
     return Patterns(
         lines,
         resolution_mhz,

@@ -122,7 +122,8 @@ class RamanLines(TransitionTable):
         """Differential cross section dσ/dΩ (n,) in cm²/sr per molecule of the gas."""
         energy_k = (self.levels.energy_mhz[self.initial] - self.levels.ground_mhz) / units.MHZ_PER_K
         population = self.weight * np.exp(-energy_k / self.temperature_k) / self.partition.q
-        photon = (2 * math.pi * self.scattered_cm) ** 4
+        photon = (2 * math.pi * self.scattered_cm) ** 4  # (2π ν)⁴ of the scattered light
+        # 7/45 γ² for polarizations that are not resolved
         return 7 / 45 * photon * self.strength_angstrom6 * ANGSTROM6_IN_CM6 * population
 
     @cached_property
@@ -217,6 +218,7 @@ def raman_lines(
     if len(lines) and least:
         section = lines.cross_section_cm2_per_sr
         lines = lines.where(section >= least * section.max())
+    # stable: shifts that coincide keep the order of levels
     return lines.where(np.argsort(lines.shift_mhz, kind="stable"))
 
 
@@ -281,9 +283,11 @@ def jmax_for_raman(top: Top, temperature_k: float, min_relative: float) -> int:
     """
     a, _, c = top.rotational_constants_mhz
     kt_mhz, heaviest = temperature_k * units.MHZ_PER_K, max(top.spin_weights.values)
-    a = top.rotational_constants_mhz[1] if math.isinf(a) else a
+    a = top.rotational_constants_mhz[1] if math.isinf(a) else a  # a linear molecule has an infinite A
+    # (2J + 1) exp(-B J(J + 1)/kT) is largest near J = √(kT/2B)
     populated = max(1.0, math.sqrt(kt_mhz / (2 * a)) * math.exp(-0.5))
     j = 2
+    # a Boltzmann factor of J - 2, from which an S line starts
     while heaviest * (2 * j + 1) * math.exp(-c * j * (j - 3) / kt_mhz) > 0.05 * min_relative * populated:
         j += 1
         if j > JMAX_DEFAULT_LIMIT:

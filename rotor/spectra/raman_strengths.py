@@ -113,14 +113,14 @@ def _ordered(levels: Levels, strength: Floats, first: Ints, second: Ints, weight
     """Transitions of nonzero strength between existing levels, the lower in energy first."""
     exists = (strength > 0) & (weight > 0)
     strength, first, second = strength[exists], first[exists], second[exists]
-    falls = levels.energy_mhz[second] < levels.energy_mhz[first]
+    falls = levels.energy_mhz[second] < levels.energy_mhz[first]  # the upper state is the one of higher energy
     return RamanTransitions(strength, np.where(falls, second, first), np.where(falls, first, second), weight[exists])
 
 
 def _joint_weights(levels: Levels, first: Ints, second: Ints) -> Floats:
     """Spin weight of one component, where both states have the same weight; 0 if one of them does not exist."""
     weight = levels.weight_per_component
-    return np.asarray(np.where(weight[second] > 0, weight[first], 0.0))
+    return np.asarray(np.where(weight[second] > 0, weight[first], 0.0))  # a level of weight 0 has no lines
 
 
 # Linear and symmetric tops
@@ -167,7 +167,7 @@ def _axial_transitions(levels: Levels, delta_j: int, along: float) -> RamanTrans
         {"v": levels.quanta["v"][lower]} if "v" in levels.quanta else {}
     )  # the polarizability connects no two vibrational states
     first, second = np.flatnonzero(lower), levels.rows_of(j=j + delta_j, k=k, **state)
-    strength = 1.5 * (along * factor) ** 2 * np.where(k == 0, 1, 2)
+    strength = 1.5 * (along * factor) ** 2 * np.where(k == 0, 1, 2)  # ±K counts twice, K = 0 once
     return _ordered(levels, strength, first, second, _joint_weights(levels, first, second))
 
 

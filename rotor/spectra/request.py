@@ -355,6 +355,7 @@ def _expected_q(lines: Lines) -> tuple[float, bool] | None:
             energy = state.operators(values).get((0, 0, 0), 0.0)
             weight = 1.0 if state.spin_weights is None else state.spin_weights.mean / top.spin_weights.mean
             sums += weight * math.exp(-energy / (units.MHZ_PER_K * kelvin))
+    # equivalent nuclei: the functions of each symmetry are counted by the weights
     functions = math.prod(twice + 1 for twice in scheme.twice) / max(scheme.equivalent, 1)
     return functions * first * sums, True
 

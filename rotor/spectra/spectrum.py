@@ -170,6 +170,7 @@ def resolving_grid(
     first, last = _ends(lines, reach) if range_mhz is None else range_mhz
     if not 0 <= first < last < float("inf"):
         raise ValueError(f"range from {first} to {last} MHz: expected two rising, finite frequencies")
+    # lines outside whose wings reach in count too
     near = (lines.frequency_mhz > first - reach) & (lines.frequency_mhz < last + reach)
     arm = _arm(float((reach / width).max(initial=1.0)))
     points = near.sum() * len(arm)
@@ -200,7 +201,9 @@ def reach_at(
 
 def _arm(reach: float) -> Floats:
     """Distances from a centre in widths: increasing steps out to the reach, and a point just beyond it."""
+    # steps grow with the distance from a centre
     half = 0.25 * np.sinh(np.arange(_STEP, np.arcsinh(4 * reach), _STEP))
+    # one point on either side of the edge, where a profile is cut
     half = np.append(half, [reach * (1 - 1e-9), reach * (1 + 1e-9)])
     return np.concatenate([-half[::-1], [0.0], half])
 
@@ -249,6 +252,7 @@ class _Shape:
             return self.lorentzian
         if self.lorentzian is None:
             return self.gaussian
+        # width of a Voigt profile: J. J. Olivero and R. L. Longbothum, JQSRT 17 (1977) 233
         return np.asarray(0.5346 * self.lorentzian + np.sqrt(0.2166 * self.lorentzian**2 + self.gaussian**2))
 
 
@@ -307,6 +311,7 @@ def _summed(grid: Floats, centres: Floats, areas: Floats, shape: _Shape, outside
         point = begin + np.arange(len(line))
         value = areas[line] * shape.at(grid[point] - centres[line], line)
         low, high = point.min(), point.max() + 1
+        # bincount adds points that coincide
         total[low:high] += np.bincount(point - low, weights=value, minlength=high - low)
     return total
 

@@ -74,7 +74,8 @@ def reaching(levels: Levels, needed: Floats, most: float) -> dict[int, int]:
     j, sizes = levels.quanta["j"], np.diff(np.append(starts, len(levels)))
     highest = np.full(j.max() + 3, -np.inf)  # of J - 1, from J = -1 on
     np.maximum.at(highest, j + 1, levels.energy_mhz)
-    highest = np.maximum(np.maximum(highest[:-2], highest[1:-1]), highest[2:])
+    highest = np.maximum(np.maximum(highest[:-2], highest[1:-1]), highest[2:])  # a line leads to J - 1, J or J + 1
+    # a bound by the largest frequency: no line of this level can be stronger
     reaches = (highest[j] - levels.energy_mhz) * (2 * j + 1) * most >= needed
     last = np.maximum.reduceat(np.where(reaches, np.arange(1, len(levels) + 1), 0), starts)
     counts = np.clip(last - starts, 0, sizes)
@@ -140,7 +141,7 @@ def _strong_lines(
     )  # energies rise within a block
     highest = max([energy[stop - 1], *(product.low.energies_mhz[b - 1] for product, _, b in products)])
     span = max(min(highest - lowest, highest_mhz), SMALLEST_MHZ)
-    scale = (1 - ROUND_OFF) / span
+    scale = (1 - ROUND_OFF) / span  # the bound must not cut by round-off
     np.greater_equal(strength, scale * needed[start:stop, None], out=keep)
     np.greater_equal(strength, scale * needed[others], out=other)
     np.logical_or(keep, other, out=keep)

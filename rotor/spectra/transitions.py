@@ -155,6 +155,7 @@ def _all_lines(pairs: list[Pair], between: Amplitudes) -> Transitions:
     """All lines of all pairs, written directly into columns of their final length."""
     sizes = [len(up.energies_mhz) * len(low.energies_mhz) for up, low in pairs]
     total = sum(sizes)
+    # int32 halves the memory of rows
     out = Transitions(np.empty(total), np.empty(total), np.empty(total, np.int32), np.empty(total, np.int32))
     fill = _choose_fill(total)
 
@@ -192,7 +193,7 @@ def _fill_pair(
     first = np.arange(start_up, start_up + shape[0], dtype=np.int32)[:, None]
     second = np.arange(start_low, start_low + shape[1], dtype=np.int32)[None, :]
     falls = difference < 0
-    upper.reshape(shape)[...] = np.where(falls, second, first)
+    upper.reshape(shape)[...] = np.where(falls, second, first)  # the upper state is the one of higher energy
     lower.reshape(shape)[...] = np.where(falls, first, second)
 
 
@@ -237,7 +238,7 @@ def _group_transitions(
     reach = np.multiply(difference, strength, out=space.array("reach", *amplitude.shape))
     keep = np.abs(reach, out=reach) >= min(needed[up].min(), needed[low].min())
     if alike:
-        keep &= up[:, :, None] > low[:, None, :]
+        keep &= up[:, :, None] > low[:, None, :]  # a block with itself contains each pair twice
     places = np.flatnonzero(keep)
     above = places // low.shape[1]
     below = above // up.shape[1] * low.shape[1] + places - above * low.shape[1]
@@ -388,7 +389,7 @@ def _hoenl_london(
 
     j, k = all_j[first].astype(float), all_k[first].astype(float)
     if delta_k == 0 and delta_j == 0:
-        strength = 2.0 * (2 * j + 1) * k**2 / (j * (j + 1))
+        strength = 2.0 * (2 * j + 1) * k**2 / (j * (j + 1))  # ±K counts twice
     elif delta_k == 0:
         strength = np.where(k == 0, 1.0, 2.0) * ((j + 1) ** 2 - k**2) / (j + 1)
     elif delta_j:

@@ -29,9 +29,9 @@ def _phase(t: float, rate_hi: float, rate_lo: float, start_hi: float, start_lo: 
 def _nearest(hi: float, lo: float) -> Any:
     """The sign (-1)^j of the nearest whole number j, and what is left, in [-½, ½]."""
     j = np.rint(hi)
-    rest = (hi - j) + lo
+    rest = (hi - j) + lo  # whole parts cancel exactly, so that the phase keeps the digits of both doubles
     more = np.rint(rest)
-    half = 0.5 * (j - 2.0 * np.rint(0.5 * j)) + 0.5 * more
+    half = 0.5 * (j - 2.0 * np.rint(0.5 * j)) + 0.5 * more  # j modulo 2 is the parity of the half turns
     odd = half != np.rint(half)
     return -1.0 if odd else 1.0, rest - more
 

@@ -91,5 +91,6 @@ def flip_phase_error(period: float, last: float, growth_rate: float) -> float:
     """
     if not (math.isfinite(period) and period and growth_rate):
         return 0.0
+    # q' = exp(-πK/K'): the modulus near the separatrix
     complementary = min(1.0, 16 * math.exp(-0.5 * period * growth_rate))
     return 2 * math.pi * last / period**2 * 2 * LAST_DIGITS / (growth_rate * complementary)

@@ -97,7 +97,7 @@ class DoubleDouble:
         return DoubleDouble(self.hi * power_of_two, self.lo * power_of_two)
 
 
-PI = DoubleDouble(np.array(np.pi), np.array(1.2246467991473532e-16))
+PI = DoubleDouble(np.array(np.pi), np.array(1.2246467991473532e-16))  # the second double is π less the first
 
 
 def choose(condition: NDArray[np.bool_], yes: DoubleDouble, no: DoubleDouble) -> DoubleDouble:

@@ -106,6 +106,7 @@ def free_motion(moments: ArrayLike, momentum0: ArrayLike, attitude0: ArrayLike =
     rows = _starting_at(rows, attitude0.reshape(-1, 4))
     steady, separatrix = rows.kind == STEADY, rows.kind == SEPARATRIX
     pace = np.abs(rows.rates[:, 0])
+    # two half turns make a period; a motion without one has an infinite period
     period = np.divide(2.0, pace, out=np.full_like(pace, np.inf), where=~(steady | separatrix))
     turning = rows.rates[:, 4] * (4.0 * np.pi)
     period, turning = period.reshape(shape), turning.reshape(shape)
@@ -117,7 +118,7 @@ def free_motion(moments: ArrayLike, momentum0: ArrayLike, attitude0: ArrayLike =
 def _rows(moments: Floats, momentum: Floats) -> Rows:
     """Rows of all bodies, scaled exactly (by powers of two) so that the largest moment and momentum are about 1."""
     unit_i = _power_of_two(np.max(moments, axis=-1))
-    unit_m = _power_of_two(np.max(np.abs(momentum), axis=-1))
+    unit_m = _power_of_two(np.max(np.abs(momentum), axis=-1))  # powers of two scale without rounding
     moments, momentum = moments / unit_i[:, None], momentum / unit_m[:, None]
     steady = _stands_still(moments, momentum)
     _check_moments(moments[~steady], unit_i[~steady])
@@ -182,4 +183,5 @@ def _starting_at(rows: Rows, attitude0: Floats) -> Rows:
 
 
 def _power_of_two(size: Floats) -> Floats:
+    # frexp: the power of two above the size, so that the scaled value is below 1
     return np.asarray(np.where(size > 0.0, np.ldexp(1.0, np.frexp(size)[1]), 1.0))

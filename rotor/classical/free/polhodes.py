@@ -34,7 +34,7 @@ def centre_axis(moments: ArrayLike, level: float) -> int:
     (2, 0)
     """
     moments = _massive(moments)
-    small, middle, large = np.argsort(moments, kind="stable")
+    small, middle, large = np.argsort(moments, kind="stable")  # stable: equal moments keep the order of the axes
     below = level < 1.0 / moments[middle] or moments[small] == moments[middle]
     return int(large if below else small)
 
@@ -60,6 +60,7 @@ def polhode(moments: ArrayLike, level: float, points: int = 361) -> Floats:
     curves = np.empty((2, points, 3))
     curves[..., b] = np.sqrt((level - inverse[a]) / (inverse[b] - inverse[a])) * np.cos(angle)
     curves[..., c] = np.sqrt((level - inverse[a]) / (inverse[c] - inverse[a])) * np.sin(angle)
+    # rounding may leave less than 0 at the edge
     along = np.sqrt(np.maximum(0.0, 1.0 - curves[0, :, b] ** 2 - curves[0, :, c] ** 2))
     curves[0, :, a], curves[1, :, a] = along, -along
     return curves
@@ -103,6 +104,7 @@ def even_levels(moments: ArrayLike, per_side: int) -> Floats:
     edge = np.arcsin(np.sqrt((inverse[1] - inverse[0]) / (inverse[2] - inverse[0])))  # angle of the separatrix
     fractions = np.arange(1, per_side + 1) / (per_side + 1)
     sides = [(0.0, edge), (edge, np.pi / 2)]
+    # sides without a width have no level between
     angles = np.concatenate([low + (high - low) * fractions for low, high in sides if high - low > 1e-9])
     return np.asarray(inverse[0] + (inverse[2] - inverse[0]) * np.sin(angles) ** 2)
 

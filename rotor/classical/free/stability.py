@@ -87,6 +87,7 @@ def separatrix_ratio(moments: ArrayLike) -> Floats:
     if np.any(i1 == i3):
         raise ValueError("a spherical top has no separatrix: every axis is steady")
     above = i3 - i2
+    # i2 = i3: the separatrix is infinitely wide
     squared = np.divide(i1 * (i2 - i1), i3 * above, out=np.full_like(above, np.inf), where=above > 0.0)
     return np.asarray(np.sqrt(squared))
 
@@ -122,7 +123,7 @@ def tumbling_period(moments: ArrayLike, momentum: ArrayLike) -> Floats:
 
     speed, mc = _speed_and_modulus(moments, momentum)
     moves = (speed > 0.0) & (mc > 0.0)
-    quarter = ellipkm1(np.where(moves, mc, 1.0))
+    quarter = ellipkm1(np.where(moves, mc, 1.0))  # K from 1 - m, exact near the separatrix where m rounds to 1
     return np.asarray(np.divide(4.0 * quarter, speed, out=np.full_like(speed, np.inf), where=moves))
 
 
@@ -135,7 +136,7 @@ def asymptotic_period(moments: ArrayLike, momentum: ArrayLike) -> Floats:
     _, mc = _speed_and_modulus(moments, momentum)
     rate = growth_rate(moments, np.linalg.norm(np.asarray(momentum, dtype=np.float64), axis=-1))
     possible = (mc > 0.0) & (rate > 0.0)
-    logarithm = np.log(16.0 / np.where(possible, mc, 16.0))
+    logarithm = np.log(16.0 / np.where(possible, mc, 16.0))  # K ≈ ½ ln(16/(1 - m)) near the separatrix
     return np.asarray(np.divide(2.0 * logarithm, rate, out=np.full_like(mc, np.inf), where=possible))
 
 
@@ -167,6 +168,7 @@ def stability(moments: ArrayLike, momentum: ArrayLike) -> Stability:
     axes = fixed_axes(moments, size)
     if np.any(moments == 0.0):
         return Stability(axes, np.nan, 0.0, np.inf, np.inf)
+    # a spherical top has no separatrix
     ratio = np.nan if np.ptp(moments) == 0.0 else float(separatrix_ratio(moments))
     period, asymptote = float(tumbling_period(moments, momentum)), float(asymptotic_period(moments, momentum))
     return Stability(axes, ratio, float(growth_rate(moments, size)), period, asymptote)
@@ -195,6 +197,7 @@ def _speed_and_modulus(moments: ArrayLike, momentum: ArrayLike) -> tuple[Floats,
     about_third = np.where(d2 >= 0.0, d1 * (i3 - i2), d3 * (i2 - i1))
     product = np.abs(d2) * (i3 - i1)
     mc = np.divide(product, about_third, out=np.ones_like(product), where=about_third > 0.0)
+    # L along an axis, or among equal moments: nothing moves in the body
     still = (m1 * m2 * (i2 - i1) == 0.0) & (m2 * m3 * (i3 - i2) == 0.0) & (m3 * m1 * (i3 - i1) == 0.0)
     return np.where(still, 0.0, np.sqrt(about_third / (i1 * i2 * i3))), mc
 

@@ -102,11 +102,12 @@ class Constants:
 
 def momentum_frame(moments: Floats, momentum: Floats) -> Frame:
     """The frame with the axis that L circles third (from the exact sign of D2) and L3 > 0."""
-    order = np.argsort(moments, axis=-1, kind="stable")
+    order = np.argsort(moments, axis=-1, kind="stable")  # stable: equal moments keep the order of the axes
     d2 = _d2_j1_j3(_columns(moments, order), _columns(momentum, order))
+    # d2 < 0: L circles the axis of the smallest moment, so the order is reversed
     axes = np.where((d2.hi < 0.0)[:, None], order[:, ::-1], order)
     third = np.where(np.take_along_axis(momentum, axes[:, 2:], axis=-1)[:, 0] < 0.0, -1.0, 1.0)
-    cyclic = (axes[:, 1] - axes[:, 0]) % 3 == 1
+    cyclic = (axes[:, 1] - axes[:, 0]) % 3 == 1  # an odd order of the axes is left-handed: the first axis is reversed
     first = np.where(cyclic, third, -third)
     # on the separatrix cn and dn do not change sign, so L1 must be positive too: rotate by π about the third axis
     back = (d2.hi == 0.0) & (np.take_along_axis(momentum, axes[:, :1], axis=-1)[:, 0] * first < 0.0)
@@ -149,12 +150,14 @@ def moving_rows(moments: Floats, momentum: Floats) -> Rows:
     """Rows of bodies (n, 3) whose momentum moves in the body; `left` is set to the identity."""
     frame = momentum_frame(moments, momentum)
     c = theta_constants(frame)
-    near = c.mc < TRANSFORM_BELOW
+    near = c.mc < TRANSFORM_BELOW  # near the separatrix the nome of the transformed series is small
     kind = np.where(frame.separatrix, SEPARATRIX, np.where(near, NEAR_SEPARATRIX, CIRCULATING))
     other_mean, y, y_rest = _amplitude_integrals(frame, c)
     # πK/K' and πK'/K; the second is infinite for a symmetric top, whose nome is zero
     long = np.pi * np.divide(other_mean, c.mean, out=np.full_like(c.mean, np.inf), where=~frame.separatrix)
+    # q = exp(-πK'/K)
     short = np.pi * np.divide(c.mean, other_mean, out=np.full_like(c.mean, np.inf), where=other_mean > 0.0)
+    # each kind has one series; the other is switched off by a nome of 0
     nome, other_nome = np.where(near, 0.0, np.exp(-short)), np.where(near, np.exp(-long), 0.0)
     plain = _series(c.b, nome, np.exp(-c.mean * y_rest), 2.0 * c.mean * y)
     phi = np.where(near, 0.5 * other_mean * np.where(near, y, 0.0), 0.0)
@@ -280,4 +283,4 @@ def _identities(n: int) -> Floats:
 
 
 def _sign(values: Floats) -> DoubleDouble:
-    return DoubleDouble.exact(np.where(values < 0.0, -1.0, 1.0))
+    return DoubleDouble.exact(np.where(values < 0.0, -1.0, 1.0))  # the sign of 0 is +1

@@ -49,7 +49,7 @@ def _turned_tensor(w: float, x: float, y: float, z: float, axes: Floats, beta: F
 def add_bodies(rows: Rows, times: Floats, vector: Floats, axes: Floats, beta: Floats, sums: Floats) -> None:
     """Add u(0)·u(t) and β(0):β(t) and their squares, over all bodies of `rows`, to sums (4, times)."""
     momentum, attitude = np.empty((1, times.size, 3)), np.empty((1, times.size, 4))
-    for b in range(rows.kind.shape[0]):
+    for b in range(rows.kind.shape[0]):  # one body at a time: slices keep the layout of `Rows`
         body = Rows(
             rows.kind[b : b + 1], rows.rates[b : b + 1], rows.shift[b : b + 1], rows.series[b : b + 1],
             rows.axes[b : b + 1], rows.signs[b : b + 1], rows.left[b : b + 1], rows.right[b : b + 1],
@@ -84,7 +84,7 @@ def add_stepped(
     about L between two times; with all in one array the loops vectorise.
     """
     row = np.zeros(12 * LANES)
-    for block in range(-(-len(momentum) // LANES)):
+    for block in range(-(-len(momentum) // LANES)):  # blocks, the last one shorter
         here = min(LANES, len(momentum) - block * LANES)
         for k in range(here):
             size = _length(momentum[block * LANES + k])
@@ -93,7 +93,7 @@ def add_stepped(
             row[4 * LANES + k], row[5 * LANES + k] = size * rates[0], size * rates[1]
             back = product(turn, conjugate(tilt))
             row[6 * LANES + k], row[7 * LANES + k], row[8 * LANES + k], row[9 * LANES + k] = back
-            half = 0.5 * size * rates[2] * step * steps
+            half = 0.5 * size * rates[2] * step * steps  # half the angle, as quaternions need
             row[10 * LANES + k], row[11 * LANES + k] = math.cos(half), math.sin(half)
         for i in range(sums.shape[1]):
             if i > 0:

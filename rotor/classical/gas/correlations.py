@@ -93,8 +93,9 @@ def linear_curves(times: ArrayLike, moment: float, kt: float) -> tuple[Floats, F
     from scipy.special import dawsn
 
     tau = np.asarray(times, dtype=np.float64) * np.sqrt(kt / moment)
+    # Dawson's integral does not overflow, exp times erf would
     f, f2 = (1.0 - np.sqrt(2.0) * x * dawsn(x / np.sqrt(2.0)) for x in (tau, 2.0 * tau))
-    return np.asarray(f), np.asarray(0.25 + 0.75 * f2)
+    return np.asarray(f), np.asarray(0.25 + 0.75 * f2)  # C2 of a planar rotation: ¼ + ¾ ⟨cos 2θ⟩
 
 
 def spherical_curves(times: ArrayLike, moment: float, kt: float) -> tuple[Floats, Floats]:
@@ -106,6 +107,7 @@ def spherical_curves(times: ArrayLike, moment: float, kt: float) -> tuple[Floats
     """
     tau = np.asarray(times, dtype=np.float64) * np.sqrt(kt / moment)
     g, g2 = ((1.0 - x * x) * np.exp(-0.5 * x * x) for x in (tau, 2.0 * tau))
+    # C1 = (1 + 2g)/3 and C2 = (1 + 2g + 2g₂)/5 of a spherical top
     return (1.0 + 2.0 * g) / 3.0, (1.0 + 2.0 * g + 2.0 * g2) / 5.0
 
 
@@ -135,13 +137,14 @@ def symmetric_curves(times: ArrayLike, moment: float, moment_of_axis: float, kt:
     g as in the head: the length of L is integrated in closed form, μ by 96 points (exact to 1e-12 for I_z/I from 0.1 to 2).
     """
     x, weight = np.polynomial.legendre.leggauss(NODES)
-    mu2 = (0.5 * (x + 1.0)) ** 2
+    mu2 = (0.5 * (x + 1.0)) ** 2  # μ = cos of the angle between axis and L, on 0 to 1 by symmetry
     a = (1.0 - mu2) / moment + mu2 / moment_of_axis
-    weight = weight * a**-1.5
+    weight = weight * a**-1.5  # directions of L weigh as (Σ n²/I)^(-3/2): the integral over |L|
     weight /= weight.sum()
     s = np.asarray(times, dtype=np.float64)[..., None] * np.sqrt(kt / a) / moment
     g, g2 = ((1.0 - y * y) * np.exp(-0.5 * y * y) for y in (s, 2.0 * s))
     c1 = mu2 + (1.0 - mu2) * g
+    # C2 with P2(μ), and the parts that oscillate once and twice
     c2 = (1.5 * mu2 - 0.5) ** 2 + 3.0 * mu2 * (1.0 - mu2) * g + 0.75 * (1.0 - mu2) ** 2 * g2
     return c1 @ weight, c2 @ weight
 
@@ -183,11 +186,13 @@ def _limit_along_third(moments: Floats) -> float:
     x, weight = np.polynomial.legendre.leggauss(NODES)
     v, dv = 0.5 * (x + 1.0), 0.5 * weight
     edge = np.arctan2(np.sqrt(abs(i1 * (i3 - i2))), np.sqrt(abs(i3 * (i2 - i1))))
+    # φ = edge (1 - v⁶): points crowd at the separatrix, where the integrand has a logarithm
     phi, s2 = edge * (1.0 - v**6)[:, None], v**2
     measure = (edge * 6.0 * v**5 * dv)[:, None] * dv
     n1, n3 = (1.0 - s2) * np.sin(phi) ** 2, (1.0 - s2) * np.cos(phi) ** 2
     d1 = s2 * (i2 - i1) / i2 + n3 * (i3 - i1) / i3
     d2 = n3 * (i3 - i2) / i3 - n1 * (i2 - i1) / i1
+    # the lower limit keeps the logarithm finite on the separatrix itself
     mc = np.clip(d2 * (i3 - i1) / (d1 * (i3 - i2)), 1e-300, 1.0)
     mean = np.sqrt(i3 * d1 / (i3 - i1)) * 0.5 * np.pi / ellipkm1(mc)
     weighed = (n1 / i1 + s2 / i2 + n3 / i3) ** -1.5

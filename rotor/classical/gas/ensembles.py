@@ -160,6 +160,7 @@ def thermal_momenta(moments: ArrayLike, kt: float, size: int, *, rng: np.random.
     if not kt > 0.0 or not np.isfinite(kt):
         raise ValueError(f"kT = {kt}: expected a finite energy above 0")
     turns = rotating_axes(inertia)
+    # L_i is normal with variance I_i kT; an axis without inertia has none
     return np.asarray(rng.standard_normal((size, 3)) * np.sqrt(np.where(turns, inertia * kt, 0.0)))
 
 
@@ -365,7 +366,7 @@ def _averaged(
     )
 
 
-def _error(mean: Floats, square: Floats, n: int) -> Floats:
+def _error(mean: Floats, square: Floats, n: int) -> Floats:  # rounding may make a variance of 0 negative
     return np.asarray(np.sqrt(np.maximum(square - mean**2, 0.0) / (n - 1)))
 
 
@@ -381,7 +382,7 @@ def _principal_values(tensor: ArrayLike) -> tuple[Floats, Floats]:
     whole = np.asarray(tensor, dtype=np.float64)
     if whole.shape != (3, 3) or not np.isfinite(whole).all() or not np.allclose(whole, whole.T):
         raise ValueError(f"a tensor fixed in the molecule is symmetric, (3, 3) and finite; got {whole.tolist()}")
-    part = whole - np.trace(whole) / 3.0 * np.eye(3)
+    part = whole - np.trace(whole) / 3.0 * np.eye(3)  # without a trace, as the isotropic part does not turn
     size = float(np.linalg.norm(part))
     if size <= 1e-9 * float(np.abs(whole).max()):
         raise ValueError("the tensor is isotropic: turning the molecule does not change it, and it has no C2")

@@ -51,9 +51,9 @@ def off_intermediate_axis(moments: ArrayLike, momentum: float, tilt_rad: float) 
     moments = checked_moments(moments)
     if moments.shape != (3,):
         raise ValueError(f"expected the three moments of one body; got shape {moments.shape}")
-    between = np.argsort(moments, kind="stable")[1]
+    between = np.argsort(moments, kind="stable")[1]  # stable: equal moments keep the order of the axes
     aside = np.where(moments > 0.0, 1.0, 0.0)
-    aside[between] = 0.0
+    aside[between] = 0.0  # the tilt is away from the middle axis
     direction = math.sin(tilt_rad) * aside / np.linalg.norm(aside)
     direction[between] = math.cos(tilt_rad)
     return np.asarray(momentum * direction)

@@ -48,7 +48,7 @@ def half_angle_terms(u: Any) -> Any:
     left out are below 1e-17 at θ = 1. They are summed in halves that do not wait for each other.
     """
     square = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
-    if square < SERIES_BELOW**2:
+    if square < SERIES_BELOW**2:  # closed forms divide by θ², which cancels for small angles
         c, s, b, y, y2, t2 = COSINE, SINE, BERNOULLI, 0.25 * square, 0.0625 * square * square, square * square
         y4, t4 = y2 * y2, t2 * t2
         cosine = (c[4] + c[5] * y) + (c[6] + c[7] * y) * y2 + c[8] * y4
@@ -58,7 +58,7 @@ def half_angle_terms(u: Any) -> Any:
         factor = (b[4] + b[5] * square) + (b[6] + b[7] * square) * t2 + ((b[8] + b[9] * square) + b[10] * t2) * t4
         factor = (b[0] + b[1] * square) + (b[2] + b[3] * square) * t2 + factor * t4
         return cosine, half_sinc, factor
-    half = 0.5 * math.sqrt(square)
+    half = 0.5 * math.sqrt(square)  # half angles: quaternions need them
     cosine, sine = math.cos(half), math.sin(half)
     return cosine, 0.5 * sine / half, (1.0 - half * cosine / sine) / square
 

@@ -50,6 +50,7 @@ def _inner_turn(row: Floats, time: float) -> None:
         s, c = sine_cosine(half)
         _place(row, i, product(_quaternion(row, i), (c, 0.0, s, 0.0)))
         _seen_turned(row, 2 * LANES + i, i, s, c)
+        # the largest half angle, squared: checked against the reach of the polynomials
         row[WIDEST + i] = max(row[WIDEST + i], half * half)
 
 
@@ -144,7 +145,7 @@ def advance_in_field(
             row[INNER + i], row[OUTER + i], row[SPHERE + i] = vector_at(rates, body)
             row[WIDEST + i] = 0.0
         _torque(codes, parameters, start, row)
-        _kick(row, 0.5 * step)
+        _kick(row, 0.5 * step)  # half a kick at both ends, whole kicks between: each pair of halves is one
         for k in range(1, steps + 1):
             symmetric_steps(field_turns, row, WHOLE_STEP, step, 1)
             _sphere(row, step)

@@ -28,6 +28,7 @@ WIDEST_TURN = 0.5  # rad per step: half of it is the largest argument of the pol
 @njit(cache=True, inline="always", fastmath={"contract"})
 def sine_series(y: Any) -> Any:
     """(x - sin x)/x³ and (1 - cos x)/x² by y = x², |x| <= ¼: Taylor polynomials, truncated at x¹³/13! = 2e-18 and x¹⁴/14!."""
+    # Horner's rule; for the angles allowed here the next terms are below the last digit
     s = 1 / 6 - y * (1 / 120 - y * (1 / 5040 - y * (1 / 362880 - y * (1 / 39916800))))
     return s, 1 / 2 - y * (1 / 24 - y * (1 / 720 - y * (1 / 40320 - y * (1 / 3628800 - y * (1 / 479001600)))))
 
@@ -57,7 +58,7 @@ def block_turns(row: Floats, inner: float, outer: float) -> None:
 @njit(cache=True, inline="always")
 def _length(v: Any) -> Any:
     """|v|, without overflow of the squares."""
-    size = max(abs(v[0]), abs(v[1]), abs(v[2]))
+    size = max(abs(v[0]), abs(v[1]), abs(v[2]))  # scaled by the largest component, so that squares do not overflow
     scale = 1.0 / size if size > 0.0 else 1.0
     a, b, c = scale * v[0], scale * v[1], scale * v[2]
     return size * math.sqrt(a * a + b * b + c * c)

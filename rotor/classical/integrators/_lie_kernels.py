@@ -92,8 +92,8 @@ def _error(slopes: Floats, h: float, third: Floats, fifth: Floats, state: Floats
             scale = 1.0 / size if k < 3 and size > 0.0 else 1.0
             five += (scale * e5) ** 2
             three += (scale * e3) ** 2
-        both = math.sqrt(five + 0.01 * three)
-        error = abs(h) * five / both if both > 0.0 else 0.0 * both
+        both = math.sqrt(five + 0.01 * three)  # DOP853's error: the estimate of order 5, damped by that of order 3
+        error = abs(h) * five / both if both > 0.0 else 0.0 * both  # 0 of no slopes stays 0, nan stays nan
         if not error <= worst:  # nan counts as the worst
             worst = error
     return worst
@@ -136,6 +136,7 @@ def _next_factor(error: float, control: Any) -> Any:
     _, shrink, grow, safety, order = control
     if error == 0.0:
         return grow
+    # an infinite error: the step shrinks as far as it may
     factor = safety * error ** (-1.0 / order) if math.isfinite(error) else shrink
     return min(grow, max(shrink, factor))
 
@@ -153,6 +154,7 @@ def to_time(
     work = np.zeros((STAGES, state.shape[0], 6)), np.zeros((state.shape[0], 6))
     forward, steps = (1.0 if end > time else -1.0), 0
     while (end - time) * forward > smallest and steps < most:
+        # a step that nearly reaches the end ends there, so that no sliver is left
         last = step >= abs(end - time) * (1.0 - 1e-12)
         h = end - time if last else forward * step
         error = _stepped(form, rolling, inverse, tableau, time, h, state, work)

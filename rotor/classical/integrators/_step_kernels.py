@@ -42,6 +42,7 @@ def _versed(square: float, square_low: float, cosine: float) -> Any:
     v = square / (1.0 + cosine) if cosine > 0.0 else 1.0 - cosine
     v2, v2_low = two_square(v)
     rest = ((square - 2.0 * v) + v2) + (v2_low + square_low)
+    # a Newton step for v; it divides by the cosine, so not near a right angle
     return v, rest / (2.0 * cosine) if cosine > 0.1 else 0.0
 
 
@@ -84,7 +85,7 @@ def _turn(row: Any, lost: Any, k: int, a: int, b: int, angle: float) -> None:
 def _turn_about(row: Any, lost: Any, x: float, y: float, z: float) -> None:
     """The body turns by the rotation vector (x, y, z), L staying where it is in the body."""
     half = 0.5 * math.sqrt(x * x + y * y + z * z)
-    scale = 0.5 * math.sin(half) / half if half > 0.0 else 0.5
+    scale = 0.5 * math.sin(half) / half if half > 0.0 else 0.5  # sin(x)/x tends to 1
     c, x, y, z = exponential(math.cos(half), scale, (x, y, z))
     _turn_attitude(row, lost, c, x, y, z)
 
@@ -98,6 +99,7 @@ def rotations(state: Floats, carry: Floats, inverse: Floats, step: float, fracti
         for _ in range(steps):
             for fraction in fractions:
                 h = fraction * step
+                # palindromic: half turns about x and y around a whole turn about z make order 2
                 _turn(row, lost, 0, 1, 2, 0.5 * h * i0 * row[0])
                 _turn(row, lost, 1, 2, 0, 0.5 * h * i1 * row[1])
                 _turn(row, lost, 2, 0, 1, h * i2 * row[2])

@@ -113,6 +113,7 @@ def over_blocks(kernel: Any, blocks: int, arguments: tuple[Any, ...], executor: 
     if executor is None:
         kernel((0, blocks), *arguments)
         return
+    # more parts than processors, so that none waits long for the last
     edges = np.linspace(0, blocks, min(blocks, 64) + 1).astype(int).tolist()
     jobs = [executor.submit(kernel, part, *arguments) for part in pairwise(edges)]
     for job in jobs:
@@ -134,7 +135,7 @@ def check_turn(rates: Floats, momentum: Floats, step: float) -> None:
 
     size = np.linalg.norm(momentum, axis=-1)
     turn = abs(step) * float(np.max(size * np.max(np.abs(rates[:, :2]), axis=-1), initial=0.0))
-    if not turn <= WIDEST_TURN:
+    if not turn <= WIDEST_TURN:  # the polynomials of sine and cosine reach no further; nan fails too
         raise ValueError(
             f"a step of {step:g} could turn a body by {turn:.3g} rad about one axis, more than {WIDEST_TURN}; "
             "take a shorter step"

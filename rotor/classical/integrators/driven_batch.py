@@ -132,7 +132,7 @@ def _in_frame(form: SystemForm, frame: Floats) -> Floats:
 
 def _check_turns(turns: Floats, step: float, most: float) -> None:
     """Refuse a result with turns (n,) beyond the polynomials, or of a body that is lost."""
-    if turns.size and not np.max(turns) <= most:
+    if turns.size and not np.max(turns) <= most:  # nan fails too
         raise ValueError(
             f"a step of {step:g} turned a body by {np.max(turns):.3g} rad about one axis, more than {most}; take a shorter step"
         )

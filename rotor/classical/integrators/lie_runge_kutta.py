@@ -132,6 +132,7 @@ class LieRungeKutta(Method):
     def _first_step(self, system: System, time: float, momentum: Floats, attitude: Floats) -> float:
         """A tenth of a radian of the fastest body, or a time unit for bodies at rest; the control corrects it."""
         fastest = float(np.max(np.linalg.norm(system.omega(time, momentum, attitude), axis=-1)))
+        # a tenth of a radian: the controller finds its step within some trials
         return 0.1 / fastest if fastest > 0.0 else 1.0
 
     def _to(
@@ -141,6 +142,7 @@ class LieRungeKutta(Method):
         time, end, most = span
         forward, smallest, steps = np.sign(end - time), SMALLEST_STEP * abs(end - time), 0
         while (end - time) * forward > smallest and steps < most:
+            # a step that nearly reaches the end ends there, so that no sliver is left
             last = step >= abs(end - time) * (1.0 - 1e-12)
             h = end - time if last else forward * step
             new_space, new_q, error = self._step(system, time, space, q, h)
@@ -148,7 +150,7 @@ class LieRungeKutta(Method):
             if self.fixed_step is None:
                 if not last or not error <= 1.0:
                     step = abs(h) * _factor(error)
-                if not error <= 1.0:
+                if not error <= 1.0:  # nan fails too: the step is repeated shorter
                     _check_step(step, smallest, time)
                     continue
             time, space, q = (end if last else time + h), new_space, new_q
@@ -170,6 +172,7 @@ class LieRungeKutta(Method):
         change = (h * DOP853.B @ flat).reshape(-1, 6)
         placed(q, change, space, here, momentum)
         size = np.linalg.norm(space, axis=-1) + np.linalg.norm(change[:, :3], axis=-1)
+        # slopes relative to L, without the error of a body at rest
         slopes[:, :, :3] /= np.where(size > 0.0, size, 1.0)[:, None]
         error = _error(slopes, h, DOP853.E3[:STAGES], DOP853.E5[:STAGES]) / self.tolerance
         return space + change[:, :3], here, error
@@ -189,7 +192,7 @@ def _error(slopes: Floats, h: float, third: Floats, fifth: Floats) -> float:
     """The estimate of Hairer, Nørsett and Wanner, |e5|²/√(|e5|² + 0.01 |e3|²), of the worst body."""
     e5 = np.sum(np.tensordot(fifth, slopes, axes=1) ** 2, axis=-1)
     e3 = np.sum(np.tensordot(third, slopes, axes=1) ** 2, axis=-1)
-    both = np.sqrt(e5 + 0.01 * e3)
+    both = np.sqrt(e5 + 0.01 * e3)  # DOP853's error: the estimate of order 5, damped by that of order 3
     return float(np.max(abs(h) * np.divide(e5, both, out=np.zeros_like(both), where=both != 0.0)))  # NaN stays NaN
 
 

@@ -218,6 +218,7 @@ class KickDrift(Method):
                 f"{type(self).__name__} drifts with moments along fixed axes; added inertia (rolling) needs LieRungeKutta"
             )
         state = rows(momentum, attitude)
+        # a quotient that is whole but for round-off makes no further step
         counts = np.maximum(1, np.ceil(np.abs(np.diff(times)) / self.step - 1e-9)).astype(np.int64)
         path = np.empty((len(times), *state.shape))
         path[0] = state
@@ -253,13 +254,14 @@ class KickDrift(Method):
         if system.free:
             self.drift(system.start_moments, state, carry, step, steps, whole=True)
             return
+        # nan until it is computed, so that a missing kick would show
         kicker = _Kicker(system, state, carry, np.full((len(state), 3), np.nan))
         torque = kicker.torque(start)
         for k in range(steps):
             time = start + k * step
             for fraction in self.kick_fractions:
                 h = fraction * step
-                kicker.kick(torque, 0.5 * h)
+                kicker.kick(torque, 0.5 * h)  # half kicks around the drift: order 2, and reversible
                 moments = system.moments(time + 0.5 * h)
                 kicker.turn(time + 0.5 * h, 0.5 * h)
                 self.drift(moments, state, carry, h, 1, whole=False)

@@ -141,11 +141,13 @@ def exact_modified_moments(moments: Floats, momentum: Floats, step: float) -> Fl
     (before, after), (q0, q1) = (np.split(array, 2, axis=1) for array in (path, attitude))
     turn = multiply(conjugate(q0), q1)
     x = turn[..., 1:] / turn[..., :1]
+    # tan of the half angle: x = v/w of the quaternion
     y = 0.25 * step * (before + after) * (1.0 + np.sum(x**2, axis=-1, keepdims=True))
     matrix = np.stack([y / moments[:, None], y], axis=-1).reshape(len(moments), -1, 2)
     expected = x.reshape(len(moments), -1)
     solution = _least_squares(matrix, expected)
     misfit = np.max(np.abs(np.einsum("nij,nj->ni", matrix, solution) - expected), axis=-1)
+    # the equations have more rows than unknowns; a misfit means that no such step exists
     if np.any(misfit > 1e-10 * np.max(np.abs(expected), axis=-1)):
         worst = int(np.argmax(misfit))
         raise ValueError(
@@ -156,6 +158,7 @@ def exact_modified_moments(moments: Floats, momentum: Floats, step: float) -> Fl
 
 def _on_grid(scaled: Floats) -> Floats:
     """Numbers rounded to the last digit of the largest: their differences are then exact, and no energy drifts."""
+    # 53 bits below the largest: products of whole multiples of the grid are exact
     grid = np.ldexp(1.0, np.frexp(np.max(np.abs(scaled), axis=-1, keepdims=True))[1] - 53)
     return np.ascontiguousarray(np.rint(scaled / grid) * grid)
 
@@ -167,7 +170,7 @@ def _least_squares(matrix: Floats, expected: Floats) -> Floats:
     """
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
     along = np.einsum("nij,ni->nj", left, expected)
-    regular = sizes > 1e-13 * sizes[:, :1]
+    regular = sizes > 1e-13 * sizes[:, :1]  # a free axis of a symmetric top leaves a zero singular value
     return np.asarray(np.einsum("nj,nji->ni", np.where(regular, along, 0.0) / np.where(regular, sizes, 1.0), right))
 
 

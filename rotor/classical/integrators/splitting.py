@@ -157,6 +157,7 @@ def turned_axes(inverse: Floats) -> NDArray[np.int64]:
     >>> turned_axes(np.array([[1.0, 0.8, 0.3]])).tolist()
     [[2, 0, 1]]
     """
-    order = np.argsort(inverse, axis=-1, kind="stable")
+    order = np.argsort(inverse, axis=-1, kind="stable")  # stable: equal moments keep the order of the axes
     low, middle, high = np.take_along_axis(inverse, order, axis=-1).T
+    # the axis of the unlike moment first: about it the other two nearly form a symmetric top
     return np.where((high - middle < middle - low)[:, None], order[:, [0, 2, 1]], order[:, [2, 0, 1]])

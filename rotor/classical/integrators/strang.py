@@ -52,5 +52,5 @@ def symmetric_steps(turns: Any, state: Any, fractions: Any, step: Any, steps: An
     before, k = 0.0, 0
     for left in range(steps * len(fractions), -1, -1):
         now = fractions[k] * step if left > 0 else 0.0
-        turns(state, before, 0.5 * (before + now))
+        turns(state, before, 0.5 * (before + now))  # neighbouring half steps are one turn
         before, k = now, k + 1 if k + 1 < len(fractions) else 0

@@ -37,7 +37,7 @@ class Light:
         if self.direction is None:
             return self
         cosine = float(np.dot(self.direction, field) / np.linalg.norm(field))
-        return Light(math.degrees(math.acos(min(1.0, max(-1.0, cosine)))))
+        return Light(math.degrees(math.acos(min(1.0, max(-1.0, cosine)))))  # round-off may exceed 1
 
     @property
     def factors(self) -> tuple[float, float]:
@@ -54,6 +54,7 @@ class Light:
         along, across = self.factors
         parallel = _square(components, field)
         whole = np.sum([np.abs(component) ** 2 for component in components], axis=0)
+        # the difference of squares may round below 0
         return np.asarray(along * parallel + across * np.maximum(whole - parallel, 0.0))
 
     @property
@@ -79,7 +80,7 @@ def light_components(light: LightText) -> Light:
     if isinstance(light, str) and light in LIGHT:
         return Light(LIGHT[light])
     try:
-        numbers = np.atleast_1d(np.asarray(light, dtype=np.float64))
+        numbers = np.atleast_1d(np.asarray(light, dtype=np.float64))  # one number is an angle, three are components
     except ValueError:
         numbers = np.array([math.nan])
     length = float(np.linalg.norm(numbers))

@@ -315,6 +315,7 @@ def _names(
             for side, rows in zip(sides, states, strict=True)
         ]
         out.append(np.where(turned, labels[other], labels[this]))
+        # M and -M have one energy where M is good
         m_values = [abs(side.block.m) if side.block.space.m_is_good else side.block.m for side in sides]
         out.append(np.where(turned, m_values[other], m_values[this]))
     return out[0], out[1], out[2], out[3]
@@ -351,6 +352,7 @@ def _joined(parts: list[_Part]) -> dict[str, NDArray[Any]]:
 def _strong(columns: dict[str, NDArray[Any]], fields: int) -> dict[str, NDArray[Any]]:
     """The columns without pairs of states that are forbidden at every field."""
     strength = columns["strength_debye2"].reshape(-1, fields)
+    # strengths are squares of elements: round-off leaves no exact zeros
     allowed = np.repeat(strength.max(axis=1) > LEAST_STRENGTH * strength.max(initial=0.0), fields)
     return {name: column[allowed] for name, column in columns.items()}
 

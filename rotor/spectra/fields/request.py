@@ -144,6 +144,7 @@ def compute_spectrum(request: FieldRequest, states: FieldMap, executor: Executor
 
     mean = float(states.fields[np.argmax(np.abs(states.fields))])
     deviation = request.spread * abs(mean)
+    # four standard deviations; a field without spread takes a small range for the slopes
     width = 4 * deviation or 1e-3 * abs(mean) or 1e-3
     lines = _lines_at(request, np.linspace(mean - width, mean + width, FIELDS_OF_SPREAD), executor)
     if not len(lines):
@@ -151,7 +152,7 @@ def compute_spectrum(request: FieldRequest, states: FieldMap, executor: Executor
             f"j_highest: no line joins two of the states up to J = {request.stark.j_highest}; take a higher J"
         )
     first, last = request.range_mhz or _around(lines, request.linewidth_mhz)
-    points = max(SPECTRUM_POINTS, int(8 * (last - first) / request.linewidth_mhz) + 1)
+    points = max(SPECTRUM_POINTS, int(8 * (last - first) / request.linewidth_mhz) + 1)  # eight points a line width
     if points > MOST_POINTS:
         raise ValueError(
             f"range_mhz: {first:.6g} to {last:.6g} MHz with lines of {request.linewidth_mhz:g} MHz are {points} points; "

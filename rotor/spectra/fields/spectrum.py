@@ -47,6 +47,7 @@ class FieldDistribution:
             )
         if not np.isfinite(fields).all() or (np.diff(fields) <= 0).any():
             raise ValueError("fields of a distribution: expected finite, rising numbers in kV/cm")
+        # normalised, so that any unit of density will do
         area = float(np.trapezoid(density, fields)) if (density >= 0).all() else math.nan
         if not (math.isfinite(area) and area > 0):
             raise ValueError("density of a distribution of fields: expected numbers of 0 or more, not all 0")
@@ -154,6 +155,7 @@ def _smeared(
             out.append((curves[0](np.array([first])), curves[1](np.array([first]))))
             continue
         moved = np.ptp(curves[0](distribution.fields_kv_per_cm))
+        # two fields for each step of a width, within bounds
         count = min(max(LEAST_FIELDS, math.ceil(2 * moved / (STEP * fwhm_mhz))), MOST_FIELDS)
         here = np.linspace(first, last, count)
         out.append((curves[0](here), curves[1](here) * distribution.weights(here)))
@@ -162,8 +164,9 @@ def _smeared(
 
 def _add(total: Floats, grid: Floats, centres: Floats, areas: Floats, fwhm_mhz: float, shape: object) -> None:
     """Add the profiles of many centres to `total`; centres more than 50 widths outside the grid are left out."""
+    # a Lorentzian has fallen to 1e-4 of its peak at 50 widths
     near = (centres > grid[0] - 50 * fwhm_mhz) & (centres < grid[-1] + 50 * fwhm_mhz)
     assert callable(shape)
-    for start in range(0, int(near.sum()), 256):
+    for start in range(0, int(near.sum()), 256):  # pieces bound the memory of (lines, points)
         piece = slice(start, start + 256)
         total += areas[near][piece] @ shape(grid[None, :] - centres[near][piece][:, None], fwhm_mhz)

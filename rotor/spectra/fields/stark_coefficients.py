@@ -115,6 +115,7 @@ def _field_series(request: MapRequest, blocks: Sequence[FieldBlock]) -> FieldSer
 
 def _block_series(request: MapRequest, block: FieldBlock) -> FieldSeries:
     """Coefficients c1 ... c6 of the states of a block, in their order at the fields of the map."""
+    # only negative fields: odd powers change sign
     sign = -1 if request.fields.max() <= 0 > request.fields.min() else 1
     turned = tuple(sign**n * term for n, term in enumerate(request.matrices(block)))
     series = field_series(turned, count_of(request, block, block.free_order), _SUMMED, block.even_in_field)
@@ -132,7 +133,7 @@ def _range(sizes: Floats) -> Floats:
         term = sizes[:, q - 1]
         reach = np.zeros(len(sizes))
         for p in range(1, POWERS + 1):
-            with np.errstate(divide="ignore", invalid="ignore"):
+            with np.errstate(divide="ignore", invalid="ignore"):  # terms of 0 never matter: their field is infinite
                 field = (SHARE * sizes[:, p - 1] / term) ** (1 / (q - p))
             reach = np.maximum(reach, np.where(term > 0, field, np.inf))
         beyond = np.minimum(beyond, reach)
