@@ -15,9 +15,9 @@ MIXED = 3  # the type of a family of lines of several types
 @njit(cache=True, nogil=True)
 def place(theta: Floats, kappa: float) -> tuple[int, float]:
     """Grid interval of κ and the position within it, from 0 to 1, for cubic interpolation between four points."""
-    angle = np.arccos(min(1.0, max(-1.0, -kappa)))
-    x = (angle - theta[0]) / (theta[1] - theta[0])
-    i = int(min(max(np.floor(x), 1), len(theta) - 3))
+    angle = np.arccos(min(1.0, max(-1.0, -kappa)))  # cos θ = -κ; round-off may leave the range
+    x = (angle - theta[0]) / (theta[1] - theta[0])  # an even grid: the place follows without a search
+    i = int(min(max(np.floor(x), 1), len(theta) - 3))  # four points of interpolation: two on either side
     return i, x - i
 
 
@@ -40,6 +40,7 @@ def level_energies(levels: Floats, theta: Floats, jj: Floats, constants: Floats,
 
 
 @njit(cache=True, nogil=True)
+# Lagrange's cubic through four neighbouring points
 def rigid_energies(reduced: Floats, theta: Floats, jj: Floats, top: Floats, energy: Floats) -> None:
     """Write energies (MHz) of all levels of a rigid top A, B, C; reduced (POINTS, levels) : E_κ."""
     mean, half = 0.5 * (top[0] + top[2]), 0.5 * (top[0] - top[2])
@@ -61,7 +62,7 @@ def lines_in_band(
     points = strength.shape[0]
     x = (np.arccos(min(1.0, max(-1.0, -kappa))) - theta[0]) / (theta[-1] - theta[0]) * (points - 1)
     k = int(min(max(x, 0.0), points - 2))
-    w = min(max(x - k, 0.0), 1.0)
+    w = min(max(x - k, 0.0), 1.0)  # beyond the ends the nearest point counts
     count = 0
     low, high = windows[0, 0], windows[-1, 1]
     for n in range(len(upper)):
@@ -73,7 +74,7 @@ def lines_in_band(
             if not inside:
                 continue
             s = (1 - w) * strength[k, n] + w * strength[k + 1, n]
-            if s > 1e-3:
+            if s > 1e-3:  # lines of no strength at this κ are left out
                 row[count], frequency[count], s_nu[count] = n, f, s * f * f
                 count += 1
     return count
@@ -162,12 +163,14 @@ def _joint(
         if total + gains[n] < least:
             break
         level = height[n] + scale
+        # a logistic function of the height: weak lines are often missed
         seen = detected / (1.0 + np.exp(-(level - log_threshold) / (0.4 * spread)))
-        if seen < 0.02:
+        if seen < 0.02:  # so unlikely that a peak here means nothing
             continue
         best, at = 0.0, -1
         for p in range(first[n], last[n]):
             if used[p] != mark:
+                # heights scatter in the logarithm, positions in units of their error
                 x, y = (peaks[p] - f[n]) / sigma[n], (log_peaks[p] - level) / spread
                 ratio = np.exp(-0.5 * (x * x + y * y) - log_density[p])
                 if ratio > best:
@@ -254,6 +257,7 @@ def best_scale(
     gains = _gains(f, sigma, first, last, peaks, log_density, spread, detected)
     if gains[0] < least:
         return 0.0, best
+    # marks of the peaks used at each scale
     used, tried, count = np.zeros(len(peaks), np.int64), np.empty(8 * proposals), 0
     for n in range(min(proposals, len(f))):
         for p in range(first[n], last[n]):
@@ -262,7 +266,7 @@ def best_scale(
             scale = log_peaks[p] - expected[n]
             is_repeated = False
             for m in range(count):
-                if abs(tried[m] - scale) < 0.25 * spread:
+                if abs(tried[m] - scale) < 0.25 * spread:  # scales this close give the same matches
                     is_repeated = True
                     break
             if is_repeated:
@@ -275,7 +279,7 @@ def best_scale(
             )  # fmt: skip
             if value > highest:
                 highest, best = value, scale
-    return highest if best > -np.inf else 0.0, best
+    return highest if best > -np.inf else 0.0, best  # no scale fits: the type is taken as absent
 
 
 @njit(cache=True, nogil=True)
@@ -314,6 +318,7 @@ def _highest(height: Floats, most: int) -> Ints:
     """Indices of the highest values in descending order; equal values keep their order."""
     out, count = np.empty(most, np.int64), 0
     for n in range(len(height)):
+        # the list is full, and this one is weaker than its last
         if count == most and height[n] <= height[out[most - 1]]:
             continue
         at = count if count < most else most - 1
@@ -398,7 +403,7 @@ def nearest_peaks(
     for n in range(len(centre)):
         reach = window * errors[n]
         first, last = np.searchsorted(peaks, centre[n] - reach), np.searchsorted(peaks, centre[n] + reach)
-        if last - first >= most:
+        if last - first >= most:  # a crowd of peaks does not tell which is the line
             continue
         best, lowest = -1, np.inf
         for p in range(first, last):
@@ -408,6 +413,7 @@ def nearest_peaks(
                 best, lowest = p, cost
         if best < 0 or abs(log_peaks[best] - height[n]) >= 3.0 * spread:
             continue
+        # a match that chance would make as often says nothing
         if 2 * reach * np.exp(log_density[best]) * 4 * spread < most_chance:
             out[n] = best
     return out

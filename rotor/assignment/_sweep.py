@@ -20,7 +20,7 @@ def _hits(
     hits, misses = 0, 0
     for q in range(len(jj)):
         f = jj[q] * mean + half * (energies[k, q] + w * (energies[k + 1, q] - energies[k, q]))
-        if f < low or f >= high:
+        if f < low or f >= high:  # outside the band nothing can be a peak
             continue
         if near[int((f - low) * per_mhz)] < reach:
             hits += 1
@@ -60,7 +60,7 @@ def _linear(difference: Floats, jj: Floats, kappa: Floats) -> Floats:
     for k in range(len(kappa)):
         first, second, third = difference[0, k], difference[1, k], difference[2, k]
         determinant = jj[0] * second - jj[1] * first
-        inverse = 0.0 if abs(determinant) < 1e-6 else 1 / determinant
+        inverse = 0.0 if abs(determinant) < 1e-6 else 1 / determinant  # parallel lines: this κ has no solution
         mean_a, mean_b = second * inverse, -first * inverse
         out[k, 0], out[k, 1], out[k, 2], out[k, 5] = mean_a, mean_b, inverse, kappa[k]
         out[k, 3], out[k, 4] = jj[2] * mean_a - third * jj[1] * inverse, jj[2] * mean_b + third * jj[0] * inverse
@@ -97,7 +97,7 @@ def _most_asymmetric(kappa: float, planar: float) -> float:
     With u = (A-C)/(A+C) the condition is 2-p + ((1-p)(1+κ) - 2) u - (1 + (1+p) κ) u² > 0; it holds at 0 and fails at 1.
     """
     square, linear, constant = -(1 + (1 + planar) * kappa), (1 - planar) * (1 + kappa) - 2.0, 2 - planar
-    root = np.sqrt(max(linear * linear - 4 * square * constant, 0.0))
+    root = np.sqrt(max(linear * linear - 4 * square * constant, 0.0))  # rounding at the edge of the band
     return float(2 * constant / (root - linear))
 
 
@@ -124,6 +124,7 @@ def _seconds_within(
                 break
             share = 1.0 if n == 0 else kappa if n == 1 else -1.0
             value, slope = mean + share * half, mean_slope + share * half_slope
+            # the grid of κ is coarse: bounds are widened by 3 %
             low, high = _narrowed(low, high, value, slope, 0.97 * bounds[2 * n], 1.03 * bounds[2 * n + 1])
         if low > high:
             begin[k], end[k] = 0, 0
@@ -145,7 +146,7 @@ def _kappa_ranges(begin: Ints, end: Ints, opening: Ints, closing: Ints) -> None:
     opening[:], closing[:] = len(begin), 0
     for step in range(len(begin)):
         for b in range(begin[step], end[step]):
-            opening[b], closing[b] = min(opening[b], step), step + 1
+            opening[b], closing[b] = min(opening[b], step), step + 1  # the last κ plus 1
 
 
 @njit(cache=True, nogil=True, fastmath=True)
@@ -166,20 +167,21 @@ def sweep(
     coarse = np.minimum(np.arange((points + stride - 2) // stride + 1) * stride, points - 1)
     looks, begin, end = linear[coarse], np.empty(len(coarse), np.int64), np.empty(len(coarse), np.int64)
     opening, closing = np.empty(n, np.int64), np.empty(n, np.int64)
+    # a wider limit than at the roots, as κ stands on a grid
     largest = np.array([_most_asymmetric(x, 0.95) for x in looks[:, 5]])
     for a in range(n):
         sa = seeds[a]
         _seconds_within(sa, jj, looks, largest, seeds, bounds, begin, end)
         _kappa_ranges(begin, end, opening, closing)
         for b in range(n):
-            if a == b or abs(log_seeds[a] - log_seeds[b]) > ratio:
+            if a == b or abs(log_seeds[a] - log_seeds[b]) > ratio:  # lines of one family have like intensities
                 continue
             sb = seeds[b]
             above = jj[0] * sb - jj[1] * sa
             before, p, at = -1.0, 0, 0
             for step in range(opening[b], closing[b]):
                 if b < begin[step] or b >= end[step]:
-                    before = -1.0
+                    before = -1.0  # a new stretch of κ: no crossing with what was before it
                     continue
                 k, third = coarse[step], sa * looks[step, 3] + sb * looks[step, 4]
                 if before < 0.0:
@@ -194,6 +196,7 @@ def sweep(
                         continue
                     i, w, s, d, x = _root(linear, sa, sb, above, seeds[line], at, k)
                     top_b = s + x * d
+                    # the third line has no such frequency, or the top is out of bounds
                     if w < 0.0 or not _inside(s + d, top_b, s - d, bounds, 0.0, 0.985):
                         continue
                     reach = min(max(tolerance, softness * top_b) * fifths, 255.0)

@@ -65,11 +65,12 @@ class AssignedSpecies:
     def dipole_ratio(self) -> Floats:
         """|μa|, |μb|, |μc| relative to the largest (3,), from intensities ∝ μ²."""
         scales = np.where(self.grown.ratios > LEAST_RATIO, self.grown.scales, -np.inf)
-        return np.asarray(np.exp((scales - scales.max()) / 2))
+        return np.asarray(np.exp((scales - scales.max()) / 2))  # intensity goes with the square of the dipole
 
     @property
     def split(self) -> bool:
         """Whether the lines are split into doublets."""
+        # a third of the assigned lines in two peaks: the spectrum is split
         return bool((self.peak[:, 0] != self.peak[:, 1]).mean() > 0.3)
 
     @property
@@ -163,6 +164,7 @@ class AssignAnswer(TextOf):
         size = len(peaks)
         species, calculated = np.zeros(size, dtype=np.int64), np.full(size, np.nan)
         upper, lower = np.full((size, 3), -1), np.full((size, 3), -1)
+        # strong species last, so that a shared peak names the strongest
         for number, member in reversed(list(enumerate(self.species, 1))):
             fit = member.refined.fit
             for side in (1, 0):

@@ -101,6 +101,7 @@ def _checked(seen: Field, species: Grown, column: int, least: int, enough: float
     taken = np.isin(species.peak, species.peak[inside])  # a peak belongs to the group with all its lines
     if not inside.any() or len(np.unique(species.peak[~taken])) < FEWEST_OTHERS:
         return species
+    # 1.4826 turns a median deviation into a standard deviation of normal residuals
     sigma0 = 1.3 * max(1.4826 * float(np.median(np.abs(species.residual))), SMALLEST_MHZ)
     places = _places(seen, species, taken, column, least, sigma0, all_types)
     if places is None:
@@ -141,7 +142,7 @@ def _places(
     constants, covariance = _others(seen, species, taken)
     predicted = predict(seen, species.constants, species.temperature_k)
     scales = np.where(species.ratios > LEAST_RATIO, species.scales, -np.inf)
-    if all_types:
+    if all_types:  # a type without evidence has no scale
         scales = np.maximum(scales, _line_scales(seen, species, predicted))
     lines = merged_lines(seen, species.constants, predicted, scales)
     inside = np.flatnonzero(_largest(seen, lines.main)[:, column] >= least)
@@ -152,6 +153,7 @@ def _places(
     variances = slopes @ covariance @ slopes.T
     values, vectors = np.linalg.eigh(variances)
     move = vectors[:, -1] * np.sqrt(max(float(values[-1]), 0.0))
+    # the length of the largest eigenvector; the limit avoids 0/0
     movement = covariance @ slopes.T @ vectors[:, -1] / np.sqrt(max(float(values[-1]), 1e-30))
     largest = float(np.abs(line_slopes(seen, species.rows[taken], species.constants) @ movement).max())
     second = float(np.abs(vectors[:, -2:-1]).max(initial=0.0) * np.sqrt(max(float(values[:-1].max(initial=0.0)), 0.0)))
@@ -159,6 +161,7 @@ def _places(
         return None
     t = np.linspace(-REACH, REACH, int(min(4 * REACH * float(np.abs(move).max()) / sigma0, MOST_STEPS)) + 1)
     present = float(move @ slopes @ (species.constants - constants) / (move @ move))
+    # the part of the variance that this direction does not carry, with the scatter of peaks
     rest = np.sqrt(np.maximum(np.diag(variances) - move**2, 0.0) + sigma0**2)
     free = np.setdiff1d(np.arange(len(seen.peaks)), species.peak[~taken])
     peaks = seen.peaks
@@ -174,7 +177,7 @@ def _moved(seen: Field, species: Grown, places: Places, sigma0: float) -> Grown 
     if species.start is None:
         return None
     best = float(places.t[np.argmax(places.log_density)])
-    step = 3 * sigma0 / places.largest_mhz
+    step = 3 * sigma0 / places.largest_mhz  # three times the scatter, in units of the largest movement
     along = np.outer(places.movement, places.movement)
     _, sizes = quartic_prior(seen, species.constants)
     prior = prior_weight(seen, species.constants, sizes)
@@ -199,6 +202,7 @@ def _line_scales(seen: Field, species: Grown, predicted: Predicted) -> Floats:
     kinds, scales = seen.table.kind[species.rows], np.full(3, -np.inf)
     for q in np.flatnonzero(species.ratios <= LEAST_RATIO).tolist():
         known = heights[(kinds == q) & np.isfinite(heights)]
+        # the median: a few blended lines do not matter
         scales[q] = float(np.median(known)) if len(known) else -np.inf
     return scales
 

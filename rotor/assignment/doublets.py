@@ -35,10 +35,12 @@ def with_centres(peaks: PeakList, alone: bool = False) -> tuple[PeakList, Ints]:
         both = np.concatenate([np.delete(both[: len(f)], np.unique(doublets), axis=0), doublets])
     split = both[:, 0] != both[:, 1]
     centre = f[both].mean(axis=1)
-    order = np.argsort(centre, kind="stable")
+    order = np.argsort(centre, kind="stable")  # stable: doublets at one centre keep their order
+    # two peaks measure their centre √2 better
     error = np.sqrt((peaks.uncertainty_mhz[both] ** 2).mean(axis=1) / np.where(split, 2, 1))
+    # the centre of unequal components is uncertain by some part of their distance
     error = error + 0.01 * (f[both[:, 1]] - f[both[:, 0]])
-    total = np.where(split, height[both].sum(axis=1), height[both[:, 0]])
+    total = np.where(split, height[both].sum(axis=1), height[both[:, 0]])  # a doublet has the intensity of both
     doubled = replace(
         peaks, frequency_mhz=centre[order], intensity=total[order], uncertainty_mhz=error[order],
         stated_windows=peaks.windows,

@@ -32,6 +32,7 @@ def probability(grown: Grown) -> float:
 
 def isotopologue_probability(grown: Grown) -> float:
     """Probability that the constants of an isotopologue are right; its prior volume of constants is small."""
+    # limited, so that exp does not overflow
     return float(1 / (1 + np.exp(-np.clip((grown.evidence - MIDDLE_OF_ISOTOPOLOGUES) / 2.0, -50, 50))))
 
 

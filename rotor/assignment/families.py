@@ -68,12 +68,13 @@ def sample_tops(bounds: Bounds, count: int, rng: np.random.Generator) -> Floats:
     total = 0
     low, high = np.log(bounds.low), np.log(bounds.high)
     for _ in range(200):
-        u = rng.random((4 * count, 3))
+        u = rng.random((4 * count, 3))  # four times as many as needed, since many are rejected
         a, b = (np.exp(low[i] + (high[i] - low[i]) * u[:, i]) for i in (0, 1))
         planar = a * b / (a + b)
+        # C lies between planarity and B
         least, most = np.maximum(planar, bounds.low[2]), np.minimum(b, bounds.high[2])
-        c = least + (most - least) * u[:, 2] ** 1.5
-        selected = (a > 1.02 * b) & (c < 0.999 * b) & (most > least)
+        c = least + (most - least) * u[:, 2] ** 1.5  # a power of 1.5: more tops near planarity
+        selected = (a > 1.02 * b) & (c < 0.999 * b) & (most > least)  # nearly symmetric tops are left out
         rows.append(np.column_stack([a, b, c])[selected])
         total += len(rows[-1])
         if total >= count:
@@ -149,6 +150,7 @@ def _cover(
     if not len(chosen):
         return []
     size = len(table.upper)
+    # one integer a family: triples compare faster
     keys, family = np.unique((chosen[:, 0] * size + chosen[:, 1]) * size + chosen[:, 2], return_inverse=True)
     by_family, by_place = np.argsort(family, kind="stable"), np.argsort(place, kind="stable")
     firsts = np.searchsorted(family[by_family], np.arange(len(keys) + 1))
@@ -183,4 +185,5 @@ def _family(table: RigidTable, chosen: Ints, lines: Ints, good: NDArray[np.bool_
     total = np.bincount(which, weight[useful])
     kinds = table.kind[chosen]
     kind = int(kinds[0]) if (kinds == kinds[0]).all() and not _mixed(table, line, int(kinds[0])) else MIXED
+    # stable: equal strengths keep the order of lines
     return Family(kind, chosen, line[np.argsort(-total, kind="stable")][:COMPANIONS], share)

@@ -101,11 +101,13 @@ def quartic_prior(field: Field, constants: Floats) -> tuple[Floats, Floats]:
     """A-priori values and standard errors of the quartic constants: about 0, or those of a parent within a fifth of their size."""
     if field.parent is None:
         return np.zeros(5), quartic_sizes(constants)
+    # a fifth of the parent's constants, and a hundredth of typical sizes where they are 0
     return field.parent[3:], 0.2 * np.abs(field.parent[3:]) + 0.01 * quartic_sizes(constants)
 
 
 def prior_weight(field: Field, constants: Floats, sizes: Floats) -> Floats:
     """1/σ² of all constants (8, 8) before any line is assigned; A, B, C to 5 % by default."""
+    # without a stated spread 5 % of each constant
     spread = 0.05 * constants[:3] if field.spread is None else field.spread
     return np.diag(1 / np.concatenate([spread, sizes]) ** 2)
 
@@ -127,6 +129,7 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
     for q in range(3):
         rows = np.flatnonzero(kind == q)
         if len(rows) > most:
+            # stable: equal strengths keep the order of lines
             rows = rows[np.argsort(-expected[rows], kind="stable")[:most]]
         selected[rows] = True
     return Predicted(row[selected], f[selected], expected[selected], kind[selected], below[selected])
@@ -183,6 +186,7 @@ def grown_from(
             temperature = best_temperature(field, constants, covariance, sigma0)
         chance = min(LAST_CHANCE, FIRST_CHANCE * RISE**turn) if last > FEW else field.chance_of_few
         matched = _matched(field, constants, covariance, temperature, sigma0, chance, grown)
+        # few matches so far: a larger chance is allowed
         while chance < field.chance_of_few and (matched is None or len(np.unique(matched.peak)) < FEW):
             chance = min(3 * chance, field.chance_of_few)
             matched = _matched(field, constants, covariance, temperature, sigma0, chance, grown)
@@ -212,8 +216,9 @@ def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0
     """The temperature with the largest likelihood ratio, among the given ones or on a grid."""
     if len(field.temperatures) == 1:
         return float(field.temperatures[0])
-    lines = predict(field, constants, TEMPERATURES[-1], 4000)
+    lines = predict(field, constants, TEMPERATURES[-1], 4000)  # the highest temperature shows the most lines
     errors = _errors(line_slopes(field, lines.row, constants), covariance, sigma0)
+    # at least thirty lines, however uncertain
     sharp = errors <= max(SHARP_MHZ, float(np.partition(errors, min(30, len(errors) - 1))[min(30, len(errors) - 1)]))
     strength = lines.expected[sharp] + lines.energy[sharp] / (MHZ_PER_K * TEMPERATURES[-1])
     peaks, best, temperature = field.peaks, -np.inf, TEMPERATURES[0]
@@ -230,6 +235,7 @@ def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0
 
 def _variances(slopes: Floats, covariance: Floats) -> Floats:
     """gᵀCg of each row g."""
+    # round-off may make a variance of 0 negative
     return np.asarray(np.maximum(((slopes @ covariance) * slopes).sum(axis=1), 0.0))
 
 
@@ -294,7 +300,9 @@ class Merged:
 def merged_lines(field: Field, constants: Floats, lines: Predicted, scales: Floats) -> Merged:
     """Predicted lines above the threshold; those closer than the width of a peak are merged."""
     level = lines.expected + scales[lines.kind]
+    # lines just below the weakest peak may still be seen
     selected = np.flatnonzero(level > field.peaks.log_threshold - 1.0)
+    # stable: lines of one frequency keep their order
     selected = selected[np.argsort(lines.frequency[selected], kind="stable")]
     row, f, level = lines.row[selected], lines.frequency[selected], level[selected]
     if not len(selected):
@@ -302,7 +310,7 @@ def merged_lines(field: Field, constants: Floats, lines: Predicted, scales: Floa
         return Merged(row, none, row, none, none, row, np.zeros((0, 8)))
     blend = np.concatenate([[0], np.cumsum(np.diff(f) > BLENDED_MHZ)])
     starts = np.flatnonzero(np.diff(np.concatenate([[-1], blend])))
-    weight = np.exp(level - level.max())
+    weight = np.exp(level - level.max())  # relative to the strongest line, so that exp does not overflow
     total = np.add.reduceat(weight, starts)
     share = weight / total[blend]
     strongest = np.lexsort((-share, blend))[starts]
@@ -324,7 +332,7 @@ def _predicted_by_others(
         return centre, variance
     weight, residual = np.zeros(len(field.table.upper)), np.zeros(len(field.table.upper))
     weight[before.rows], residual[before.rows] = before.weight, before.residual
-    leverage = np.minimum(weight[rows] * variance, 0.9999)
+    leverage = np.minimum(weight[rows] * variance, 0.9999)  # a leverage of 1 has no prediction by the others
     return centre - residual[rows] * leverage / (1 - leverage), variance / (1 - leverage)
 
 
@@ -343,7 +351,7 @@ def _without_doubles(chosen: Ints, height: Floats) -> Ints:
     out = chosen.copy()
     for peak in np.flatnonzero(np.bincount(chosen[chosen >= 0], minlength=1) > 1).tolist():
         rivals = np.flatnonzero(chosen == peak)
-        out[rivals] = -1
+        out[rivals] = -1  # a peak belongs to its strongest line
         out[rivals[np.argmax(height[rivals])]] = peak
     return out
 
@@ -373,6 +381,7 @@ def _refitted(
     residual = peaks.frequency_mhz[peak] - centre
     peak_errors = np.maximum(peaks.uncertainty_mhz[peak], SMALLEST_MHZ)
     sigma = np.maximum(peak_errors, sigma0 / 1.5)
+    # a Cauchy weight: lines beyond 2.4 errors count less
     weight = 1 / (sigma**2 * (1 + (residual / (2.4 * sigma)) ** 2))
     normal = slope.T @ (weight[:, None] * slope) + prior
     pull = slope.T @ (weight * residual)
@@ -380,6 +389,7 @@ def _refitted(
     covariance = np.asarray(np.linalg.inv(normal), dtype=np.float64)
     new = constants + covariance @ pull
     after = residual - slope @ (new - constants)
+    # 1.4826 turns a median deviation into a standard deviation; four degrees of freedom are used up
     scatter = 1.4826 * float(np.median(np.abs(after))) * np.sqrt(len(peak) / max(len(peak) - 4, 1.0))
     sigma0 = float(np.clip(max(scatter, np.median(peak_errors)), SMALLEST_MHZ, sigma0))
     grown = Grown(

@@ -54,17 +54,18 @@ class Intensities:
         temperature = self.temperature_k if np.isfinite(self.temperature_k) else lines.temperature_k
         scale = self.log_scale[line_types(lines, np.arange(len(lines)))]
         below = lines.levels.energy_mhz[lines.lower] - lines.levels.energy_mhz.min()
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore"):  # a line of strength 0 has no logarithm
             strength = np.log(lines.strength_debye2 * lines.frequency_mhz**2)
         return np.asarray(np.exp(scale + strength - below / (MHZ_PER_K * temperature)))
 
 
 def matched(lines: Lines, peaks: PeakList) -> tuple[Ints, Ints]:
     """Strong single lines and their peaks; -1 without a peak."""
+    # stable: equal intensities keep the order of lines
     order = np.argsort(-lines.intensity_nm2_mhz, kind="stable")[:STRONGEST]
     rows = np.sort(order)
     f = lines.frequency_mhz[rows]
-    gaps = np.concatenate([[np.inf], np.diff(f), [np.inf]])
+    gaps = np.concatenate([[np.inf], np.diff(f), [np.inf]])  # only isolated lines: a blend has the height of several
     rows = rows[(gaps[:-1] > APART_MHZ) & (gaps[1:] > APART_MHZ)]
     f = lines.frequency_mhz[rows]
     at = np.clip(np.searchsorted(peaks.frequency_mhz, f), 1, len(peaks) - 1)
@@ -80,7 +81,7 @@ def line_types(lines: Lines, rows: Ints) -> Ints:
     if not {"ka", "kc"} <= set(quanta):
         return np.zeros(len(rows), dtype=np.int64)
     ka, kc = ((quanta[name][lines.upper[rows]] - quanta[name][lines.lower[rows]]) % 2 for name in ("ka", "kc"))
-    return np.where(ka == 0, 0, np.where(kc == 1, 1, 2))
+    return np.where(ka == 0, 0, np.where(kc == 1, 1, 2))  # even, odd: a; odd, odd: b; odd, even: c
 
 
 def fit_intensities(lines: Lines, peaks: PeakList) -> Intensities:
@@ -133,6 +134,7 @@ def _fitted(lines: Lines, peaks: PeakList, line: Ints, peak: Ints, kind: Ints) -
     for _ in range(TURNS):
         solved = np.linalg.lstsq(np.sqrt(weight)[:, None] * used, np.sqrt(weight) * value, rcond=None)[0]
         off = value - used @ solved
+        # 1.4826 turns a median deviation into a standard deviation
         scatter = max(1.4826 * float(np.median(np.abs(off))), 1e-6)
         weight = np.minimum(1.0, HUBER * scatter / np.maximum(np.abs(off), 1e-12))
     temperature = error = float("nan")
@@ -143,4 +145,5 @@ def _fitted(lines: Lines, peaks: PeakList, line: Ints, peak: Ints, kind: Ints) -
     log_scale[kinds] = solved[: len(kinds)]
     factors = np.exp((log_scale - log_scale.max()) / 2)
     dipole = factors * np.abs(np.array(lines.top.dipole_abc_debye))
+    # the limit avoids 0/0 where no dipole is left
     return Intensities(temperature, error, dipole / max(dipole.max(), 1e-300), line, peak, scatter, log_scale)

@@ -54,6 +54,7 @@ def expected_isotopologues(parent: Floats, molecule: Molecule) -> list[Expected]
     """
     top = Top.from_molecule(molecule)
     computed = np.array([top.constants[name] for name in "ABC"]) if top.kind == "asymmetric" else np.zeros(3)
+    # a geometry this far off belongs to another molecule
     if not computed.all() or np.abs(computed / parent[:3] - 1).max() > 0.2:
         raise ValueError(
             f"molecule: A, B, C of its geometry are {', '.join(f'{x:.1f}' for x in computed)} MHz, those of the species "
@@ -62,7 +63,7 @@ def expected_isotopologues(parent: Floats, molecule: Molecule) -> list[Expected]
     out = []
     abundant = isotopologues(top, min_abundance=LEAST_ABUNDANCE)
     for isotopologue in abundant[1:]:
-        if len(isotopologue.substituted) != 1:
+        if len(isotopologue.substituted) != 1:  # only single substitutions are looked for
             continue
         ratio = np.array([isotopologue.top.constants[name] for name in "ABC"]) / computed
         constants = parent[:3] * ratio
@@ -107,6 +108,7 @@ def find_isotopologues(
 def _score(expected: Expected, grown: Grown, parent: Grown) -> float:
     """Evidence minus half the squared deviation from the expected constants; 0 for a species that cannot be this isotopologue."""
     off = (grown.constants[:3] - expected.constants) / expected.errors
+    # constants beyond four expected errors, or heights that do not suit the abundance
     if np.abs(off).max() > 4 or not _like(grown, parent.scales + np.log(expected.abundance)):
         return 0.0
     return float(grown.evidence - 0.5 * np.sum((off / TYPICAL) ** 2))
@@ -120,6 +122,7 @@ def candidates(peaks: PeakList, parent: Grown, expected: Expected, table: RigidT
     start = np.concatenate([expected.constants, parent.constants[3:]])
     lines = merged_lines(seen, start, predict(seen, start, parent.temperature_k), scales)
     visible = np.argsort(-lines.height, kind="stable")[:MOST_LINES]
+    # lines just below the weakest peak may still be seen
     visible = visible[lines.height[visible] > peaks.log_threshold - 0.5]
     if len(visible) < 4:
         return []
@@ -159,6 +162,7 @@ def _triples(slopes: Floats, visible: Ints) -> list[Ints]:
 def _shifts(peaks: PeakList, lines: Merged, three: Ints, expected: Expected) -> list[Floats]:
     """Shifts of A, B, C that put three lines on peaks of their height."""
     slopes = lines.slope[three, :3]
+    # three expected errors, and a little for distortion
     reach = 3 * np.sqrt(((slopes * expected.errors) ** 2).sum(axis=1)) + 0.05
     near = []
     for n, line in enumerate(three.tolist()):
@@ -169,6 +173,7 @@ def _shifts(peaks: PeakList, lines: Merged, three: Ints, expected: Expected) -> 
     if not all(len(part) for part in near) or np.prod([len(part) for part in near]) > MOST_SHIFTS:
         return []
     moved = np.stack(np.meshgrid(*near, indexing="ij"), axis=-1).reshape(-1, 3)
+    # three parallel lines determine no constants
     shift = np.linalg.solve(slopes, moved.T).T if abs(np.linalg.det(slopes)) > 1e-9 else np.zeros((0, 3))
     return list(shift[(np.abs(shift) < 3 * expected.errors).all(axis=1)])
 
@@ -186,6 +191,7 @@ def _ratio(peaks: PeakList, lines: Merged, visible: Ints, shift: Floats) -> floa
 def _like(grown: Grown, scales: Floats) -> bool:
     """Whether the intensities agree with the abundance within a factor of three."""
     strongest = int(np.argmax(scales))
+    # a factor of three of the expected heights
     return bool(abs(grown.scales[strongest] - scales[strongest]) < np.log(3.0))
 
 

@@ -31,9 +31,11 @@ def local_noise(intensity: Floats) -> Floats:
     """Standard deviation of the noise at each point (n,)."""
     steps = np.abs(np.diff(intensity))
     edges = np.arange(0, max(len(steps) - WINDOW // 2, 1), WINDOW)
+    # a difference of two points has √2 times the noise of one; 1.4826 from the median
     levels = [1.4826 * float(np.median(steps[a : a + WINDOW])) / np.sqrt(2) for a in edges]
     positive = [level for level in levels if level > 0]
     floor = min(positive) if positive else float(np.ptp(intensity)) * 1e-9 or 1.0
+    # between windows the noise is interpolated; it is never below the floor
     return np.interp(np.arange(len(intensity)), edges + WINDOW / 2, np.maximum(levels, floor))
 
 
@@ -91,6 +93,7 @@ class _Piece:
         self.f = f
         self.noise = local_noise(x)
         self.width = _width(x, self.noise)  # in steps
+        # four widths on either side: the Gaussian has fallen to 3e-4
         reach = np.arange(-int(np.ceil(4 * self.width)), int(np.ceil(4 * self.width)) + 1)
         kernel = np.exp(-0.5 * (reach / self.width) ** 2)
         kernel /= kernel.sum()
@@ -123,6 +126,7 @@ def _parabola(x: Floats, top: Ints) -> tuple[Floats, Floats, Floats]:
     """Shift of the centre in steps, second difference and middle of the logarithms around maxima."""
     left, centre, right = (np.log(x[top + k]) for k in (-1, 0, 1))
     bend = np.minimum(left - 2 * centre + right, -1e-9)
+    # a maximum lies within half a step of its highest point
     return np.clip(0.5 * (left - right) / bend, -0.5, 0.5), bend, centre
 
 
@@ -133,4 +137,4 @@ def _width(x: Floats, noise: Floats) -> float:
         return 1.0
     strongest = top[np.argsort(-x[top])][:STRONGEST]
     _, bend, _ = _parabola(x, strongest)
-    return float(np.clip(np.median(1 / np.sqrt(-bend)), 0.5, 50.0))
+    return float(np.clip(np.median(1 / np.sqrt(-bend)), 0.5, 50.0))  # widths from half a step to fifty

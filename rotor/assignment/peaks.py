@@ -50,6 +50,7 @@ class PeakList(Table):
             return self.stated_windows
         f = np.concatenate([[self.band_mhz[0]], self.frequency_mhz, [self.band_mhz[1]]])
         steps = np.diff(f)
+        # an empty stretch also needs a hundredth of the whole band
         empty = np.flatnonzero(steps > max(EMPTY * float(np.mean(steps)), 0.01 * (f[-1] - f[0])))
         inner = empty[(empty > 0) & (empty < len(steps) - 1)]
         first = np.concatenate([[f[0]], f[inner + 1] - 1.0])
@@ -80,7 +81,7 @@ class PeakList(Table):
     @cached_property
     def log_threshold(self) -> float:
         """ln of the detection threshold: the intensity of the weakest peak, without outliers."""
-        return float(np.quantile(self.log_intensity, 0.02))
+        return float(np.quantile(self.log_intensity, 0.02))  # the weakest 2 % of the peaks are left aside
 
     @cached_property
     def log_density(self) -> Floats:
@@ -157,16 +158,19 @@ def local_density(at: Floats, frequency: Floats, band_mhz: tuple[float, float]) 
     first = np.clip(at - DENSITY_WIDTH_MHZ / 2, band_mhz[0], max(band_mhz[0], band_mhz[1] - DENSITY_WIDTH_MHZ))
     last = np.minimum(first + DENSITY_WIDTH_MHZ, band_mhz[1])
     counts = np.searchsorted(frequency, last, side="right") - np.searchsorted(frequency, first)
+    # one more than counted, so that no stretch has a density of 0
     return np.asarray((counts + 1.0) / np.maximum(last - first, 1.0))
 
 
 def _log_density(values: Floats) -> Floats:
+    # spacing of a quarter of the width resolves the kernel
     """ln of a kernel estimate of a density at the values themselves."""
     grid = np.arange(values.min() - 2, values.max() + 2, LOG_WIDTH / 4)
     counts = np.bincount(np.searchsorted(grid, values), minlength=len(grid)).astype(np.float64)
-    reach = np.arange(-16, 17) * (LOG_WIDTH / 4)
+    reach = np.arange(-16, 17) * (LOG_WIDTH / 4)  # four widths of the kernel
     kernel = np.exp(-0.5 * (reach / LOG_WIDTH) ** 2)
     smooth = np.convolve(counts, kernel / kernel.sum(), mode="same") / (len(values) * LOG_WIDTH / 4)
+    # no density of 0: its logarithm is needed
     return np.asarray(np.log(np.maximum(np.interp(values, grid, smooth), 1e-6)))
 
 
@@ -179,10 +183,10 @@ def spurs(peaks: PeakList) -> NDArray[np.bool_]:
     out = np.zeros(len(peaks), dtype=bool)
     f = peaks.frequency_mhz
     for clock in CLOCKS_MHZ:
-        apart = np.abs(f - clock * np.round(f / clock))
+        apart = np.abs(f - clock * np.round(f / clock))  # distance to the nearest harmonic of the clock
         near = apart < 0.03
-        expected = float(np.sum(~out)) * 0.06 / clock
-        if _poisson_tail(int(near.sum()), expected) < 1e-4:
+        expected = float(np.sum(~out)) * 0.06 / clock  # a window of 2 · 0.03 MHz in each period of the clock
+        if _poisson_tail(int(near.sum()), expected) < 1e-4:  # more coincidences than chance explains
             out |= near
     return out
 
@@ -195,4 +199,4 @@ def _poisson_tail(count: int, mean: float) -> float:
     for n in range(count):
         below += term
         term *= mean / (n + 1)
-    return max(0.0, 1.0 - below)
+    return max(0.0, 1.0 - below)  # round-off may leave less than 0

@@ -58,6 +58,7 @@ def excess_scatter(grown: Grown, peaks: PeakList) -> float:
     """
     peak_error = float(np.median(np.maximum(peaks.uncertainty_mhz[grown.peak], SMALLEST_MHZ)))
     scatter = 1.4826 * float(np.median(np.abs(grown.residual)))
+    # scatter beyond the stated errors, as far as it is clear
     return float(np.sqrt(scatter**2 - peak_error**2)) if scatter > SCATTERED * peak_error else 0.0
 
 
@@ -71,4 +72,5 @@ def refine(grown: Grown, peaks: PeakList, table: RigidTable) -> Refined:
     free = parameters(start, PARAMETERS, priors_mhz=dict(zip(PARAMETERS[3:], sizes.tolist(), strict=True)))
     free = type(free)(**{**free.__dict__, "centre": np.concatenate([free.start[:3], np.zeros(5)])})
     fit = fit_lines(lines, start, free, FitOptions(reject_above=REJECTED, poor_rms=100.0, most_iterations=30))
+    # errors grow with reduced χ, and never shrink
     return Refined(fit, fit.values, fit.errors * max(1.0, fit.reduced_chi if np.isfinite(fit.reduced_chi) else 1.0))

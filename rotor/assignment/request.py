@@ -177,6 +177,7 @@ def families_for(
 def search_families(request: AssignRequest) -> list[Family]:
     """Families for the band, bounds and temperature of a request."""
     temperature = request.temperature_k
+    # a stated temperature is uncertain by a quarter
     range_k = (COLDEST_K, HOTTEST_K) if temperature is None else (0.8 * temperature, 1.25 * temperature)
     samples = SAMPLES if request.guess_mhz is None else SAMPLES_OF_GUESS
     return families_for(tuple(request.bounds.array.tolist()), request.peaks.band_mhz, range_k, request.seed, samples)
@@ -286,6 +287,7 @@ class _Search:
         first = rivals[0]
         seen = self._field(peaks, self.request)
         best = first if isotopologue else confirmed(seen, first, all_types=self.request.guess_mhz is not None)
+        # rivals within exp(10) share the probability
         twins = [other for other in rivals[1:] if other.evidence > first.evidence - 10 and differs(first, other)]
         p = isotopologue_probability(best) if isotopologue else probability(best)
         p /= 1 + sum(float(np.exp(other.evidence - first.evidence)) for other in twins)

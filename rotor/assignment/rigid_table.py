@@ -82,6 +82,7 @@ class RigidTable:
 @lru_cache(maxsize=2)
 def rigid_table(jmax: int = JMAX) -> RigidTable:
     """The table up to `jmax`, computed once per process (1 s)."""
+    # Chebyshev nodes in θ: interpolation of smooth functions converges fast
     nodes = np.pi * (np.arange(NODES) + 0.5) / NODES
     coarse_nodes = np.pi * (np.arange(STRENGTH_NODES) + 0.5) / STRENGTH_NODES
     quanta, kind, upper, lower = _lines(jmax)
@@ -100,6 +101,7 @@ def rigid_table(jmax: int = JMAX) -> RigidTable:
         upper=upper,
         lower=lower,
         kind=kind,
+        # interpolation may leave a strength of 0 negative
         strength=np.maximum(_interpolation(coarse_nodes, inside) @ strength, 0.0).astype(np.float32),
     )
 
@@ -148,7 +150,7 @@ def _lines(jmax: int) -> tuple[Ints, Ints, Ints, Ints]:
     upper, lower = np.nonzero(np.abs(quanta[:, None, 0] - quanta[None, :, 0]) <= 1)
     j, ka, kc = (quanta[upper] - quanta[lower]).T
     selected = (np.minimum(quanta[upper, 1], quanta[lower, 1]) <= KA_MAX) & ((j != 0) | (upper > lower))
-    change = (ka % 2) * 2 + kc % 2
+    change = (ka % 2) * 2 + kc % 2  # parities of the changes of Ka and Kc
     kind = np.array([-1, 0, 2, 1])[change]  # (even, odd): a, (odd, odd): b, (odd, even): c
     selected &= (kind >= 0) & ~((kind == 0) & (ka == 0) & (j < 0))
     return quanta, kind[selected], upper[selected], lower[selected]
@@ -159,9 +161,9 @@ def _interpolation(nodes: Floats, points: Floats) -> Floats:
 
     Barycentric form, J.-P. Berrut, L. N. Trefethen, SIAM Rev. 46, 501 (2004), eqs. 4.2 and 5.3.
     """
-    weights = (-1.0) ** np.arange(len(nodes)) * np.sin(nodes)
+    weights = (-1.0) ** np.arange(len(nodes)) * np.sin(nodes)  # barycentric weights of Chebyshev nodes
     apart = np.cos(points)[:, None] - np.cos(nodes)[None, :]
-    hit = np.abs(apart) < 1e-15
+    hit = np.abs(apart) < 1e-15  # at a node the formula is 0/0: its value is that of the node
     terms = weights / np.where(hit, 1.0, apart)
     matrix = terms / terms.sum(axis=1, keepdims=True)
     exact = hit.any(axis=1)

@@ -80,7 +80,7 @@ class Field:
         return np.ascontiguousarray(self.table.reduced[self.points].T)
 
     @cached_property
-    def order(self) -> Ints:
+    def order(self) -> Ints:  # stable: equal heights keep the order of frequency
         """Peaks by decreasing intensity."""
         return np.argsort(-self.peaks.intensity, kind="stable")
 
@@ -94,6 +94,7 @@ class Field:
         right = np.clip(np.searchsorted(strongest, centres), 0, len(strongest) - 1)
         left = np.maximum(right - 1, 0)
         apart = np.minimum(np.abs(centres - strongest[left]), np.abs(centres - strongest[right]))
+        # fifths of a bin in a byte; beyond 255 nothing is near
         return np.minimum(5 * apart / BIN_MHZ, 255).astype(np.uint8)
 
     def seeds(self, count: int) -> Ints:
@@ -133,7 +134,7 @@ def ranked(field: Field, family: Family, roots: Floats, least: float) -> list[Ca
     """Candidates from the roots of a family with a ratio above `least`, best first, without duplicates."""
     if not len(roots):
         return []
-    order = np.argsort(roots[:, 1] - 2 * roots[:, 0], kind="stable")[:300]
+    order = np.argsort(roots[:, 1] - 2 * roots[:, 0], kind="stable")[:300]  # stable; a miss costs half of a hit
     tops = np.ascontiguousarray(roots[order, 2:])
     ratios, temperatures = quick_ratios(field, tops, family.kind, least)
     out, left = list[Candidate](), np.argsort(-ratios)

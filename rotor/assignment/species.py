@@ -146,6 +146,7 @@ def _grown(seen: Field, candidates: list[Candidate], tried: list[tuple[Floats, f
     for candidate in sorted(candidates, key=lambda candidate: -candidate.ratio):
         if len(out) >= most:
             break
+        # equal constants grow to equal species
         if any(alike(candidate.constants, other, near) for other, near in tried):
             continue
         tried.append((candidate.constants, NEAR))
@@ -189,6 +190,7 @@ def multiples(seen: Field, grown: Grown) -> list[Candidate]:
         places = [_multiple_row(low, upper, row, ratio) for row in rows.tolist()]
         present = np.array([place >= 0 for place in places], dtype=bool)
         lines = np.array(places, dtype=np.int64)[present]
+        # three kinds of lines at least: fewer leave a constant free
         if top[0] <= top[1] or len({(upper[line, 1], upper[line, 2] - upper[line, 0]) for line in lines.tolist()}) < 3:
             continue
         top = _fitted_top(seen, top, lines, f[present])
@@ -206,7 +208,7 @@ def _multiple_row(low: Ints, upper: Ints, row: int, ratio: float) -> int:
     """The line with J of the upper level multiplied by a ratio and the same Ka and Kc - J; -1 without one."""
     j, ka, kc = upper[row].tolist()
     changed = round(ratio * j)
-    if abs(changed - ratio * j) > 1e-9:
+    if abs(changed - ratio * j) > 1e-9:  # the ratio of J is no whole number: no such line
         return -1
     same = low[(upper[low] == (changed, ka, kc - j + changed)).all(axis=1)]
     return int(same[0]) if len(same) else -1
@@ -263,6 +265,7 @@ def _shifted(seen: Field, start: Floats, present: NDArray[np.bool_], slow: Ints)
     x = ((peaks[None, :] - line[:, None]) / change[rows][:, None]).ravel()
     tops = constants[:3] + x[:, None]
     a, b, c = tops.T
+    # not at the place itself, and not beyond planarity
     sound = (np.abs(x) > 1e-3 * constants[2]) & (c * (a + b) > 0.99 * a * b)
     sound &= (tops > seen.bounds.low).all(axis=1) & (tops < seen.bounds.high).all(axis=1)
     tops, which = np.ascontiguousarray(tops[sound]), np.repeat(rows, len(peaks))[sound]
@@ -295,8 +298,9 @@ def explained(seen: Field, grown: Grown) -> NDArray[np.bool_]:
     out = np.zeros(len(seen.peaks), dtype=bool)
     out[grown.peak] = True
     lines = predict(seen, grown.constants, grown.temperature_k, 4000)
+    # types without evidence have no lines
     level = lines.expected + np.where(grown.ratios > LEAST_RATIO, grown.scales, -np.inf)[lines.kind]
-    strong = level > seen.peaks.log_threshold - 2.0
+    strong = level > seen.peaks.log_threshold - 2.0  # lines well below the weakest peak cannot be seen
     f, height = lines.frequency[strong], level[strong]
     peaks = seen.peaks
     reach = max(PEAK_MHZ, 2 * grown.rms_mhz)

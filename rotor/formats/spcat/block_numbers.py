@@ -99,7 +99,8 @@ class Blocks:
 
 def _least_k(species: int, first: int) -> int:
     """The smallest K ≥ `first` of the functions of a species at even N."""
-    least = (0, 1, 1, 2)[species]
+    least = (0, 1, 1, 2)[species]  # least K of the species in Wang functions: 0 for E+, 1 for O±, 2 for E-
+    # KNMIN of the other parity of K begins one higher
     return least if least >= first else first + (first - least) % 2
 
 
@@ -145,6 +146,7 @@ def _rises(spins: tuple[int, ...]) -> Ints:
     return np.concatenate([steps[:, :1], steps[:, :1] + np.cumsum(ups, axis=1)], axis=1)
 
 
+# species alternate with N, so that a state exists for either
 def _exists(state: StateOptions, species: int, oblate: bool) -> bool:
     """Whether SPCAT forms sub-blocks of a species: K in its range for even or odd N, and a weight."""
     least = min(_least_k(parity_species, state.kmin) for parity_species in (species, 3 - species))
@@ -232,7 +234,7 @@ def sub_blocks(group: Group, levels: Levels, negative: bool) -> tuple[list[SubBl
         species = species_numbers(quanta["ka"], quanta["kc"], group.oblate)
     else:
         species = np.where(k % 2, 1 if negative else 2, 3 if negative else 0)
-        species = np.where(k == 0, 3 * (n % 2), species)
+        species = np.where(k == 0, 3 * (n % 2), species)  # K = 0 has one function, even or odd as N
     names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []
     pattern = pattern_numbers(group, levels, names) if names else np.zeros(len(n), dtype=np.int64)
     return [SubBlock(*row) for row in zip(v.tolist(), species.tolist(), pattern.tolist(), strict=True)], k

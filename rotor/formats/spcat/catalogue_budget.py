@@ -29,6 +29,7 @@ what its lines leave out'
     if decimals == 4 and lines.frequency_mhz.max(initial=0.0) >= WIDE_MHZ:
         decimals = WIDE_DECIMALS
     per_unit = units.MHZ_PER_CM if bool(len(lines)) and frequency[0] != lines.frequency_mhz[0] else 1.0
+    # half of the last printed digit
     rounding = ErrorTerm(0.5 * 10.0**-decimals * per_unit, f"{decimals} decimals are printed")
     return listed_budget(rounding, error, lines.lgint)
 
@@ -56,7 +57,7 @@ def _stated(error_mhz: Floats, lgint: Floats) -> ErrorTerm:
     """The largest error of strong lines; not estimated if one of them has no error."""
     if not len(error_mhz):
         return ErrorTerm(None, "there is no line")
-    errors = error_mhz[lgint >= lgint.max() + np.log10(STRONG)]
+    errors = error_mhz[lgint >= lgint.max() + np.log10(STRONG)]  # lgint is a logarithm: a tenth is one less
     stated = errors[np.isfinite(errors) & (errors > 0)]
     if len(stated) < len(errors):
         others = f"; the largest of the others is {stated.max():.2g} MHz" if len(stated) else ""

@@ -30,6 +30,7 @@ def spin_quanta(catalogue: Catalogue) -> int:
 def _spin_counts(catalogue: Catalogue) -> NDArray[np.int64]:
     """Number of spin quantum numbers of each line."""
     count, before = catalogue.qnfmt % 10, catalogue.qnfmt // 100 % 10
+    # codes without a count of rotational quantum numbers name no spins
     return np.where(before > 0, np.maximum(count - before, 0), 0).astype(np.int64)
 
 
@@ -63,11 +64,14 @@ def without_spins(catalogue: Catalogue) -> Catalogue:
         frequency_mhz=mean(catalogue.frequency_mhz),
         error_mhz=mean(catalogue.error_mhz),
         energy_lower_cm=mean(catalogue.energy_lower_cm),
+        # relative to the strongest line, so that weak lines keep their digits
         lgint=np.log10(total) + catalogue.lgint.max(initial=-np.inf),
         g_upper=np.bincount(code, catalogue.g_upper).astype(np.int32),
+        # a negative tag: at least one component was measured
         tag=np.where(measured, -1, 1) * np.abs(catalogue.tag[first]),
         qnfmt=(catalogue.qnfmt - 10 * (catalogue.qnfmt // 10 % 10) - spin_count)[first],
         quanta_upper=upper[first],
         quanta_lower=lower[first],
     )
+    # stable: lines of one frequency keep the order of the file
     return out.take(np.argsort(out.frequency_mhz, kind="stable"))

@@ -24,6 +24,7 @@ MOST_OF_SLOPE = 2000  # number of strongest lines from which a temperature is es
 def in_mhz(catalogue: Catalogue) -> tuple[Floats, Floats]:
     """Frequencies and errors in MHz, (n,) each; infrared catalogues and lines with a negative error are in cm⁻¹."""
     infrared = catalogue.layout.decimals[0] == INFRARED_DECIMALS
+    # infrared catalogues and negative errors are in cm⁻¹
     factor = np.where(infrared | (catalogue.error_mhz < 0), units.MHZ_PER_CM, 1.0)
     return catalogue.frequency_mhz * factor, np.abs(catalogue.error_mhz) * factor
 
@@ -108,17 +109,19 @@ def likely_temperature_k(comparison: Comparison, temperature_k: float) -> float:
     rows = comparison.reference_rows[np.argsort(-comparison.reference.lgint[comparison.reference_rows])[:MOST_OF_SLOPE]]
     selected = np.isin(comparison.reference_rows, rows)
     energy = comparison.reference.energy_lower_cm[comparison.reference_rows][selected]
-    if len(energy) < 3 or np.ptp(energy) == 0:
+    if len(energy) < 3 or np.ptp(energy) == 0:  # a temperature needs lines from different energies
         return float("nan")
     frequency = comparison.reference.frequency_mhz[comparison.reference_rows][selected]
     off = comparison.differences("lgint")[selected]
 
     def populated(kelvin: Floats) -> Floats:
         at = units.MHZ_PER_K * kelvin[:, None]
+        # ln of exp(-E/kT) (1 - exp(-hν/kT)), exact for small hν/kT
         log = -energy * units.MHZ_PER_CM / at + np.log(-np.expm1(-frequency / at))
         return np.asarray(log / np.log(10.0))
 
     change = off + populated(TEMPERATURES_K) - populated(np.array([temperature_k]))
+    # the spread about the median, which lines with other causes do not move
     spread = np.median(np.abs(change - np.median(change, axis=1)[:, None]), axis=1)
     return float(TEMPERATURES_K[np.argmin(spread)])
 
@@ -160,9 +163,9 @@ def _components_added(catalogue: Catalogue, width: int) -> Catalogue:
     merged = catalogue.take(order[first])
     strongest = catalogue.lgint.max()  # scaled, so that lines of 1e-100 keep their digits
     added = np.add.reduceat(10.0 ** (catalogue.lgint[order] - strongest), first)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore"):  # no strength at all: the logarithm of the merged line remains
         summed = np.where(added > 0, np.log10(added) + strongest, merged.lgint)
-    alone = np.diff(np.append(first, len(order))) == 1
+    alone = np.diff(np.append(first, len(order))) == 1  # a single component keeps its printed digits
     degeneracy = np.add.reduceat(catalogue.g_upper[order], first)
     merged = replace(merged, lgint=np.where(alone, merged.lgint, summed), g_upper=degeneracy.astype(np.int32))
     return merged.take(np.argsort(merged.frequency_mhz, kind="stable"))
@@ -185,7 +188,7 @@ def _keys(left: Catalogue, right: Catalogue, width: int) -> _Keys:
 
 def _place_within(code: Rows) -> Rows:
     """Number of earlier lines with the same code, (n,)."""
-    order = np.argsort(code, kind="stable")
+    order = np.argsort(code, kind="stable")  # stable: rows of one label keep their order
     ordered = code[order]
     begins = np.flatnonzero(np.concatenate(([True], np.diff(ordered) != 0))) if len(code) else np.zeros(0, np.int64)
     place = np.empty(len(code), dtype=np.int64)
@@ -210,7 +213,7 @@ def agreement(comparison: Comparison, chosen: NDArray[np.bool_] | None = None) -
     """Agreement with the measured lines of the reference: all, or those `chosen` among the matched ones, (m,)."""
     seen = comparison.measured if chosen is None else comparison.measured & chosen
     off = np.abs(comparison.differences("frequency_mhz"))[seen]
-    sigma = comparison.reference.error_mhz[comparison.reference_rows][seen]
+    sigma = comparison.reference.error_mhz[comparison.reference_rows][seen]  # an error of 0 states none
     if not len(off):
         return Agreement(0, float("nan"), float("nan"), float("nan"), 0)
     has_error = sigma > 0
@@ -243,7 +246,7 @@ def with_measured_lines(predicted: Catalogue, measured: Catalogue) -> Catalogue:
     columns: dict[str, Any] = {name: getattr(predicted, name).copy() for name in DTYPES}
     columns["frequency_mhz"][is_measured] = seen.frequency_mhz[row[is_measured]]
     columns["error_mhz"][is_measured] = seen.error_mhz[row[is_measured]]
-    columns["tag"][is_measured] = -np.abs(columns["tag"][is_measured])
+    columns["tag"][is_measured] = -np.abs(columns["tag"][is_measured])  # a negative tag marks a measured line
     merged = replace(predicted, **columns, layout=replace(predicted.layout, spelling={}))
     return merged.take(np.argsort(merged.frequency_mhz, kind="stable"))
 

@@ -65,7 +65,7 @@ def group_transitions(group: Group, levels: Levels, request: Request) -> Transit
         Frequencies in MHz and strengths in D². Lines between unequal weights are left out, as in SPCAT.
     """
     if not (group.effect.moments or group.effect.others):
-        none = np.zeros(0, dtype=np.int32)
+        none = np.zeros(0, dtype=np.int32)  # int32 halves the memory of rows
         return Transitions(np.zeros(0), np.zeros(0), none, none)
     transitions = all_transitions(
         levels,
@@ -140,7 +140,7 @@ def line_weights(group: Group, levels: Levels, transitions: Transitions) -> Ints
     It is the weight of the level in the later block, by F, first state and species."""
     weight = levels.weight // levels.components
     if len(weight) and weight.min() == weight.max():
-        return np.full(1, weight[0])
+        return np.full(1, weight[0])  # one weight for all lines takes no memory
     if (weight[transitions.upper] == weight[transitions.lower]).all() or "kc" not in levels.quanta:
         return np.asarray(weight[transitions.lower])
     species = species_numbers(levels.quanta["ka"], levels.quanta["kc"], group.oblate)
@@ -159,7 +159,7 @@ def equally_weighted(levels: Levels, upper: Indices, lower: Indices) -> NDArray[
     """Whether transitions connect levels of equal nuclear-spin weight; others do not exist for any dipole."""
     weight = levels.weight // levels.components
     if len(weight) and weight.min() == weight.max():
-        return np.ones(len(upper), dtype=bool)
+        return np.ones(len(upper), dtype=bool)  # lines between functions of unequal weight do not exist
     return np.asarray(weight[upper] == weight[lower])
 
 
@@ -228,7 +228,7 @@ def _intensity(group: Group, levels: Levels, transitions: Transitions, request: 
     if (levels.components > 1).any():
         out /= np.maximum(levels.components[transitions.upper], levels.components[transitions.lower])
     out *= line_weights(group, levels, transitions)
-    below = np.expm1(-transitions.frequency_mhz / kt)
+    below = np.expm1(-transitions.frequency_mhz / kt)  # 1 - exp(-hν/kT), exact for small hν/kT
     with np.errstate(over="ignore"):  # far below zero and cold, where no line may start
         below *= -np.exp(-levels.energy_mhz / kt)[transitions.lower]
     out *= below
@@ -239,7 +239,7 @@ def _single_component(
     group: Group, levels: Levels, form: Format, up: Indices, low: Indices
 ) -> tuple[Ints | slice, Quanta, Quanta]:
     """The transition of each line of one component of ±K, and the quantum numbers of its levels, (lines, width)."""
-    plus = listed_quanta(group, levels, form).astype(np.int16)
+    plus = listed_quanta(group, levels, form).astype(np.int16)  # int16: four bytes less a number in long lists
     if (levels.components == 1).all():
         return slice(None), copy_rows(plus, up), copy_rows(plus, low)
     pair, minus = (
@@ -288,13 +288,13 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, *,
     joined = {name: end_to_end([getattr(each, name) for each, _ in lines]) for name in _COLUMNS}
     qnfmt = np.concatenate([np.full(len(each.frequency_mhz), code) for each, code in lines])
     order = _rising(joined["frequency_mhz"])
-    width = max(6, form.width)
+    width = max(6, form.width)  # six columns at least, as the format has
     quanta = {}
     for name in ("upper", "lower"):
         table = np.full((len(qnfmt), width), BLANK, dtype=np.int16)
         table[:, : form.width] = joined[name][order]
         quanta[name] = table
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore"):  # a strength of 0 has no logarithm
         lgint = np.log10(joined["intensity"][order])
     numbers = {
         "frequency_mhz": joined["frequency_mhz"][order],

@@ -84,6 +84,7 @@ class Group:
         Levels that do not exist are listed with weight 0.
         """
         if self.spins or self.effect.others:
+            # F has the parity of the sum of the spins, doubled
             all_f = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
             exist = None if self.top.kind == "linear" else self._exist
             if self.effect.pairs:  # labels by l must be known before existing levels can be selected
@@ -116,7 +117,8 @@ class Group:
 
     def has_levels(self, twice_f: tuple[int, int]) -> bool:
         """Whether any level from the first to the last of the doubled F has a weight and a K from KNMIN on."""
-        highest = (twice_f[1] + sum(self.spins)) // 2
+        highest = (twice_f[1] + sum(self.spins)) // 2  # N reaches F + ΣI
+        # E states count where the axis has them
         weighted = any(max(state.plus, state.minus, state.e_weight if state.fold else 0) > 0 for state in self.states)
         return weighted and twice_f[0] <= twice_f[1] and any(state.kmin <= highest for state in self.states)
 

@@ -61,9 +61,9 @@ class Format:
         code = 1000 * self.states + 100 * self.before_spins + self.width
         aggregated = self.aggregates(len(spins))
         code += {0: 0, 2: 2000, 3: 6000}[0 if aggregated else self.equivalent]
-        odd = np.cumsum(spins) % 2 if spins else np.zeros(0, dtype=np.int64)
+        odd = np.cumsum(spins) % 2 if spins else np.zeros(0, dtype=np.int64)  # half-integer sums are marked by bits
         if self.equivalent == 2 and len(odd) > 1:
-            odd[-2] = 0
+            odd[-2] = 0  # the total of two equal spins is an integer
         if self.equivalent == 3 and len(odd) > 2:
             odd[-3:-1] = 0, sum(spins[-3:]) % 2
         total = int(odd[-1]) if len(odd) else 0
@@ -73,7 +73,7 @@ class Format:
         h = 0
         for bit in halves:
             h = 2 * h + bit
-        return code + 10 * (h & 7 if h > 9 else h)
+        return code + 10 * (h & 7 if h > 9 else h)  # one digit: of larger numbers the last three bits remain
 
 
 def quanta_format(file: ParameterFile, groups: list[Group]) -> Format:
@@ -111,6 +111,7 @@ def listed_quanta(group: Group, levels: Levels, form: Format, negative: bool = F
     if form.states:
         columns.append(np.array([state.number for state in group.states])[v])
     names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []
+    # half-integers are rounded up in these files
     totals = [(quanta[name] + 1) // 2 if name in levels.halves else quanta[name] for name in names] or [n]
     if form.aggregates(len(group.spins)):
         columns += [pattern_numbers(group, levels, names), totals[-1]]

@@ -96,6 +96,7 @@ def _by_exchange(line: CodedLine, state_of: Mapping[int, StateOptions]) -> list[
 
 def _with_threefold_factors(line: CodedLine, spins: int, axes: str) -> CodedLine:
     """A line with SPCAT's factors for three equivalent spins."""
+    # only terms that touch the three equivalent spins change
     touches = max(line.operator.spins, default=0) > spins - 3
     if touches and isinstance(line.operator.rotor, ByElements):
         raise ValueError(

@@ -35,6 +35,7 @@ def option_weights(options: Options, symmetric: bool = True) -> SpinWeights:
     where K is a multiple of 3 or 5, EWT elsewhere; where they differ, at K = 0 by the parity of J, of a symmetric top alone. An
     odd last digit of VSYM exchanges WTPL and WTMN.
     """
+    # an odd VSYM exchanges the two weights
     plus, minus = (options.wtpl, options.wtmn) if options.vsym % 2 == 0 else (options.wtmn, options.wtpl)
     if options.iax in FOLD:
         return _fold_weights(options, plus, minus, symmetric)
@@ -59,7 +60,7 @@ def option_weights(options: Options, symmetric: bool = True) -> SpinWeights:
 
 def _fold_weights(options: Options, plus: int, minus: int, symmetric: bool) -> SpinWeights:
     fold = FOLD[options.iax]
-    factor = 100 if options.ewt >= 0 else 1000
+    factor = 100 if options.ewt >= 0 else 1000  # EWT has two or three digits for the weight, by its sign
     if abs(options.ewt) >= factor - 1:
         raise ValueError(f"EWT = {options.ewt}: l-doubled states, and E levels without a weight, {PLURAL_NOT_YET}")
     if plus == minus:
@@ -68,6 +69,7 @@ def _fold_weights(options: Options, plus: int, minus: int, symmetric: bool) -> S
         raise ValueError(f"IAX = {options.iax} of an asymmetric top with unlike WTPL and WTMN {NO_NAME}")
     raw = fold_parts(fold, plus, minus, abs(options.ewt))
     names = ["0even", "0odd", *(str(k) for k in range(1, fold))]
+    # a negative weight marks missing levels: 0 of them
     return SpinWeights.from_mapping(dict(zip(names, (max(w, 0) for w in raw), strict=True)))
 
 
@@ -182,7 +184,7 @@ def names_what_is_not_there(parameters: ParameterFile) -> bool:
 def parameter_file(top: Top, kmax: int) -> ParameterFile:
     """The .var or .par file of a top, for levels with K up to `kmax`."""
     parameters = parameter_lines(top.constants)
-    header = Header(npar=len(parameters), nline=1, nitr=1, errtst=1e6)
+    header = Header(npar=len(parameters), nline=1, nitr=1, errtst=1e6)  # ERRTST of 1e6 keeps every line
     return ParameterFile(top.name, header, (option_line(top.constants, top.spin_weights, kmax),), parameters)
 
 

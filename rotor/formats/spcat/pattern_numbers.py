@@ -32,6 +32,7 @@ def pattern_numbers(group: Group, levels: Levels, names: list[str]) -> Ints:
 def _threefold_patterns(spins: tuple[int, ...]) -> Ints:
     """2(N - F), I_tot, the other steps and the species of all patterns with a total of three spins, in the order of SPCAT."""
     tables = []
+    # totals of three spins fall by whole numbers, to 0 or 1/2
     for total in range(3 * spins[-1] % 2, 3 * spins[-1] + 1, 2):
         names = symmetric_functions(spins[-1], total).symmetry // 2
         order = np.lexsort((names, ~np.isin(names % 6, (0, 2))))  # even functions before odd ones

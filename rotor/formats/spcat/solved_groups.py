@@ -68,6 +68,7 @@ def solved_groups(parameters: ParameterFile, groups: list[Group], request: Reque
         levels = group.levels(_f_range(group, request))
         solved_group = SolvedGroup(group, levels, _spread(group, levels, names, factor))
         if request.maxv >= 0 and form.states:
+            # a weight of 0 leaves the level out of lines, but in the table
             weight = np.where(solved_group.numbers <= request.maxv, levels.weight, 0)
             solved_group = solved_group._replace(levels=replace(levels, weight=weight))
         solved.append(solved_group)
@@ -93,7 +94,7 @@ def _with_levels(groups: list[Group], request: Request) -> list[Group]:
 
 def _f_range(group: Group, request: Request) -> tuple[int, int]:
     """The doubled F from FBGN to FEND, which are rounded up."""
-    half = sum(group.spins) % 2
+    half = sum(group.spins) % 2  # F has the parity of the sum of the spins, doubled
     return max(half, 2 * request.fbgn - half), 2 * request.fend - half
 
 

@@ -139,6 +139,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         start=values[list(free)],
         prior=np.array([_prior(file.parameters[i]) for i in free]),
         constant_names=names,
+        # columns below 0 are held at their values
         base=matrix @ np.where(np.array(columns) < 0, values, 0.0),
         matrix=matrix @ spread,
     )
@@ -149,6 +150,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         )
     options = FitOptions(
         reject_above=_largest_error(file.header),
+        # a count, whatever its sign
         most_iterations=max(abs(file.header.nitr), 1),
         kmax=kmax,
         leave_out_missing=True,
@@ -330,6 +332,7 @@ def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignm
         notes.append(
             f"{unresolved} lines with F below 0: the last {file.header.nxpar} parameters (NXPAR) do not count for them"
         )
+    # the first quantum number is N
     highest = int(max(lines.upper[:, 0].max(initial=0), lines.lower[:, 0].max(initial=0)))
     if options.kmax is not None and options.kmax < highest:
         notes.append(f"KNMAX = {options.kmax} is below the highest J, {highest}: the basis is cut there, as SPFIT does")
@@ -395,5 +398,6 @@ def _lower_factor(correlations: Floats) -> Floats:
         try:
             return np.asarray(np.linalg.cholesky(correlations + lift * np.eye(len(correlations))))
         except np.linalg.LinAlgError:
+            # a correlation matrix printed in few digits may fail to be positive by round-off: its diagonal is lifted
             lift = max(10 * lift, 1e-15)
     raise ValueError("the correlation matrix is not positive; some combination of the parameters is not determined")

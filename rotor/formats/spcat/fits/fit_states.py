@@ -138,12 +138,12 @@ def _with_labels(
     if not len(here):
         return []
     total = labels[here, -1] if form.spins else labels[here, 0]
-    if (total < 0).any():
+    if (total < 0).any():  # a difference of F below 0 marks a level that does not exist
         first = " ".join(map(str, labels[here[int(np.argmax(total < 0))]].tolist()))
         raise MissingLevelsError(f"there is no level {first}: F or J is below 0", here[total < 0])
     if _direct(group, form):
         return _assign_without_spins(group, form, labels, here, names, values)
-    twice = 2 * total - sum(group.spins) % 2
+    twice = 2 * total - sum(group.spins) % 2  # F is listed rounded up: doubled, less the half
     find = _assign_with_spins if group.spins else _assign_in_blocks
     return find(group, form, labels, here, twice, names, values)
 
@@ -197,6 +197,7 @@ def _label_rows(group: Group, levels: Levels, form: Format, labels: Ints) -> Int
 def _parameter_columns(group: Group, names: Sequence[str], values: Floats) -> tuple[Ints, Floats]:
     """Columns of the parameters of a group, and their values."""
     columns = np.array([names.index(name) for name in group.effect.parameters(group.top)])
+    # derivatives of a parameter at 0 need a small value to exist
     return columns, np.where(values == 0, AT_ZERO_MHZ, values)[columns]
 
 

@@ -62,6 +62,7 @@ def _numbers(fit_input: SpfitInput, fit: Fit, place: int) -> tuple[float, float 
 
 def _leader(parameters: Sequence[Parameter], place: int) -> Parameter:
     """The parameter to which a parameter has a fixed ratio."""
+    # a constrained parameter follows the last free one above it
     return next(p for p in reversed(parameters[: place + 1]) if not p.constrained)
 
 

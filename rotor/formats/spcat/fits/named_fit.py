@@ -37,7 +37,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     if isinstance(fit.named, TopConstants) and fit.named.in_field:
         raise ValueError("lines in an electric field: SPFIT's files have none")
     if isinstance(fit.named, TopConstants):
-        file, codes = named_parameters(fit.named, title, min(highest, 359))
+        file, codes = named_parameters(fit.named, title, min(highest, 359))  # 359 is SPCAT's largest KNMAX
         matrix: Floats = np.asarray(np.linalg.pinv(codes), dtype=np.float64)
     else:
         file = parameter_file(Top.from_constants(fit.named, name=title), kmax=min(highest, 359))
@@ -59,6 +59,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
 
 def _covariance(fit: Fit, rows: Floats) -> Floats:
     """Covariance of determined combinations (m, n) of the free constants."""
+    # undetermined parameters have no covariance in the file
     covariance = np.where(np.isfinite(fit.statistics.covariance), fit.statistics.covariance, 0.0)
     return np.asarray(rows @ covariance @ rows.T)
 
@@ -117,7 +118,7 @@ def _tied(
     for i, name in enumerate(fit.parameters.names):
         rows = np.flatnonzero(back[:, i]).tolist()
         factors = matrix[fit.parameters.constant_names.index(name)]
-        leader = max(rows, key=lambda k: abs(factors[k]))
+        leader = max(rows, key=lambda k: abs(factors[k]))  # the largest factor divides the ratios: none exceeds 1
         if len(rows) > 1 and not _share(fit, back, leader):
             raise ValueError(f"{name} is 0, and SPFIT has no ratio to a parameter that is 0")
         if not variances or _is_determined(fit, back[leader]):

@@ -49,7 +49,7 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
     measured_pairs = set(zip(number.of(seen.upper).tolist(), number.of(seen.lower).tolist(), strict=True))
     rows = number.of(labels)
     order = np.argsort(rows)
-    low_mhz = float(seen.frequency_mhz.min()) * (1 - _WIDER)
+    low_mhz = float(seen.frequency_mhz.min()) * (1 - _WIDER)  # a little beyond the measured band
     high_mhz = float(seen.frequency_mhz.max()) * (1 + _WIDER)
     pairs = []
     for change in changes:
@@ -72,6 +72,7 @@ def _group_labels(group: Group, form: Format, highest: int) -> tuple[Ints, Float
         total = sum(group.spins)
         if group.states[0].equivalent == 3:
             raise ValueError("no line is suggested with a total spin of three nuclei; leave --suggest out")
+        # F has the parity of the sum of the spins, doubled
         levels = unmixed_levels(group.top, (group.effect,), list(range(total % 2, 2 * highest + total + 1, 2)))
     else:
         levels = levels_in_blocks(group, range(0, 2 * highest + 1, 2))
@@ -89,7 +90,7 @@ class _Numbering:
     def __init__(self, labels: Ints, changes: Ints) -> None:
         self._least = labels.min(axis=0) + np.minimum(changes.min(axis=0, initial=0), 0)
         spans = labels.max(axis=0) + np.maximum(changes.max(axis=0, initial=0), 0) - self._least + 1
-        if prod(spans.tolist()) > _MOST_NUMBERS:
+        if prod(spans.tolist()) > _MOST_NUMBERS:  # int64 keys of all labels must not overflow
             raise ValueError("so many quantum numbers cannot be counted: no line can be suggested for this file")
         self._steps = np.array([prod(spans[i + 1 :].tolist()) for i in range(len(spans))], dtype=np.int64)
 

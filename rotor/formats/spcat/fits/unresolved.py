@@ -22,6 +22,7 @@ HIGHEST_SEARCHED = 9  # highest F that is tried for a level with F below 0 if |F
 def excluded_parameters(file: ParameterFile) -> Ints:
     """Places of the last NXPAR parameter lines that follow no parameter before them."""
     first = len(file.parameters) - file.header.nxpar
+    # a constrained parameter follows the last free one above it
     leaders = np.maximum.accumulate([0 if p.constrained else place for place, p in enumerate(file.parameters)])
     return np.flatnonzero(leaders >= first)
 

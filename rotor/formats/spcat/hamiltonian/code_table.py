@@ -52,6 +52,7 @@ TABLE = (
     Row(80, 89, Kind.LEVEL),
     Row(90, 99, Kind.EULER),
 )
+# a table by TYP: looking it up is faster than searching ranges
 _ROW_OF_TYP = tuple(row for row in TABLE for _ in range(row.first, row.last + 1))
 _ALONG = {row.axis: row for row in TABLE if row.axis}
 LADDERS = next(row for row in TABLE if row.kind is Kind.LADDER)
@@ -203,6 +204,7 @@ class Digits(NamedTuple):
     @property
     def sine(self) -> bool:
         """Whether FF is a sine."""
+        # harmonics come in alternate runs of cosines and sines
         return self.ff > 0 and (self.ff - 1) // _HARMONICS % 2 == 1
 
     @property
@@ -266,7 +268,7 @@ def axis_product(first: str, second: str) -> str:
 
 def ladder_typ(n: int) -> int:
     """TYP of N₊^2n + N₋^2n, of 1 for n = 0."""
-    return LADDERS.first + n - 1 if n else 0
+    return LADDERS.first + n - 1 if n else 0  # TYP 4 begins with n = 1
 
 
 def square_typ(axis: str) -> int:
@@ -294,12 +296,12 @@ TYPES_BETWEEN = (  # interactions of two states without spins, by name
 
 def state_digits(states: int) -> int:
     """Number of digits of V1 and of V2 in a code: one up to 9 states, two up to 99, else three."""
-    return 1 if states <= 9 else 2 if states <= 99 else 3
+    return 1 if states <= 9 else 2 if states <= 99 else 3  # the digits of V1 and V2 grow with the number of states
 
 
 def all_states_digit(states: int) -> int:
     """The V1 and V2 that stand for all states: 9, 99 or 999."""
-    return int(10 ** state_digits(states)) - 1
+    return int(10 ** state_digits(states)) - 1  # 9, 99 or 999: the largest number of that many digits stands for all
 
 
 @lru_cache(maxsize=4096)  # a file is looked through for states, phases, series and operators

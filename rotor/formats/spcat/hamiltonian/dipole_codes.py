@@ -39,7 +39,7 @@ def split_dipole(code: int, states: int) -> DipoleCode:
     rest, v2 = divmod(rest, step)
     rest, spin = divmod(rest, 10)
     second, typ = divmod(rest, 10)
-    low, high = sorted((v1, v2))
+    low, high = sorted((v1, v2))  # V1 and V2 in either order are one pair
     if typ in FOURIER:
         return DipoleCode(typ, spin + 10 * second, (low, high), axis)
     return DipoleCode(typ + 10 * second, spin, (low, high), axis)
@@ -51,7 +51,7 @@ def split_dipoles(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list
     others = []
     for dipole in dipoles:
         code = split_dipole(dipole.code, states)
-        if code.states[1] >= states:
+        if code.states[1] >= states:  # states that the file does not have
             continue
         if code.typ or code.spin or code.axis not in (1, 2, 3):
             others.append((dipole, code))

@@ -102,6 +102,7 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     for place, parameter in enumerate(file.parameters, 1):
         digits = split_code(parameter.code, states)
         missing = digits.is_place_holder(states) or digits.missing_state(states) is not None
+        # a line without a value, or for no state of the file, adds nothing
         if parameter.value == 0.0 or digits.is_constant or missing:
             continue
         label = f" /{parameter.label}" if parameter.label else ""
@@ -325,6 +326,7 @@ class FileEffect(QuantumEffect):
         operator_at = coupling.operator
         whole = operator_at(_LOOKED_AT, self._representation)
         part = between_species(whole, self._representation, pairs)
+        # round-off between species that the operator does not connect
         if np.abs((whole - part).matrix).max() <= NOTHING * np.abs(whole.matrix).max():
             return coupling
         return replace(

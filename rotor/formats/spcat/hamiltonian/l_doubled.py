@@ -132,6 +132,7 @@ def over_real_states(
 
 def _ordered(first: int, second: int, factor: float, turned: bool = False) -> RealPart:
     """A real part with the lower number first."""
+    # pairs are kept with the lower state first
     return RealPart(min(first, second), max(first, second), factor, turned)
 
 
@@ -219,7 +220,7 @@ def _by_k(part: Part, representation: str) -> tuple[list[int], list[int]]:
     """Ka and Kc of the functions, whose K rises."""
     ka, kc = names_of(part.basis, representation)
     along = kc if representation == "IIIl" else ka
-    order = np.argsort(along, kind="stable")
+    order = np.argsort(along, kind="stable")  # stable: both components of one K keep their order
     return ka[order].tolist(), kc[order].tolist()
 
 

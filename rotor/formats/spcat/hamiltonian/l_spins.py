@@ -90,7 +90,7 @@ def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Le
     for block in levels.blocks:
         if not isinstance(block, SpinBlock):
             labels_and_weights.append(block_names(block, pairs, representation))
-            continue
+            continue  # a block without spins has its labels at once
         for part in block.parts:
             if part.number not in functions_by_block:
                 functions_by_block[part.number] = l_functions(part.rotor, pairs, representation)

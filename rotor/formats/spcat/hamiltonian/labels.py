@@ -77,7 +77,7 @@ def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diago
             shares.append(clear[1])
             continue
         functions = wang_functions(block, str(levels.representation))
-        energies = -block.energies_mhz if oblate else block.energies_mhz
+        energies = -block.energies_mhz if oblate else block.energies_mhz  # along c energies fall with K
         at = places(functions, energies, diag, diagonal)
         tables.append(functions.names[at])
         shares.append(_group_weights(functions, at, diag))
@@ -142,9 +142,11 @@ def _clear_labels(block: object, oblate: bool, representation: str) -> tuple[Int
     """Labels v, Ka, Kc of DIAG 0 and weights, if each state has more than half of its weight in one Wang block; else None."""
     if not isinstance(block, SolvedBlock) or block.alone:
         return None
+    # squares over each part: the weight of the part
     weights_of_parts = np.add.reduceat(block.vectors**2, [part.start for part in block.parts], axis=0)
     part_of_state, shares = weights_of_parts.argmax(axis=0), weights_of_parts.max(axis=0)
     sizes = [part.basis.size for part in block.parts]
+    # every state has one clear part, and each part as many states as functions
     if shares.min() <= _CLEAR or (np.bincount(part_of_state, minlength=len(sizes)) != sizes).any():
         return None
     names = np.empty((len(shares), 3), dtype=np.int64)
@@ -184,6 +186,7 @@ def places(functions: Functions, energies: Floats, diag: int, diagonal: Diagonal
             functions_of_states[states] = _by_k2(functions, members, states, shares, energies)
         else:
             rising = _by_rising_k(functions, members) if ranks is None else _by_diagonal(functions, members, ranks)
+            # stable: states of one energy keep their order
             functions_of_states[states[np.argsort(energies[states], kind="stable")]] = rising
     return functions_of_states
 
@@ -219,6 +222,7 @@ def _by_rising_k(functions: Functions, members: Ints) -> Ints:
 def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, energies: Floats) -> Ints:
     """Functions for states ordered by ⟨K²⟩ of their part in the group; states of one K by energy."""
     weights = shares[np.ix_(members, states)]
+    # the mean of K² of each state orders the states of a group
     k2 = (functions.k[members].astype(float) ** 2) @ weights / weights.sum(axis=0)
     by_k2, by_tau = np.argsort(k2, kind="stable"), _by_rising_k(functions, members)
     ks, functions_of_states = functions.k[by_tau], np.empty(len(states), dtype=np.int64)

@@ -120,6 +120,7 @@ def _plain(d: Digits, axes: str) -> Operators:
     place = axes.index(d.square_axis)
     if place == 2:
         return {(p, q + 1, 0): 1.0}
+    # Nx² and Ny² = ½(N² - Nz²) ± ¼(N₊² + N₋²)
     return {(p + 1, q, 0): 0.5, (p, q + 1, 0): -0.5, (p, q, 1): 0.25 if place == 0 else -0.25}
 
 
@@ -156,7 +157,8 @@ def _tensor_in_n(tensor: Tensor, n_abc: Mapping[str, JOperator], z: str) -> JOpe
     if k == 0:
         return n_abc[z]
     raised, lowered = (n_abc[x] + 1j * n_abc[y]) ** k, (n_abc[x] - 1j * n_abc[y]) ** k
-    pair = raised + lowered if cosine else -1j * (raised - lowered)
+    pair = raised + lowered if cosine else -1j * (raised - lowered)  # i(raised - lowered) is Hermitian, as the sum is
+    # symmetrized products with Nz where the rank exceeds the ladder
     return 0.5 * pair if k == tensor.rank else tensor.factor_below() * anticommutator(n_abc[z], pair)
 
 

@@ -91,7 +91,7 @@ def with_dipoles(phases: Phases, dipoles: Iterable[tuple[int, bool]], oblate: bo
         flipped = frozenset(axis for bit, axis in enumerate(axes) if number >> bit & 1)
         odd = phases.odd ^ flipped
         real = sum(("abc"[axis - 1] in odd) != commutator for axis, commutator in within_states)
-        left = min(real, len(within_states) - real)
+        left = min(real, len(within_states) - real)  # an i in front of all moments exchanges real and imaginary ones
         if not flipped & phases.settled and (left < least or not number):
             least, best = left, (odd, real < len(within_states) - real)
     return Phases(best[0], phases.settled, not best[1])

@@ -82,6 +82,7 @@ def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats
         Group numbers from 0 on.
     """
     hamiltonian = (amplitudes * (energies - energies.mean())) @ amplitudes.T
+    # elements of round-off link nothing
     linked = np.abs(hamiltonian) > _NO_ELEMENT * np.abs(energies).max(initial=0.0)
     if diag == 0:
         apart = _rolled_over(groups, k, hamiltonian.diagonal())
@@ -93,6 +94,7 @@ def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats
 def clear_functions(amplitudes: Floats) -> Ints | None:
     """The function (states,) with more than half of the weight of each state; None if a state has none."""
     shares = amplitudes**2
+    # one clear function a state names it
     return shares.argmax(axis=0) if (shares.max(axis=0) > _CLEAR).all() else None
 
 
@@ -101,7 +103,7 @@ def _rolled_over(groups: Ints, k: Ints, diagonal: Floats) -> NDArray[np.bool_]:
     apart = np.zeros(len(k), dtype=bool)
     for group in np.unique(groups):
         members = np.flatnonzero(groups == group)
-        members = members[np.argsort(k[members], kind="stable")]
+        members = members[np.argsort(k[members], kind="stable")]  # stable: components of one K keep their order
         first = max(_FIRST_LOOKED_AT - int(k[members[0]]), 0) // 2
         falls = np.flatnonzero(np.diff(diagonal[members[first:]]) < 0)
         if len(falls):

@@ -78,7 +78,7 @@ def file_series(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int
         d = split_code(parameter.code, states)
         if not d.is_constant:
             continue
-        both = d.states(states)
+        both = d.states(states)  # constants of a series without states hold for all
         for pair in [both] if both else [(v, v) for v in range(states)]:
             _set(series, d, parameter, pair)
     for pair in pairs:
@@ -155,7 +155,7 @@ def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float,
     """α' and α of the angle α'K' + αK'' of a Fourier term between two states."""
     up, low = (series.rho.get(v, 0.0) for v in states)
     each = pi / 3 * (n - 0.5 * ((up < 0) != (low < 0)))
-    return each * abs(up), each * abs(low)
+    return each * abs(up), each * abs(low)  # the size of ρ turns; unlike signs shift n by one half
 
 
 def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
@@ -201,6 +201,7 @@ def _sampled(n: int, sine: bool) -> Factor:
 
     def factor(j: int, above: Floats, below: Floats) -> Floats:
         twice = above + below
+        # the mean of both K, rounded up, is n
         return np.where((abs(twice) + 1) // 2 == n, np.sign(twice) if sine else 1.0, 0.0)
 
     return factor
@@ -233,6 +234,7 @@ def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Cod
 def _mean(n2: int, k2: int, constants: tuple[float, float], extra: bool) -> Factor:
     """½(f' + f'') with NSQ and KSQ, divided by D once more if `extra`."""
     f = _euler_function(*constants, n2, k2, extra)
+    # the mean over both functions keeps the element Hermitian
     return lambda j, above, below: 0.5 * (f(j, above) + f(j, below))
 
 

@@ -84,6 +84,7 @@ def _cosine_ladder(rank: int, frame: tuple[str, str, str], sign: int, where: Whe
     m, n, representation = where
     x, y, _ = frame
     if rank == 0:
+        # rank 0 is a number: no change of N
         return np.eye(2 * n + 1, dtype=np.complex128) if m == n else np.zeros((2 * m + 1, 2 * n + 1), np.complex128)
     if rank == 1:
         return _vector(x, 1, where) + sign * 1j * _vector(y, 1, where)
@@ -145,7 +146,7 @@ def multiplied(rotor: Rotor, factor: FactorOfBoth, whole: complex, odd: bool) ->
         above, below = np.arange(-m, m + 1.0)[:, None], np.arange(-n, n + 1.0)[None, :]
         return np.asarray(whole * factor(m, n, above, below) * base(m, n, representation))
 
-    return ByElements(rotor.rank, lru_cache(maxsize=256)(matrix), odd)
+    return ByElements(rotor.rank, lru_cache(maxsize=256)(matrix), odd)  # blocks of one N recur for every F
 
 
 def over_k(rotor: Rotor) -> OverK:

@@ -113,6 +113,7 @@ class StateOptions:
         if fold is None or self.equivalent == 3:  # with their spins all levels are of A species
             return weight
         class_of = (k - self.l_code) % fold.n
+        # pairs that turn into each other under the axis have the weight of E
         paired = np.where(np.isin(class_of, fold.paired) & self._has_e(weight), self.e_weight, 0)
         return np.where(class_of == fold.alone, weight, paired)
 
@@ -164,7 +165,7 @@ def doubled_spins(spind: int) -> tuple[int, ...]:
     if digits.endswith("0") and len(digits) > 1:
         digits, width = digits[:-1], 2
     sizes = [int(digits[max(end - width, 0) : end]) for end in range(len(digits), 0, -width)]
-    while sizes and sizes[-1] <= 1:
+    while sizes and sizes[-1] <= 1:  # spins of 0 at the end stand for none
         sizes.pop()
     return tuple(size - 1 for size in sizes)
 
@@ -182,6 +183,7 @@ def state_options(file: ParameterFile, v: int) -> Options:
     if stated:
         return stated[-1]
     digits = str(max(first.vsym, 0))[::-1]
+    # digits of VSYM count states from the right
     swapped = not file.options[1:] and v < len(digits) and int(digits[v]) % 2 == 1
     return replace(first, wtpl=first.wtmn, wtmn=first.wtpl) if swapped else first
 
@@ -189,13 +191,13 @@ def state_options(file: ParameterFile, v: int) -> Options:
 def _state(v: int, line: Options, first: Options) -> StateOptions:
     """The options of a state from its line and the first line."""
     factor = 100 if first.ewt >= 0 else 1000
-    code, weight = divmod(abs(line.ewt), factor)
+    code, weight = divmod(abs(line.ewt), factor)  # EWT has two or three digits for the weight, by its sign
     iax, spins = abs(line.iax), doubled_spins(line.spind)
     if iax not in (0, 1, 2, 3, *_FOLDS):
         raise ValueError(f"IAX = {line.iax} of state {v}: expected an axis or fold of weights, 1 to 11")
     if line.iax < 0:
         _check_total(v, line, spins, (code % 10, weight))
-    kmax = line.knmax if 0 <= line.knmax <= 359 else 359
+    kmax = line.knmax if 0 <= line.knmax <= 359 else 359  # 359 is SPCAT's largest K
     return StateOptions(
         v,
         spins,

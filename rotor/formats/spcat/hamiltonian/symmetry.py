@@ -60,6 +60,7 @@ def forbidden(
         return "" if named else "of three equivalent spins the first is named, or the first and the second"
     if low.fold > 2 and (symmetry.delta_k - del_l) % low.fold:
         return f"its Δk - Δl is no multiple of {low.fold}"
+    # the last two spins carry the total
     on_total = low.equivalent == 2 and max(spins, default=0) > len(low.spins) - 2
     turns = (0, 1) if on_total else (0,)  # of the function of two equivalent spins
     if not doubled and not any(weights_agree(symmetry.axis, low, high, odd) for odd in turns):

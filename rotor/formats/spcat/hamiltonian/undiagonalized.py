@@ -40,7 +40,7 @@ def _functions_as_states(block: SolvedBlock | SpinBlock, representation: str) ->
     """
     functions = wang_functions(block, representation)
     diagonal: Floats = functions.amplitudes**2 @ block.energies_mhz
-    order = np.argsort(diagonal, kind="stable")
+    order = np.argsort(diagonal, kind="stable")  # stable: equal diagonal elements keep the order of functions
     vectors = (block.vectors @ functions.amplitudes.T)[:, order]
     names = functions.names[order]
     if isinstance(block, SpinBlock):

@@ -168,4 +168,5 @@ def _matrix_codes(c: Floats, whole: bool, oblate: bool, acts_on_three: bool) -> 
         factors |= {0: mean, along: float(diagonal[z]) - mean, ladder: across}
     else:
         factors |= {square_typ("abc"[i]): float(diagonal[i]) for i in range(3)}
+    # factors of round-off are no codes
     return {typ: factor for typ, factor in factors.items() if abs(factor) > 1e-12}

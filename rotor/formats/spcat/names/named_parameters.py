@@ -41,6 +41,7 @@ def named_parameters(constants: TopConstants, title: str, kmax: int) -> tuple[Pa
         Parameter(code, float(value), _error(factors, constants.uncertainties), _label(factors))
         for (code, factors), value in zip(codes.items(), values, strict=True)
     )
+    # a negative NLINE: more than six quantum numbers a state
     header = Header(npar=len(parameters), nline=-1 if len(constants.quanta) > 6 else 1, nitr=1, errtst=1e6)
     return ParameterFile(title, header, _option_lines(constants, kmax), parameters), matrix
 

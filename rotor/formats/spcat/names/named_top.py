@@ -288,9 +288,11 @@ def _letters(kind: str, total: Floats) -> list[str]:
     """The nonzero elements that define a tensor; for spin-rotation only the scalar if it is one."""
     if kind == "J":
         return [""]
+    # equal but for round-off
     if kind == "C" and np.allclose(total, total[0, 0] * np.eye(3), rtol=0, atol=1e-14 * np.abs(total).max()):
         return ["iso"]
     names = ["aa", "bb", "cc", *PAIRS] if kind == "C" else ["aa", "bb-cc", *PAIRS]
+    # elements of round-off get no name
     return [name for name in names if abs(_element(total, name)) > 1e-14 * np.abs(total).max()]
 
 
