@@ -1,11 +1,15 @@
 """Whole commands as a user meets them: processes from start to end, beside `python -c "import numpy, typer, rich.table"`.
 
     python benchmarks/bench_start.py [rounds]
+    python benchmarks/bench_start.py --published ../shared/reference [rounds]
 
 All commands take their turn in every round, so that a change of the machine's speed meets all alike; the median of the rounds
 counts (seven unless given), as a ratio to the imports alone. "First" runs have an empty cache of compiled code. The last rows
 are of one process: making a list in memory. SPCAT makes the same lists in the first two rounds where it is on the PATH; else its column
 has the seconds of its own process on a quiet machine of this kind. Results go to benchmarks/results/start.json.
+
+--published: predictions from published .var and .int files with errors, in processor time net of `rotor info water` in the same round
+(20 rounds unless given), beside SPCAT's whole process. Results go to benchmarks/results/published.json.
 """
 
 from __future__ import annotations
@@ -13,6 +17,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import resource
 import shutil
 import statistics
 import subprocess
@@ -91,6 +96,15 @@ a 1 1 0 {jmax} 0 1 1 1 0 1 0
 MEMORY = {"J ≤ 200 above 1e-12, in memory": ("-12", 0.22), "J ≤ 200 all lines, in memory": ("None", None)}
 
 
+PUBLISHED = {  # the .var below the folder of reference files, or below tests/oracles; the .int; SPCAT's recorded seconds
+    "CH3CN": ("fits/ch3cn_MeCN/v2008_results/ch3cn_MeCN.var", "fits/ch3cn_MeCN/ch3cn_MeCN.int", 0.1),
+    "Ar-SO2": ("fits/ar-so2/v2008_results/ar-so2.var", "fits/ar-so2/ar-so2.int", None),
+    "FSO3": ("kinds/fso3/fso3.var", "kinds/fso3/fso3.int", None),
+    "O2": ("kinds/o2/o2.var", "kinds/o2/o2.int", None),
+}
+PUBLISHED_RESULTS = RESULTS.with_name("published.json")
+
+
 def _environment() -> dict[str, str]:
     """Of an installation: this package, its modules compiled to bytecode once."""
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
@@ -146,6 +160,57 @@ def measured(rounds: int) -> tuple[dict[str, list[float]], dict[str, list[float]
     return times, lists, peer
 
 
+def processor_s(command: list[str], folder: Path) -> float:
+    """Processor time of one process in a folder."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, capture_output=True, check=True, cwd=folder, env=_environment())
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def published(reference: Path, rounds: int) -> None:
+    """Measure predictions from published files in turn, print a table, write the figures."""
+    rotor = [sys.executable, "-m", "rotor"]
+    info: list[float] = []
+    times: dict[str, list[float]] = {name: [] for name in PUBLISHED}
+    peer: dict[str, list[float]] = {name: [] for name in PUBLISHED}
+    with tempfile.TemporaryDirectory() as folder_name:
+        folder = Path(folder_name)
+        for name, (*files, _) in PUBLISHED.items():
+            for file in files:
+                root = ROOT / "tests" / "oracles" if file.startswith("kinds") else reference
+                (folder / f"{name}{Path(file).suffix}").write_bytes((root / file).read_bytes())
+        for turn in range(-1, rounds):
+            seconds = processor_s([*rotor, "info", "water"], folder)
+            info += [seconds] if turn >= 0 else []
+            for name, measured_s in times.items():
+                command = [*rotor, "spectrum", f"{name}.int", "--cat", f"list_{name}.cat", "--top", "0"]
+                seconds = processor_s(command, folder)
+                measured_s += [seconds] if turn >= 0 else []
+                if SPCAT and turn >= 0:
+                    peer[name].append(processor_s([SPCAT, name], folder))
+    rows = []
+    print(f"rotor info water: {statistics.median(info):.3f} s")
+    print(f"{'input':8} {'net median s':>12} {'net mean':>8} {'net best':>8} {'SPCAT s':>8} {'goal':>6}")
+    for name, (*_, recorded) in PUBLISHED.items():
+        net = [whole - base for whole, base in zip(times[name], info, strict=True)]
+        row = {"what": name, "net_median_s": statistics.median(net), "net_mean_s": statistics.mean(net)}
+        row["net_best_s"] = min(times[name]) - min(info)
+        theirs = statistics.median(peer[name]) if peer[name] else recorded
+        texts = (f"{theirs:.3f}", f"{2 * theirs:.2f}") if theirs else ("", "")
+        row |= {"spcat_s": theirs, "spcat_here": bool(peer[name])}
+        rows.append(row)
+        figures = " ".join(f"{row[key]:{width}.3f}" for key, width in zip(list(row)[1:4], (12, 8, 8), strict=True))
+        print(f"{name:8} {figures} {texts[0]:>8} {texts[1]:>6}")
+    content = {
+        "rounds": rounds,
+        "info_water_median_s": statistics.median(info),
+        "load": os.getloadavg()[1],
+        "rows": rows,
+    }
+    PUBLISHED_RESULTS.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
 def main(rounds: int) -> None:
     """Measure, print a table with the goals, write the figures."""
     times, lists, peer = measured(rounds)
@@ -184,4 +249,7 @@ def main(rounds: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 7)
+    if sys.argv[1:2] == ["--published"]:
+        published(Path(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 20)
+    else:
+        main(int(sys.argv[1]) if len(sys.argv) > 1 else 7)

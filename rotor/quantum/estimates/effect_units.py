@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 Functions = Callable[[SolvedBlock | SpinBlock], tuple[Floats, Ints]]
+SpinNaming = Callable[[SpinBlock, str], NamedFunctions]
+"""How the states of a block with spins are labelled, from the block and the representation, over its functions as rows of vectors."""
 
 
 def unit_levels(
@@ -45,6 +47,7 @@ def unit_levels(
     values_mhz: Floats,
     functions: Functions | None = None,
     naming: Naming | None = None,
+    spin_naming: SpinNaming | None = None,
 ) -> LabelledBlocks:
     """The blocks of labelled levels as functions of the parameters.
 
@@ -65,6 +68,8 @@ def unit_levels(
         basis, and their labels v, Ka, Kc and, with spins, the doubled pattern (n, 3 + pattern). Levels without spins have these labels.
     naming : callable, optional
         For blocks without spins: how states are labelled; by default by overlaps. The levels have these labels.
+    spin_naming : callable, optional
+        For blocks with spins: how states are labelled; by default by Wang blocks and patterns. Rows are those of states in solved blocks.
 
     Returns
     -------
@@ -81,12 +86,14 @@ def unit_levels(
     block_of_row = np.searchsorted(starts, rows, side="right") - 1
     numbers = distinct(block_of_row).tolist()
     blocks = [levels.blocks[number] for number in numbers]
-    units = list(_named_blocks(top, levels, names, blocks, functions, naming))
+    units = list(_named_blocks(top, levels, names, blocks, functions, naming, spin_naming))
     inside = [np.flatnonzero(block_of_row == number) for number in numbers]
 
     def find(place: int, names: Ints) -> tuple[Ints, Ints]:
         """Rows of the labels in a block, and the states that have these labels."""
         block, rows_of_block = blocks[place], inside[place]
+        if spin_naming:
+            return rows_of_block, rows[rows_of_block] - block.start
         state_of = {tuple(name): state for state, name in enumerate(names.tolist())}
         if functions and isinstance(block, SpinBlock):
             requested = _names_by(block, *functions(block))[rows[rows_of_block] - block.start]
@@ -130,6 +137,7 @@ def _named_blocks(
     blocks: Sequence[Any],
     functions: Functions | None,
     naming: Naming | None,
+    spin_naming: SpinNaming | None,
 ) -> Iterator[NamedBlock]:
     """The linear block of each solved block with the rule that labels its states."""
     if isinstance(blocks[0], SpinBlock):
@@ -141,7 +149,7 @@ def _named_blocks(
         if functions:
             yield _turned(linear, *functions(block))
         elif isinstance(block, SpinBlock):
-            yield linear, _names_with_spins(block)
+            yield linear, (spin_naming(block, representation) if spin_naming else _names_with_spins(block))
         elif naming:
             yield linear, naming(vertices_of(block), representation)
         elif block.alone:
@@ -201,7 +209,7 @@ def _namer(solved: tuple[SpinPart, ...], all_names: Ints) -> Namer:
     parts = tuple(
         part._replace(rotor=replace(part.rotor, vectors=np.eye(len(part.rotor.energies_mhz)))) for part in solved
     )
-    names = names_of_parts(parts, all_names)
+    names = names_of_parts(parts, all_names)[:2]
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
         return labels_of(parts, names, vectors)[0]

@@ -119,7 +119,7 @@ def tensors_of_axial_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[C
 def powers_of_axial(terms: StateTerms, count: int, blocks: Sequence[SolvedBlock]) -> Floats:
     """Diagonal elements [N(N+1)]^p K^2q by function and parameter, (blocks, count); operators that change K do not contribute."""
     parts = [block.parts[0] for block in blocks]
-    v, n, k = (np.array(column) for column in zip(*((p.v, p.basis.j, p.basis.k[0]) for p in parts), strict=True))
+    v, n, k = np.array([(part.v, part.basis.j, part.basis.axial_k) for part in parts]).T
     x, out = n * (n + 1.0), np.zeros((len(parts), count))
     for state, (p, q, order), column, factor in terms.by_power():
         if not order:

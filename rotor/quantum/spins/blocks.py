@@ -10,7 +10,7 @@ a Kronecker product for each pair of solved blocks. Blocks that no channel conne
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -148,6 +148,15 @@ def diagonalised(
     return States(numbers, energies + zeros_mhz[:, None], vectors, groups)
 
 
+class Placed(NamedTuple):
+    """Members of families: N and class as one number (`_key`), family, place in it, and number of the rotational block."""
+
+    keys: Ints
+    families: Ints
+    places: Ints
+    numbers: Ints
+
+
 @dataclass(frozen=True)
 class Plan:
     """Solved rotation, operators of each channel, and the blocks that they connect.
@@ -179,13 +188,15 @@ class Plan:
         return [len(block.energies_mhz) for block in self.blocks]
 
     @cached_property
-    def families_at(self) -> dict[tuple[int, int], dict[int, list[tuple[int, int]]]]:
-        """By N and class, then by number of the family: (place in the family, block) of its members there."""
-        places: dict[tuple[int, int], dict[int, list[tuple[int, int]]]] = {}
-        for number, family in enumerate(self.families):
-            for at, (i, symmetry_class) in enumerate(family):
-                places.setdefault((self.blocks[i].j, symmetry_class), {}).setdefault(number, []).append((at, i))
-        return places
+    def placed(self) -> Placed:
+        """All members of families, in order of N and class."""
+        counts = [len(family) for family in self.families]
+        members = np.array([member for family in self.families for member in family]).reshape(-1, 2)
+        families = np.repeat(np.arange(len(counts)), counts)
+        places = np.arange(len(members)) - np.repeat(np.cumsum(counts) - counts, counts)
+        keys = _key(np.array([block.j for block in self.blocks])[members[:, 0]], members[:, 1])
+        order = np.argsort(keys, kind="stable")
+        return Placed(keys[order], families[order], places[order], members[order, 0])
 
     def with_method(self, used: Used, operators: InStacks | None = None) -> Plan:
         """This rotation with the operators of a treatment of the spins (all by default), which `used` describes."""
@@ -237,25 +248,60 @@ def _alike(channels: Channels) -> dict[Channel, Channel]:
     return firsts
 
 
-def parts_of_f(plan: Plan, patterns: Ints) -> Iterator[tuple[SpinPart, ...]]:
-    """The parts of each block of an F with these patterns; nothing for an F that N and the spins cannot form."""
-    if not len(patterns):
-        return
-    n, classes = patterns[:, 0] // 2, plan.shared.scheme.classes(patterns)
-    bounds = [0, *(np.flatnonzero((n[1:] != n[:-1]) | (classes[1:] != classes[:-1])) + 1).tolist(), len(patterns)]
-    families: dict[int, list[tuple[int, int, int, int]]] = {}
-    for a, b in pairwise(bounds):
-        for number, members in plan.families_at.get((int(n[a]), int(classes[a])), {}).items():
-            families.setdefault(number, []).extend([(at, i, a, b) for at, i in members])
-    for number in sorted(families):
-        yield _parts(plan, sorted(families[number]))
+def blocks_of_f(plan: Plan, patterns: Mapping[int, Ints]) -> list[tuple[int, tuple[SpinPart, ...]]]:
+    """Doubled F and parts of each block, by F, then by family; an F whose patterns no rotational block has is left out."""
+    runs, placed = _runs_of_patterns(plan, patterns), plan.placed
+    low, high = (np.searchsorted(placed.keys, runs.keys, side) for side in ("left", "right"))
+    run = np.repeat(np.arange(len(low)), high - low)
+    member = np.arange(len(run)) + np.repeat(high - np.cumsum(high - low), high - low)
+    family, place = placed.families[member], placed.places[member]
+    order = np.lexsort((runs.first[run], place, family, runs.f[run]))
+    run, family, numbers = run[order], family[order], placed.numbers[member[order]]
+    if not len(run):
+        return []
+    first, last, f = runs.first[run], runs.last[run], runs.f[run]
+    begins = np.flatnonzero(np.append(True, (f[1:] != f[:-1]) | (family[1:] != family[:-1])))
+    sizes = (last - first) * np.array(plan.sizes)[numbers]
+    stop = np.cumsum(sizes)
+    stop -= np.repeat((stop - sizes)[begins], np.diff(np.append(begins, len(run))))
+    slices = (map(slice, a.tolist(), b.tolist()) for a, b in ((first, last), (stop - sizes, stop)))
+    rotors = map(plan.blocks.__getitem__, numbers.tolist())
+    parts = list(map(SpinPart, numbers.tolist(), rotors, *slices))
+    bounds = pairwise([*begins.tolist(), len(parts)])
+    return [(twice_f, tuple(parts[a:b])) for twice_f, (a, b) in zip(f[begins].tolist(), bounds, strict=True)]
+
+
+class _Runs(NamedTuple):
+    """Successive patterns of one F with one N and class: F, key (see `Placed`), first and last row among the patterns of the F."""
+
+    f: Ints
+    keys: Ints
+    first: Ints
+    last: Ints
+
+
+def _runs_of_patterns(plan: Plan, patterns: Mapping[int, Ints]) -> _Runs:
+    counts = np.array([len(patterns_of_f) for patterns_of_f in patterns.values()], dtype=np.int64)
+    if not counts.any():
+        return _Runs(*np.zeros((4, 0), dtype=np.int64))
+    f, rows = np.repeat(list(patterns), counts), np.concatenate([each for each in patterns.values() if len(each)])
+    keys = _key(rows[:, 0] // 2, plan.shared.scheme.classes(rows))
+    begins = np.flatnonzero(np.append(True, (f[1:] != f[:-1]) | (keys[1:] != keys[:-1])))
+    row = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
+    lengths = np.diff(np.append(begins, len(rows)))
+    return _Runs(f[begins], keys[begins], row[begins], row[begins] + lengths)
+
+
+def _key(n: Ints, symmetry_class: Ints) -> Ints:
+    """One number for N and the class of a function of two equivalent spins, 0 or 1."""
+    return 2 * n + symmetry_class
 
 
 def functions_of_blocks(plan: Plan, all_f: Sequence[int]) -> list[SpinBlock]:
     """Basis functions of the blocks of all F, without vectors: labels and energies are those of the rotational states."""
     table = pattern_table(plan.shared.scheme, all_f[0], all_f[-1])
     frame = plan.shared.cache["frame"] = frame_of(plan.shared.stacks, table)
-    members = [(f, parts) for f in all_f if f in table.patterns for parts in parts_of_f(plan, table.patterns[f])]
+    members = blocks_of_f(plan, {f: table.patterns[f] for f in all_f if f in table.patterns})
     groups = {number: group for group, numbers in groups_of(members, frame) for number in numbers}
     out = []
     for number, (twice_f, parts) in enumerate(members):
@@ -271,13 +317,3 @@ def _labels_of_functions(part: SpinPart, part_patterns: Ints) -> Ints:
     """Labels of the functions of a part, pattern by pattern."""
     names = named_states(part.rotor, part.rotor.vectors)
     return np.concatenate([np.column_stack([names, np.tile(pattern, (len(names), 1))]) for pattern in part_patterns])
-
-
-def _parts(plan: Plan, members: list[tuple[int, int, int, int]]) -> tuple[SpinPart, ...]:
-    """The parts of one block, one after another; members: place in the family, rotational block, first and last row of its patterns."""
-    parts, start, blocks, sizes = [], 0, plan.blocks, plan.sizes
-    for _, i, first, last in members:
-        stop = start + (last - first) * sizes[i]
-        parts.append(SpinPart(i, blocks[i], slice(first, last), slice(start, stop)))
-        start = stop
-    return tuple(parts)

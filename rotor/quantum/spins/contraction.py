@@ -64,7 +64,7 @@ def stacks_of(blocks: Sequence[SolvedBlock], contract: bool = True) -> list[Stac
     """
     alike: dict[tuple[tuple[int, ...], ...], list[int]] = {}
     for number, block in enumerate(blocks):
-        alike.setdefault(tuple((part.v, *_kind(part.basis)) for part in block.parts), []).append(number)
+        alike.setdefault(tuple([(part.v, *_kind(part.basis)) for part in block.parts]), []).append(number)
     stacks = list[Stack]()
     for kind, members in enumerate(alike.values()):
         rising = sorted(members, key=lambda number: blocks[number].j)
@@ -88,21 +88,32 @@ def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: list[int], contrac
         sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), parts))
         start += largest.size
     sizes = [len(block.energies_mhz) for block in members]
-    vectors = np.zeros((len(members), start, max(sizes)))
-    for place, (block, states) in enumerate(zip(members, sizes, strict=True)):
-        for part, section in zip(block.parts, sections, strict=True):
-            first = section.rows.start
-            vectors[place, first : first + part.basis.size, :states] = block.vectors[part.place]
     return Stack(
         kind,
         np.array(numbers),
         np.array([block.j for block in members]),
         tuple(sections),
-        vectors if contract else None,
+        _padded_vectors(members, sections, sizes) if contract else None,
         sizes,
         members,
-        [len(block.energies_mhz) == 1 or any(part.basis.size == 1 for part in block.parts) for block in members],
+        [
+            size == 1 or any(part.basis.size == 1 for part in block.parts)
+            for size, block in zip(sizes, members, strict=True)
+        ],
     )
+
+
+def _padded_vectors(members: Sequence[SolvedBlock], sections: Sequence[Section], sizes: Sequence[int]) -> Floats:
+    """Vectors of the blocks of a stack (blocks, rows, states), zero beyond a block."""
+    rows = sections[-1].rows.stop
+    if min(sizes) == rows:
+        return np.concatenate([block.vectors for block in members]).reshape(len(members), rows, rows)
+    vectors = np.zeros((len(members), rows, max(sizes)))
+    for place, (block, states) in enumerate(zip(members, sizes, strict=True)):
+        for part, section in zip(block.parts, sections, strict=True):
+            first = section.rows.start
+            vectors[place, first : first + part.basis.size, :states] = block.vectors[part.place]
+    return vectors
 
 
 def operators_of_stacks(

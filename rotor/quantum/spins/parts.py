@@ -58,7 +58,7 @@ def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Fl
 def labels_by_shares(names: Ints, sizes: Ints, vectors: Floats) -> tuple[Ints, Floats]:
     """Labels (blocks, n, 3 + pattern) of the states by rising energy, and weights (blocks, n) of the sub-blocks that give them.
 
-    names, sizes: labels of the levels sub-block by sub-block, and how many each has (`names_of_tables`). vectors: eigenvectors in columns
+    names, sizes: labels of the levels sub-block by sub-block, and how many each has (`names_of_parts`). vectors: eigenvectors in columns
     (blocks, n, n) over functions sub-block by sub-block.
     """
     (count, subs), n = sizes.shape, names.shape[1]
@@ -93,26 +93,52 @@ def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
     return np.concatenate([each[:, wang_part.place].reshape(-1, rows.shape[1]) for wang_part in part.rotor.parts])
 
 
-def names_of_parts(parts: Sequence[SpinPart], patterns: Ints) -> tuple[Ints, Ints]:
-    """Labels v, Ka, Kc, pattern of the levels, (functions, 3 + pattern), sub-block by sub-block, and number of levels of each."""
-    return names_of_tables([(patterns, parts)])
+class Names(NamedTuple):
+    """Labels v, Ka, Kc, pattern of levels (functions, 3 + pattern), sub-block by sub-block.
+
+    sizes: number of levels of each sub-block. sub_blocks: number of sub-blocks of each part.
+    """
+
+    labels: Ints
+    sizes: Ints
+    sub_blocks: Ints
 
 
-def names_of_tables(tables: Sequence[tuple[Ints, Sequence[SpinPart]]]) -> tuple[Ints, Ints]:
-    """Labels and sizes as from `names_of_parts`, for several tables of patterns, each with its parts."""
-    names, sizes, rows, first = list[Ints](), list[int](), list[int](), 0
-    for patterns, parts in tables:
-        for part in parts:
-            pattern_rows, count = range(first + part.patterns.start, first + part.patterns.stop), part.repeats
-            for wang_part in part.rotor.parts:
-                names += [wang_part.names] * count
-                rows += pattern_rows
-                sizes += [len(wang_part.names)] * count
-        first += len(patterns)
-    out = np.empty((sum(sizes), 3 + tables[0][0].shape[1]), dtype=np.int64)
-    np.concatenate(names, out=out[:, :3])
-    out[:, 3:] = np.concatenate([patterns for patterns, _ in tables])[rows].repeat(sizes, axis=0)
-    return out, np.array(sizes)
+def names_of_parts(parts: Sequence[SpinPart], patterns: Ints, first_rows: Ints | int = 0) -> Names:
+    """Labels of the levels of parts, whose patterns count from the first row of their F in a table of patterns."""
+    rotors = {part.number: part.rotor for part in parts}
+    places = dict(zip(rotors, range(len(rotors)), strict=True))
+    wang_names = [[wang_part.names for wang_part in rotor.parts] for rotor in rotors.values()]
+    rotor = np.array([places[part.number] for part in parts])
+    repeats: Ints = np.array([part.patterns.stop - part.patterns.start for part in parts])
+    rows = np.asarray([part.patterns.start for part in parts], dtype=np.int64) + first_rows
+
+    counts: Ints = np.array([len(names) for names in wang_names])  # Wang blocks of each rotational block
+    part, wang_part = _each(counts[rotor], _starts(counts)[rotor])
+    of_part, row = _each(repeats[part], rows[part])
+    wang_part = wang_part[of_part]
+    names = [of_wang_part for of_rotor in wang_names for of_wang_part in of_rotor]
+    lengths = np.array([len(of_wang_part) for of_wang_part in names])
+    sub_block, name = _each(lengths[wang_part], _starts(lengths)[wang_part])
+    labels = np.empty((len(name), 3 + patterns.shape[1]), dtype=np.int64)
+    labels[:, :3] = np.concatenate(names)[name]
+    labels[:, 3:] = patterns[row[sub_block]]
+    return Names(labels, lengths[wang_part], counts[rotor] * repeats)
+
+
+def _starts(counts: Ints) -> Ints:
+    """The first place of each run of these counts."""
+    return np.asarray(np.cumsum(counts) - counts)
+
+
+def _each(counts: Ints, firsts: Ints) -> tuple[Ints, Ints]:
+    """The number of each run, and the whole numbers of the run from its first one, over runs of these counts.
+
+    >>> [column.tolist() for column in _each(np.array([2, 1]), np.array([5, 0]))]
+    [[0, 0, 1], [5, 6, 0]]
+    """
+    run = np.repeat(np.arange(len(counts)), counts)
+    return run, np.arange(len(run)) + (firsts - np.cumsum(counts) + counts)[run]
 
 
 def assigned(shares: Floats, capacity: Ints) -> Ints:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import repeat
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -120,11 +121,9 @@ def _existing(v: Ints, k: Ints, exist: Exist, scheme: Scheme) -> NDArray[np.bool
 def _axial_blocks(v: Ints, n: Ints, k: Ints, energies_mhz: Floats) -> list[SolvedBlock]:
     """A block of one function for each level; their arrays are views of shared ones."""
     names, vector = np.column_stack([v, k, np.zeros_like(k)]), np.ones((1, 1))
-    rows = enumerate(zip(v.tolist(), n.tolist(), k.tolist(), strict=True))
-    return [
-        SolvedBlock((Part(state, AxialState(m, q), 0, names[i : i + 1]),), energies_mhz[i : i + 1], vector)
-        for i, (state, m, q) in rows
-    ]
+    functions = map(AxialState, n.tolist(), k.tolist())
+    parts = map(Part, v.tolist(), functions, repeat(0), names[:, None])
+    return [SolvedBlock((part,), energy, vector) for part, energy in zip(parts, energies_mhz[:, None], strict=True)]
 
 
 def _named(block: SolvedBlock, names: Ints) -> SolvedBlock:

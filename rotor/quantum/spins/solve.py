@@ -11,10 +11,10 @@ from itertools import accumulate
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, Workspace
-from rotor.quantum.spins.blocks import Member, Plan, SpinBlock, States, diagonalised, parts_of_f
+from rotor.arrays import Floats, Ints, Workspace, end_to_end
+from rotor.quantum.spins.blocks import Member, Plan, SpinBlock, States, blocks_of_f, diagonalised
 from rotor.quantum.spins.many_f import Frame, Group, Tables, between, frame_of, groups_of, tables_of
-from rotor.quantum.spins.parts import SpinPart, labels_by_shares, names_of_tables, over_functions
+from rotor.quantum.spins.parts import labels_by_shares, names_of_parts, over_functions
 from rotor.quantum.spins.pattern_tables import PatternTable, couplings_by_f, pattern_table
 from rotor.quantum.spins.rotor import Exist
 
@@ -47,7 +47,8 @@ def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) 
 
 def _named(states: States, members: Sequence[Member]) -> Iterator[tuple[int, Floats, Floats, Ints, Floats]]:
     """Number, energies, vectors over parts, labels and mixing of each solved block of one size."""
-    names, sizes = (np.stack(column) for column in zip(*((m.names, m.sizes) for m in members), strict=True))
+    names = np.concatenate([member.names for member in members]).reshape(len(members), *members[0].names.shape)
+    sizes = np.concatenate([member.sizes for member in members]).reshape(len(members), -1)
     vectors: Sequence[Floats] | Floats = states.vectors
     if members[0].allowed is None:
         labels, mixing = labels_by_shares(names, sizes, over_functions([m.parts for m in members], states.vectors))
@@ -61,15 +62,16 @@ def _named(states: States, members: Sequence[Member]) -> Iterator[tuple[int, Flo
 
 def _existing_members(plan: Plan, patterns: dict[int, Ints], exist: Exist | None) -> list[Member]:
     """The blocks in which a level exists."""
-    candidates = [(f, parts) for f, patterns_of_f in patterns.items() for parts in parts_of_f(plan, patterns_of_f)]
+    candidates = blocks_of_f(plan, patterns)
     if not candidates:  # N of the first K (KNMIN) is above every N of these F
         return []
-    by_f: dict[int, list[SpinPart]] = {}
-    for f, parts in candidates:
-        by_f.setdefault(f, []).extend(parts)
-    names, sizes = names_of_tables([(patterns[f], parts) for f, parts in by_f.items()])
-    stops = np.cumsum([0, *(parts[-1].place.stop for _, parts in candidates)])
-    lasts = np.cumsum([0, *(sum(part.sub_blocks for part in parts) for _, parts in candidates)])
+    table = end_to_end(list(patterns.values()))
+    first_rows = dict(zip(patterns, accumulate(map(len, patterns.values()), initial=0), strict=False))
+    parts = [part for _, parts_of_block in candidates for part in parts_of_block]
+    counts: Ints = np.array([len(parts_of_block) for _, parts_of_block in candidates])
+    names, sizes, sub_blocks = names_of_parts(parts, table, np.repeat([first_rows[f] for f, _ in candidates], counts))
+    stops = np.cumsum([0, *(parts_of_block[-1].place.stop for _, parts_of_block in candidates)])
+    lasts = np.append(0, np.cumsum(np.add.reduceat(sub_blocks, np.asarray(np.cumsum(counts) - counts))))
     exists = np.ones(len(candidates), dtype=bool)
     if exist is not None:
         exists = np.logical_or.reduceat(exist(names), stops[:-1])
