@@ -17,12 +17,22 @@ if TYPE_CHECKING:
     from rotor.quantum.estimates.contracted import ContractedLevels
 
 
+class DiagonalElements(NamedTuple):
+    """Diagonal elements of a Hamiltonian over fixed functions, linear in the parameters; slopes: (levels, parameters)."""
+
+    slopes: Floats
+
+    def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """Energies (levels,) and derivatives."""
+        return self.slopes @ values_mhz, self.slopes
+
+
 class AssignedLevels(NamedTuple):
     """Blocks of some labels and parameters: the places of both among all (rows, columns)."""
 
     rows: Ints
     columns: Ints
-    blocks: LabelledBlocks | ContractedLevels
+    blocks: LabelledBlocks | ContractedLevels | DiagonalElements
 
     @property
     def with_level(self) -> Ints:
@@ -40,11 +50,11 @@ def without_level(parts: Sequence[AssignedLevels], count: int) -> NDArray[np.boo
 
 @dataclass(frozen=True)
 class BlockLevels(LevelModel):
-    """Labelled levels as functions of constants; contracted: parts of which each label is solved among the functions near it."""
+    """Labelled levels as functions of constants; others: parts of which each label is solved among the functions near it, or is one."""
 
     names: tuple[str, ...]
     labelled: LabelledBlocks
-    contracted: tuple[AssignedLevels, ...]
+    others: tuple[AssignedLevels, ...]
 
     @classmethod
     def from_parts(cls, names: tuple[str, ...], parts: Sequence[AssignedLevels], count: int) -> BlockLevels:
@@ -61,7 +71,7 @@ class BlockLevels(LevelModel):
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`."""
         energies, slopes = self.labelled.levels(values_mhz)
-        for part in self.contracted:
+        for part in self.others:
             energies[part.rows], derived = part.blocks.levels(values_mhz[part.columns])
             slopes[part.rows[:, None], part.columns] = derived
         return energies, slopes

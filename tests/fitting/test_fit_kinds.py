@@ -350,7 +350,7 @@ def test_levels_of_large_blocks_are_those_of_the_whole_matrix(monkeypatch):
     labels = np.array([[n, ka, n - ka, v, n + 1, n + 2] for n in (13,) for ka in (0, 1, 9) for v in (0, 1)])
     monkeypatch.setattr(contracted, "_LARGE", 100)
     model = FileLevels.from_labels(file, labels)
-    assert isinstance(model.whole.contracted[0].blocks, contracted.ContractedLevels)
+    assert isinstance(model.whole.others[0].blocks, contracted.ContractedLevels)
     computed, slopes = model.levels(values)
     monkeypatch.setattr(contracted, "_LARGE", 10**9)
     whole, whole_slopes = FileLevels.from_labels(file, labels).levels(values)

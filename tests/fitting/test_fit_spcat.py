@@ -317,7 +317,7 @@ def test_levels_of_two_chlorines_and_two_states_are_spfits():
     """ClClO2 with all spins: blocks of some 1,000 functions, F below 0, frequencies as SPFIT prints them."""
     fit_input = read_fit(KINDS / "clclo2_spins" / "clclo2.par")
     model = fit_input.model(np.unique(np.concatenate([fit_input.lines.upper, fit_input.lines.lower]), axis=0))
-    assert isinstance(model.whole.contracted[0].blocks, ContractedLevels)
+    assert isinstance(model.whole.others[0].blocks, ContractedLevels)
     labels, places = np.unique(
         np.concatenate([fit_input.lines.upper, fit_input.lines.lower]), axis=0, return_inverse=True
     )

@@ -39,7 +39,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
     symmetric_part,
     weights_agree,
 )
-from rotor.formats.spcat.hamiltonian.undiagonalized import is_undiagonalized, without_diagonalization
+from rotor.formats.spcat.hamiltonian.undiagonalized import refuse_other_functions, without_diagonalization
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.quantum.connected import connected_parts
@@ -94,13 +94,22 @@ class Group:
             levels = solve_levels(
                 self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
             )
-        if self.effect.pairs:
-            levels = named_by_l(levels, self.effect.pairs, str(levels.representation))
-        elif is_undiagonalized(levels, self.diag):
-            levels = without_diagonalization(levels)
-        else:
-            levels = named_by(levels, self.diag, self.oblate, self.diagonal(levels.jmax))
+        levels = self.named(levels)
         return replace(levels, weight=self._weights(levels))
+
+    def named(self, levels: Levels) -> Levels:
+        """Levels as DIAG says: with its names or, where it is below 0, the functions of the basis with their diagonal elements."""
+        if self.diag < 0:
+            refuse_other_functions(levels, bool(self.effect.pairs))
+            return without_diagonalization(levels)
+        if self.effect.pairs:
+            return named_by_l(levels, self.effect.pairs, str(levels.representation))
+        return named_by(levels, self.diag, self.oblate, self.diagonal(levels.jmax))
+
+    @property
+    def is_diagonal(self) -> bool:
+        """Whether a single state of a symmetric or linear top without spins has no elements off the diagonal."""
+        return self.top.kind != "asymmetric" and len(self.states) == 1 and not self.spins
 
     def falls_from(self, highest_n: int) -> int | None:
         """The lowest N at which the diagonal of the Hamiltonian does not rise (oblate: fall) with K; None up to the highest N."""

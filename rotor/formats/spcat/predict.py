@@ -15,13 +15,11 @@ from pathlib import Path
 from rotor.formats.spcat import wavenumbers
 from rotor.formats.spcat.block_numbers import numbered_blocks
 from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, group_lines, group_transitions
-from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format, quanta_format
 from rotor.formats.spcat.hamiltonian.states import file_states
-from rotor.formats.spcat.hamiltonian.undiagonalized import is_undiagonalized
+from rotor.formats.spcat.hamiltonian.undiagonalized import UNDIAGONALIZED_NOTE
 from rotor.formats.spcat.prediction_notes import (
     basis_notes,
-    diagonal_elements_note,
     falling_diagonal_notes,
     file_notes,
     full_basis_notes,
@@ -148,7 +146,7 @@ def _predicted(parameters: ParameterFile, intensities: IntensityFile, as_spcat: 
     groups = groups_to_solve(parameters, intensities, as_spcat, full_basis)
     form = quanta_format(parameters, groups)
     solved = solved_groups(parameters, groups, request, form)
-    notes = file_notes(parameters, intensities, as_spcat) + _notes_without_diagonalization(solved, as_spcat)
+    notes = file_notes(parameters, intensities, as_spcat) + _notes_without_diagonalization(solved)
     listed = [group_lines(*each, group_transitions(each.group, each.levels, request), form, request) for each in solved]
     pieces = [(lines, form.qnfmt(each.group.spins)) for lines, each in zip(listed, solved, strict=True)]
 
@@ -180,27 +178,10 @@ def _listed_levels(parameters: ParameterFile, solved: list[SolvedGroup], form: F
     return as_level_list(solved, form, numbered_blocks(parameters, [each.group for each in solved]))
 
 
-def _notes_without_diagonalization(solved: list[SolvedGroup], as_spcat: bool) -> list[str]:
-    """The notes of groups with DIAG below 0, whose levels are diagonal elements in place of eigenvalues.
-
-    Raises ValueError with `as_spcat` for a group whose basis is not one of Wang functions, and which therefore has eigenvalues.
-    """
-    listed = [
-        is_undiagonalized(each.levels, each.group.diag)
-        for each in solved
-        if each.group.diag < 0 and not _is_diagonal(each.group)
-    ]
-    if as_spcat and not all(listed):
-        raise ValueError(
-            "DIAG below 0: diagonal elements in place of eigenvalues, which are computed for asymmetric tops and states over Wang "
-            "functions alone; give DIAG = 0, or leave --as-spcat out for eigenvalues"
-        )
-    return [diagonal_elements_note(undiagonalized) for undiagonalized in dict.fromkeys(listed)]
-
-
-def _is_diagonal(group: Group) -> bool:
-    """Whether a single state of a symmetric or linear top without spins has no elements off the diagonal."""
-    return group.top.kind != "asymmetric" and len(group.states) == 1 and not group.spins
+def _notes_without_diagonalization(solved: list[SolvedGroup]) -> list[str]:
+    """The note on DIAG below 0, if any group has elements off the diagonal."""
+    groups = [each.group for each in solved]
+    return [UNDIAGONALIZED_NOTE] if any(group.diag < 0 and not group.is_diagonal for group in groups) else []
 
 
 def _not_written(request: Request) -> list[str]:

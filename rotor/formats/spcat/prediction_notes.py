@@ -21,7 +21,7 @@ from rotor.formats.spcat.hamiltonian.l_doubled import l_doubled_pairs
 from rotor.formats.spcat.hamiltonian.phases import read_phases, with_dipoles
 from rotor.formats.spcat.hamiltonian.states import StateOptions, file_states
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
-from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, ParameterFile, npar_notes
+from rotor.formats.spcat.text.par import ParameterFile, npar_notes
 
 
 def file_notes(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
@@ -142,16 +142,6 @@ def _energies(groups: Iterable[Group], twice_f: int) -> tuple[dict[tuple[int, ..
         energies |= dict(zip(map(tuple, labels.tolist()), levels.energy_mhz[exist].tolist(), strict=True))
         count += int(levels.components[exist].sum())
     return energies, count
-
-
-def diagonal_elements_note(undiagonalized: bool) -> str:
-    """The note for DIAG below 0: whether the levels are diagonal elements, as in SPCAT, or eigenvalues."""
-    if not undiagonalized:
-        return UNDIAGONALIZED_NOTE
-    return (
-        "DIAG is below 0: the energies are diagonal elements of the Hamiltonian over the functions of the file, as in SPCAT, and each "
-        "level is one function; DIAG = 0 has eigenvalues"
-    )
 
 
 def falling_diagonal_notes(groups: Iterable[Group], diag: int, highest_n: int) -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.block_levels import AssignedLevels
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.effect_units import Functions, unit_levels
+from rotor.quantum.estimates.effect_units import Functions, SpinNaming, unit_levels
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.spins.scheme import scheme_of
@@ -33,6 +33,7 @@ def assigned_with_spins(
     twice_f: Ints,
     rows_of: Callable[[Levels, Ints], Ints],
     functions: Callable[[Levels], Functions] | None = None,
+    naming: SpinNaming | None = None,
 ) -> list[AssignedLevels]:
     """Assign labels with spins to levels, and return the blocks of these as functions of the parameters.
 
@@ -52,6 +53,8 @@ def assigned_with_spins(
         Takes levels and places of labels, and returns the row of each label, -1 if it has none.
     functions : callable, optional
         Functions other than basis functions that label the levels, see `unit_levels`.
+    naming : SpinNaming, optional
+        How the states of solved blocks are labelled; `rows_of` takes levels with these labels.
 
     Returns
     -------
@@ -60,7 +63,8 @@ def assigned_with_spins(
     """
     scheme, all_f, columns = scheme_of(top, effects), distinct(twice_f), np.arange(len(names))
     size = (1 + sum(len(effect.states(top)) for effect in effects)) * int(np.prod([two + 1 for two in scheme.twice]))
-    products = scheme.equivalent < 3 and functions is None  # functions of three equivalent nuclei are not products
+    # functions of three equivalent nuclei are not products
+    products = scheme.equivalent < 3 and functions is None and naming is None
     if products and size * int(all_f.max() + 1) > _LARGE:
         from rotor.quantum.estimates.contracted import contracted_levels
 
@@ -80,6 +84,6 @@ def assigned_with_spins(
         has_level = rows >= 0
         if has_level.any():
             namer = functions(levels) if functions else None
-            blocks = unit_levels(top, levels, rows[has_level], names, values_mhz, namer)
+            blocks = unit_levels(top, levels, rows[has_level], names, values_mhz, namer, spin_naming=naming)
             out.append(AssignedLevels(places[has_level], columns, blocks))
     return out

@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from spcat_fits import fit_of_prediction
 
 from rotor.cli import run
 from rotor.fitting.fit import fit_lines
-from rotor.formats.spcat.fits.fit_input import read_fit, spfit_input
+from rotor.formats.spcat.fits.fit_input import read_fit
 from rotor.formats.spcat.hamiltonian.roll_over import connected_groups, falls_with_k
 from rotor.formats.spcat.predict import Prediction, predict
 from rotor.formats.spcat.text.int_file import read_int
-from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import ParameterFile, format_par, read_par
 
 MEAN, ALONG = 133480.0, -15992.0
@@ -105,52 +105,46 @@ def test_with_diag_0_functions_beyond_the_fall_stand_alone():
 def test_a_fit_finds_the_constants(options: str, tmp_path: Path):
     """Lines of the true constants, which h3 of 2e-4 MHz moves by up to a GHz, from a start with B 0.1 % off."""
     true = _file(options, h3=2e-4)
-    listed = _prediction(true, 7).catalogue
-    width = int((listed.quanta_upper[0] >= -99).sum())
-    rows = [
-        "".join(f"{q:3d}" for q in (*up[:width], *low[:width])).ljust(36) + f" {frequency:.5f} 0.01"
-        for up, low, frequency in zip(
-            listed.quanta_upper.tolist(), listed.quanta_lower.tolist(), listed.frequency_mhz.tolist(), strict=True
-        )
-        if frequency > 1
-    ]
-    (tmp_path / "a.lin").write_text("\n".join(rows[:300]) + "\n")
-    off = tuple(replace(p, value=1.001 * p.value) if p.code == 100 else p for p in true.parameters)
-    fit_input = spfit_input(replace(true, parameters=off), read_lin(tmp_path / "a.lin", width, 900), "a.lin")
-    fit = fit_lines(
-        fit_input.lines, fit_input.constants, fit_input.parameters, fit_input.options, model=fit_input.model
-    )
+    _, fit = fit_of_prediction(true, _prediction(true, 7), tmp_path)
     assert fit.converged, fit.reason
     assert fit.weighted_rms < 0.01
     expected = [p.value for p in true.parameters if p.error is not None and p.error > 1]
     assert (np.abs(fit.values - expected) < 0.1 * fit.errors).all()  # lines are given to 1e-5 of 0.01 MHz
 
 
-def test_a_fit_with_spins_says_how_levels_are_named(tmp_path: Path):
-    (tmp_path / "a.lin").write_text("  1  0  2  0  0  1".ljust(36) + " 266900.0 0.01\n")
-    fit_input = spfit_input(_file("-3 1 0 60 0 1 1 1 0 1 0", chi=0.001), read_lin(tmp_path / "a.lin", 3, 900), "a.lin")
-    assert any(
-        "falls with K: with spins a fit names levels of a Wang block by energy" in note for note in fit_input.notes
-    )
+@pytest.mark.parametrize("diag", [0, 1, 2, 4, 5])
+@pytest.mark.parametrize("nvib", [1, -1])
+def test_a_fit_with_spins_names_levels_as_the_prediction_does(diag: int, nvib: int, tmp_path: Path):
+    """Named by energy in each Wang block, as K rises, no fit converged (weighted rms 2e7)."""
+    true = _file(f"-3 {nvib} 0 60 0 1 1 1 0 1 {diag}", chi=0.5, h3=2e-4)
+    fit_input, fit = fit_of_prediction(true, _prediction(true, 5), tmp_path)
+    assert fit.converged, fit.reason
+    assert fit.weighted_rms < 0.01
+    expected = [p.value for p in true.parameters if p.error is not None and p.error > 1]
+    assert (np.abs(fit.values - expected) < 0.1 * fit.errors).all()
+    assert not any("by energy" in note for note in fit_input.notes)
 
 
-@pytest.mark.parametrize(
-    ("options", "chi", "said"),
-    [
-        ("-3 -1 0 60 0 1 1 1 0 1 2", 0.001, "DIAG = 2: with spins a fit names levels of a Wang block by energy"),
-        ("-1 -1 0 60 0 1 1 1 0 1 2", 0.0, ""),
-        ("-1 -1 0 60 0 1 1 1 0 1 -1", 0.0, "DIAG is below 0: SPCAT and SPFIT diagonalize nothing"),
-        ("-3 -1 0 60 0 1 1 1 0 1 -1", 0.001, "DIAG is below 0: SPCAT and SPFIT diagonalize nothing"),
-        ("-3 -1 0 60 0 1 1 1 0 1 0", 0.001, ""),
-    ],
-)
-def test_a_fit_says_what_it_does_not_do_as_diag_says(options: str, chi: float, said: str, tmp_path: Path):
-    numbers = "  1  0  2  0  0  1" if chi else "  1  0  0  0"
-    (tmp_path / "a.lin").write_text(numbers.ljust(36) + " 266900.0 0.01\n")
-    fit_input = spfit_input(_file(options, chi), read_lin(tmp_path / "a.lin", 3 if chi else 2, 900), "a.lin")
-    named = [note for note in fit_input.notes if "DIAG" in note]
-    assert len(named) == bool(said), named
-    assert not said or said in named[0]
+def test_names_of_spins_are_those_of_the_constants_of_each_step(tmp_path: Path):
+    """The model of a fit beside predictions at other constants: its energies by quantum numbers are theirs, under each DIAG."""
+    for diag in (0, 1, 2, 4, 5):
+        true = _file(f"-3 1 0 60 0 1 1 1 0 1 {diag}", chi=0.5, h3=2e-4)
+        fit_input, _ = fit_of_prediction(true, _prediction(true, 4), tmp_path)
+        assert fit_input.model is not None
+        lines = fit_input.lines
+        other = replace(true, parameters=tuple(replace(p, value=1.02 * p.value) for p in true.parameters))
+        values = np.array([p.value for p in other.parameters])
+        energies = [fit_input.model(labels).levels(values)[0] for labels in (lines.upper, lines.lower)]
+        listed = _prediction(other, 4).catalogue
+        frequency = {
+            (*up[:3], *low[:3]): nu
+            for up, low, nu in zip(
+                listed.quanta_upper.tolist(), listed.quanta_lower.tolist(), listed.frequency_mhz.tolist(), strict=True
+            )
+        }
+        both = np.column_stack([lines.upper, lines.lower]).tolist()
+        expected = [frequency[tuple(row)] for row in both]
+        np.testing.assert_allclose(energies[0] - energies[1], expected, atol=1e-3)
 
 
 CASES = "cases_refused_or_wrong"

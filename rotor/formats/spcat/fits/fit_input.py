@@ -24,13 +24,12 @@ from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, i
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, default_note, read_lin, remark_notes, with_defaults
-from rotor.formats.spcat.text.par import UNDIAGONALIZED_NOTE, Header, Parameter, ParameterFile, npar_notes, read_par
+from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, npar_notes, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
 from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
 from rotor.tops.constants import AxisOrderError, Constants
 
-_LOOKED_AT = 20  # highest N at which the diagonal is tested
 _NO_ERRTST = 1e6  # SPFIT's value for an ERRTST of 0 or less
 
 
@@ -99,14 +98,19 @@ def _quanta_names(file: ParameterFile) -> tuple[str, ...]:
 def _named_constants(file: ParameterFile) -> tuple[Constants, Floats] | None:
     """The constants of a file by name and M of `constants_and_matrix`; None if the codes themselves are fitted.
 
-    Codes are fitted for spins, states and further operators, for axes not in the order A >= B >= C, and if the sign of SPIND requests the
-    quantum numbers of the other kind of top.
+    Codes are fitted for spins, states and further operators, for axes not in the order A >= B >= C, if the sign of SPIND requests the
+    quantum numbers of the other kind of top, and for the diagonal elements of DIAG below 0.
     """
     if not is_plain(file, None):
         return None
     try:
         constants, matrix = constants_and_matrix(file)
     except AxisOrderError:
+        return None
+    if file.options[0].diag < 0 and constants.kind in (
+        "asymmetric",
+        "spherical",
+    ):  # diagonal elements, over the functions of the codes
         return None
     by_k = file.options[0].spind < 0
     return None if (constants.kind in ("asymmetric", "spherical")) == by_k else (constants, matrix)
@@ -163,27 +167,13 @@ def _notes_on_codes(file: ParameterFile) -> list[str]:
     """Notes on parameters that act on no level, and on free ones that a fit does not move from 0."""
     from rotor.formats.spcat.file_model import left_out
     from rotor.formats.spcat.fits.at_zero import stay_at_zero
-    from rotor.formats.spcat.hamiltonian.labels import BY_DIAG
+    from rotor.formats.spcat.fits.fit_states import groups_for_fit
+    from rotor.formats.spcat.hamiltonian.undiagonalized import UNDIAGONALIZED_NOTE
 
     stay = stay_at_zero(file)
     at_zero = f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"
-    diag, spind = file.options[0].diag, file.options[0].spind
-    by_energy = [f"DIAG = {diag}: with spins a fit names levels of a Wang block by energy, as DIAG = 0 does"]
-    named = by_energy if diag in BY_DIAG and abs(spind) > 1 else []
-    return left_out(file) + ([at_zero] if stay else []) + named + _notes_on_falling_diagonals(file)
-
-
-def _notes_on_falling_diagonals(file: ParameterFile) -> list[str]:
-    """Note on levels with spins whose labels by energy differ from those by K."""
-    from rotor.formats.spcat.fits.fit_states import groups_for_fit
-
-    falls = [n for group in groups_for_fit(file) if group.spins and (n := group.falls_from(_LOOKED_AT)) is not None]
-    if not falls:
-        return []
-    return [
-        f"from N = {min(falls)} on the diagonal of the Hamiltonian falls with K: with spins a fit names levels of a Wang block by energy, "
-        "as K rises; write the constants in the basis of the other sign of NVIB"
-    ]
+    below = any(group.diag < 0 and not group.is_diagonal for group in groups_for_fit(file))
+    return left_out(file) + ([at_zero] if stay else []) + ([UNDIAGONALIZED_NOTE] if below else [])
 
 
 def _largest_error(header: Header) -> float:
@@ -338,8 +328,6 @@ def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignm
         notes.append(f"KNMAX = {options.kmax} is below the highest J, {highest}: the basis is cut there, as SPFIT does")
     if plain and options.kmax is not None and file.options[0].diag not in (0, 3):
         notes.append(f"DIAG = {file.options[0].diag}: levels are labelled by the order of energy in each Wang block")
-    if file.options[0].diag < 0:
-        notes.append(UNDIAGONALIZED_NOTE)
     return notes
 
 

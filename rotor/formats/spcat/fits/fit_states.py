@@ -19,16 +19,17 @@ from rotor.formats.spcat.file_quanta import Format, listed_quanta, quanta_format
 from rotor.formats.spcat.fits.at_zero import left_at_zero
 from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
 from rotor.formats.spcat.hamiltonian.l_spins import functions_by_l, named_by_l
-from rotor.formats.spcat.hamiltonian.labels import named_by, naming_by
+from rotor.formats.spcat.hamiltonian.labels import has_other_names, named_by, naming_by, spin_naming_by
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.quantum.block_levels import AssignedLevels, BlockLevels, without_level
+from rotor.quantum.block_levels import AssignedLevels, BlockLevels, DiagonalElements, without_level
+from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import assigned_with_spins
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
 from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.levels import levels_of_f
+from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation
 
 _NO_REQUEST = IntensityFile("", Request(), ())
@@ -123,11 +124,7 @@ def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
     if group.spins:
         return levels_of_f(group.top, (group.effect,), angular, None, None)
     j = [value // 2 for value in angular]
-    levels = solve_rotation(group.top, (group.effect,), min(j), max(j), in_blocks=True)
-    pairs = group.effect.pairs
-    if pairs:
-        return named_by_l(levels, pairs, str(levels.representation))
-    return named_by(levels, group.diag, group.oblate, group.diagonal(max(j)))
+    return group.named(solve_rotation(group.top, (group.effect,), min(j), max(j), in_blocks=True))
 
 
 def _with_labels(
@@ -141,9 +138,11 @@ def _with_labels(
     if (total < 0).any():  # a difference of F below 0 marks a level that does not exist
         first = " ".join(map(str, labels[here[int(np.argmax(total < 0))]].tolist()))
         raise MissingLevelsError(f"there is no level {first}: F or J is below 0", here[total < 0])
+    twice = 2 * total - sum(group.spins) % 2  # F is listed rounded up: doubled, less the half
+    if group.diag < 0:
+        return _assign_functions(group, form, labels, here, twice, names, values)
     if _direct(group, form):
         return _assign_without_spins(group, form, labels, here, names, values)
-    twice = 2 * total - sum(group.spins) % 2  # F is listed rounded up: doubled, less the half
     find = _assign_with_spins if group.spins else _assign_in_blocks
     return find(group, form, labels, here, twice, names, values)
 
@@ -175,13 +174,20 @@ def _assign_with_spins(
     columns, start = _parameter_columns(group, names, values)
     parameters = tuple(group.effect.parameters(group.top))
 
+    diagonal = group.diagonal(int(labels[here, 0].max()))
+    highest = unmixed_levels(group.top, (group.effect,), [int(twice.max())])
+    by_diag = not group.effect.pairs and has_other_names(highest, group.diag, diagonal)
+    naming = partial(spin_naming_by, group.diag, group.oblate, diagonal) if by_diag else None
+
     def rows_of(levels: Levels, chosen: Ints) -> Ints:
         if group.effect.pairs:
             levels = named_by_l(levels, group.effect.pairs, str(levels.representation))
+        elif naming:
+            levels = named_by(levels, group.diag, group.oblate, diagonal)
         return _label_rows(group, levels, form, labels[here[chosen]])
 
     functions = partial(_label_functions, group) if group.effect.pairs else None
-    assigned = assigned_with_spins(group.top, (group.effect,), parameters, start, twice, rows_of, functions)
+    assigned = assigned_with_spins(group.top, (group.effect,), parameters, start, twice, rows_of, functions, naming)
     return [AssignedLevels(here[part.rows], columns, part.blocks) for part in assigned]
 
 
@@ -217,6 +223,19 @@ def _assign_in_blocks(
     naming = naming_by(group.diag, group.oblate, group.diagonal(levels.jmax)) if named else None
     blocks = unit_levels(group.top, levels, rows[has_level], parameters, start, functions, naming)
     return [AssignedLevels(here[has_level], columns, blocks)]
+
+
+def _assign_functions(
+    group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
+) -> list[AssignedLevels]:
+    """Labels at the places `here` with these doubled F, where DIAG is below 0: each level is one function."""
+    levels = levels_in_blocks(group, distinct(twice).tolist())
+    levels = group.named(levels) if group.spins else levels
+    rows = _label_rows(group, levels, form, labels[here])
+    has_level = rows >= 0
+    columns, _ = _parameter_columns(group, names, values)
+    slopes = level_derivatives(group.top, levels, tuple(group.effect.parameters(group.top)), rows[has_level])
+    return [AssignedLevels(here[has_level], columns, DiagonalElements(slopes))]
 
 
 def _label_functions(group: Group, levels: Levels) -> Functions:

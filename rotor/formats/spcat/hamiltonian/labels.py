@@ -63,10 +63,9 @@ class Functions(NamedTuple):
 
 def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diagonal.RISES) -> Levels:
     """Levels of an asymmetric top with the labels of DIAG; unchanged if they have these labels already."""
-    rises = diagonal is Diagonal.RISES
-    anew = not rises or diag in BY_DIAG
-    if "kc" not in levels.quanta or not (anew or any(_needs_names(block, diag) for block in levels.blocks)):
+    if not has_other_names(levels, diag, diagonal):
         return levels
+    rises = diagonal is Diagonal.RISES
     tables, shares = [], []
     for block in levels.blocks:
         clear = _clear_labels(block, oblate, str(levels.representation)) if diag == 0 and rises else None
@@ -85,14 +84,13 @@ def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diago
 
 
 def renamed(levels: Levels, tables: Sequence[Ints], shares: Sequence[Floats]) -> Levels:
-    """Levels with new labels v, Ka, Kc (with spins also the doubled pattern N, ..., F) and weights, listed by block."""
+    """Levels with new labels v, Ka (or K), Kc (with spins also the doubled pattern N, ..., F) and weights, listed by block."""
     table = np.concatenate(tables)
-    quanta = {**levels.quanta, "ka": table[:, 1], "kc": table[:, 2]}
-    if "v" in quanta:
-        quanta["v"] = table[:, 0]
+    columns = {"v": 0, "k": 1, "ka": 1, "kc": 2}
+    quanta = {name: table[:, columns[name]] if name in columns else values for name, values in levels.quanta.items()}
     if table.shape[1] > 3:
         quanta["n"] = table[:, 3] // 2
-        for column, name in enumerate([name for name in quanta if name not in ("v", "n", "ka", "kc")], 4):
+        for column, name in enumerate([name for name in quanta if name not in columns and name != "n"], 4):
             quanta[name] = table[:, column] if name in levels.halves else table[:, column] // 2
     return replace(levels, quanta=quanta, mixing=np.concatenate(shares))
 
@@ -107,15 +105,48 @@ def _named_functions(
 ) -> NamedFunctions:
     pieces = [(v, basis, None, np.empty((basis.size, 0))) for v, basis in blocks]
     functions = _joined(pieces, representation)
-    groups = np.arange(len(functions.k)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
         at = places(functions._replace(amplitudes=vectors), -energies if oblate else energies, diag, diagonal)
         return functions.names[at]
 
-    return NamedFunctions(
-        groups, namer, Follows.NOTHING if diagonal is not Diagonal.RISES or diag in _ANEW else Follows.GROUPS
-    )
+    return NamedFunctions(_groups(functions, diag), namer, _follows(diag, diagonal))
+
+
+def spin_naming_by(
+    diag: int, oblate: bool, diagonal: Diagonal, block: SpinBlock, representation: str
+) -> NamedFunctions:
+    """Rule that labels the states of a block with spins while constants change, over its basis functions."""
+    size = block.parts[-1].place.stop
+    over_basis = [
+        part._replace(rotor=replace(part.rotor, vectors=np.eye(len(part.rotor.energies_mhz)))) for part in block.parts
+    ]
+    functions = _functions_with_spins(replace(block, parts=tuple(over_basis), vectors=np.eye(size)), representation)
+    turn, row_of_function = functions.amplitudes, functions.amplitudes.argmax(axis=1)
+    groups = np.empty(size, dtype=np.int64)
+    groups[row_of_function] = _groups(functions, diag)
+
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        at = places(functions._replace(amplitudes=turn @ vectors), -energies if oblate else energies, diag, diagonal)
+        return functions.names[at]
+
+    return NamedFunctions(groups, namer, _follows(diag, diagonal))
+
+
+def _groups(functions: Functions, diag: int) -> Ints:
+    """The group of each function in which levels are labelled by their order."""
+    return np.arange(len(functions.k)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
+
+
+def _follows(diag: int, diagonal: Diagonal) -> Follows:
+    """How labels are followed while constants change."""
+    return Follows.NOTHING if diagonal is not Diagonal.RISES or diag in _ANEW else Follows.GROUPS
+
+
+def has_other_names(levels: Levels, diag: int, diagonal: Diagonal) -> bool:
+    """Whether DIAG gives levels of an asymmetric top other labels than those that they have."""
+    anew = diagonal is not Diagonal.RISES or diag in BY_DIAG
+    return "kc" in levels.quanta and (anew or any(_needs_names(block, diag) for block in levels.blocks))
 
 
 def _needs_names(block: object, diag: int) -> bool:
@@ -160,7 +191,7 @@ def _clear_labels(block: object, oblate: bool, representation: str) -> tuple[Int
 
 def _group_weights(functions: Functions, at: Ints, diag: int) -> Floats:
     """The weight of each state in the group that labels it."""
-    group_of_function = np.arange(len(at)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
+    group_of_function = _groups(functions, diag)
     inside = group_of_function[:, None] == group_of_function[at][None, :]
     return np.asarray((functions.amplitudes**2 * inside).sum(axis=0))
 

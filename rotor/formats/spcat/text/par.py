@@ -107,9 +107,6 @@ class ParameterFile:
 
 
 _HEADER = {"npar": 0, "nline": 1, "nitr": 1, "nxpar": 0, "thresh": 0.0, "errtst": 1e6, "frac": 1.0, "cal": 1.0}
-UNDIAGONALIZED_NOTE = (
-    "DIAG is below 0: SPCAT and SPFIT diagonalize nothing then and take diagonal elements; here are eigenvalues"
-)
 _OPTIONS = ("spind", "nvib", "knmin", "knmax", "ixx", "iax", "wtpl", "wtmn", "vsym", "ewt", "diag", "xopt")
 
 
