@@ -48,8 +48,10 @@ folder = Path("data/observed")  # observed spectra, beside this notebook
 # %%
 spectrum = read_spectrum(folder / "iras16293_ethylene_oxide.csv", ReadChoices(noise=0.29))
 species = read_cat_species(folder / "c044504.cat")
-print(spectrum)
-print(species)
+print(f"{len(spectrum)} channels, {len(species)} lines of {species.name}")
+species.to_pandas()[["frequency_mhz", "energy_upper_k", "einstein_a_per_s", "upper", "lower"]]
+
+# %%
 assert len(spectrum) == 106
 assert species.name == "Ethylene oxide"
 
@@ -63,6 +65,7 @@ assert species.name == "Ethylene oxide"
 sight = Sight(beam_arcsec=0.5)
 start = start_components(spectrum, [species], sight, velocity_km_s=0.0, fwhm_km_s=1.0, size_arcsec=0.5)
 fit = fit_rejecting(spectrum, start, sight, FitChoices(calibration=0.1), deviations=4.0)
+component = fit.components[0]
 pd.DataFrame(
     [{"parameter": r["name"], "value": f"{r['value']:.5g}", "error": f"{r['error']:.2g}"} for r in fit.parameters]
 )
@@ -160,6 +163,8 @@ grid = np.arange(230e3, 230.6e3, 0.25)
 there = [Component(candidates[i], n, t, -7.0, 3.0) for i, n, t in ((2, 3e16, 60.0), (7, 8e15, 30.0), (11, 2e16, 150.0))]
 seen = observed_spectrum(grid, model(there, grid).brightness_k + rng.normal(0, 0.05, len(grid)), noise=0.05)
 found = identify(seen, candidates, choices=IdentifyChoices())
-print(found)
+found.to_pandas()
+
+# %%
 assert set(found.names) == {"s2", "s7", "s11"}
 assert abs(found.velocity_km_s + 7) < 0.5

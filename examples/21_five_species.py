@@ -48,8 +48,9 @@ published = {  # tag: column density (1/cm²), vibrational correction, temperatu
     "c058505": (2.2e15, 1.489, 125.0),
 }
 species = {tag: read_cat_species(folder / f"{tag}.cat") for tag in published}
-print(spectrum)
-print("; ".join(f"{lines.name}: {len(lines)} lines" for lines in species.values()))
+pd.DataFrame({"lines": {lines.name: len(lines) for lines in species.values()}})
+
+# %%
 assert len(spectrum) == 5076
 
 # %% [markdown]
@@ -81,7 +82,9 @@ for tag, fit in fits.items():
 pd.DataFrame(rows).transpose()
 
 # %%
-ratio = {tag: fit.components[0].column_per_cm2 / (published[tag][0] / published[tag][1]) for tag, fit in fits.items()}
+ratio = {
+    name: fits[name].components[0].column_per_cm2 / (value / factor) for name, (value, factor, _) in published.items()
+}
 assert all(0.5 < ratio[tag] < 1.3 for tag in ("c060501", "c044504", "c057505", "c062504"))
 assert all(-0.25 < fit.components[0].velocity_km_s < 0.1 for fit in fits.values())  # published: -0.2 km/s
 assert all(0.8 < fit.components[0].fwhm_km_s < 1.4 for fit in fits.values())  # published: 1.0 km/s
@@ -97,7 +100,9 @@ start = start_components(
 )
 fixed = FitChoices(calibration=0.1, fixed=((0, "excitation_k"),))
 propanal = fit_rejecting(spectrum, start, sight, fixed, deviations=4.0)
-print(propanal)
+propanal.to_pandas()
+
+# %%
 assert not fits["c058505"].parameters_of(0)["excitation_k"]["determined"]
 assert propanal.components[0].excitation_k == 125.0
 
@@ -140,8 +145,14 @@ joint = fit_rejecting(
     FitChoices(calibration=0.1, shared=("velocity_km_s", "fwhm_km_s"), fixed=((4, "excitation_k"),)),
     deviations=4.0,
 )
-for row in joint.parameters:
-    print(f"{row['name']:32s} {row['value']:10.4g} ± {row['error']:.2g}")
+pd.DataFrame(
+    [
+        {"parameter": row["name"], "value": f"{row['value']:.4g}", "error": f"{row['error']:.2g}"}
+        for row in joint.parameters
+    ]
+).set_index("parameter")
+
+# %%
 assert joint.minimum.converged
 assert abs(joint.components[0].fwhm_km_s - 1.0) < 0.1
 for before, component in zip(starts, joint.components, strict=True):
