@@ -71,7 +71,6 @@ pd.DataFrame(
 )
 
 # %%
-component = fit.components[0]
 assert abs(component.velocity_km_s - -0.2) < 0.1  # published: -0.2 km/s
 assert abs(component.fwhm_km_s - 1.0) < 0.25  # published: 1.0 km/s
 assert 100 < component.excitation_k < 250  # published: 125 K
