@@ -314,10 +314,14 @@ def _named_functions(space: CoupledSpace, part: Sequence[int], vectors: NDArray[
 def _moved(
     entries: Mapping[Pair, Entry], states: Sequence[tuple[Sector, NDArray[Any]]], where: Mapping[int, tuple[int, slice]]
 ) -> dict[Pair, NDArray[Any]]:
-    """V† T V over the eigenfunctions."""
+    """V† T V over the eigenfunctions, of whole parts: one product for many pairs of sectors."""
     blocks: dict[Pair, NDArray[Any]] = {}
     for (a, b), entry in entries.items():
         (up, rows), (low, columns) = where[a], where[b]
-        moved = states[up][1][rows].conj().T @ (entry.matrix() @ states[low][1][columns])
-        blocks[up, low] = blocks[up, low] + moved if (up, low) in blocks else moved
-    return blocks
+        matrix = entry.matrix()
+        if (up, low) not in blocks:
+            blocks[up, low] = np.zeros((len(states[up][1]), len(states[low][1])), dtype=matrix.dtype)
+        elif np.iscomplexobj(matrix) and not np.iscomplexobj(blocks[up, low]):
+            blocks[up, low] = blocks[up, low].astype(complex)
+        blocks[up, low][rows, columns] = matrix
+    return {(up, low): states[up][1].conj().T @ (matrix @ states[low][1]) for (up, low), matrix in blocks.items()}

@@ -187,7 +187,8 @@ def _check_highest(jmax: int) -> None:
 def smallest_jmax(request: MapRequest, executor: Executor | None = None) -> int:
     """The lowest J max, at most 300, for which the bounds of all energies at the strongest field are within the tolerance."""
     lowest = _lowest_jmax(request)
-    highest = lowest + STEP_J
+    costly = request.top.internal_rotation is not None or any(effect.spins(request.top) for effect in request.effects)
+    highest = lowest if costly else lowest + STEP_J  # free states with spins or a torsion take longer than a field
     while True:
         _check_highest(highest)
         enough = _smallest_between(request, lowest, highest, executor)
