@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.fitting.top_constants import ConstantSet, TopConstants
-from rotor.quantum.block_levels import AssignedLevels, BlockLevels, without_level
 from rotor.quantum.estimates.derivatives import level_derivatives
+from rotor.quantum.label_tracking import LabelledBlocks, without_level
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError, level_model
 from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels
@@ -75,9 +75,8 @@ def _state_levels(begin: TopConstants, columns: dict[str, Ints], labels: Ints, n
     )
     values = np.array(list(begin.values.values()))
     blocks = labelled_states(begin.top, begin.effects, names, labels_by_row, values)
-    parts = [AssignedLevels(np.arange(len(labels)), np.arange(len(names)), blocks)]
-    _refuse(begin, labels, without_level(parts, len(labels)))
-    return BlockLevels.from_parts(names, parts, len(labels))
+    _refuse(begin, labels, ~np.isin(np.arange(len(labels)), blocks.with_level))
+    return blocks
 
 
 def _levels_with_spins(
@@ -95,7 +94,7 @@ def _levels_with_spins(
     values = np.array(list(begin.values.values()))
     parts = assigned_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
     _refuse(begin, labels, without_level(parts, len(labels)))
-    return BlockLevels.from_parts(names, parts, len(labels))
+    return LabelledBlocks.from_parts(names, parts, len(labels))
 
 
 def _in_closed_form(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:

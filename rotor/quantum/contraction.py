@@ -14,7 +14,7 @@ again, so that fits, fields and further spins need nothing else.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, NamedTuple
@@ -219,53 +219,47 @@ def _scalar(
     first: Space, second: Space, left: Tensor, right: Tensor, rows: Mapping[Pair, Mapping[int, int]]
 ) -> dict[Pair, Entry]:
     """A·B in the coupled functions (Edmonds 7.1.6), the lower triangle of sectors."""
-    places, numbers, factors = [], [], []
+    found = []
     for bra, ket, a, b in _pairs(left, right, rows):
         j = [first.sectors[bra[0]].twice_j, second.sectors[bra[1]].twice_j,
              first.sectors[ket[0]].twice_j, second.sectors[ket[1]].twice_j]  # fmt: skip
         for total, row in rows[bra].items():
             column = rows[ket].get(total)
             if column is not None and column <= row:
-                places.append((row, column))
-                numbers.append((total, j[1], j[0], 2 * left.rank, j[2], j[3], (j[2] + j[1] + total) // 2))
-                factors.append((a, b))
-    if not places:
-        return {}
-    twice = np.array(numbers)
-    symbols = six_j(*(twice[:, :6].T / 2)) * np.where(twice[:, 6] % 2, -1.0, 1.0)
-    return {
-        place: Entry(symbol, a, b)
-        for place, symbol, (a, b) in zip(places, symbols.tolist(), factors, strict=True)
-        if symbol
-    }
+                numbers = total, j[1], j[0], 2 * left.rank, j[2], j[3], (j[2] + j[1] + total) // 2
+                found.append(((row, column), numbers, a, b))
+    return _entries(found, lambda twice: six_j(*(twice[:, :6].T / 2)) * np.where(twice[:, 6] % 2, -1.0, 1.0))
 
 
 def _product(
     first: Space, second: Space, left: Tensor, right: Tensor, rank: int, rows: Mapping[Pair, Mapping[int, int]]
 ) -> dict[Pair, Entry]:
     """[A × B]^k in the coupled functions (Edmonds 7.1.5)."""
-    places, numbers, factors = [], [], []
+    found = []
     for bra, ket, a, b in _pairs(left, right, rows):
         j = [first.sectors[bra[0]].twice_j, first.sectors[ket[0]].twice_j,
              second.sectors[bra[1]].twice_j, second.sectors[ket[1]].twice_j]  # fmt: skip
         for total, row in rows[bra].items():
             for other, column in rows[ket].items():
                 if abs(total - other) <= 2 * rank <= total + other:
-                    places.append((row, column))
-                    numbers.append(
-                        [[j[0], j[1], 2 * left.rank], [j[2], j[3], 2 * right.rank], [total, other, 2 * rank]]
-                    )
-                    factors.append((a, b))
-    if not places:
+                    numbers = [j[0], j[1], 2 * left.rank], [j[2], j[3], 2 * right.rank], [total, other, 2 * rank]
+                    found.append(((row, column), numbers, a, b))
+
+    def symbols(twice: Ints) -> Floats:
+        roots = np.sqrt((twice[:, 2, 0] + 1.0) * (twice[:, 2, 1] + 1) * (2 * rank + 1))
+        return np.asarray(roots * nine_j(twice / 2))
+
+    return _entries(found, symbols)
+
+
+def _entries(
+    found: Sequence[tuple[Pair, Any, NDArray[Any], NDArray[Any]]], symbols: Callable[[Ints], Floats]
+) -> dict[Pair, Entry]:
+    """Entries at places from doubled quantum numbers and A and B; those with a symbol of 0 are left out."""
+    if not found:
         return {}
-    twice = np.array(numbers)
-    roots = np.sqrt((twice[:, 2, 0] + 1.0) * (twice[:, 2, 1] + 1) * (2 * rank + 1))
-    symbols = roots * nine_j(twice / 2)
-    return {
-        place: Entry(symbol, a, b)
-        for place, symbol, (a, b) in zip(places, symbols.tolist(), factors, strict=True)
-        if symbol
-    }
+    values = symbols(np.array([numbers for _, numbers, _, _ in found])).tolist()
+    return {place: Entry(value, a, b) for (place, _, a, b), value in zip(found, values, strict=True) if value}
 
 
 def _solved_parts(

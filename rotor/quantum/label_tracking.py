@@ -11,14 +11,18 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, Workspace
+from rotor.quantum.labelled import ClosedForm, LevelModel
 from rotor.quantum.linear_stacks import LinearBlock, LinearStack, SolvedStack, stack_numbers
 from rotor.quantum.wang.basis import WangBlock
+
+if TYPE_CHECKING:
+    from rotor.quantum.estimates.contracted import ContractedLevels
 
 _CLEAR = 0.8  # share of a sub-block in a state, above which it and the rank by energy in it make the name
 _FIRST = 0.5  # share above which a state has its sub-block before all others
@@ -80,9 +84,13 @@ class Tracked(NamedTuple):
 
 
 def tracked_blocks(
-    blocks: Sequence[NamedBlock], count: int, find: Callable[[int, Ints], tuple[Ints, Ints]], values_mhz: Floats
+    names: Sequence[str],
+    blocks: Sequence[NamedBlock],
+    count: int,
+    find: Callable[[int, Ints], tuple[Ints, Ints]],
+    values_mhz: Floats,
 ) -> LabelledBlocks:
-    """The blocks, solved at some values, in which labels lie, of which there are `count`.
+    """The blocks, solved at values of named parameters, in which labels lie, of which there are `count`.
 
     find: from the number of a block and the names (n, columns) of its states to the places of labels in it, and which states have them.
     """
@@ -104,7 +112,7 @@ def tracked_blocks(
                     values_mhz[block.parameters], solved.energies[place, states], block_rows, *leading_of_states
                 )
                 tracked.append(Tracked(block, named, rows, state_names[place][states], states, start))
-    return LabelledBlocks(count, tuple(tracked))
+    return LabelledBlocks(tuple(names), count, tuple(tracked))
 
 
 def _members(sub_blocks: Sequence[Ints], size: int) -> Floats:
@@ -266,12 +274,47 @@ def _states_of(state_names: Ints, names: Ints) -> Ints:
     return np.array(states)
 
 
-@dataclass(frozen=True)
-class LabelledBlocks:
-    """Blocks with the labels that lie in them; `levels` gives energies and derivatives, in the order of the labels."""
+class AssignedLevels(NamedTuple):
+    """Blocks of some labels and parameters: the places of both among all (rows, columns)."""
 
+    rows: Ints
+    columns: Ints
+    blocks: LabelledBlocks | ContractedLevels | ClosedForm
+
+    @property
+    def with_level(self) -> Ints:
+        """Places of the labels that have a level."""
+        return self.rows[self.blocks.with_level] if isinstance(self.blocks, LabelledBlocks) else self.rows
+
+
+def without_level(parts: Sequence[AssignedLevels], count: int) -> NDArray[np.bool_]:
+    """Which of `count` labels have no level in any of these blocks."""
+    missing = np.ones(count, dtype=bool)
+    for part in parts:
+        missing[part.with_level] = False
+    return missing
+
+
+@dataclass(frozen=True)
+class LabelledBlocks(LevelModel):
+    """Blocks of named parameters and the labels in them; others: parts of which each label is solved among functions near it or is one."""
+
+    names: tuple[str, ...]
     count: int
     tracked: tuple[Tracked, ...]
+    others: tuple[AssignedLevels, ...] = ()
+
+    @classmethod
+    def from_parts(cls, names: tuple[str, ...], parts: Sequence[AssignedLevels], count: int) -> LabelledBlocks:
+        """The model of `count` labels; blocks of all parts are one set, so that those of equal size are solved together."""
+        tracked = [
+            block
+            for part in parts
+            if isinstance(part.blocks, LabelledBlocks)
+            for block in part.blocks.moved(part.rows, part.columns)
+        ]
+        others = tuple(part for part in parts if not isinstance(part.blocks, LabelledBlocks))
+        return cls(names, count, tuple(tracked), others)
 
     @property
     def with_level(self) -> Ints:
@@ -296,7 +339,18 @@ class LabelledBlocks:
         ]
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
-        """Energies (count,) and derivatives (count, parameters); nan for labels that are not in these blocks."""
+        """See `LevelModel`; nan for labels that are not in these blocks."""
+        energies, slopes = self._tracked_levels(values_mhz)
+        for part in self.others:
+            energies[part.rows], derived = part.blocks.levels(values_mhz[part.columns])
+            slopes[part.rows[:, None], part.columns] = derived
+        return energies, slopes
+
+    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
+        """1 for all levels: labels follow the dominant function at any constants."""
+        return np.ones(self.count)
+
+    def _tracked_levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         if all(np.array_equal(block.start.values_mhz, values_mhz[block.block.parameters]) for block in self.tracked):
             return self._levels_at_start(len(values_mhz))
         energies = np.full(self.count + 1, np.nan)  # padded labels and parameters go to the last place

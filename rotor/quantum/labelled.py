@@ -98,7 +98,7 @@ def _refuse_labels(kind: str, labels: Ints) -> None:
 
 @dataclass(frozen=True)
 class ClosedForm(LevelModel):
-    """E = slopes @ values: linear, spherical and symmetric tops."""
+    """E = slopes @ values: linear, spherical and symmetric tops, and diagonal elements over fixed functions."""
 
     names: tuple[str, ...]
     slopes: Floats

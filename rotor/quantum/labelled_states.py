@@ -61,7 +61,7 @@ def labelled_states(
         states = np.array([state_of.get(tuple(name), -1) for name in labels[rows, 1:].tolist()], dtype=np.int64)
         return rows[states >= 0], states[states >= 0]
 
-    return tracked_blocks(blocks, len(labels), find, values_mhz)
+    return tracked_blocks(names, blocks, len(labels), find, values_mhz)
 
 
 def by_overlaps(blocks: Sequence[Vertex], representation: str) -> NamedFunctions:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum import quanta as names_of
+from rotor.quantum.quanta import labels as texts_of_labels
 from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.table import Table
 from rotor.tops.spins.spin_weights import SpinWeights
@@ -348,7 +348,7 @@ class Levels(Table):
 
     def labels(self, rows: NDArray[Any]) -> list[str]:
         """The levels `rows` as text, one row of quantum numbers each."""
-        return names_of.labels(self.quanta, rows, self.halves)
+        return texts_of_labels(self.quanta, rows, self.halves)
 
     def quantum(self, name: str) -> Ints:
         """A quantum number of all levels (n,), 0 where they do not have it."""
@@ -356,11 +356,11 @@ class Levels(Table):
 
     def quanta_of(self, rows: NDArray[Any]) -> Ints:
         """Quantum numbers (n, names) of the levels `rows`, in the order of `quanta_names`."""
-        return names_of.matrix(self.quanta, rows)
+        return np.stack([column[rows] for column in self.quanta.values()], axis=1)
 
     def quanta_columns(self, rows: NDArray[Any], suffix: str) -> dict[str, NDArray[Any]]:
         """Quantum numbers of the levels `rows` as columns by name: j_upper, ka_upper, kc_upper for the suffix upper."""
-        return names_of.columns(self.quanta, rows, suffix)
+        return {f"{name}_{suffix}": column[rows] for name, column in self.quanta.items()}
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:

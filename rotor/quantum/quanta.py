@@ -94,16 +94,6 @@ def headings(names: Iterable[str]) -> str:
     return " ".join(heading(name) for name in names)
 
 
-def columns(quanta: Quanta, rows: NDArray[Any] | slice, suffix: str) -> dict[str, NDArray[Any]]:
-    """The quantum numbers of some levels as columns by name: j_upper, ka_upper, kc_upper for the suffix upper."""
-    return {f"{name}_{suffix}": column[rows] for name, column in quanta.items()}
-
-
-def matrix(quanta: Quanta, rows: NDArray[Any]) -> Ints:
-    """The quantum numbers of some levels side by side, (rows, names)."""
-    return np.stack([column[rows] for column in quanta.values()], axis=1)
-
-
 def value_text(value: Any, half: bool = False) -> str:
     """One quantum number as text, of which twice the value is stored where it may be half-integer.
 

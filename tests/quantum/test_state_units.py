@@ -101,7 +101,7 @@ def test_blocks_of_many_sizes_give_what_each_gives_alone(monkeypatch):
     together = FileLevels.from_labels(file, labels).levels(other)
     monkeypatch.setattr(linear_stacks, "_AT_ONCE", 1)
     model = FileLevels.from_labels(file, labels)
-    blocks = model.whole.labelled
+    blocks = model.whole
     assert isinstance(blocks, LabelledBlocks)
     alone = model.levels(other)
     at_start, _ = model.levels(values)

@@ -105,7 +105,7 @@ def unit_levels(
             )
         return rows_of_block, np.array([state_of[tuple(name)] for name in requested.tolist()])
 
-    return tracked_blocks(units, len(rows), find, values_mhz)
+    return tracked_blocks(names, units, len(rows), find, values_mhz)
 
 
 def _quanta(levels: Levels) -> Ints:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.quantum.block_levels import AssignedLevels
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.effect_units import Functions, SpinNaming, unit_levels
+from rotor.quantum.label_tracking import AssignedLevels
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.spins.scheme import scheme_of

@@ -155,7 +155,6 @@ def test_an_operator_of_one_file_is_fitted():
     from rotor.fitting.assignment import assignments
     from rotor.fitting.fit import fit_lines
     from rotor.fitting.parameters import Parameters
-    from rotor.quantum.block_levels import BlockLevels
     from rotor.quantum.labelled_states import labelled_states
 
     top = Top.from_constants("A=10000 B=6000 C=4000 MHz", dipole_abc_debye=tuple(DIPOLE))
@@ -169,8 +168,7 @@ def test_an_operator_of_one_file_is_fitted():
     def model(wanted):
         j, ka, kc = wanted.T
         start = np.array([10001.0, 6000.5, 3999.5, 1.5])
-        blocks = labelled_states(top, effects, names, np.column_stack([j, 0 * j, ka, kc]), start)
-        return BlockLevels(names, blocks, ())
+        return labelled_states(top, effects, names, np.column_stack([j, 0 * j, ka, kc]), start)
 
     start = np.array([10001.0, 6000.5, 3999.5, 1.5])
     free = Parameters(names, start, np.full(4, np.inf), names, np.zeros(4), np.eye(4))

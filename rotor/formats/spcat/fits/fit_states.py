@@ -22,11 +22,11 @@ from rotor.formats.spcat.hamiltonian.l_spins import functions_by_l, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import has_other_names, named_by, naming_by, spin_naming_by
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.quantum.block_levels import AssignedLevels, BlockLevels, DiagonalElements, without_level
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import assigned_with_spins
-from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
+from rotor.quantum.label_tracking import AssignedLevels, LabelledBlocks, without_level
+from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError
 from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
@@ -68,7 +68,7 @@ class FileLevels(LevelModel):
     """
 
     names: tuple[str, ...]
-    whole: BlockLevels
+    whole: LabelledBlocks
     reduced: Ints
     excluded: Ints
 
@@ -84,7 +84,7 @@ class FileLevels(LevelModel):
         if len(reduced):
             refuse_far_f(labels, reduced, form, quanta_names(form), max(sum(group.spins) for group in groups))
         names, parts = line_names(file), _searched(file, groups, form, labels, reduced)
-        return cls(names, BlockLevels.from_parts(names, parts, len(labels)), reduced, excluded_parameters(file))
+        return cls(names, LabelledBlocks.from_parts(names, parts, len(labels)), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies and derivatives, see `LevelModel`."""
@@ -96,7 +96,7 @@ class FileLevels(LevelModel):
         return energies, slopes
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """See `BlockLevels`."""
+        """See `LabelledBlocks`."""
         return self.whole.overlaps(before_mhz, after_mhz)
 
 
@@ -234,8 +234,9 @@ def _assign_functions(
     rows = _label_rows(group, levels, form, labels[here])
     has_level = rows >= 0
     columns, _ = _parameter_columns(group, names, values)
-    slopes = level_derivatives(group.top, levels, tuple(group.effect.parameters(group.top)), rows[has_level])
-    return [AssignedLevels(here[has_level], columns, DiagonalElements(slopes))]
+    parameters = tuple(group.effect.parameters(group.top))
+    slopes = level_derivatives(group.top, levels, parameters, rows[has_level])
+    return [AssignedLevels(here[has_level], columns, ClosedForm(parameters, slopes))]
 
 
 def _label_functions(group: Group, levels: Levels) -> Functions:
