@@ -26,7 +26,7 @@ from rotor.quantum.spins.pattern_tables import tensors_by_f
 from rotor.quantum.tensors import Tensors, rank_of
 
 _ELEMENT, _PRODUCT = 1.5e-4, 2e-6  # time of an element, and of one step of its products, relative to that of a call
-_IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that are kept side by side: 32 MB
+_IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that lie side by side: 32 MB
 
 
 class Acting(NamedTuple):

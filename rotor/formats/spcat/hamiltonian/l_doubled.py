@@ -132,7 +132,7 @@ def over_real_states(
 
 def _ordered(first: int, second: int, factor: float, turned: bool = False) -> RealPart:
     """A real part with the lower number first."""
-    # pairs are kept with the lower state first
+    # a pair has the lower state first
     return RealPart(min(first, second), max(first, second), factor, turned)
 
 
