@@ -13,6 +13,8 @@ WORDS = (
     "room", "rooms", "door", "doors", "whoever", "nobody", "anybody", "somebody",
 )  # fmt: skip
 FORBIDDEN = re.compile(rf"(?<![A-Za-z])({'|'.join(WORDS)})(?![A-Za-z])", re.IGNORECASE)
+VAGUE = re.compile(r"^\s*def (?:\w*_)?(?:of|one|some|every|found|own|asked|given)(?:_\w*)?\(", re.MULTILINE)
+MOST_VAGUE = 230  # functions with such a name; lower it with each one that is renamed
 ORDINARY = re.compile(r"(left|right)[-_]handed|room[-_ ]temperature", re.IGNORECASE)  # of frames and of samples
 
 
@@ -39,3 +41,14 @@ def test_the_guard_sees_words_in_names_and_texts(text):
 )
 def test_the_guard_leaves_ordinary_words_alone(text):
     assert not found_in(text)
+
+
+def test_functions_with_vague_names_do_not_increase():
+    assert sum(len(VAGUE.findall(path.read_text(encoding="utf-8"))) for path in PACKAGE.rglob("*.py")) <= MOST_VAGUE
+
+
+@pytest.mark.parametrize(
+    "name", ["of", "of_strength", "rows_of", "lines_of_block", "_one_way", "every_limit", "own_name"]
+)
+def test_the_guard_counts_vague_names(name):
+    assert VAGUE.search(f"    def {name}(self):") and not VAGUE.search(f"    def {name.replace('_', '')}x(self):")
