@@ -35,7 +35,7 @@ Complexes = NDArray[np.complex128]
 _SPACE = "XYZ"
 _EVEN_WITHIN = 1e-9  # of a step: times that differ less from an even grid are on it
 _CHUNK = 1 << 21
-FEW_LINES = 64  # which are not worth being searched for pairs that are there more than once
+FEW_LINES = 64  # below this number a search for repeated pairs costs more than it saves
 
 
 @dataclass(frozen=True)

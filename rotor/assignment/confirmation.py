@@ -217,7 +217,7 @@ def _without_absent_types(seen: Field, species: Grown) -> Grown:
 
 
 def _without(seen: Field, species: Grown, constants: Floats, covariance: Floats, taken: Mask, lost: float) -> Grown:
-    """The species without a group of lines, with the constants from the others, and without what these add to the evidence."""
+    """The species without a group of lines, with constants from the other lines; its evidence is lower by that of the group."""
     table, rows, peak = seen.table, species.rows[~taken], species.peak[~taken]
     shift = line_slopes(seen, rows, species.constants) @ (constants - species.constants)
     at = np.unique(peak, return_inverse=True)[1]

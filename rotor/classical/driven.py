@@ -101,7 +101,7 @@ class DrivenRequest:
 
 @dataclass(frozen=True, repr=False)
 class DrivenTable(Table):
-    """The motion by columns: t, L, attitude, energy, ω; all vectors in body axes."""
+    """Columns of the motion: t, L, attitude, energy, ω; all vectors in body axes."""
 
     motion: Motion
 
@@ -123,7 +123,7 @@ class DrivenAnswer:
 
     @property
     def table(self) -> DrivenTable:
-        """The motion by columns."""
+        """The motion as a table."""
         return DrivenTable(self.motion)
 
     @cached_property

@@ -95,7 +95,7 @@ def headings(names: Iterable[str]) -> str:
 
 
 def value_text(value: Any, half: bool = False) -> str:
-    """One quantum number as text, of which twice the value is stored where it may be half-integer.
+    """A quantum number as text; with `half`, twice its value is stored.
 
     >>> value_text(3), value_text(3, half=True), value_text(4, half=True)
     ('3', '3/2', '2')

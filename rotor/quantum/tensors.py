@@ -185,7 +185,7 @@ class BodyTensor:
 def body_tensor(cartesian: ArrayLike, rank: int, representation: str) -> BodyTensor:
     """The part of one rank of a vector (3,) or a matrix (3, 3) along a, b, c, ready to act in a representation.
 
-    Raises ValueError as `spherical_components` does, and for rank 1 of a matrix, which is i times a vector: give that.
+    Raises ValueError as `spherical_components` does, and for rank 1 of a matrix; give its antisymmetric part as a vector.
     """
     return BodyTensor(rank, tuple(spherical_components(cartesian, rank, representation).tolist()))
 

@@ -120,7 +120,7 @@ def refuse_changing_moments(rotation: BondRotation) -> None:
     change = max(float(np.abs(matrix - kinetic).max()) for matrix in turned) / float(kinetic[3, 3])
     if change > SYMMETRIC:
         raise ValueError(
-            f"classical_k: the moments change by {change:.2g} of that of the turning part as it turns; computed are parts with a threefold "
+            f"classical_k: the moments change by {change:.2g} of that of the turning part as it turns; expected a part with a threefold "
             "axis or more behind the bond, such as methyl: name the bond the other way, or another one"
         )
 

@@ -139,7 +139,7 @@ class InternalRotationConstants:
         """Raise ValueError for unknown names, names of the other frame, and missing names."""
         for name in self.values:
             if re.fullmatch(r"(F0|delta|epsilon|V3|V6)_[4-9]", name):
-                raise ValueError(f"{name}: computed are molecules with up to three tops; leave the others locked")
+                raise ValueError(f"{name}: a molecule may have up to three tops; leave the others locked")
             if not is_torsional(name):
                 known = ("F", "rho", *BARRIERS, *NAMED)
                 raise ValueError(

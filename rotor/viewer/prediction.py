@@ -66,7 +66,7 @@ def without_isotopes(source: str) -> tuple[str, str]:
 def source_top(source: str) -> Top:
     """The top of a name, a file, SMILES:..., constants such as "B=6081 MHz", or an isotopologue such as "OCS, S=34S".
 
-    Raises ValueError for what is no molecule.
+    Raises ValueError for a source that is not a molecule.
     """
     from rotor.formats import read
 

@@ -36,9 +36,9 @@ class SpinningRotor(InnerMomentum):
         object.__setattr__(self, "momentum", checked_vector(self.momentum, "the momentum of a rotor"))
 
     def inner_momentum(self, time: float) -> Floats:
-        """h, the same at any time."""
+        """Angular momentum h of the spinning rotor in body axes; constant in time."""
         return np.asarray(self.momentum)
 
     def compiled_form(self) -> Floats:
-        """h."""
+        """h, the only parameter of the compiled form."""
         return np.asarray(self.momentum)

@@ -35,7 +35,7 @@ class Format:
 
     @property
     def before_spins(self) -> int:
-        """Number of columns before those of spins."""
+        """Number of columns of rotational and vibrational quantum numbers, which precede those of spins."""
         return self.rotation + self.states
 
     @property
@@ -49,7 +49,7 @@ class Format:
 
     @property
     def width(self) -> int:
-        """Number of columns."""
+        """Number of columns of quantum numbers of one state."""
         return self.before_spins + (2 if self.aggregate else self.spins)
 
     def qnfmt(self, spins: tuple[int, ...]) -> int:

@@ -354,7 +354,7 @@ def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence
     if axis is None or not any(elements.paired):
         return
     if not all(operator.axial_about(axis) for operator in operators):
-        raise ValueError("a symmetric top with spins is solved with tensors that have its axis")
+        raise ValueError("a symmetric top with spins: expected tensors that are axial about its axis")
 
 
 def _refuse_unknown_nuclei(elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:

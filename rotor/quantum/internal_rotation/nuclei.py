@@ -137,7 +137,9 @@ class Nuclei:
             values |= effect.parameters(top)
         for spin in spins.values():
             if spin.electron or spin.total:
-                raise ValueError(f"spin {spin.name} beside internal rotation: computed are single nuclei")
+                raise ValueError(
+                    f"spin {spin.name} beside internal rotation: electrons and total spins are not supported; give single nuclei"
+                )
         constants = tuple(_constant(term, list(spins)) for term in terms)
         return cls(tuple(spins.values()), constants, {constant.name: values[constant.name] for constant in constants})
 
@@ -147,7 +149,7 @@ def _constant(term: SpinTerm, spins: Sequence[str]) -> NuclearConstant:
     powers = term.n2 or term.nz2 or term.ns
     if not isinstance(term.rotor, Cosines | CosinesWithN) or powers or len(set(term.spins)) != 1:
         raise ValueError(
-            f"{term.name} beside internal rotation: computed are quadrupole and spin-rotation tensors of one nucleus"
+            f"{term.name} beside internal rotation: only quadrupole and spin-rotation tensors of one nucleus are supported"
         )
     body = term.factor * np.array(term.rotor.components, dtype=float)
     return NuclearConstant(term.name, spins.index(term.spins[0]), 2 if isinstance(term.rotor, Cosines) else 1, body)

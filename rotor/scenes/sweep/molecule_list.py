@@ -30,7 +30,7 @@ def is_list(source: str, folder: str | os.PathLike[str]) -> bool:
 
 
 def list_entries(source: str, folder: str | os.PathLike[str]) -> list[Entry]:
-    """The molecules of a list, a file in a folder.
+    """The molecules named in a file of a folder.
 
     Raises ValueError for a CSV file without a column of molecules or without rows.
     """

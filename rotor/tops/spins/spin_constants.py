@@ -81,7 +81,7 @@ class SpinConstants:
         for name, error in self.uncertainties.items():
             if name not in self.values or not error >= 0:
                 raise ValueError(
-                    f"uncertainty {error:g} of {name}: expected a number of at least 0 and a constant that is there"
+                    f"uncertainty {error:g} of {name}: expected a number of at least 0, for a constant with a value"
                 )
 
     def __reduce__(self) -> tuple[type[SpinConstants], tuple[Any, ...]]:

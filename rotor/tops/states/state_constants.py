@@ -72,7 +72,7 @@ class StateConstants:
         for name, error in self.uncertainties.items():
             if name not in self.values or not error >= 0:
                 raise ValueError(
-                    f"uncertainty {error:g} of {name}: expected a number of at least 0 and a constant that is there"
+                    f"uncertainty {error:g} of {name}: expected a number of at least 0, for a constant with a value"
                 )
         self._refuse_unknown_states()
         first_names: dict[tuple[str, tuple[int, ...]], str] = {}

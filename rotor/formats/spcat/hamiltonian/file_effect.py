@@ -199,8 +199,8 @@ def real_lines(
         within_plain_state = not between and not (line.states and line.states[0] in doubled)
         if within_plain_state and not axis and line.operator.odd:
             raise ValueError(
-                f"parameter {line.code}: time reversal changes the sign of the operator and no half turn does, so that it can connect "
-                "different states only"
+                f"parameter {line.code}: the operator changes sign under time reversal and under no half turn; it can only connect "
+                "different states"
             )
         if not within_plain_state or not axis or line.operator.odd == (axis in odd):
             acting.append(line)

@@ -88,7 +88,7 @@ class StateOptions:
         return self if self.has_fixed_k else replace(self, kmin=0, kmax=ALL_K)
 
     def with_k_to(self, highest_n: int) -> StateOptions:
-        """The state without a KNMAX that excludes nothing up to the highest N."""
+        """The state with all K if its KNMAX excludes no level up to the highest N; equal bases then compare as equal."""
         return self if self.has_fixed_k or self.kmax < highest_n else replace(self, kmax=ALL_K)
 
     def weights(self, ka: Ints, kc: Ints, k: Ints, odd_spins: Ints | int = 0) -> Ints:

@@ -364,7 +364,7 @@ def _spin_names(rows: list[tuple[CodedLine, Parameter]], sizes: tuple[int, ...])
 
 
 def _once(states: Iterable[int]) -> list[int]:
-    """States, each once."""
+    """States without repetitions."""
     return list(dict.fromkeys(states))
 
 

@@ -55,7 +55,7 @@ def read_lines(source: str | os.PathLike[str] | bytes) -> list[Line]:
 
 
 def encode(texts: Sequence[str]) -> bytes:
-    """The bytes of a file, as `read_lines` took them; a piece that is followed by another ends with its line."""
+    """The bytes of a file, the inverse of `read_lines`; every piece but the last ends with a line break."""
     pieces = [text for text in texts if text]
     ended = [text if text.endswith("\n") else text + "\n" for text in pieces[:-1]]
     return "".join(ended + pieces[-1:]).encode("utf-8", "surrogateescape")

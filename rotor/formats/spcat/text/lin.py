@@ -189,8 +189,8 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0, most: i
             count = _leading(fields[missing])
             raise listed[missing].error(
                 3 * count,
-                f"{count} quantum numbers; expected as many for the upper state as for the lower, "
-                "or other lines, or the constants of a fit, that show how many are missing",
+                f"{count} quantum numbers; the two states need equally many; complete the line, or give "
+                "a line with all numbers or the constants of a fit, from which the missing ones follow",
             )
     measured = [_numbers(line, width) for line in plain]
     count = width if missing is None else 2 * per_state

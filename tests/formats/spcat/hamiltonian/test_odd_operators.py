@@ -166,8 +166,8 @@ def test_those_of_the_rarer_kind_are_left_out_with_a_note():
     [
         (((200099, 70.0), (410099, 20.0), (610099, 20.0)), "a odd, b even, c even"),
         (((200099, 70.0), (400099, 20.0), (600099, 20.0)), "a odd, b odd, c odd"),
-        (((11_000_210_099, 5.0), (910099, 0.4)), "no half turn does"),
-        (((120099, 5.0),), "no half turn does"),
+        (((11_000_210_099, 5.0), (910099, 0.4)), "under no half turn"),
+        (((120099, 5.0),), "under no half turn"),
     ],
 )
 def test_what_is_complex_in_all_phases_is_refused(parameters, says):
