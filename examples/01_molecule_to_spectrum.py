@@ -187,6 +187,7 @@ table = pd.DataFrame(
 table["difference (%)"] = 100 * (table.iloc[:, 0] / table.iloc[:, 1] - 1)
 table.round(1)
 
+# %%
 estimated = np.array(sketch.rotational_constants_mhz) / [real.constants[name] for name in "ABC"]
 assert np.abs(estimated - 1).max() < 0.04
 
