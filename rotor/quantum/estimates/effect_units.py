@@ -7,7 +7,6 @@ The levels are solved once. Blocks that contain a label are then expanded over b
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from rotor.quantum.label_tracking import (
     LabelledBlocks,
     NamedBlock,
     NamedFunctions,
-    Namer,
     Naming,
     tracked_blocks,
 )
@@ -28,8 +26,7 @@ from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins
-from rotor.quantum.spins.parts import SpinPart, assigned, labels_by_shares, labels_of, names_of_parts
-from rotor.quantum.spins.three_spins import Allowed
+from rotor.quantum.spins.parts import assigned, functions_by_sub_block, labels_by_shares, names_of_parts
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -51,34 +48,11 @@ def unit_levels(
 ) -> LabelledBlocks:
     """The blocks of labelled levels as functions of the parameters.
 
-    Parameters
-    ----------
-    top : Top
-        Constants and kind.
-    levels : Levels
-        Levels with vectors, at approximate values of the parameters.
-    rows : (n,) array
-        Rows of levels, in the order in which `LabelledBlocks.levels` returns them.
-    names : sequence of str
-        Parameters of the effects, in the order of the values.
-    values_mhz : (parameters,) array
-        Values at which the levels were solved.
-    functions : callable, optional
-        For blocks of several states that are labelled by other than basis functions: returns these functions (n, n) in rows over the
-        basis, and their labels v, Ka, Kc and, with spins, the doubled pattern (n, 3 + pattern). Levels without spins have these labels.
-    naming : callable, optional
-        For blocks without spins: how states are labelled; by default by overlaps. The levels have these labels.
-    spin_naming : callable, optional
-        For blocks with spins: how states are labelled; by default by Wang blocks and patterns. Rows are those of states in solved blocks.
-
-    Returns
-    -------
-    LabelledBlocks
-
-    Raises
-    ------
-    ValueError
-        If the levels have no blocks.
+    rows: of the levels, in the order in which `LabelledBlocks.levels` returns them; the levels have vectors, at `values_mhz` of `names`.
+    functions: for blocks of several states that are labelled by other than basis functions, returns these functions (n, n) in rows over the
+    basis, and their labels v, Ka, Kc and, with spins, the doubled pattern (n, 3 + pattern). naming: how states of blocks without spins are
+    labelled, by default by overlaps. With either, levels without spins have these labels. spin_naming: how states of blocks with spins are
+    labelled, by default by Wang blocks and patterns; rows are those of states in solved blocks. ValueError for levels without blocks.
     """
     if not levels.blocks:
         raise ValueError("levels of a closed form have no blocks; solve them in blocks")
@@ -172,46 +146,19 @@ def _turned(block: LinearBlock, functions: Floats, names: Ints) -> NamedBlock:
 def _names_with_spins(block: SpinBlock) -> NamedFunctions:
     """Labels by Wang blocks and patterns, or by the functions that exchange allows."""
     if block.allowed:
-        return NamedFunctions(block.allowed.sub_block, _namer_of_allowed(block.allowed), Follows.MOSTLY)
-    sub_blocks = _sub_blocks(block.parts, block.parts[-1].place.stop)
-    return NamedFunctions(sub_blocks, _namer(block.parts, block.patterns), Follows.MOSTLY)
+        names, sizes, order = block.allowed.names, block.allowed.sizes, np.arange(len(block.allowed.names))
+    else:
+        names, sizes, _ = names_of_parts(block.parts, block.patterns)
+        order = functions_by_sub_block(block.parts)
+
+    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+        return np.asarray(labels_by_shares(names[None], sizes[None], vectors[None, order])[0][0])
+
+    sub_blocks = np.empty(len(order), dtype=np.int64)
+    sub_blocks[order] = np.repeat(np.arange(len(sizes)), sizes)
+    return NamedFunctions(sub_blocks, namer, Follows.MOSTLY)
 
 
 def _by_rank(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
     """Labels by rank in energy."""
     return np.arange(len(energies))[:, None]
-
-
-def _namer_of_allowed(allowed: Allowed) -> Namer:
-    """Labels by functions that exchange allows."""
-
-    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        return np.asarray(labels_by_shares(allowed.names[None], allowed.sizes[None], vectors[None])[0][0])
-
-    return namer
-
-
-def _sub_blocks(parts: tuple[SpinPart, ...], size: int) -> Ints:
-    """Number of the sub-block (Wang block and pattern) of each function, as `labels_of` counts them."""
-    out, number = np.empty(size, dtype=np.int64), 0
-    for part in parts:
-        states = len(part.rotor.energies_mhz)
-        for sub_part in part.rotor.parts:
-            for pattern in range(part.repeats):
-                start = part.place.start + pattern * states
-                out[start + sub_part.place.start : start + sub_part.place.stop] = number
-                number += 1
-    return out
-
-
-def _namer(solved: tuple[SpinPart, ...], all_names: Ints) -> Namer:
-    """Labels by Wang blocks and patterns."""
-    parts = tuple(
-        part._replace(rotor=replace(part.rotor, vectors=np.eye(len(part.rotor.energies_mhz)))) for part in solved
-    )
-    names = names_of_parts(parts, all_names)[:2]
-
-    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        return labels_of(parts, names, vectors)[0]
-
-    return namer

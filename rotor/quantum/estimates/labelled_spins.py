@@ -35,31 +35,11 @@ def assigned_with_spins(
     functions: Callable[[Levels], Functions] | None = None,
     naming: SpinNaming | None = None,
 ) -> list[AssignedLevels]:
-    """Assign labels with spins to levels, and return the blocks of these as functions of the parameters.
+    """Blocks of labels with spins as functions of the parameters; labels without a level are missing.
 
-    Parameters
-    ----------
-    top : Top
-        Constants and kind.
-    effects : tuple of QuantumEffect
-        Effects of the Hamiltonian, spins included, with parameters `values_mhz`.
-    names : sequence of str
-        Parameters of the effects, in the order of the values.
-    values_mhz : (parameters,) array
-        Values at which levels are labelled.
-    twice_f : (n,) array
-        Twice F of each label, 0 or more.
-    rows_of : callable
-        Takes levels and places of labels, and returns the row of each label, -1 if it has none.
-    functions : callable, optional
-        Functions other than basis functions that label the levels, see `unit_levels`.
-    naming : SpinNaming, optional
-        How the states of solved blocks are labelled; `rows_of` takes levels with these labels.
-
-    Returns
-    -------
-    list of AssignedLevels
-        Blocks with their labels; labels without a level are missing.
+    values_mhz: at which levels are labelled, in the order of `names`. twice_f: doubled F of each label, 0 or more. rows_of: takes levels
+    and places of labels, and returns the row of each label, -1 if it has none. functions: functions other than basis functions that label
+    the levels, see `unit_levels`. naming: how the states of solved blocks are labelled; `rows_of` takes levels with these labels.
     """
     scheme, all_f, columns = scheme_of(top, effects), distinct(twice_f), np.arange(len(names))
     size = (1 + sum(len(effect.states(top)) for effect in effects)) * int(np.prod([two + 1 for two in scheme.twice]))

@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -24,12 +23,13 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import Block, SolvedBlock, Used
 from rotor.quantum.spins.axial import are_axial, contracted_operators
-from rotor.quantum.spins.contraction import Contracted, Stack, by_numbers, stacks_of
+from rotor.quantum.spins.contraction import Contracted, Stack, stacks_of, within_blocks
 from rotor.quantum.spins.families import families_of, links_of_stacks
 from rotor.quantum.spins.many_f import Frame, Group, frame_of, groups_of
 from rotor.quantum.spins.parts import SpinPart, named_states
 from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import (
+    ALONE,
     Channel,
     Channels,
     Exist,
@@ -46,8 +46,6 @@ if TYPE_CHECKING:
 
     from rotor.tops.top import Top
 
-Operators = dict[tuple[int, int], list[tuple[Floats, list[Channel]]]]
-"""Matrices between two blocks of the rotation, each with the channels that share it."""
 InStacks = list[tuple[list[Contracted], list[Channel]]]
 
 
@@ -130,22 +128,19 @@ class Member(NamedTuple):
 
 
 class States(NamedTuple):
-    """Solved blocks of one size: their numbers, energies (blocks, n), rising, vectors (blocks, functions, n), and groups by number."""
+    """Solved blocks of one size: their numbers, energies (blocks, n), rising, and vectors (blocks, functions, n)."""
 
     numbers: Sequence[int]
     energies_mhz: Floats
     vectors: Floats
-    groups: Mapping[int, Group] = MappingProxyType({})
 
 
-def diagonalised(
-    numbers: Sequence[int], matrices: Floats, zeros_mhz: Floats, groups: Mapping[int, Group] = MappingProxyType({})
-) -> States:
+def diagonalised(numbers: Sequence[int], matrices: Floats, zeros_mhz: Floats) -> States:
     """States of blocks of one size from lower triangles (blocks, n, n), from whose diagonals `zeros_mhz` (blocks,) is subtracted."""
     if not np.isfinite(matrices).all():
         raise ValueError("a block of the Hamiltonian overflows: N max is too high for these constants")
     energies, vectors = np.linalg.eigh(matrices)  # reads the lower triangles
-    return States(numbers, energies + zeros_mhz[:, None], vectors, groups)
+    return States(numbers, energies + zeros_mhz[:, None], vectors)
 
 
 class Placed(NamedTuple):
@@ -162,25 +157,12 @@ class Plan:
     """Solved rotation, operators of each channel, and the blocks that they connect.
 
     families: members (block, class), see `families`. contracted: operators in stacks, each with the channels that share it.
-    replacement: operators by pairs of blocks (i ≥ k) that replace the contracted ones.
     """
 
     shared: Shared
     blocks: list[SolvedBlock]
     families: list[list[tuple[int, int]]]
     contracted: InStacks = field(repr=False)
-    replacement: Operators | None = field(default=None, repr=False)
-
-    @cached_property
-    def operators(self) -> Operators:
-        """Operators by pairs of blocks (i ≥ k)."""
-        if self.replacement is not None:
-            return self.replacement
-        out: Operators = {}
-        for stacked, channels in self.contracted:
-            for pair, operator in by_numbers(stacked).items():
-                out.setdefault(pair, []).append((operator, channels))
-        return out
 
     @cached_property
     def sizes(self) -> list[int]:
@@ -223,6 +205,11 @@ def contracted_plan(
     scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor, exist)
     channels = channels_of(terms, scheme)
+    hamiltonians = list[Floats]()
+    if scheme.equivalent == 3:
+        from rotor.quantum.spins.three_equivalent import in_wang_functions
+
+        blocks, hamiltonians = in_wang_functions(blocks)
     firsts = _alike(channels)
     distinct = {first: channels[first] for first in firsts.values()}
     reach = 0 if "n" in scheme.conserved else 2
@@ -235,6 +222,8 @@ def contracted_plan(
             same_rank, contracted_operators(stacks, min(reach, rank), pieces, representation), strict=True
         )
     contracted = [(by_channel[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
+    if hamiltonians:
+        contracted.append(([within_blocks(stack, hamiltonians) for stack in stacks], [ALONE]))
     families = families_of(len(blocks), links_of_stacks(contracted), max(scheme.equivalent, 1))
     return Plan(Shared(scheme, representation, stacks), blocks, families, contracted)
 

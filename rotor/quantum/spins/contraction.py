@@ -169,17 +169,13 @@ def acting_numbers(contracted: Sequence[Contracted]) -> Ints:
     return np.concatenate(out)
 
 
-def by_numbers(contracted: Sequence[Contracted]) -> dict[tuple[int, int], Floats]:
-    """The (n', n) elements by pairs of block numbers, without pairs where all are zero."""
-    out = {}
-    for up, low, pairs, matrices in contracted:
-        acting: list[bool] = matrices.any(axis=(1, 2)).tolist()  # type: ignore[assignment]
-        numbers = zip(up.numbers[pairs.up].tolist(), low.numbers[pairs.low].tolist(), strict=True)
-        sizes = zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)
-        for matrix, acts_here, number, (a, b) in zip(matrices, acting, numbers, sizes, strict=True):
-            if acts_here:
-                out[number] = matrix[: up.sizes[a], : low.sizes[b]]
-    return out
+def within_blocks(stack: Stack, matrices: Sequence[Floats]) -> Contracted:
+    """An operator within the blocks of a stack, from its matrices by number."""
+    places = np.arange(len(stack.numbers))
+    out = np.zeros((len(places), max(stack.sizes), max(stack.sizes)))
+    for place, (number, size) in enumerate(zip(stack.numbers.tolist(), stack.sizes, strict=True)):
+        out[place, :size, :size] = matrices[number]
+    return Contracted(stack, stack, Pairs(places, places, stack.n[:, None], stack.n[:, None]), out)
 
 
 def _tensor_elements(tensors: Tensors, up: Stack, low: Stack, pairs: Pairs) -> list[Element]:

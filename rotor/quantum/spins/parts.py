@@ -29,11 +29,6 @@ class SpinPart(NamedTuple):
     place: slice
 
     @property
-    def sub_blocks(self) -> int:
-        """Number of sub-blocks: Wang blocks times patterns."""
-        return len(self.rotor.parts) * self.repeats
-
-    @property
     def repeats(self) -> int:
         """Number of patterns."""
         return int(self.patterns.stop - self.patterns.start)
@@ -46,13 +41,6 @@ def named_states(rotor: SolvedBlock, vectors: Floats) -> Ints:
     labels = np.empty((len(part_of_state), 3), dtype=np.int64)
     labels[np.argsort(part_of_state, kind="stable")] = np.concatenate([part.names for part in rotor.parts])
     return labels
-
-
-def labels_of(parts: tuple[SpinPart, ...], named: tuple[Ints, Ints], vectors: Floats) -> tuple[Ints, Floats]:
-    """Labels (n, 3 + pattern) of the states of a block by rising energy, and weights (n,) of the sub-blocks that give them."""
-    names, sizes = named
-    labels, mixing = labels_by_shares(names[None], sizes[None], over_functions([parts], vectors[None]))
-    return labels[0], mixing[0]
 
 
 def labels_by_shares(names: Ints, sizes: Ints, vectors: Floats) -> tuple[Ints, Floats]:
@@ -91,6 +79,16 @@ def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
         return rows
     each = np.matmul(part.rotor.vectors, rows.reshape(part.repeats, len(part.rotor.energies_mhz), -1))
     return np.concatenate([each[:, wang_part.place].reshape(-1, rows.shape[1]) for wang_part in part.rotor.parts])
+
+
+def functions_by_sub_block(parts: Sequence[SpinPart]) -> Ints:
+    """Places of the functions of a block sub-block by sub-block."""
+    pieces = []
+    for part in parts:
+        firsts = part.place.start + len(part.rotor.energies_mhz) * np.arange(part.repeats)
+        for wang_part in part.rotor.parts:
+            pieces.append((firsts[:, None] + np.arange(wang_part.place.start, wang_part.place.stop)).ravel())
+    return np.concatenate(pieces)
 
 
 class Names(NamedTuple):

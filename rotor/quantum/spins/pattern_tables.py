@@ -89,6 +89,7 @@ def _couplings_of_f(scheme: Scheme, channel: Channel, twice_f: int) -> Floats:
     """c(p', p) of a channel over all patterns of one F with a total spin; read-only, shared by levels and derivatives."""
     patterns = scheme.patterns(twice_f)
     values = coefficients_between(scheme, channel, patterns, patterns)
+    values = np.where(np.abs(values) > ROUND_OFF, values, 0.0)  # round-off would connect states of different symmetry
     values.flags.writeable = False
     return values
 

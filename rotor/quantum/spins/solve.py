@@ -11,37 +11,38 @@ from itertools import accumulate
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, Workspace, end_to_end
+from rotor.arrays import Floats, Ints, end_to_end
 from rotor.quantum.spins.blocks import Member, Plan, SpinBlock, States, blocks_of_f, diagonalised
-from rotor.quantum.spins.many_f import Frame, Group, Tables, between, frame_of, groups_of, tables_of
+from rotor.quantum.spins.hamiltonians import hamiltonians
+from rotor.quantum.spins.many_f import Group, frame_of, groups_of
 from rotor.quantum.spins.parts import labels_by_shares, names_of_parts, over_functions
-from rotor.quantum.spins.pattern_tables import PatternTable, couplings_by_f, pattern_table
+from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import Exist
 
 
 def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock]:
     """Solve the blocks of all doubled F in which a level exists (`levels.levels_of_f`): by F, then by the lowest member of each family."""
-    table = pattern_table(plan.shared.scheme, all_f[0], all_f[-1])
+    shared = plan.shared
+    table = pattern_table(shared.scheme, all_f[0], all_f[-1])
     patterns = {f: table.patterns[f] for f in all_f if f in table.patterns}
-    if plan.shared.scheme.equivalent == 3:
-        from rotor.quantum.spins.three_equivalent import allowed_states, in_wang_functions
+    frame = shared.cache["frame"] = frame_of(shared.stacks, table)
+    if shared.scheme.equivalent == 3:
+        from rotor.quantum.spins.three_equivalent import allowed_states
 
-        plan = in_wang_functions(plan)
         members, solutions = allowed_states(plan, patterns, exist)
-        frame = plan.shared.cache["frame"] = frame_of(plan.shared.stacks, table)
         grouped = groups_of([member[:2] for member in members], frame)
-        groups = {number: group for group, numbers in grouped for number in numbers}
-        solutions = (states._replace(groups=groups) for states in solutions)
     else:
         members = _existing_members(plan, patterns, exist)
-        solutions = _states(plan, members, table)
+        grouped = groups_of([member[:2] for member in members], frame)
+        solutions = _states(plan, members, grouped)
+    groups = {number: group for group, numbers in grouped for number in numbers}
     starts = list(accumulate((len(member.names) for member in members), initial=0))
     out: list[SpinBlock] = [None] * len(members)  # type: ignore[list-item]
     for states in solutions:
         for i, energies, vectors, labels, mixing in _named(states, [members[i] for i in states.numbers]):
             f, parts, _, _, allowed = members[i]
             results = energies, vectors, labels, mixing
-            out[i] = SpinBlock(f, patterns[f], parts, *results, plan.shared, states.groups[i], starts[i], allowed)
+            out[i] = SpinBlock(f, patterns[f], parts, *results, shared, groups[i], starts[i], allowed)
     return out
 
 
@@ -82,65 +83,26 @@ def _existing_members(plan: Plan, patterns: dict[int, Ints], exist: Exist | None
     ]
 
 
-def _states(plan: Plan, members: Sequence[Member], table: PatternTable) -> Iterator[States]:
-    """The states of blocks whose matrices are computed for many F at once."""
-    if not members:
-        return
-    shared, first, last = plan.shared, min(table.patterns), max(table.patterns)
-    frame = shared.cache["frame"] = frame_of(shared.stacks, table)
-    acting = []
-    for contracted, channels in plan.contracted:
-        if contracted:
-            each = [couplings_by_f(shared.scheme, channel, first, last) for channel in channels]
-            acting.append((tables_of(contracted, frame), each[0] if len(each) == 1 else np.add.reduce(each)))
+def _states(plan: Plan, members: Sequence[Member], grouped: Sequence[tuple[Group, list[int]]]) -> Iterator[States]:
+    """The states of blocks, those of one size together."""
     zeros = np.array([member.parts[0].rotor.energies_mhz[0] for member in members])  # energy zero of each block
+    kinds = [_kind(plan, member) for member in members]
     alike: dict[tuple[int, ...], list[tuple[list[int], Floats]]] = {}
-    groups: dict[int, Group] = {}
-    space = Workspace()
-    for group, numbers in groups_of([member[:2] for member in members], frame):
-        groups |= dict.fromkeys(numbers, group)
-        kinds = [_kind(plan, members[number]) for number in numbers]
-        for places, matrices in _hamiltonians(group, kinds, acting, frame, zeros[numbers], space):
-            alike.setdefault(kinds[places[0]], []).append(([numbers[place] for place in places], matrices))
+    for numbers, matrices in hamiltonians(plan, grouped, kinds, zeros):
+        alike.setdefault(kinds[numbers[0]], []).append((numbers, matrices))
     for (_, _, repeats), pieces in alike.items():
         numbers = [number for piece, _ in pieces for number in piece]
         matrices = np.concatenate([matrices for _, matrices in pieces])
         if repeats > 1:
-            yield States(numbers, *_state_by_state(matrices, repeats, zeros[numbers]), groups)
+            yield States(numbers, *_state_by_state(matrices, repeats, zeros[numbers]))
         else:
-            yield diagonalised(numbers, matrices, zeros[numbers], groups)
+            yield diagonalised(numbers, matrices, zeros[numbers])
 
 
 def _kind(plan: Plan, member: Member) -> tuple[int, int, int]:
     """Functions and sub-blocks of a block, and the number of patterns where each rotational state is solved by itself, else 1."""
     by_state = plan.shared.state_by_state and len(member.parts) == 1
     return len(member.names), len(member.sizes), member.parts[0].repeats if by_state else 1
-
-
-def _hamiltonians(
-    group: Group, kinds: Sequence[tuple[int, ...]], acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats,
-    space: Workspace,
-) -> Iterator[tuple[list[int], Floats]]:  # fmt: skip
-    """Places of blocks of one kind in a group and their matrices (blocks, n, n), energies relative to `zeros` in the lower triangle."""
-    for run in group.runs():
-        places, height = np.arange(run.start, run.stop), int(group.heights[run].max())
-        shape = len(places), group.columns, height, group.columns, height
-        whole = space.array("whole", *shape)
-        whole.fill(0.0)
-        for tables, coefficients in acting:
-            whole += between(group, group, places, 0, tables, coefficients, frame, space.array("elements", *shape))
-        energies = np.zeros(shape[:3])
-        for rotation in group.rotations:
-            of_kind = frame.energies_mhz[rotation.kind][frame.rows_of(group.twice_rows[run], rotation), :height]
-            energies[:, rotation.columns, : of_kind.shape[1]] = (of_kind - zeros[run, None])[:, None]
-        for kind in dict.fromkeys(kinds[run]):
-            of_kind_at = [place for place in places.tolist() if kinds[place] == kind]
-            at = np.array(of_kind_at)[:, None] - run.start
-            columns, states = (np.array(pair) for pair in zip(*(group.functions[i] for i in of_kind_at), strict=True))
-            matrices = whole[at[:, :, None], columns[:, :, None], states[:, :, None], columns[:, None], states[:, None]]
-            diagonal = np.arange(kind[0])
-            matrices[:, diagonal, diagonal] += energies[at, columns, states]
-            yield of_kind_at, matrices
 
 
 def _state_by_state(matrices: Floats, repeats: int, zeros_mhz: Floats) -> tuple[Floats, Floats]:

@@ -8,7 +8,7 @@ import pytest
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.spins.axial import tensors_of_axial_stacks
-from rotor.quantum.spins.contraction import by_numbers, operators_of_stacks, stacks_of, tensors_of_stacks
+from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of, tensors_of_stacks
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar, tensor_elements
 from rotor.quantum.spins.rotor import Piece, acts, solved_rotor
 from rotor.quantum.tensors import body_tensor, tensor_between
@@ -20,6 +20,17 @@ STATES = InteractingStates(
     {"E[1]": 2e4, "A[1]": 9300.0, "B[1]": 3110.0, "C[1]": 2490.0, "G_c[0,1]": 300.0, "F_ab[0,1]": 4.0}
 )
 RNG = np.random.default_rng(5)
+
+
+def by_numbers(contracted):
+    """The (n', n) elements by pairs of block numbers, without pairs where all are zero."""
+    out = {}
+    for up, low, pairs, matrices in contracted:
+        numbers = zip(up.numbers[pairs.up].tolist(), low.numbers[pairs.low].tolist(), strict=True)
+        for matrix, number, a, b in zip(matrices, numbers, pairs.up, pairs.low, strict=True):
+            if matrix.any():
+                out[number] = matrix[: up.sizes[a], : low.sizes[b]]
+    return out
 
 
 def _matrix() -> tuple[tuple[float, float, float], ...]:

@@ -1,0 +1,58 @@
+"""Matrices of H of the blocks of all F, ⟨r' p'|H|r p⟩ = E_r δ + Σ_channels c(p', p) ⟨r'|X|r⟩, many at once (`many_f`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from rotor.arrays import Floats, Workspace
+from rotor.quantum.spins.blocks import Plan
+from rotor.quantum.spins.many_f import Frame, Group, Tables, between, tables_of
+from rotor.quantum.spins.pattern_tables import couplings_by_f
+
+
+def hamiltonians(
+    plan: Plan, grouped: Sequence[tuple[Group, list[int]]], kinds: Sequence[tuple[int, ...]], zeros: Floats
+) -> Iterator[tuple[list[int], Floats]]:
+    """Numbers of blocks of one kind in a group, and their matrices (blocks, n, n).
+
+    kinds: number of functions and further data of each block. Lower triangles count; their energies are relative to `zeros`.
+    """
+    scheme, frame = plan.shared.scheme, plan.shared.cache["frame"]
+    acting = []
+    for contracted, channels in plan.contracted:
+        if contracted:
+            each = [couplings_by_f(scheme, channel, frame.twice_f[0], frame.twice_f[-1]) for channel in channels]
+            acting.append((tables_of(contracted, frame), each[0] if len(each) == 1 else np.add.reduce(each)))
+    space = Workspace()
+    for group, numbers in grouped:
+        kinds_of_group = [kinds[number] for number in numbers]
+        for places, matrices in _matrices_of_group(group, kinds_of_group, acting, frame, zeros[numbers], space):
+            yield [numbers[place] for place in places], matrices
+
+
+def _matrices_of_group(
+    group: Group, kinds: Sequence[tuple[int, ...]], acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats,
+    space: Workspace,
+) -> Iterator[tuple[list[int], Floats]]:  # fmt: skip
+    """Places of blocks of one kind in a group, and their matrices."""
+    for run in group.runs():
+        places, height = np.arange(run.start, run.stop), int(group.heights[run].max())
+        shape = len(places), group.columns, height, group.columns, height
+        whole = space.array("whole", *shape)
+        whole.fill(0.0)
+        for tables, coefficients in acting:
+            whole += between(group, group, places, 0, tables, coefficients, frame, space.array("elements", *shape))
+        energies = np.zeros(shape[:3])
+        for rotation in group.rotations:
+            of_kind = frame.energies_mhz[rotation.kind][frame.rows_of(group.twice_rows[run], rotation), :height]
+            energies[:, rotation.columns, : of_kind.shape[1]] = (of_kind - zeros[run, None])[:, None]
+        for kind in dict.fromkeys(kinds[run]):
+            of_kind_at = [place for place in places.tolist() if kinds[place] == kind]
+            at = np.array(of_kind_at)[:, None] - run.start
+            columns, states = (np.array(pair) for pair in zip(*(group.functions[i] for i in of_kind_at), strict=True))
+            matrices = whole[at[:, :, None], columns[:, :, None], states[:, :, None], columns[:, None], states[:, None]]
+            diagonal = np.arange(kind[0])
+            matrices[:, diagonal, diagonal] += energies[at, columns, states]
+            yield of_kind_at, matrices
