@@ -1,7 +1,7 @@
-"""Line lists larger than memory: pieces by J on disk, sorted by DuckDB into one Parquet or .cat file; interrupted runs can resume.
+"""Line lists larger than memory: pieces on disk, sorted by DuckDB into one Parquet or .cat file; interrupted runs can resume.
 
-A piece contains the transitions whose lower J lies in its range. Each is written atomically, so that a killed run leaves only complete
-pieces; the next run with the same settings makes the others.
+A piece contains the transitions whose lower J lies in its range; with spins, whose lower F does, since they mix N but not F. Each is
+written atomically, so that a killed run leaves only complete pieces; the next run with the same settings makes the others.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from rotor import units
+from rotor.arrays import Ints
 from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.line_tables import as_printed
 from rotor.formats.provenance import write_beside
@@ -27,7 +28,9 @@ from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.tables import copy_columns, quoted, run
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.spins.scheme import scheme_of
 from rotor.spectra.intensity import intensity_cut, jmax_for_cut, require_cut
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.spectra.transitions import all_transitions
@@ -90,9 +93,10 @@ class SortedLines:
         """The lgint that `count` lines exceed, and their highest J; None if the list has no more lines."""
         from rotor.formats.tables import quoted
 
+        n = "n" if self.plan.twice_spins else "j"
         with engine_in(self.plan.folder, self.memory_mb) as engine:
             rows = engine.execute(
-                f"SELECT lgint, greatest(j_upper, j_lower) FROM read_parquet({quoted(str(self.file))}) WHERE lgint IS NOT NULL "
+                f"SELECT lgint, greatest({n}_upper, {n}_lower) FROM read_parquet({quoted(str(self.file))}) WHERE lgint IS NOT NULL "
                 f"ORDER BY lgint DESC LIMIT {count}"
             ).fetchall()
         return (rows[-1][0] if len(rows) == count else None), max((j for _, j in rows), default=1)
@@ -116,7 +120,10 @@ class SortedLines:
 
 @dataclass(frozen=True)
 class _Plan:
-    """The input of all pieces, which can be sent to other processes."""
+    """The input of all pieces, which can be sent to other processes.
+
+    twice_spins: doubled sizes of the spins; with any, pieces are ranges of F, counted from the lowest, 0 or 1/2.
+    """
 
     top: Top
     dipole_abc: tuple[float, float, float]
@@ -130,10 +137,29 @@ class _Plan:
     quanta_names: tuple[str, ...]
     halves: frozenset[str]
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID
+    twice_spins: tuple[int, ...] = ()
 
     def piece(self, first: int, last: int) -> Path:
-        """The file of the lines with lower J from `first` to `last`."""
-        return self.folder / f"j{first:04d}-{last:04d}.parquet"
+        """The file of the lines with lower J (or number of the lower F) from `first` to `last`."""
+        return self.folder / f"{'f' if self.twice_spins else 'j'}{first:04d}-{last:04d}.parquet"
+
+    @property
+    def highest(self) -> int:
+        """The highest J, or the number of the highest F."""
+        return self.jmax + sum(self.twice_spins) // 2
+
+    def levels(self, first: int, last: int) -> tuple[Levels, Ints]:
+        """The levels of these J (or F), and the J (or number of F) of each."""
+        if not self.twice_spins:
+            levels = solve_levels(self.top, last, jmin=first, effects=self.effects)
+            return levels, levels.rotational
+        from rotor.quantum.spins.levels import levels_of_f
+
+        half = sum(self.twice_spins) % 2
+        all_f = range(2 * first + half, 2 * last + half + 1, 2)
+        levels = levels_of_f(self.top, self.effects, all_f, (0, self.jmax))
+        name = list(levels.quanta)[-1]
+        return levels, (levels.quanta[name] - half) // 2 if name in levels.halves else levels.quanta[name]
 
 
 def stream_lines(
@@ -267,10 +293,16 @@ def sorted_lines(
     return SortedLines(merged, count, len(missing), before, plan, record, memory_mb)
 
 
-def transition_count(top: Top, jmax: int) -> float:
-    """Approximate number of transitions up to a J before any cut, without spins and further states."""
+def transition_count(top: Top, jmax: int, twice_spins: Sequence[int] = ()) -> float:
+    """Approximate number of transitions up to a J before any cut, without further states; each F joins all N that spins reach."""
     components = sum(1 for mu in top.dipole_abc_debye or () if mu)
-    return 0.5 * components * (jmax + 1) ** 3 if top.kind == "asymmetric" else components * (jmax + 1.0) ** 2
+    count = 0.5 * components * (jmax + 1) ** 3 if top.kind == "asymmetric" else components * (jmax + 1.0) ** 2
+    return count * _functions(twice_spins) ** 2
+
+
+def _functions(twice_spins: Sequence[int]) -> int:
+    """Number of functions of spins of these doubled sizes."""
+    return math.prod(twice + 1 for twice in twice_spins)
 
 
 def _refuse_forks(executor: Executor | None) -> None:
@@ -289,12 +321,13 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
         jmax = jmax_for_cut(top, dipole, start.temperature_k, q.q, least)
     if jmax < 1:
         raise ValueError(f"J max = {jmax}: expected 1 or more, J = 0 alone has no line")
-    if (count := transition_count(top, jmax)) > MOST_TRANSITIONS:
+    effects = start.levels.effects
+    twice_spins = scheme_of(top, effects).twice
+    if (count := transition_count(top, jmax, twice_spins)) > MOST_TRANSITIONS:
         raise ValueError(
             f"J max {jmax}: about {count:.0e} transitions before the cut, more than {MOST_TRANSITIONS:.0e}; lower J max, or leave "
             "it out: it then follows from min_lgint"
         )
-    effects = start.levels.effects
     ground = solve_levels(
         top, 3, effects=effects, vectors=False
     ).ground_mhz  # whatever the weights are, it is among these
@@ -311,19 +344,22 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
         start.quanta_names,
         start.levels.halves,
         effects,
+        twice_spins,
     )
 
 
 def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
-    """First and last lower J of the pieces, chosen for about `piece_lines` transitions in each."""
-    if plan.top.kind != "asymmetric":  # closed forms start at J = 0; their lists, of about J² lines, are one piece
+    """First and last lower J (or number of F) of the pieces, chosen for about `piece_lines` transitions in each."""
+    if (
+        plan.top.kind != "asymmetric" and not plan.twice_spins
+    ):  # closed forms start at J = 0; their lists, of about J² lines, are one piece
         yield 0, plan.jmax
         return
     components = sum(1 for mu in plan.dipole_abc if mu)
-    first, count = 0, 0.0
-    for j in range(plan.jmax + 1):
-        count += 1.5 * components * (j + 1) ** 2
-        if (count >= piece_lines and j >= 3) or j == plan.jmax:  # from J = 2 on every species has a level
+    first, count, functions = 0, 0.0, _functions(plan.twice_spins)
+    for j in range(plan.highest + 1):
+        count += 1.5 * components * ((j + 1) * functions) ** 2
+        if (count >= piece_lines and j >= 3) or j == plan.highest:  # from J = 2 on every species has a level
             yield first, j
             first, count = j + 1, 0.0
 
@@ -347,17 +383,15 @@ def _provenance(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
 
 
 def _make_piece(plan: _Plan, first: int, last: int) -> None:
-    """Lines with lower J from `first` to `last`, sorted, as a Parquet file."""
-    top_j = min(last + 1, plan.jmax)
-    levels = solve_levels(plan.top, top_j, jmin=first, effects=plan.effects)
+    """Lines with lower J (or number of F) from `first` to `last`, sorted, as a Parquet file."""
+    levels, totals = plan.levels(first, min(last + 1, plan.highest))
     trusted = are_trusted(plan.top, levels, plan.ground_mhz)
     if trusted.any():  # the others may lie far below the ground; without any there are no lines at all
         levels = replace(levels, weight=np.where(trusted, levels.weight, 0))
-    rotational = levels.rotational
     cut = intensity_cut(levels, plan.temperature_k, plan.partition.q, plan.min_lgint, plan.ground_mhz)
     dipoles = dipoles_by_state(plan.top, plan.dipole_abc, levels.effects)
     transitions = all_transitions(levels, dipoles, plan.range_mhz, cut)
-    in_piece = np.minimum(rotational[transitions.upper], rotational[transitions.lower]) <= last
+    in_piece = np.minimum(totals[transitions.upper], totals[transitions.lower]) <= last
     in_piece &= trusted[transitions.upper] & trusted[transitions.lower]
     lines = Lines(
         plan.top,

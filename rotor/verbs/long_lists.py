@@ -59,11 +59,19 @@ def is_long(request: SpectrumRequest, files: Mapping[str, Any], resolution: floa
         or files.keys() - STREAMED - SMALL
     ):
         return False
+    if request.top.internal_rotation is not None and _twice_spins(request):  # spins beside rotors have no ranges of F
+        return False
     if any(path.suffix == ".gz" for path in _streamed(files)) or request.top.dipole_abc_debye is None:
         return False
     from rotor.formats.streamed_lines import transition_count
 
-    return transition_count(request.top, _highest_j(request)) > TRANSITIONS
+    return transition_count(request.top, _highest_j(request), _twice_spins(request)) > TRANSITIONS
+
+
+def _twice_spins(request: SpectrumRequest) -> tuple[int, ...]:
+    from rotor.quantum.spins.scheme import scheme_of
+
+    return scheme_of(request.top, request.effects).twice
 
 
 def _streamed(files: Mapping[str, tuple[Path, ...]]) -> list[Path]:
@@ -77,7 +85,9 @@ def refuse_long_json(request: SpectrumRequest, files: Mapping[str, Any], resolut
 
         first, last = request.range_mhz
         if first <= 0 and last == float("inf"):
-            raise ValueError(_no_json(f"some {transition_count(request.top, _highest_j(request)):.0e}"))
+            raise ValueError(
+                _no_json(f"some {transition_count(request.top, _highest_j(request), _twice_spins(request)):.0e}")
+            )
 
 
 def _no_json(count: str) -> str:

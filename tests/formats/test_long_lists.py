@@ -88,6 +88,41 @@ def test_a_long_list_is_written_as_csv(call, folder, monkeypatch, short):
     ]
 
 
+SPINS = {  # constants, spins, dipole, J max, cut
+    "14N": (CONSTANTS, "chi_aa(14N)=-40 chi_bb(14N)=20", "1.2,1.9,0.4", 9, "none"),
+    "14N, chi_ab": (CONSTANTS, "chi_aa(14N)=-40 chi_bb(14N)=20 chi_ab(14N)=900", "1.2,1.9,0", 8, "-9"),
+    "35Cl": (CONSTANTS, "chi_aa(35Cl)=-60 chi_bb(35Cl)=25", "1.2,0,0.4", 8, "-9"),
+    "two nuclei": (CONSTANTS, "chi_aa(35Cl)=-60 chi_bb(35Cl)=25 chi_aa(14N)=-4 chi_bb(14N)=1", "1.2,0,0", 6, "none"),
+    "symmetric": ("A=9000 B=3000 MHz", "chi_aa(14N)=-40", "1.2,0,0", 20, "none"),
+    "linear": ("B=3000 MHz", "chi_aa(35Cl)=-40", "1.2,0,0", 40, "none"),
+}
+
+
+@pytest.mark.parametrize("name", SPINS)
+def test_a_long_list_with_spins_is_the_one_in_memory(call, folder, monkeypatch, short, name):
+    """Pieces of few F, whose levels mix N: every line once, the catalogue of a list in memory. Ended in an error of the sort before."""
+    from rotor.formats import streamed_lines
+
+    constants, spins, dipole, jmax, cut = SPINS[name]
+    typed = ("spectrum", "--constants", constants, "--spin-constants", spins, "--dipole-abc", dipole, "--jmax", str(jmax),
+             "--min-lgint", cut, "--q", "1e5", "--hyperfine")  # fmt: skip
+    made, true = [], streamed_lines._make_piece
+    monkeypatch.setattr(long_lists, "TRANSITIONS", 100)
+    with monkeypatch.context() as patch:
+        defaults = streamed_lines.sorted_lines.__kwdefaults__ | {"piece_lines": 300}
+        patch.setattr(streamed_lines.sorted_lines, "__kwdefaults__", defaults)
+        patch.setattr(streamed_lines, "_make_piece", lambda *job: (made.append(job[1:]), true(*job)))
+        code, out, _ = call(*typed, "--cat", "a.cat")
+    assert code == 0
+    assert len(made) > 2
+    code, plain, _ = _in_memory(call, monkeypatch, *typed, "--cat", "b.cat")
+    assert code == 0
+    streamed, whole = (sorted(Path(f"{file}.cat").read_text().splitlines()) for file in "ab")
+    assert streamed == whole
+    assert len(whole) > 200
+    assert sorted(out.split()) == sorted(plain.replace("b.cat", "a.cat").split())
+
+
 def test_a_scene_makes_a_long_list_on_disk(folder, short):
     scene = parse_scene(
         f'schema = 1\nkind = "spectrum"\n[molecule]\nconstants = "{CONSTANTS}"\ndipole_abc = [1.2, 1.9, 0.4]\n'
