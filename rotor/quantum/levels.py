@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.level_weights import weights_of_quanta
 from rotor.quantum.quanta import labels as texts_of_labels
 from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.table import Table
@@ -385,15 +386,9 @@ class TransitionTable(Table):
 
 
 def weights_of_levels(levels: Levels, weights: SpinWeights) -> Ints:
-    """Spin weights of levels, summed over the components of each row, by other weights than they were solved with.
-
-    Beside a total spin I of two nuclei the weights are those of even I; levels of odd I have those of the other class.
-    """
-    quanta = levels.quanta
-    if "i_tot" in quanta and "i_sym" not in quanta and weights.rule != "none":
-        even, odd = (_rotational_weights(levels, kind) for kind in (weights, weights.exchanged()))
-        return np.where(quanta["i_tot"] % 2 == 0, even, odd)
-    return _rotational_weights(levels, weights)
+    """Spin weights of levels by other weights than they were solved with; species have theirs where the weights are all 1."""
+    species = "species" in levels.quanta and weights.rule == "none"
+    return levels.weight if species else weights_of_quanta(levels.kind, levels.quanta, weights)
 
 
 def levels_table(
@@ -408,12 +403,11 @@ def levels_table(
     """Levels with the spin weights of the top or of their state; by default of one component and 2J+1 projections. others: see `Levels`."""
     ones = np.ones(len(energy_mhz), dtype=np.int64)
     others = {"multiplicity": 2 * quanta["j"] + 1 if "j" in quanta else ones, "components": ones, **others}
-    levels = Levels(top.kind, representation, jmax, energy_mhz, quanta, weight=ones, effects=effects, **others)
-    weight = weights_of_levels(levels, top.spin_weights)
+    weight = weights_of_quanta(top.kind, quanta, top.spin_weights)
     for state in (state for effect in effects for state in effect.states(top)):
         if state.spin_weights is not None:
-            weight = np.where(quanta["v"] == state.v, weights_of_levels(levels, state.spin_weights), weight)
-    return replace(levels, weight=weight)
+            weight = np.where(quanta["v"] == state.v, weights_of_quanta(top.kind, quanta, state.spin_weights), weight)
+    return Levels(top.kind, representation, jmax, energy_mhz, quanta, weight=weight, effects=effects, **others)
 
 
 def levels_of_blocks(
@@ -428,37 +422,3 @@ def levels_of_blocks(
     """The levels of blocks of several states or with spins; others: see `Levels`."""
     energies, mixing = (np.concatenate([getattr(b, name) for b in blocks]) for name in ("energies_mhz", "mixing"))
     return levels_table(top, effects, jmax, energies, quanta, representation, blocks=blocks, mixing=mixing, **others)
-
-
-def _rotational_weights(levels: Levels, weights: SpinWeights) -> Ints:
-    quanta = levels.quanta
-    if "species" in quanta and weights.rule == "none":
-        return levels.weight
-    if "irrep" in quanta:
-        weight_of = {name: weights.irrep_weight(name) for name in np.unique(quanta["irrep"]).tolist()}
-        return np.array([weight_of[name] for name in quanta["irrep"].tolist()], dtype=np.int64)
-    if "kc" in quanta:
-        return _asymmetric_weights(levels, weights)
-    if "k" in quanta:
-        return weights.symmetric_weights(levels.rotational, np.abs(quanta["k"]), oblate=levels.kind == "oblate")
-    return (
-        weights.spherical_weights(levels.rotational)
-        if levels.kind == "spherical"
-        else weights.linear_weights(levels.rotational)
-    )
-
-
-def _asymmetric_weights(levels: Levels, weights: SpinWeights) -> Ints:
-    """By parities of (Ka, Kc); a symmetric top whose ±K are split has weights by K, one component each.
-
-    Of a pair with K a multiple of n, 0even and 0odd go by the parity of the other label, which is J where K = 0: a half turn about
-    an axis across the main one distinguishes the two components of the pair.
-    """
-    ka, kc = levels.quanta["ka"], levels.quanta["kc"]
-    if levels.kind in ("prolate", "oblate") and weights.rule == "K":
-        k, other = (kc, ka) if levels.kind == "oblate" else (ka, kc)
-        at_zero = np.array([weights.symmetric_weights(j, 0) for j in (0, 1)])  # of K = 0, whose other label is J
-        both = weights.symmetric_weights(levels.rotational, k, oblate=levels.kind == "oblate") // np.where(k == 0, 1, 2)
-        return np.where(k % weights.modulus == 0, at_zero[other % 2], both)
-    by_parity = np.array([[weights.asymmetric_weight(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)
-    return np.asarray(by_parity[ka % 2, kc % 2])

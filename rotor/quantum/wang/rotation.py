@@ -139,7 +139,7 @@ def _symmetric(
 ) -> Levels:
     """Symmetric tops: E(J, K) = Σ c X^p K^2q of each state, with one row for ±K; ordered by J, state and K."""
     all_j = np.arange(jmin, jmax + 1)
-    j, k = np.repeat(all_j, all_j + 1), np.concatenate([np.arange(value + 1) for value in all_j])
+    j, k = np.repeat(all_j, all_j + 1), np.concatenate([np.arange(value + 1) for value in all_j.tolist()])
     x, squares, numbers = (j * (j + 1)).astype(float), (k * k).astype(float), sorted(states)
     energies = [sum((c * x**p * squares**q for (p, q, _), c in states[v].items()), np.zeros(j.shape)) for v in numbers]
     energy, quanta = np.concatenate(energies), {"j": j, "k": k}
