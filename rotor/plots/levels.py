@@ -161,9 +161,10 @@ def _species(table: SelectedLevels, top: Top | None) -> list[_Species]:
     if not 2 <= len(weights) <= MOST_WEIGHTS:
         return [_Species(weight > 0, BLUE, "-", "existing" if missing.rows.any() else ""), missing]
     words = ("para, ", "ortho, ") if top is not None and _is_ortho_and_para(top.spin_weights) else ("",) * len(weights)
-    kinds = zip(weights.tolist(), (BLUE, ORANGE, GREEN, PALETTE[3]), words, strict=False)
+    means = ["" if value.is_integer() else "mean " for value in weights.tolist()]  # over the representations of a level
+    kinds = zip(weights.tolist(), (BLUE, ORANGE, GREEN, PALETTE[3]), words, means, strict=False)
     return [
-        *(_Species(weight == value, colour, "-", f"{word}spin weight {value:.4g}") for value, colour, word in kinds),
+        *(_Species(weight == w, colour, "-", f"{word}{mean}spin weight {w:.4g}") for w, colour, word, mean in kinds),
         missing,
     ]
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.assignment.peaks import PeakList
-from rotor.plots.names import SPACE, Peak, name_peaks
+from rotor.plots.names import Peak, name_peaks
 from rotor.plots.picture import (
     BLUE,
     GREY,
@@ -31,6 +31,7 @@ from rotor.spectra.lines import Lines
 MOST_ROWS = 60
 WINDOW_MHZ = 5.0  # on either side of a line
 MOST_NAMES = 24
+NAME_SHARE = 0.32  # part of the vertical axis that a name above the tallest peak may take
 LEAST_NAMED = 1e-2  # relative to the strongest line in view
 BESIDE = 500  # a peak belongs to a line nearer than the width of the picture divided by this
 LEAST_SHOWN = 1e-3  # relative to the strongest line in the band
@@ -76,7 +77,8 @@ def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view
         axes.set_title(title, loc="left")
         legend_below(figure, axes, ncols=2)
         axes.set_xlim(*peaks.band_mhz)
-        axes.set_ylim(-1.05 * float(heights.max(initial=0.0)), SPACE * float(peaks.intensity.max()))
+        low, tallest = -1.05 * float(heights.max(initial=0.0)), float(peaks.intensity.max())
+        axes.set_ylim(low, (tallest - NAME_SHARE * low) / (1 - NAME_SHARE))
         show_part(axes, view)
         curves = [(peaks.frequency_mhz, peaks.intensity), *(thinned(*piece) for piece in peaks.trace)]
         drawn = np.concatenate([np.stack(curve, axis=1) for curve in curves])
