@@ -257,7 +257,7 @@ def put(content: dict[str, Any], name: str, value: Any) -> None:
         inner = {"source": inner} if isinstance(inner, str) else inner
         if not isinstance(inner, dict | list):
             raise ValueError(f"sweep.{name}: {part} is no table of the scene")
-        table[place] = inner = inner.copy()  # points share the scene
+        table[place] = inner
         table = inner
     if isinstance(table, list):
         raise ValueError(f"sweep.{name}: expected the number of a table and its key, such as {'.'.join(path)}.1.KEY")

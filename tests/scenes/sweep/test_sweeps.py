@@ -710,7 +710,7 @@ centre = "2 ps"
 
 
 def test_a_key_of_the_second_pulse_is_swept():
-    """Only the second pulse moves, and the points do not share it."""
+    """Only the second pulse moves."""
     scene = parse_scene(TWO_PULSES + '[sweep]\n"pulses.2.centre" = ["4 ps", "8.4 ps"]\n')
     pulses = [point.scene.pulses for point in points(scene)]
     assert [(first.centre, second.centre) for first, second in pulses] == [("0 ps", "4 ps"), ("0 ps", "8.4 ps")]
