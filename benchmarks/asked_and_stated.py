@@ -22,8 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor.scenes.accuracy import unit_of
-from rotor.scenes.run import run_scene
+from rotor.scenes.run import run_scene, scene_calculation
 from rotor.scenes.scene_file import parse_scene
 from rotor.verbs.verb import verb_of
 
@@ -205,7 +204,7 @@ def _levels(scene: Any, request: Any, answer: Any) -> Reference:
 
 
 def _intensities(scene: Any, request: Any, answer: Any) -> Reference:
-    if unit_of(scene) != "%":
+    if scene_calculation(scene).accuracy.unit != "%":
         return _levels(scene, request, answer)
     levels, kelvin = answer.lines.levels, request.temperature_k
     from rotor.quantum.solve import solve_levels

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -17,8 +16,9 @@ from rotor.checks import did_you_mean
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import Field
 from rotor.requests.fill import Entries
-from rotor.table import Table, errors_html
-from rotor.verbs.verb import Place, Subject, Verb, Work, file_writer, report_of, verb_of
+from rotor.table import errors_html
+from rotor.verbs.calculation import Calculation, Outcome
+from rotor.verbs.verb import Verb, Work, verb_of
 
 EXAMPLES = {
     "spectrum": (
@@ -65,23 +65,8 @@ EXAMPLES = {
 }  # fmt: skip  # an example of each function and its value; a test evaluates them
 
 
-@dataclass(frozen=True, repr=False)
-class Result:
-    """Result of a verb: tables, errors, pictures and files.
-
-    answer: all computed data; its attributes are also attributes of the result. verb, request, subject, entries: the call that produced it.
-    """
-
-    verb: Verb
-    request: Any
-    answer: Any
-    subject: Subject
-    entries: Entries
-
-    @property
-    def table(self) -> Table:
-        """The main table: lines, levels, states, ..."""
-        return self.verb.table(self.answer)
+class Result(Outcome):
+    """Result of a verb: tables, errors, pictures and files. Attributes of the answer are also attributes of the result."""
 
     @property
     def errors(self) -> ErrorBudget:
@@ -126,15 +111,13 @@ class Result:
         if not outputs:
             suffixes = ", ".join(dict.fromkeys(suffix for output in files for suffix in output.suffixes))
             raise ValueError(f"{target.name}: {self.verb.name} writes files that end in {suffixes}")
-        head = {"command": f"rotor.{self.verb.name}", "input": self.subject.text}
-        report = report_of(self.verb, self.answer, head, self.entries)
-        write_together({target: file_writer(self.verb, outputs[0], self.answer, report)})
+        write_together({target: self.writer(outputs[0])})
 
     def scene(self, folder: str | os.PathLike[str] = ".") -> Any:
         """The scene that repeats the calculation; `rotor.write_scene` writes it. folder: of the scene, for names of files."""
         from rotor.scenes.saved import saved_scene
 
-        return saved_scene(self.verb, self.request, self.subject, Path(folder), {}, self.entries)
+        return saved_scene(self, Path(folder), {})
 
     def plan(self) -> Any:
         """Method, cost and neglected effects, as `rotor plan` of the scene."""
@@ -166,8 +149,8 @@ def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Re
         others = f"; it takes {', '.join(fields)}"
         raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{did_you_mean(unknown[0], fields) or others}")
     entries = Entries({fields[name].identity: value for name, value in values.items() if value is not None}, "name")
-    request, subject = verb.read(entries, Place())
-    return Result(verb, request, verb.answer(request, Work(executor, shown=verb.read_shown(entries))), subject, entries)
+    work = Work(shown=verb.read_shown(entries), provenance={"command": f"rotor.{verb.name}"})
+    return Result.extending(Calculation(verb, entries, work).run(executor))
 
 
 @cache

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 from rotor.alignment.align import BasisTooSmallError, truncation_apart
 from rotor.alignment.basis import least_jmax, trace_with
-from rotor.alignment.request import AlignRequest, answer_align, cosine_error
+from rotor.alignment.request import FINEST_TOLERANCE, TOLERANCE, answer_align, cosine_error
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.plans import plan_fields
 from rotor.quantum.fields.inputs import largest_difference
-from rotor.requests.field import declared_fields
-from rotor.requests.knob import Choice, Knob, Measure, with_whole
+from rotor.requests.knob import Choice, Knob, Measure, Sought, with_whole
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Plan, peak_mb, timed
+from rotor.requests.plan import Cost, peak_mb, timed
 
 MORE_J = 6  # in the reference
 SHARES_OF_J = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -36,6 +36,32 @@ def _smaller(setting: tuple[Any, int]) -> list[int]:
     return sorted(j for j in values if j >= trace.ensemble.jmax)
 
 
+def _looser(sought: Sought) -> Iterator[Choice]:
+    """The loosest tolerances first, with the error that a run finds: often a hundred times less than the tolerance, which bounds it."""
+    tolerances = [min(looser * sought.accuracy, LOOSEST_COSINE) for looser in LOOSER]
+    for tolerance in [value for value in tolerances if value >= FINEST_TOLERANCE] or [FINEST_TOLERANCE]:
+        trace = answer_align(replace(sought.request, tolerance=tolerance, classical_molecules=0)).trace
+        chosen = replace(sought.request, tolerance=tolerance)
+        yield Choice(chosen, f"tolerance {tolerance:g}", trace.error_estimate, trace)
+
+
+def _smaller_bases(sought: Sought) -> Iterator[Choice]:
+    """The smallest J max first, estimated on one block and confirmed by a run; at last the one that follows from the tolerance."""
+    if sought.request.jmax is not None:
+        return
+    trace = sought.answer
+    first, truncation = least_jmax(trace, sought.accuracy - truncation_apart(trace))
+    for jmax in range(first, min(first + MOST_CONFIRMED, trace.jmax)):
+        smaller = replace(sought.request, jmax=jmax)
+        try:
+            confirmed = answer_align(replace(smaller, classical_molecules=0)).trace
+        except BasisTooSmallError:
+            continue
+        error = truncation_apart(confirmed) + max(confirmed.edge_population, truncation)
+        yield Choice(smaller, f"J max {jmax}", error)
+    yield Choice(sought.request, f"J max {trace.jmax} from it")
+
+
 BASIS = Knob(
     _smaller,
     lambda setting: setting[1] + MORE_J,
@@ -47,6 +73,7 @@ BASIS = Knob(
     title="highest J of the basis",
     value=lambda setting: setting[1],
     answer=lambda setting: trace_with(*setting),
+    search=_smaller_bases,
 )
 
 
@@ -74,60 +101,38 @@ CLASSICAL = Knob(
 )
 
 
-def choose_basis(scene: Any, request: Any, allowed: float) -> Choice:
-    """The loosest tolerance whose error, measured by a run, meets the accuracy, and then the smallest J max.
-
-    A tolerance bounds each source of error; what a run finds is often a hundred times less.
-    """
-    structure: Any = AlignRequest
-    field = declared_fields(structure)["tolerance"]
-    choice: Choice = field.knob.choose(field, request, allowed, answer_align)
-    for looser in LOOSER:
-        tried = replace(request, tolerance=min(looser * allowed, LOOSEST_COSINE), classical_molecules=0)
-        trace = answer_align(tried).trace
-        if trace.error_estimate > allowed:
-            continue
-        if request.jmax is not None:
-            return Choice(replace(request, tolerance=tried.tolerance), f"tolerance {tried.tolerance:g}")
-        return _least_basis(request, tried.tolerance, trace, allowed)
-    return choice
-
-
-def _least_basis(request: Any, tolerance: float, trace: Any, allowed: float) -> Choice:
-    """The smallest J max whose error fits into the accuracy left by other errors; estimated on one block, confirmed by a run."""
-    first, truncation = least_jmax(trace, allowed - truncation_apart(trace))
-    for jmax in range(first, min(first + MOST_CONFIRMED, trace.jmax)):
-        smaller = replace(request, tolerance=tolerance, jmax=jmax)
-        try:
-            confirmed = answer_align(replace(smaller, classical_molecules=0)).trace
-        except BasisTooSmallError:
-            continue
-        error = truncation_apart(confirmed) + max(confirmed.edge_population, truncation)
-        if error <= allowed:
-            return Choice(smaller, f"tolerance {tolerance:g}, and J max {jmax}", error)
-    return Choice(replace(request, tolerance=tolerance), f"tolerance {tolerance:g}, and J max {trace.jmax} from it")
-
-
-def plan_align(request: Any) -> Plan:
-    """The plan of a gas under pulses: timed with a coarse tolerance; the number of steps grows with its fourth root."""
-    # the pilot of a plan is coarse
-    coarse = replace(request, tolerance=max(request.tolerance, 1e-3), points=11, classical_molecules=0)
-    trace = answer_align(coarse).trace
+def align_cost(request: Any) -> Cost:
+    """The cost with a coarse tolerance, scaled: the number of steps grows with its fourth root; and the coarse answer."""
+    coarse = _coarse(request)
+    answer = answer_align(coarse)
     # steps of a method of order 4 grow with tolerance^(-1/4)
     seconds = timed(lambda: answer_align(coarse)) * (coarse.tolerance / request.tolerance) ** 0.25
+    return Cost(seconds, peak_mb(lambda: answer_align(replace(coarse, points=request.points))), answer)
+
+
+def _coarse(request: Any) -> Any:
+    """A shorter request: the pilot of a plan is coarse."""
+    return replace(request, tolerance=max(request.tolerance, 1e-3), points=11, classical_molecules=0)
+
+
+def describe_align(request: Any, coarse: Any) -> dict[str, Any]:
+    """What a gas under pulses does, from a coarse answer."""
+    trace = coarse.trace
     described = plan_fields(request.top, max(trace.ensemble.jmax, 1), SEMI_RIGID)
-    basis = f"J to {trace.jmax} at least, for a tolerance of {coarse.tolerance:g}"
+    basis = f"J to {trace.jmax} at least, for a tolerance of {_coarse(request).tolerance:g}"
     method = f"{trace.method} during the pulses, exact phases after them; steps halved until the cosines agree"
-    return Plan(
-        kind="align",
-        effects=(*described["effects"], *(f"pulse on the {pulse.acts_on}" for pulse in request.pulses)),
-        good=("M",) if all(pulse.axis == (0, 0, 1) for pulse in request.pulses) else (),
-        parts=(("basis", f"J to {request.jmax}" if request.jmax else basis), ("method", method)),
-        counts={"initial states": trace.states, "times": request.points},
-        seconds=seconds,
-        memory_mb=peak_mb(lambda: answer_align(replace(coarse, points=request.points))),
-        left_out=described["left_out"],
-    )
+    return {
+        "effects": (*described["effects"], *(f"pulse on the {pulse.acts_on}" for pulse in request.pulses)),
+        "good": ("M",) if all(pulse.axis == (0, 0, 1) for pulse in request.pulses) else (),
+        "parts": (("basis", f"J to {request.jmax}" if request.jmax else basis), ("method", method)),
+        "counts": {"initial states": trace.states, "times": request.points},
+        "left_out": described["left_out"],
+    }
 
 
-ALIGN = Numerics({"": Goal("cosines", choose_basis)}, knobs=(BASIS, CLASSICAL), plan=plan_align)
+ALIGN = Numerics(
+    {"": Goal("cosines", knobs=(replace(TOLERANCE, search=_looser), BASIS), sets=("numerics.tolerance",))},
+    knobs=(BASIS, CLASSICAL),
+    describe=describe_align,
+    cost=align_cost,
+)

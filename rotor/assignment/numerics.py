@@ -5,33 +5,38 @@ from __future__ import annotations
 from typing import Any
 
 from rotor.requests.numerics import Numerics
-from rotor.requests.plan import Plan
+from rotor.requests.plan import Cost
+
+MEMORY_MB = 150.0  # of a search
 
 
-def plan_assign(request: Any) -> Plan:
-    """The plan of a search for constants; its time is bounded by the seconds of the request."""
+def assign_cost(request: Any) -> Cost:
+    """The cost of a search, bounded by the seconds of the request."""
+    return Cost(float(min(request.seconds, 1.0 + request.species)), MEMORY_MB)
+
+
+def describe_assign(request: Any, _: Any) -> dict[str, Any]:
+    """What a search for constants does."""
     peaks = request.peaks
     temperature = "not known, tried from 1 to 8 K" if request.temperature_k is None else f"{request.temperature_k:g} K"
     bounds = request.bounds
     limits = ", ".join(
         f"{name} {low:g} to {high:g}" for name, low, high in zip("ABC", bounds.low, bounds.high, strict=True)
     )
-    return Plan(
-        kind="assign",
-        effects=("rigid", "quartic distortion"),
-        good=("J",),
-        parts=(
+    return {
+        "effects": ("rigid", "quartic distortion"),
+        "good": ("J",),
+        "parts": (
             ("method", "families of three lines on the strongest peaks, evidence against chance, refinement by a fit"),
             ("bounds", f"{limits} MHz"),
             ("temperature", temperature),
         ),
-        counts={"peaks": len(peaks), "species": request.species},
-        seconds=float(min(request.seconds, 1.0 + request.species)),
-        memory_mb=150.0,
-    )
+        "counts": {"peaks": len(peaks), "species": request.species},
+    }
 
 
 ASSIGN = Numerics(
     remarks=lambda request: ("search: seeded; how sure the answer is stands with it as a probability",),
-    plan=plan_assign,
+    describe=describe_assign,
+    cost=assign_cost,
 )

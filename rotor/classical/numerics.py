@@ -15,17 +15,16 @@ from rotor.classical.motion_steps import (
     timed_steps,
 )
 from rotor.classical.step_errors import MOST_CALLED, MOST_STEPS, apart
-from rotor.classical.tolerance_search import FINER, Planned, choose_tolerance, planned_tolerance
+from rotor.classical.tolerance_search import ORDER, tolerances
 from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.requests.budget import ROUNDING
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure
+from rotor.requests.knob import NOTHING_CHEAPER, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import LONG_SEARCH, LeftOut, Plan, peak_mb, timed
+from rotor.requests.plan import Cost, LeftOut, peak_mb, timed
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
 
-ORDER = 8  # of the adaptive method: steps go with the tolerance to the power -1/8
 NAME = "error of the steps"
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 FINEST_TOLERANCE = 1e-13  # of references: a hundred times finer than the finest that is tried
@@ -33,25 +32,19 @@ DIVISIONS = (8, 16, 32, 64, 128)  # of the duration: steps of a splitting, times
 ORDERS = (2, 4, 6, 8)
 
 
-def choose(scene: Any, request: Any, allowed: float) -> Choice:
-    """Choose the tolerance of a driven motion; a free motion needs no settings."""
-    free = isinstance(request, TumbleRequest)
-    return Choice(request, NOTHING_CHEAPER) if free else choose_tolerance(request, allowed)
-
-
 def motion_error(answer: Any) -> float:
     """Rounding error of a free motion; 0 for a driven motion, whose step error is estimated when the step is chosen."""
     return float(answer.errors.rounding.value or 0.0) if isinstance(answer, TumbleAnswer) else 0.0
 
 
-def choose_growth(scene: Any, request: Any, allowed: float) -> Choice:
-    """No settings to choose: the growth rate at the unstable axis of a free body is a closed form."""
-    if not isinstance(request, TumbleRequest):
-        raise ValueError(
-            f"accuracy: {allowed:g} %: % is the unit of the growth rate of a free motion; for a motion under effects give the "
-            "accuracy of the attitude, in rad"
-        )
-    return Choice(request, NOTHING_CHEAPER)
+def _under_effects(request: Any) -> str:
+    """Why an accuracy of the growth rate, which is a closed form, does not suit a motion under effects."""
+    if isinstance(request, TumbleRequest):
+        return ""
+    return (
+        "% is the unit of the growth rate of a free motion; for a motion under effects give the "
+        "accuracy of the attitude, in rad"
+    )
 
 
 def growth_error(answer: Any) -> float:
@@ -90,6 +83,7 @@ TOLERANCE = Knob(
     key="numerics.tolerance",
     value=lambda request: request.tolerance if request.step is None else None,
     answer=answer_driven,
+    search=tolerances,
 )
 
 
@@ -130,59 +124,30 @@ def step_error(request: Any, steps: int) -> LeftOut:
     return LeftOut(NAME, steps * request.tolerance, "rad", basis)
 
 
-def plan_motion(request: Any) -> Plan:
-    """The plan of a free or driven motion with the settings of its request."""
-    if not isinstance(request, TumbleRequest):
-        return _driven(request)
-    return Plan(
-        kind="tumble",
-        effects=("free rotation",),
-        good=("energy", "angular momentum in space"),
-        parts=(("method", "the exact free motion (theta functions): no step, round-off alone"),),
-        counts={"times": len(request.times or ()) or 201},
-        seconds=timed(lambda: answer_tumble(request)),
-        memory_mb=peak_mb(lambda: answer_tumble(request).table.columns),
-    )
-
-
-def planned(scene: Any, request: Any, allowed: float) -> tuple[Plan, Choice | None]:
-    """The plan of a motion with the tolerance of its run; also the choice, if the search made the whole motion.
-
-    The search makes only the first part of a long motion; the run then adds a motion a hundred times finer, for the error.
-    """
+def motion_cost(request: Any) -> Cost:
+    """The cost of a free or driven motion; of a driven one with its number of steps."""
     if isinstance(request, TumbleRequest):
-        choice = choose(scene, request, allowed)
-        plan = plan_motion(request)
-        return replace(plan, parts=(*plan.parts, ("accuracy", choice.how))), choice
-    searched: list[Planned] = []
-    search = timed(lambda: searched.append(planned_tolerance(request, allowed)), LONG_SEARCH)
-    search_result = searched[-1]
-    chosen = replace(request, tolerance=search_result.tolerance)
-    plan = _driven(chosen, search_result.steps, search_result.error)
-    parts = (*plan.parts, ("accuracy", search_result.how))
-    if search_result.steps is not None:
-        choice = Choice(chosen, search_result.how, search_result.error or 0.0)
-        return replace(plan, parts=parts, seconds=search + plan.seconds), choice
-    finer = 10.0 ** (FINER / ORDER)  # times as many steps
-    return replace(plan, parts=parts, seconds=search + (2.0 + finer) * plan.seconds), None
+        return Cost(timed(lambda: answer_tumble(request)), peak_mb(lambda: answer_tumble(request).table.columns))
+    steps = expected_steps(request)
+    return Cost(_step_seconds(request, steps), _memory_mb(request), steps)
 
 
-def _driven(request: DrivenRequest, known_steps: int | None = None, known_error: float | None = None) -> Plan:
-    steps = expected_steps(request) if known_steps is None else known_steps
-    if known_error is None:
-        error = step_error(request, steps)
-    else:
-        error = LeftOut(NAME, known_error, "rad", f"{steps} steps, found by the search for the accuracy")
-    return Plan(
-        kind="tumble",
-        effects=tuple(type(effect).__name__ for effect in request.effects),
-        good=("energy",) if all(effect.conserves_energy for effect in request.effects) else (),
-        parts=(("method", _stepping(request, steps)),),
-        counts={"steps": steps, "times": len(request.times)},
-        seconds=_step_seconds(request, steps),
-        memory_mb=_memory_mb(request),
-        left_out=(error,),
-    )
+def describe_motion(request: Any, steps: Any) -> dict[str, Any]:
+    """What a free motion does, or a driven one of these steps."""
+    if isinstance(request, TumbleRequest):
+        return {
+            "effects": ("free rotation",),
+            "good": ("energy", "angular momentum in space"),
+            "parts": (("method", "the exact free motion (theta functions): no step, round-off alone"),),
+            "counts": {"times": len(request.times or ()) or 201},
+        }
+    return {
+        "effects": tuple(type(effect).__name__ for effect in request.effects),
+        "good": ("energy",) if all(effect.conserves_energy for effect in request.effects) else (),
+        "parts": (("method", _stepping(request, steps)),),
+        "counts": {"steps": steps, "times": len(request.times)},
+        "left_out": (step_error(request, steps),),
+    }
 
 
 def _stepping(request: DrivenRequest, steps: int) -> str:
@@ -211,9 +176,12 @@ def _memory_mb(request: DrivenRequest) -> float:
 
 
 TUMBLE = Numerics(
-    {"rad": Goal("attitude", choose, motion_error), "%": Goal("growth rate", choose_growth, growth_error)},
+    {
+        "rad": Goal("attitude", motion_error, (TOLERANCE,), ("numerics.tolerance", "numerics.step")),
+        "%": Goal("growth rate", growth_error, unfit=_under_effects),
+    },
     knobs=(TOLERANCE, *map(_splitting, ORDERS)),
     remarks=_remarks,
-    plan=plan_motion,
-    planned=planned,
+    describe=describe_motion,
+    cost=motion_cost,
 )

@@ -11,14 +11,16 @@ this tolerance and a finer motion for the stated error; if that exceeds the accu
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotor.classical.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
 from rotor.classical.step_errors import error_by_finer, step_rounding
-from rotor.requests.knob import Choice
+from rotor.requests.knob import Choice, Sought
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 
 LOOSEST, FINEST, FINEST_REFERENCE = 3, 13, 14  # decades: tolerances of 1e-3, 1e-13 and 1e-14
 FINER = 2  # decades of a reference
+ORDER = 8  # of the adaptive method: steps go with the tolerance to the power -1/8
+CHAOS = "the motion is chaotic or too long for double precision"
 LONG_STEPS, LONG_PLAIN_STEPS = 1_000_000, 4000  # of a motion, compiled or not: about a second
 REGULAR = 2.0  # the power of the time with which the error of a regular motion grows at the most
 CHAOTIC = 4.0  # a power that is seen beyond which the growth is taken as exponential
@@ -73,40 +77,27 @@ def likely_decade(allowed: float) -> int:
     return min(max(round(-math.log10(allowed)), LOOSEST) + FINER, FINEST)
 
 
-@dataclass(frozen=True)
-class Planned:
-    """A tolerance chosen before a run.
+def tolerances(sought: Sought) -> Iterator[Choice]:
+    """The loosest tolerance, in decades, that reaches an accuracy in radians; of a long motion that of its first part, then finer ones.
 
-    decade: of the tolerance. how: in words. error, steps: of the whole motion; None if only a part was computed.
+    A plan and a run choose the same tolerance. A free motion needs none.
     """
+    from rotor.classical.driven import DrivenRequest
 
-    decade: int
-    how: str
-    error: float | None = None
-    steps: int | None = None
-
-    @property
-    def tolerance(self) -> float:
-        """Tolerance of a step."""
-        return decade_tolerance(self.decade)
-
-
-def planned_tolerance(request: DrivenRequest, allowed: float) -> Planned:
-    """The loosest tolerance, in decades, that reaches an accuracy in radians, from the whole motion or the first part of a long one.
-
-    A plan and a run choose the same tolerance. Raises ValueError if a tolerance or step is given too, and if double precision does not
-    suffice.
-    """
-    from rotor.classical.driven import DEFAULT_TOLERANCE
-
-    if request.tolerance != DEFAULT_TOLERANCE or request.step is not None:
-        raise ValueError("accuracy and numerics: give one of them")
+    request, allowed = sought.request, sought.accuracy
+    if not isinstance(request, DrivenRequest):
+        return
+    motions, misses = _Motions(request), LOOSEST - 1
     if _is_long(request, allowed):
         _refuse_endless(request, allowed)
-        return Planned(*_pilot_decade(request, allowed))
-    motions = _Motions(request)
-    decade, error = _loosest(motions, allowed)
-    return Planned(decade, _words(decade), error, motions.at(decade).steps)
+        misses, how = _pilot_decade(request, allowed)
+        chosen = replace(request, tolerance=decade_tolerance(misses))
+        yield Choice(chosen, how, partial(motions.error, misses), confirming=1.0 + 10.0 ** (FINER / ORDER))
+    if misses < FINEST:
+        decade, error = _loosest(motions, allowed, misses)
+        missed = f", finer than the plan's {decade_tolerance(misses):g}, which missed" if misses >= LOOSEST else ""
+        how = _words(decade) + missed + ("" if error <= allowed else f": {CHAOS}")
+        yield Choice(replace(request, tolerance=decade_tolerance(decade)), how, error)
 
 
 def _words(decade: int) -> str:
@@ -147,10 +138,7 @@ def _pilot_decade(request: DrivenRequest, allowed: float) -> tuple[int, str]:
     grown = math.log10(_growth(float(np.max(apart[: middle + 1])), float(np.max(apart))))
     part = f"from the first {100 / BEGINNINGS:g} % of the time, in which errors grow {{}}"
     needed = math.log10(allowed) - grown
-    try:
-        decade = _loosest(motions, 10.0**needed)[0] if needed > -FINEST_REFERENCE else FINEST
-    except ValueError:  # double precision does not suffice for the part
-        decade = FINEST
+    decade = _loosest(motions, 10.0**needed)[0] if needed > -FINEST_REFERENCE else FINEST
     kind = "exponentially" if grown > REGULAR * math.log10(BEGINNINGS) else "as the square of the time at the most"
     return decade, f"{_words(decade)}, {part.format(kind)}"
 
@@ -170,27 +158,8 @@ def _growth(middle: float, end: float) -> float:
     return float(BEGINNINGS**REGULAR)
 
 
-def choose_tolerance(request: DrivenRequest, allowed: float) -> Choice:
-    """The request with the tolerance of the plan, or a finer one if that does not suffice, and its error.
-
-    Raises ValueError if a tolerance or step is given too, and if double precision does not suffice.
-    """
-    planned = planned_tolerance(request, allowed)
-    if planned.error is not None:
-        return Choice(replace(request, tolerance=planned.tolerance), planned.how, planned.error)
-    motions = _Motions(request)
-    error, decade = motions.error(planned.decade), planned.decade
-    if error > allowed and decade < FINEST:
-        decade, error = _loosest(motions, allowed, misses=decade)
-        how = f"tolerance {decade_tolerance(decade):g} of a step, finer than the plan's {planned.tolerance:g}, which missed"
-        return Choice(replace(request, tolerance=decade_tolerance(decade)), how, error)
-    if error > allowed:
-        raise ValueError(_refusal(allowed, error))
-    return Choice(replace(request, tolerance=planned.tolerance), planned.how, error)
-
-
 def _loosest(motions: _Motions, allowed: float, misses: int = LOOSEST - 1) -> tuple[int, float]:
-    """The lowest decade whose error is at most `allowed`, and that error; the decade below it, or `misses`, has a larger error."""
+    """The lowest decade whose error is at most `allowed`, else the finest, and its error; `misses` is a decade with a larger error."""
     decade = min(max(round(-math.log10(allowed)), misses + 1), FINEST)
     errors: dict[int, float] = {}
     reaches = FINEST + 1
@@ -203,13 +172,5 @@ def _loosest(motions: _Motions, allowed: float, misses: int = LOOSEST - 1) -> tu
             reaches, decade = decade, max(decade - apart, misses + 1)
         else:
             misses, decade = decade, min(decade + apart, reaches - 1)
-    if reaches > FINEST:
-        raise ValueError(_refusal(allowed, errors[FINEST]))
-    return reaches, errors[reaches]
-
-
-def _refusal(allowed: float, error: float) -> str:
-    return (
-        f"accuracy: {allowed:g} rad cannot be given: steps to {decade_tolerance(FINEST):g} still differ by {error:.2g} rad at "
-        "the end, the motion is chaotic or too long for double precision; choose a lower accuracy or a shorter time"
-    )
+    decade = min(reaches, FINEST)
+    return decade, errors[decade]

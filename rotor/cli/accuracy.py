@@ -5,15 +5,17 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part, record_table, show_parts
 from rotor.requests.field import REQUIRED, declared
 from rotor.requests.readers import Quantity, Text
+from rotor.verbs.outputs import PICTURES, Output, Report
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import PICTURES, Output, Report, Work
+from rotor.verbs.verb import Work
 
 if TYPE_CHECKING:
     from rotor.scenes.accuracy_sweep import WorkPrecision

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part
 from rotor.reports.top_facts import left_out_facts
 from rotor.requests.field import REQUIRED, declared

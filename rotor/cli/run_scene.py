@@ -8,12 +8,12 @@ import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
-from functools import cached_property
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.cli.shared.workers import MOST_WORKERS
+from rotor.frozen import dataclass
 from rotor.reports.error_table import error_parts
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.reports.screen import Part, Table, evenly, json_with_rows
@@ -21,7 +21,7 @@ from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Report, Work, verb_of
+from rotor.verbs.verb import Work
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -87,34 +87,30 @@ class SceneRun:
     result: SceneResult
     failure: str = ""
 
-    @cached_property
-    def report(self) -> Report:
-        """The report of the scene's verb."""
-        from rotor.scenes.calculation import Calculation
-
-        head = {"scene": self.options.scene, "kind_of_scene": self.result.scene.kind}
-        return Calculation(self.result.scene).report(self.result.answer, head)
-
     @property
     def notes(self) -> list[str]:
         """Remarks on the molecule and on the answer, each once."""
         top = getattr(self.result.request, "top", None)
-        return list(dict.fromkeys([*(top.notes if top is not None else ()), *self.report.content.get("notes", ())]))
+        return list(dict.fromkeys([*(top.notes if top is not None else ()), *self.facts().get("notes", ())]))
 
     def facts(self) -> dict[str, Any]:
         """The facts of the answer, and those of the run."""
-        accuracy = None if self.result.reached is None else asdict(self.result.reached)
-        return {**self.report.content, "accuracy": accuracy, "seconds": self.result.seconds}
+        result = self.result
+        content = result.report.content
+        head = {"scene": self.options.scene, "kind_of_scene": result.scene.kind}
+        accuracy = None if result.reached is None else asdict(result.reached)
+        run = {"accuracy": accuracy, "seconds": result.seconds}
+        return {"rotor_version": content["rotor_version"], **head, **content, **head, **run}
 
     def json(self, content: Mapping[str, Any]) -> str:
         """The JSON of the verb."""
         files = [str(path) for path in self.result.files]
-        return verb_of(self.result.scene.kind).json(self.result.answer, {**content, "files": files})
+        return self.result.verb.json(self.result.answer, {**content, "files": files})
 
     def parts(self, content: Mapping[str, Any]) -> Iterator[Part | None]:
         """The title of the scene and the report of its verb, then files and seconds of the run."""
         result = self.result
-        parts = [*verb_of(result.scene.kind).show(result.answer, replace(self.report, content=content))]
+        parts = [*result.verb.show(result.answer, replace(result.report, content=content))]
         if title := result.scene.title:
             heading = parts.pop(0) if parts and isinstance(parts[0], str) else ""
             yield f"{title}\n{heading}".rstrip()

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Flag, Names, Quantity, Text, Whole
 from rotor.verbs.observed_file import PANEL
+from rotor.verbs.outputs import Output, Report
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Output, Report, Work
+from rotor.verbs.verb import Work
 
 if TYPE_CHECKING:
     from rotor.viewer.service import Service

@@ -27,7 +27,7 @@ the scene, whose cutoff is part of the model. Effects neglected by a box of clas
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -36,9 +36,9 @@ import numpy as np
 from rotor import units
 from rotor.fluids.request import NewBox, answer_fluid, make_box
 from rotor.fluids.settings import ELECTROSTATICS
-from rotor.requests.knob import Choice, Knob, Measure, refuse_set
+from rotor.requests.knob import Choice, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Growth, LeftOut, Plan, largest_first, peak_mb
+from rotor.requests.plan import Cost, Growth, LeftOut, largest_first, peak_mb
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
@@ -67,31 +67,38 @@ def with_box(request: FluidRequest) -> FluidRequest:
     return replace(request, box=box, box_source=request.start)
 
 
-def _rotor_request(request: FluidRequest) -> FluidRequest:
-    """The request with its box; ValueError for another engine."""
-    if request.engine != "rotor":
-        raise ValueError(
-            f"accuracy: not available for the engine {request.engine}; give numerics.step, or use the engine rotor"
-        )
-    return with_box(request)
+def _other_engine(request: FluidRequest) -> str:
+    """Why an accuracy does not suit a request: only settings of the engine rotor are chosen."""
+    if request.engine == "rotor":
+        return ""
+    return f"not available for the engine {request.engine}; give numerics.step, or use the engine rotor"
 
 
-def choose_step(scene: Any, request: FluidRequest, allowed: float) -> Choice:
-    """The longest step that conserves the energy to an accuracy in K; the box of the returned request is made."""
-    request = _rotor_request(request)
-    refuse_set(request.settings, "step_fs")
-    # The error is of second order: extrapolate from a short step, in hundredths of a femtosecond, then shorten until it is small enough.
-    step = FIRST_STEP_FS * math.sqrt(allowed / conserved_bound_k(request, FIRST_STEP_FS))
-    step = min(math.floor(100.0 * step) / 100.0, LONGEST_STEP_FS)
-    while step > SHORTEST_STEP_FS:
-        if (error := conserved_bound_k(request, step)) <= allowed:
-            longest = ", nothing cheaper: the longest there is" if step == LONGEST_STEP_FS else ""
-            how = f"a step of {step:g} fs{longest}; root mean square of the conserved energy about its mean"
-            return Choice(replace(request, settings=replace(request.settings, step_fs=step)), how, error)
-        step = math.floor(95.0 * step) / 100.0
-    raise ValueError(
-        f"accuracy: {allowed:g} K cannot be given: the steps would be shorter than {SHORTEST_STEP_FS:g} fs; choose a lower accuracy"
+def _other_forces(request: FluidRequest) -> str:
+    """Why an accuracy of Ewald's forces does not suit a request."""
+    other = request.settings.electrostatics
+    if _other_engine(request) or other == "ewald":
+        return _other_engine(request)
+    return (
+        f"of the forces is that of Ewald's sum, and {other} is another model; give "
+        'numerics.electrostatics = "ewald", or an accuracy of the conserved energy in K'
     )
+
+
+def _shorter_steps(sought: Sought) -> Iterator[Choice]:
+    """The longest step first, with the bound of the deviation of the conserved energy, in K.
+
+    The error is of second order: the first step is extrapolated from a short one, in hundredths of a femtosecond, and then shortened.
+    """
+    request = sought.request
+    step = FIRST_STEP_FS * math.sqrt(sought.accuracy / conserved_bound_k(request, FIRST_STEP_FS))
+    step = max(min(math.floor(100.0 * step) / 100.0, LONGEST_STEP_FS), SHORTEST_STEP_FS)
+    while step >= SHORTEST_STEP_FS:
+        longest = ", nothing cheaper: the longest there is" if step == LONGEST_STEP_FS else ""
+        how = f"a step of {step:g} fs{longest}; root mean square of the conserved energy about its mean"
+        chosen = replace(request, settings=replace(request.settings, step_fs=step))
+        yield Choice(chosen, how, conserved_bound_k(request, step))
+        step = math.floor(95.0 * step) / 100.0
 
 
 def conserved_bound_k(request: FluidRequest, step_fs: float) -> float:
@@ -113,24 +120,14 @@ def conserved_bound_k(request: FluidRequest, step_fs: float) -> float:
     return float(np.mean(deviations)) + float(stdtrit(BOXES - 1, SURE)) * spread
 
 
-def choose_ewald(scene: Any, request: FluidRequest, allowed: float) -> Choice:
-    """The coarsest tolerance of the Ewald sum for an accuracy of forces in percent; the box of the returned request is made."""
-    request = _rotor_request(request)
-    settings = request.settings
-    if settings.electrostatics != "ewald":
-        raise ValueError(
-            f"accuracy: {allowed:g} %: of the forces is that of Ewald's sum, and {settings.electrostatics} is another model; give "
-            'numerics.electrostatics = "ewald", or an accuracy of the conserved energy in K'
-        )
-    refuse_set(settings, "ewald_tolerance")
+def _finer_sums(sought: Sought) -> Iterator[Choice]:
+    """The coarsest tolerance of the Ewald sum first, with the error of its forces in percent, which may grow during a run."""
+    settings = sought.request.settings
     for tolerance in EWALD_LADDER:
-        chosen = replace(request, settings=replace(settings, ewald_tolerance=tolerance))
-        error = force_error(chosen)
-        if error <= allowed / SPARE:
-            return Choice(chosen, f"a tolerance of {tolerance:g} of Ewald's sum")
-    raise ValueError(
-        f"accuracy: {allowed:g} % cannot be given: Ewald's sum to {tolerance:g} is still off by {error:.2g} %"
-    )
+        chosen = replace(sought.request, settings=replace(settings, ewald_tolerance=tolerance))
+        spared = SPARE * force_error(chosen)
+        error = spared if spared > sought.accuracy else 0.0  # else the answer states it
+        yield Choice(chosen, f"a tolerance of {tolerance:g} of Ewald's sum", error)
 
 
 def force_error(request: FluidRequest) -> float:
@@ -222,6 +219,7 @@ STEP = Knob(
     title="length of a step",
     value=lambda request: request.settings.step_fs,
     answer=answer_followed,
+    search=_shorter_steps,
 )
 FORCE = Measure("force", "%", force_difference)
 
@@ -256,6 +254,7 @@ SUM = Knob(
     title="tolerance of Ewald's sum",
     value=lambda request: request.settings.ewald_tolerance,
     answer=lambda forces: forces(),
+    search=_finer_sums,
 )
 
 
@@ -284,40 +283,53 @@ def neglected_in_fluid(
     return largest_first([*neglected, LeftOut("vibration", None, "", "molecules are rigid")])
 
 
-def plan_fluid(request: Any) -> Plan:
-    """The plan of a fluid request."""
+def fluid_cost(request: Any) -> Cost:
+    """The cost of a run, from short runs of its box; and a short run, after which forces are nearly those of the fluid."""
     from rotor.fluids.equilibration import equilibration_range
 
     settings = request.settings
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: a plan is of the engine rotor alone")
     ready: Any = replace(with_box(request), box_equilibration_ps=0.0)  # its box is made
-    least_ps, most_ps = equilibration_range(request.equilibration_ps)
-    before = round(1e3 * least_ps / settings.step_fs)
+    before = _steps_before(equilibration_range(request.equilibration_ps)[0], settings)
 
     def short(steps: int) -> Any:
         return answer_fluid(
             replace(ready, box=ready.box.copy(), settings=replace(settings, steps=steps)), progress=lambda *_: None
         )
 
-    seconds, settled = Growth(short, before + settings.steps, SHORT_STEPS).seconds, min(SETTLING_STEPS, settings.steps)
+    settled = min(SETTLING_STEPS, settings.steps)
+    seconds = Growth(short, before + settings.steps, SHORT_STEPS).seconds
+    return Cost(seconds, peak_mb(lambda: short(settled)), short(settled))
+
+
+def _steps_before(picoseconds: float, settings: Any) -> int:
+    """Steps of an equilibration."""
+    return round(1e3 * picoseconds / float(settings.step_fs))
+
+
+def describe_fluid(request: Any, settled: Any) -> dict[str, Any]:
+    """What a box does, from a short run."""
+    from rotor.fluids.equilibration import equilibration_range
+
+    settings = request.settings
+    least_ps, most_ps = equilibration_range(request.equilibration_ps)
+    before = _steps_before(least_ps, settings)
     until = (
         "" if most_ps == least_ps else f" at least, until stationary, {most_ps:g} ps at most; seconds count the least"
     )
-    return Plan(
-        kind="fluid",
-        effects=("Lennard-Jones and charges of rigid sites", settings.electrostatics),
-        good=("energy", "momentum") if settings.ensemble == "nve" else (),
-        parts=(
+    return {
+        "effects": ("Lennard-Jones and charges of rigid sites", settings.electrostatics),
+        "good": ("energy", "momentum") if settings.ensemble == "nve" else (),
+        "parts": (
             ("method", f"splitting of rigid bodies, {settings.step_fs:g} fs a step, {settings.ensemble}"),
             ("forces", f"cutoff {settings.cutoff_angstrom:g} Å, {settings.electrostatics}, even liquid beyond it"),
             *([("equilibration", f"{least_ps:g} ps{until}")] if before else []),
         ),
-        counts={"atoms": len(ready.box), "steps": settings.steps} | ({"equilibration steps": before} if before else {}),
-        seconds=seconds,
-        memory_mb=peak_mb(lambda: short(settled)),
-        left_out=_left_out(short(settled).atoms, settings),
-    )
+        "counts": {"atoms": len(settled.atoms), "steps": settings.steps}
+        | ({"equilibration steps": before} if before else {}),
+        "left_out": _left_out(settled.atoms, settings),
+    }
 
 
 def _left_out(atoms: Any, settings: Any) -> tuple[LeftOut, ...]:
@@ -329,14 +341,20 @@ def _left_out(atoms: Any, settings: Any) -> tuple[LeftOut, ...]:
     return neglected_in_fluid(dynamics.bodies, *dynamics.wrench(), settings.temperature_k, settings.step_fs)
 
 
+def _force_error_at_end(answer: Any) -> float:
+    """The error of the forces at the end of a run, in percent."""
+    return force_error(replace(answer.request, box=answer.atoms))
+
+
 FLUID = Numerics(
     {
-        "K": Goal("conserved energy", choose_step, conserved_k),
-        "%": Goal("forces", choose_ewald, lambda answer: force_error(replace(answer.request, box=answer.atoms))),
+        "K": Goal("conserved energy", conserved_k, (STEP,), ("numerics.step",), _other_engine, with_box),
+        "%": Goal("forces", _force_error_at_end, (SUM,), ("numerics.ewald_tolerance",), _other_forces, with_box),
     },
     bare=False,
     knobs=(STEP, *map(_cutoff, ELECTROSTATICS), SUM),
     prepare=_swept_box,
     remarks=lambda request: ("conditions.steps: the error of a mean is in its report",),
-    plan=plan_fluid,
+    describe=describe_fluid,
+    cost=fluid_cost,
 )

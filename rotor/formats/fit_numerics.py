@@ -13,7 +13,7 @@ from rotor.quantum.estimates.left_out import neglected_in_levels
 from rotor.quantum.estimates.plans import effect_texts
 from rotor.requests.knob import DECADES, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import LeftOut, Plan, peak_mb, timed
+from rotor.requests.plan import Cost, LeftOut, peak_mb, timed
 
 if TYPE_CHECKING:
     from rotor.formats.fit_request import FitRequest
@@ -74,23 +74,28 @@ TOLERANCE = Knob(
 )
 
 
-def plan_fit(request: Any) -> Plan:
-    """The plan of a fit: time from the cost of the setup and of one iteration, for the usual number of iterations."""
-    lines, free = request.lines, request.parameters.names
+def fit_cost(request: Any) -> Cost:
+    """The cost of a fit: of the setup and of one iteration, for the usual number of iterations."""
 
     def limited(iterations: int) -> Any:
         return answer_fit(with_options(request, most_iterations=min(iterations, request.options.most_iterations)))
 
     least = timed(lambda: limited(SHORT_ITERATIONS))
     step = max(timed(lambda: limited(SHORT_ITERATIONS + 2)) - least, 0.0) / 2
+    seconds = least + step * (USUAL_ITERATIONS - SHORT_ITERATIONS)
+    return Cost(seconds, peak_mb(lambda: limited(SHORT_ITERATIONS)))
+
+
+def describe_fit(request: Any, _: Any) -> dict[str, Any]:
+    """What a fit does."""
+    lines, free = request.lines, request.parameters.names
     blends = len(lines) - len(set(lines.blend.tolist()))
     labels = len({tuple(row) for side in (lines.upper, lines.lower) for row in side.tolist()})
     top, j = request.top, int(max(lines.upper[:, 0].max(), lines.lower[:, 0].max(), 1))
-    return Plan(
-        kind="fit",
-        effects=() if top is None else effect_texts(top, j, SEMI_RIGID),
-        good=tuple(lines.names),
-        parts=(
+    return {
+        "effects": () if top is None else effect_texts(top, j, SEMI_RIGID),
+        "good": tuple(lines.names),
+        "parts": (
             ("free", ", ".join(free)),
             ("levels", f"{labels}, to J = {j}, {_levels_text(request)}"),
             (
@@ -98,11 +103,9 @@ def plan_fit(request: Any) -> Plan:
                 "Levenberg and Marquardt in scaled variables, analytic derivatives; errors by the column-scaled SVD",
             ),
         ),
-        counts={"lines": len(lines), "blended": blends, "parameters": len(free)},
-        seconds=least + step * (USUAL_ITERATIONS - SHORT_ITERATIONS),
-        memory_mb=peak_mb(lambda: limited(SHORT_ITERATIONS)),
-        left_out=() if top is None else _absent(request, top, j),
-    )
+        "counts": {"lines": len(lines), "blended": blends, "parameters": len(free)},
+        "left_out": () if top is None else _absent(request, top, j),
+    }
 
 
 def _absent(request: FitRequest, top: Top, j: int) -> tuple[LeftOut, ...]:
@@ -123,10 +126,11 @@ def _levels_text(request: FitRequest) -> str:
 
 FIT = Numerics(
     {
-        "MHz": Goal("frequencies of the lines", knob=TOLERANCE),
-        "%": Goal("constants", error=constants_error, knob=TOLERANCE),
+        "MHz": Goal("frequencies of the lines", knobs=(TOLERANCE,)),
+        "%": Goal("constants", constants_error, (TOLERANCE,)),
     },
     knobs=(STEPS, TOLERANCE),
     remarks=lambda request: ("numerics.loss, numerics.reject_above: an accuracy does not decide which lines count",),
-    plan=plan_fit,
+    describe=describe_fit,
+    cost=fit_cost,
 )

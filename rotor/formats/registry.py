@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+
+from rotor.frozen import dataclass
 
 LINES = "rotor.spectra.lines:Lines"
 TABLE = "rotor.table:Table"

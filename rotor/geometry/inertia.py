@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
+from rotor.frozen import dataclass
 
 LINEAR_BELOW = 1e-6  # default of I_a / I_c below which a body is linear
 EQUAL_MOMENTS = 1e-6  # default relative difference below which two moments count as equal

@@ -8,13 +8,14 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.molecules.nuclei import Isotope, isotope
 from rotor.units import DEBYE_PER_E_ANGSTROM, QUADRUPOLE_MHZ_PER_BARN_AU
 

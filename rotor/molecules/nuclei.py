@@ -7,12 +7,13 @@ abundant isotope, or the longest-lived one of elements that do not occur in natu
 import difflib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from rotor.frozen import dataclass
 
 _ISOTOPE_SYMBOLS = {"D": ("H", 2), "T": ("H", 3)}
 _MASS_FIRST = re.compile(r"(\d+)-?([A-Za-z]{1,2})")

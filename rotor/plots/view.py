@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
+
+from rotor.frozen import dataclass
 
 Limits = tuple[float, float]
 

@@ -10,12 +10,13 @@ too, with one parameter: H itself.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.quantum.basis.state_elements import StateElements, StateTerms
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of

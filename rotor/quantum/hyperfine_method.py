@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.checks import require_choice, require_positive
+from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Used
 

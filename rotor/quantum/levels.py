@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.quantum.level_weights import weights_of_quanta
 from rotor.quantum.quanta import labels as texts_of_labels
 from rotor.quantum.wang.basis import Part, WangBlock

@@ -13,7 +13,6 @@ more products for the states that are asked for. `blocks` finds the blocks of an
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -22,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size, symmetric_from_lower
+from rotor.frozen import dataclass
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
 _LIKE = 1.5  # sizes of blocks that stand side by side

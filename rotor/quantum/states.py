@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from rotor.frozen import dataclass
 from rotor.quantum.wang.j_operators import JOperator
 from rotor.tops.operators import Operators, added
 from rotor.tops.spins.spin_weights import SpinWeights

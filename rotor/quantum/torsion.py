@@ -12,13 +12,14 @@ rotation of the whole molecule; without it (K = 0) this is the torsion alone. E(
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 
 WAVES = 12  # |k| of the free-rotor functions: m up to 36 for a threefold top, exact to 1e-12 of a barrier of 1000 F below v_t = 4
 

@@ -8,8 +8,9 @@ import shutil
 import string
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
+
+from rotor.frozen import dataclass
 
 if TYPE_CHECKING:
     from rotor.table import Table as Columns

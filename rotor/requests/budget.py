@@ -14,8 +14,10 @@ import math
 import re
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
+
+from rotor.frozen import dataclass
 
 NOT_ESTIMATED = "not estimated"
 ROUNDING = 8 * sys.float_info.epsilon  # of an eigenvalue, relative to the largest: a few units in the last place

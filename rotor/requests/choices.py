@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from rotor.frozen import dataclass
 from rotor.requests.field import REQUIRED, Field, all_fields, undeclared
 from rotor.requests.fill import Entries, equal, read_instance, written_fields
 from rotor.requests.readers import InsideError, Reader

@@ -12,11 +12,12 @@ request, the names in errors, and the reference page. A field that is made from 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from dataclasses import field as dataclass_field
 from functools import cache
 from typing import Any
 
+from rotor.frozen import dataclass
 from rotor.requests.readers import InsideError, Reader
 
 MOLECULE, SPINS, CONDITIONS, OBSERVABLES, NUMERICS, OUTPUT, PICTURE = PANELS = (

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from rotor.frozen import dataclass
 from rotor.requests.field import REQUIRED, Field, Part, all_fields, declared_fields, names_of, parts_of
 
 

@@ -3,8 +3,8 @@
     relative_error: float = declared(1e-6, Quantity(above=0), "Of Q, U and C_v", "numerics.relative_error", knob=Knob(
         (1e-1, 1e-2, 1e-3), 1e-13, (Measure("Q", "%", error_of_q),), "sums to {:g}", least=1e-13))
 
-A sweep computes answers at each step and compares them with the finest value. An accuracy goal either sets a field whose value bounds
-the error, or is reached by trying values, coarsest first. `Numerics`, beside the request, holds the knobs of a verb that are no fields,
+A sweep computes answers at each step and compares them with the finest value. An accuracy takes the coarsest setting whose estimated
+error is within it. `Numerics`, beside the request, holds the knobs of a verb that are no fields,
 and its plan.
 """
 
@@ -12,10 +12,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
-from rotor.requests.field import Field, all_fields, changed_fields
+from rotor.frozen import dataclass
+from rotor.requests.field import Field, all_fields
+from rotor.requests.fill import Entries
 
 NOTHING_CHEAPER = "exact: nothing cheaper"
 LOOSEST = ", nothing cheaper: the loosest there is"
@@ -47,7 +49,8 @@ class Sweep:
 
     name: the key of the scene. title: in words. measures: errors of each answer. settings: coarsest first. reference: the request that
     errors are measured against; None if the true value is known. against: the reference in words. answer: computes a request; its
-    processor time is the cost of a setting. repeats: number of calculations in one answer; reported times are for one of them.
+    processor time is the cost of a setting. repeats: number of calculations in one answer; reported times are for one of them. series:
+    whether the settings are values of one quantity, which a picture joins.
     """
 
     name: str
@@ -58,6 +61,7 @@ class Sweep:
     answer: Callable[[Any], Any]
     repeats: int = 1
     title: str = ""
+    series: bool = True
 
 
 @dataclass(frozen=True)
@@ -70,18 +74,39 @@ class Sweeps:
 
 @dataclass(frozen=True)
 class Choice:
-    """Settings chosen for an accuracy. request: with these settings. how: the settings in words. error: estimated during the search,
-    in the unit of the accuracy; 0 if only the answer states it."""
+    """Settings for an accuracy, chosen or tried.
+
+    request: with these settings. how: the settings in words. error: estimated during the search, in the unit of the accuracy; 0 if only
+    the answer states it; a function if its estimate takes a run: a plan does not call it. answer: with these settings, if the search
+    computed it. confirming: cost of the estimate of an error in a run, in runs.
+    """
 
     request: Any
     how: str
-    error: float = 0.0
+    error: float | Callable[[], float] = 0.0
+    answer: Any = None
+    confirming: float = 0.0
+
+    @property
+    def estimate(self) -> float:
+        """The error; 0 if only a run estimates it."""
+        return 0.0 if callable(self.error) else self.error
 
 
-def stated(answer: Any) -> float:
-    """The numerical error of an answer; infinite if it is not estimated."""
-    error = answer.errors.numerical
-    return float("inf") if error is None else float(error)
+@dataclass(frozen=True)
+class Sought:
+    """Where a search for settings begins.
+
+    request: with the settings of earlier knobs. accuracy: in its unit. compute: answers a request. error: of an answer. entries: as
+    entered. answer: of the knob before, if it was computed.
+    """
+
+    request: Any
+    accuracy: float
+    compute: Answering
+    error: Callable[[Any], float]
+    entries: Entries
+    answer: Any = None
 
 
 def with_field(request: Any, name: str, value: Any) -> Any:
@@ -104,10 +129,12 @@ class Knob:
     least: finest possible value of a field that bounds the error in the unit of the accuracy; None for other fields.
     change: returns the request with a value. prepare: returns the request of a sweep. used: whether the knob affects a request.
     tried: values tried for an accuracy, coarsest first, where no value bounds the error.
+    search: settings for an accuracy, coarsest first, each with its estimated error, where they are more than such values.
     title: in words, for pictures. key: of a knob that is declared beside the fields. attribute: of the request, which it changes, or
     value: of a request.
     reference: returns the request of the reference if `change` to the finest value does not; it returns None if the true value is known.
     answer: computes a request, by default as the verb does. repeats: number of calculations in one answer. label: formats a value.
+    series: whether the values are those of one quantity.
     """
 
     steps: Iterable[Any] | Callable[[Any], Iterable[Any]]
@@ -119,6 +146,7 @@ class Knob:
     prepare: Callable[[Any], Any] = lambda request: request
     used: Callable[[Any], bool] = lambda request: True
     tried: tuple[Any, ...] = ()
+    search: Callable[[Sought], Iterable[Choice]] | None = None
     title: str = ""
     key: str = ""
     attribute: str = ""
@@ -127,6 +155,7 @@ class Knob:
     answer: Answering | None = None
     repeats: int = 1
     label: Callable[[Any], str] = "{:g}".format
+    series: bool = True
 
     def sweep(self, field: Field | None, request: Any, answer: Answering) -> Sweep:
         """The settings of this knob for a request, including the request's value. field: None for a knob that is no field."""
@@ -155,50 +184,30 @@ class Knob:
             self.answer or answer,
             self.repeats,
             self.title or in_words(key),
+            self.series,
         )
 
-    def choose(self, field: Field, request: Any, accuracy: float, answer: Answering) -> Choice:
-        """Set the field to the accuracy, or to the first tried value that reaches it.
-
-        Raises ValueError if the accuracy is finer than possible, or if the field was set as well.
-        """
-        refuse_set(request, field.name)
-        if self.tried:
-            return self.search(field.name, field.last, request, accuracy, answer)
-        assert self.least is not None
-        if accuracy < self.least:
-            raise ValueError(f"accuracy: {accuracy:g}: the finest that is possible here is {self.least:g}")
-        return Choice(self.change(request, field.name, accuracy), f"{field.last} {accuracy:g}")
-
-    def search(
-        self,
-        name: str,
-        key: str,
-        request: Any,
-        accuracy: float,
-        answer: Answering,
-        error: Callable[[Any], float] = stated,
-    ) -> Choice:
-        """The request with the first tried value whose answer reaches the accuracy; else with the last, which a run then refuses.
-
-        name: of the field that `change` sets. error: of an answer.
-        """
-        for value in self.tried:
-            changed = self.change(request, name, value)
-            if error(answer(changed)) <= accuracy:
-                break
-        return Choice(changed, f"{in_words(key)} {value:g}" + (LOOSEST if value == self.tried[0] else ""))
+    def choices(self, sought: Sought, field: Field | None = None) -> Iterator[Choice]:
+        """Settings for an accuracy, coarsest first. field: that `change` sets."""
+        if self.search is not None:
+            yield from self.search(sought)
+            return
+        name, key = ("", self.key) if field is None else (field.name, field.key)
+        words = in_words(key)
+        if self.least is not None:
+            value = max(sought.accuracy, self.least)
+            error = self.least if sought.accuracy < self.least else 0.0
+            yield Choice(self.change(sought.request, name, value), f"{words} {value:g}", error)
+        for number, value in enumerate(self.tried):
+            changed = self.change(sought.request, name, value)
+            answer = sought.compute(changed)
+            how = f"{words} {value:g}" + ("" if number else LOOSEST)
+            yield Choice(changed, how, sought.error(answer), answer)
 
 
 def in_words(key: str) -> str:
     """The last part of a key in words."""
     return key.partition(",")[0].rpartition(".")[2].replace("_", " ")
-
-
-def refuse_set(request: Any, *names: str) -> None:
-    """Raise ValueError if a field that the accuracy chooses was also set."""
-    for field in changed_fields(request, names):
-        raise ValueError(f"accuracy and {field.key}: give one of them")
 
 
 def knobs_of_fields(request: Any) -> Iterator[tuple[Field, Knob]]:

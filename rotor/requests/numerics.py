@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
-from rotor.requests.knob import Choice, Knob, stated
-from rotor.requests.plan import Plan
+from rotor.frozen import dataclass
+from rotor.requests.fill import Entries
+from rotor.requests.knob import Knob
+from rotor.requests.plan import Cost
 
 
 def numerical_error(answer: Any) -> float:
@@ -24,27 +26,16 @@ def numerical_error(answer: Any) -> float:
 class Goal:
     """An accuracy goal in one unit.
 
-    of: the observable in words. error: the error of an answer. knob: whose values are tried; without it, the knob of a field chooses.
-    choose: returns the settings from (scene, request, accuracy), where the accuracy determines them without a search.
+    of: the observable in words. error: of an answer. knobs: set one after the other; without them, the first knob of a field that can be
+    set. sets: keys of the fields that they set. unfit: why the goal does not suit a request. prepare: returns the request of the search.
     """
 
     of: str = ""
-    choose: Callable[[Any, Any, float], Choice] | None = None
     error: Callable[[Any], float] = numerical_error
-    knob: Knob | None = None
-
-    @property
-    def by_field(self) -> bool:
-        """Whether the knob of a field chooses."""
-        return self.choose is None and self.knob is None
-
-    def chosen(self, scene: Any, request: Any, accuracy: float, answer: Callable[[Any], Any]) -> Choice:
-        """The settings for an accuracy, where no knob of a field chooses. answer: computes a request."""
-        if self.choose is not None:
-            return self.choose(scene, request, accuracy)
-        assert self.knob is not None
-        error = stated if self.error is numerical_error else self.error
-        return self.knob.search("", self.knob.key, request, accuracy, answer, error)
+    knobs: tuple[Knob, ...] = ()
+    sets: tuple[str, ...] = ()
+    unfit: Callable[[Any], str] = lambda request: ""
+    prepare: Callable[[Any], Any] = lambda request: request
 
 
 @dataclass(frozen=True)
@@ -52,19 +43,18 @@ class Numerics:
     """Accuracy goals, sweeps and plan of a verb.
 
     goals: by unit. bare: whether an accuracy may have no unit; it then belongs to the goal "" or, without one, to the first goal.
-    percent: the unit that a percentage means in a scene.
+    percent: the unit that a percentage means, from the entries.
     knobs: that are no fields. prepare: returns the request for their sweeps. remarks: approximations without a sweep, with the reason.
-    plan: from a request; the default is the plan of a run.
-    planned: plan and settings from (scene, request, accuracy in the first unit), where a search would take as long as a run.
+    describe: fields of a plan from a request and an answer that its cost has. cost: of a request; None: that of a complete run.
     rounding: error of the highest level from rounding, in MHz.
     """
 
     goals: Mapping[str, Goal] = field(default_factory=lambda: {"MHz": Goal()})
     bare: bool = True
-    percent: Callable[[Any], str] = lambda scene: "%"
+    percent: Callable[[Entries], str] = lambda entries: "%"
     knobs: tuple[Knob, ...] = ()
     prepare: Callable[[Any], Any] = lambda request: request
     remarks: Callable[[Any], Iterable[str]] = lambda request: ()
-    plan: Callable[[Any], Plan] | None = None
-    planned: Callable[[Any, Any, float], tuple[Plan, Choice | None]] | None = None
+    describe: Callable[[Any, Any], Mapping[str, Any]] | None = None
+    cost: Callable[[Any], Cost] | None = None
     rounding: Callable[[Any], float] | None = None

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, field
 from functools import cached_property, partial
 from typing import Any, TypeVar
+
+from rotor.frozen import dataclass
 
 LONG_SEARCH = 10.0  # seconds; a shorter search is repeated, since its first run includes imports and compilation
 T = TypeVar("T")
@@ -75,11 +77,20 @@ class Plan:
         return asdict(self) | {"parts": dict(self.parts), "counts": dict(self.counts)}
 
 
-def plan_complete_run(kind: str, call: Callable[[], Any], describe: Callable[[Any], Mapping[str, Any]]) -> Plan:
-    """Plan from a complete run of the call; `describe` returns the other fields of the plan from its answer."""
+@dataclass(frozen=True)
+class Cost:
+    """Cost of a request. seconds: processor time. memory_mb: peak. answer: of the request, or of a shorter one that describes it."""
+
+    seconds: float
+    memory_mb: float
+    answer: Any = None
+
+
+def whole_cost(call: Callable[[], Any]) -> Cost:
+    """The cost of a complete run of a call."""
     answers: list[Any] = []
     seconds = timed(lambda: answers.append(call()))
-    return Plan(kind, seconds=seconds, memory_mb=peak_mb(call), **describe(answers[-1]))
+    return Cost(seconds, peak_mb(call), answers[-1])
 
 
 @dataclass(frozen=True)
@@ -105,6 +116,11 @@ class Growth:
     def memory_mb(self) -> float:
         """Peak memory."""
         return self.extrapolated(peak_mb, self.memory)
+
+    @property
+    def cost(self) -> Cost:
+        """Both."""
+        return Cost(self.seconds, self.memory_mb)
 
     @cached_property
     def enough(self) -> tuple[int, int]:

@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from rotor.frozen import dataclass
 from rotor.units import LEAST_KELVIN, MOST_KELVIN, parse_grid, parse_quantity, parse_range
 
 MOST_WHOLE = 10**15  # up to here a double holds every whole number

@@ -20,7 +20,7 @@ def panels_of(table: WorkPrecision) -> list[Panel]:
         label = f"{error_of} ({unit})" if unit else error_of
         grouped.setdefault((name, label), {})[variant or name] = points_of(rows)
     return [
-        Panel(table.titles.get(name, name), label, curves, joined=name != "effects.hyperfine_method")
+        Panel(table.titles.get(name, name), label, curves, joined=name not in table.methods)
         for (name, label), curves in grouped.items()
     ]
 

@@ -14,15 +14,16 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field, replace
 from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.frozen import dataclass
 from rotor.requests.knob import Setting, Sweep, Sweeps, knobs_of_fields
-from rotor.scenes.calculation import Calculation
+from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import Scene
 from rotor.table import Table
 
@@ -54,7 +55,8 @@ class WorkPrecision(Table):
     """Errors and times of all settings of all knobs.
 
     kind: of the scene. rows: coarse settings first. references: what errors are measured against, by knob. remarks: approximations
-    without a knob, and sweeps left out, with the reason. titles: knobs in words, by the key of each.
+    without a knob, and sweeps left out, with the reason. titles: knobs in words, by the key of each. methods: knobs whose settings are
+    no series.
     """
 
     kind: str
@@ -62,6 +64,7 @@ class WorkPrecision(Table):
     references: Mapping[str, str]
     remarks: tuple[str, ...] = ()
     titles: Mapping[str, str] = field(default_factory=dict)
+    methods: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -97,10 +100,9 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
     """
     if scene.sweep:
         raise ValueError("sweep: the knobs of one point are swept; give the scene without its sweep")
-    calculation = Calculation(scene, folder)
-    request = calculation.request()
-    choice = calculation.choice(request)
-    request, verb = request if choice is None else choice.request, calculation.verb
+    calculation = scene_calculation(scene, folder)
+    verb, choice = calculation.verb, calculation.choice
+    request = calculation.request if choice is None else choice.request
     sweeps = [knob.sweep(field, request, verb.compute) for field, knob in knobs_of_fields(request)]
     numerics = verb.load_numerics()
     prepared = numerics.prepare(request)
@@ -150,12 +152,13 @@ def work_precision(
     """
     knobs, left = knobs_of(scene, folder), limit_seconds
     titles = {knob.name.partition(",")[0]: knob.title for knob in knobs.knobs}
-    table = WorkPrecision(scene.kind, (), {}, knobs.remarks, titles)
+    methods = frozenset(knob.name for knob in knobs.knobs if not knob.series)
+    table = WorkPrecision(scene.kind, (), {}, knobs.remarks, titles, methods)
     for number, knob in enumerate(knobs.knobs):
         rows, against, remarks, spent = sweep(knob, left / (len(knobs.knobs) - number), progress)
         left = max(left - spent, 0.0)
         references = {**table.references, f"{knob.name}: {knob.measures[0].of}": against}
-        table = WorkPrecision(scene.kind, (*table.rows, *rows), references, (*table.remarks, *remarks), titles)
+        table = replace(table, rows=(*table.rows, *rows), references=references, remarks=(*table.remarks, *remarks))
         on_knob(table)
     return table
 

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
-import msgspec
-
+from rotor.requests.accuracy import Accuracy
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
-from rotor.requests.plan import LONG_SEARCH, Plan, plan_complete_run, timed
-from rotor.scenes.calculation import Calculation, NoResultError
-from rotor.scenes.outputs import checked_paths
+from rotor.requests.plan import LONG_SEARCH, Plan, timed, whole_cost
+from rotor.scenes.outputs import Where, checked_paths
+from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import Scene
-from rotor.verbs.verb import verb_of
+from rotor.verbs.calculation import Calculation, NoResultError
+from rotor.verbs.verb import Verb
 
 SHARE = 0.1  # of the model or data error: a smaller numerical error does not matter
 SHORT_RUN, SMALL_MB = 1.0, 500.0  # seconds and memory up to which a scene is run for its plan
 
 
-def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".", out: str | os.PathLike[str] = ".") -> Plan:
+def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
     """The plan of a scene. A scene of at most a second is also run, so that its errors are found.
 
     Parameters
@@ -50,44 +50,42 @@ def plan_of(scene: Scene, folder: str | os.PathLike[str] = ".", out: str | os.Pa
     if scene.sweep:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
     checked_paths(scene, out)
-    calculation = Calculation(scene, folder)
-    request = calculation.request()
+    calculation = scene_calculation(scene, folder)
     with calculation.verb.naming("key"):
-        plan, choice = _plan(calculation, request)
+        plan, choice = _plan(calculation)
         if plan.seconds <= SHORT_RUN and plan.memory_mb <= SMALL_MB:
-            plan = _with_outcome(plan, calculation, request, choice)
+            plan = _with_outcome(plan, calculation, choice)
     return plan
 
 
-def _with_outcome(plan: Plan, calculation: Calculation, request: Any, choice: Choice | None) -> Plan:
+def _with_outcome(plan: Plan, calculation: Calculation, choice: Choice | None) -> Plan:
     """The plan with a warning if the run has no result, or with coarser settings that would do; ValueError as in a run."""
-    scene: Any = calculation.scene
-    bare = replace(calculation, scene=msgspec.structs.replace(scene, outputs=type(scene.outputs)()))
+    bare = replace(calculation, work=replace(calculation.work, files={}))
     try:
-        answer = bare.answer(request if choice is None else choice.request)
+        answer = bare.answer(calculation.request if choice is None else choice.request, choice).answer
     except NoResultError as reason:
         return replace(plan, parts=(*plan.parts, ("warning", f"no result: {reason}")))
-    calculation.reached(answer, choice)
-    enough = "" if choice is not None else coarser_settings(scene, request, getattr(answer, "errors", None))
+    enough = "" if choice is not None else coarser_settings(calculation, getattr(answer, "errors", None))
     return replace(plan, parts=(*plan.parts, ("enough", enough))) if enough else plan
 
 
-def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> str:
+def coarser_settings(calculation: Calculation, errors: ErrorBudget | None) -> str:
     """Advice to use an accuracy of a tenth of the model or data error; empty if the settings are no finer than that.
 
     Only for kinds whose accuracy is set by one field, and if the scene leaves that field out.
     """
-    from rotor.scenes.accuracy import chosen
-
-    goals = verb_of(scene.kind).load_numerics().goals
-    if errors is None or errors.numerical is None or errors.unit not in goals or not goals[errors.unit].by_field:
+    numerics, entries = calculation.verb.load_numerics(), calculation.entries
+    goals = numerics.goals
+    if errors is None or errors.numerical is None or errors.unit not in goals or goals[errors.unit].knobs:
         return ""
     uncertain = max((errors.model, errors.data), key=lambda term: term.value or 0.0)
     goal = float(f"{SHARE * (uncertain.value or 0.0):.2g}")
     if not 0.0 < goal > errors.numerical:
         return ""
     try:
-        choice = chosen(msgspec.structs.replace(scene, accuracy=goal), request)
+        choice = Accuracy(goal, errors.unit, False, numerics).chosen(
+            calculation.request, entries, calculation.verb.compute
+        )
     except ValueError:  # the scene sets the field
         return ""
     if choice.how == NOTHING_CHEAPER:
@@ -96,46 +94,40 @@ def coarser_settings(scene: Scene, request: Any, errors: ErrorBudget | None) -> 
     return f'accuracy = "{enough}" would do, a tenth of {size}: {uncertain.source}'
 
 
-def _plan(calculation: Calculation, request: Any) -> tuple[Plan, Choice | None]:
-    """The plan, and the settings for the accuracy of the scene; None without an accuracy, or if only the run finds the settings."""
-    from rotor.scenes.accuracy import accuracy_of, unit_of
-
-    scene = calculation.scene
-    goal, numerics = accuracy_of(scene), verb_of(scene.kind).load_numerics()
+def _plan(calculation: Calculation) -> tuple[Plan, Choice | None]:
+    """The plan, and the settings for the accuracy of the scene; None without an accuracy."""
+    verb, request, goal = calculation.verb, calculation.request, calculation.accuracy
     if goal is None:
-        return plan_of_request(scene.kind, request), None
-    if numerics.planned is not None and unit_of(scene) == next(iter(numerics.goals)):
-        return numerics.planned(scene, request, goal)
-    choices: list[Choice | None] = []
-    search = timed(lambda: choices.append(calculation.choice(request)), LONG_SEARCH)
+        return plan_of_request(verb, request), None
+    numerics, choices = goal.numerics, list[Choice]()
+    choose = partial(goal.chosen, request, calculation.entries, verb.compute, confirmed=False)
+    search = timed(lambda: choices.append(choose()), LONG_SEARCH)
     choice = choices[-1]
-    assert choice is not None  # the scene has an accuracy
-    plan, parts = plan_of_request(scene.kind, choice.request), [("accuracy", choice.how)]
+    plan, parts = plan_of_request(verb, choice.request), [("accuracy", choice.how)]
     if numerics.rounding is not None:
         parts.append(("orders of distortion", "all that the constants have: fewer save milliseconds at the most"))
-        parts.append(
-            ("rounding", f"{_checked(numerics.rounding(choice.request), goal, choice):.1e} MHz of the highest energy")
-        )
-    return replace(plan, parts=(*plan.parts, *parts), seconds=plan.seconds + search), choice
+        rounding = _checked(numerics.rounding(choice.request), goal, choice)
+        parts.append(("rounding", f"{rounding:.1e} MHz of the highest energy"))
+    return replace(plan, parts=(*plan.parts, *parts), seconds=(1.0 + choice.confirming) * plan.seconds + search), choice
 
 
-def plan_of_request(kind: str, request: Any) -> Plan:
-    """The plan of a request; from a complete run if its kind declares no plan."""
-    verb = verb_of(kind)
-    if plan := verb.load_numerics().plan:
-        return plan(request)
-    return plan_complete_run(
-        kind, lambda: verb.compute(request), lambda answer: {"counts": {"rows": len(verb.table(answer))}}
+def plan_of_request(verb: Verb, request: Any) -> Plan:
+    """The plan of a request: its cost, and what its verb says of it."""
+    numerics = verb.load_numerics()
+    cost = whole_cost(lambda: verb.compute(request)) if numerics.cost is None else numerics.cost(request)
+    described = (
+        {"counts": {"rows": len(verb.table(cost.answer))}}
+        if numerics.describe is None
+        else numerics.describe(request, cost.answer)
     )
+    return Plan(verb.name, seconds=cost.seconds, memory_mb=cost.memory_mb, **described)
 
 
-def _checked(rounding: float, goal: float, choice: Choice) -> float:
+def _checked(rounding: float, goal: Accuracy, choice: Choice) -> float:
     """Rounding error of the energies at the highest J in MHz; ValueError if it clearly exceeds the requested accuracy.
 
     The factor of 2: a run omits levels beyond the reach of the distortion constants, so that its rounding may be less.
     """
-    from rotor.scenes.accuracy import out_of_reach
-
-    if rounding > 2.0 * goal:
-        raise out_of_reach(goal, rounding, "MHz", choice.how)
+    if goal.unit == "MHz" and rounding > 2.0 * goal.value:
+        raise goal.out_of_reach(rounding, choice.how)
     return rounding

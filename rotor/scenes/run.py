@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import os
-import time
 from concurrent.futures import Executor
 from contextlib import ExitStack
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+
+import msgspec
 
 from rotor.formats.atomic_write import resolved
-from rotor.scenes.calculation import Calculation
-from rotor.scenes.outputs import checked_paths
+from rotor.requests.fill import Entries, flattened
+from rotor.scenes.outputs import Where, checked_paths, paths_of
 from rotor.scenes.scene import Scene, SceneResult
+from rotor.scenes.scene_file import scene_text
 from rotor.temporary import locked_file
-
-if TYPE_CHECKING:
-    from rotor.scenes.choice import Reached
+from rotor.verbs.calculation import Calculation, Outcome
+from rotor.verbs.scene_tables import keyed
+from rotor.verbs.verb import Work, verb_of
 
 
 def run_scene(
     scene: Scene,
     *,
-    folder: str | os.PathLike[str] = ".",
-    out: str | os.PathLike[str] = ".",
+    folder: Where = ".",
+    out: Where = ".",
     executor: Executor | None = None,
 ) -> SceneResult:
     """Run one scene.
@@ -60,29 +59,28 @@ def run_scene(
     with ExitStack() as stack:
         for path in sorted(set(map(resolved, files))):
             stack.enter_context(locked_file(path))
-        calculation = Calculation(scene, folder, out)
-        request = calculation.request()
-        start, choice = time.perf_counter(), calculation.choice(request)
-        request = request if choice is None else choice.request
-        answer = calculation.answer(request, executor)
-        seconds = time.perf_counter() - start
-        outcome = calculation.reached(answer, choice)
-        _write(calculation, answer, outcome)
-        return SceneResult(scene, request, answer, calculation.verb.table(answer), files, seconds, outcome)
+        outcome = scene_calculation(scene, folder, out).run(executor)
+        _write(outcome)
+    return SceneResult.extending(outcome, scene=scene, files=files)
 
 
-def _write(calculation: Calculation, answer: Any, outcome: Reached | None) -> None:
-    """Write all files together, except those written during the calculation; without files, nothing is prepared."""
-    pending = {name: paths for name, paths in calculation.files.items() if name not in calculation.growing}
-    if not pending:
-        return
-    from rotor.formats.atomic_write import write_together
-    from rotor.scenes.scene_file import scene_text
+def scene_calculation(scene: Scene, folder: Where = ".", out: Where = ".") -> Calculation:
+    """The calculation of a scene. folder: of the files that it reads. out: of those that it writes."""
+    verb = verb_of(scene.kind)  # no other verb is imported
+    tables = verb.subject.tables(msgspec.to_builtins(scene))
+    entries = Entries(flattened(tables, [*keyed(verb), *verb.subject.tables_read]), "key")
+    files = paths_of(scene, out)
+    provenance = {"scene": scene_text(scene)} if files else {}
+    work = Work(shown=verb.read_shown(entries), files=files, provenance=provenance, from_scene=True)
+    return Calculation(verb, entries, work, folder, getattr(scene, "accuracy", None))
 
-    provenance: dict[str, Any] = {"scene": scene_text(calculation.scene)}
-    if outcome is not None:
-        provenance["accuracy"] = asdict(outcome)
-    if (budget := getattr(answer, "errors", None)) is not None:
-        provenance["errors"] = budget.as_json()
-    writers = calculation.writers(answer, provenance)
-    write_together({path: writers[name] for name, paths in pending.items() for path in paths})
+
+def _write(outcome: Outcome) -> None:
+    """Write all files of a scene together, except those written during the calculation; without files, nothing is prepared."""
+    files = outcome.calculation.work.files
+    growing = {output.name for output in outcome.verb.outputs if output.grows}
+    if pending := files.keys() - growing:
+        from rotor.formats.atomic_write import write_together
+
+        writers = {"json": lambda path: outcome.write_table(outcome.table, path), **outcome.writers}
+        write_together({path: writers[name] for name in files if name in pending for path in files[name]})

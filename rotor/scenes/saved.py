@@ -6,19 +6,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rotor.requests.fill import Entries, nested
+from rotor.requests.fill import nested
 from rotor.scenes.scene import KINDS
 from rotor.scenes.scene_file import scene_of
+from rotor.verbs.calculation import Outcome
 from rotor.verbs.scene_tables import keyed
-from rotor.verbs.verb import Verb
 
 
-def saved_scene(
-    verb: Verb, request: Any, subject: Any, folder: Path, outputs: Mapping[str, Any], entries: Entries
-) -> Any:
-    """The scene of an answered request. outputs: files by name. entries: may hold settings of these files."""
+def saved_scene(outcome: Outcome, folder: Path, outputs: Mapping[str, Any]) -> Any:
+    """The scene of an answered request, in a folder. outputs: files by name; their settings are among the inputs."""
+    verb, entries = outcome.verb, outcome.calculation.entries
     flat = {
-        **verb.saved(request, subject, folder),
+        **verb.saved(outcome.request, outcome.subject, folder),
         **{f"outputs.{name}": _plain(value) for name, value in outputs.items()},
     }
     for key, field in keyed(verb).items():

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -18,15 +17,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import msgspec
 from msgspec import Struct, field
 
-from rotor.scenes.choice import Accuracy
+from rotor.frozen import dataclass
+from rotor.requests.accuracy import Stated
+from rotor.verbs.calculation import Outcome
 from rotor.verbs.scene_tables import entries_before, tables_of
 from rotor.verbs.tables import described
 from rotor.verbs.verb import SCENE_VERBS, verb_of
 
 if TYPE_CHECKING:
     from rotor.requests.plan import Plan
-    from rotor.scenes.choice import Reached
-    from rotor.table import Table
 
 SCHEMA = 1
 
@@ -72,18 +71,12 @@ class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_
         return plan
 
 
-@dataclass(frozen=True)
-class SceneResult:
-    """Result of a scene. request, answer: objects of the library. table: the rows. files: written files. seconds: time of the
-    calculation. reached: the error, if the scene requests an accuracy."""
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class SceneResult(Outcome):
+    """Result of a scene. files: written files."""
 
     scene: Scene
-    request: Any
-    answer: Any
-    table: Table
     files: tuple[Path, ...]
-    seconds: float
-    reached: Reached | None = None
 
     def _repr_html_(self) -> str:
         """The rows and their errors, for notebooks."""
@@ -99,7 +92,7 @@ def _scene_class(kind: str) -> Any:
     entries = entries_before(verb)
     if verb.accuracy:
         meta = described(verb.accuracy, verb.accuracy_example)
-        entries.append(("accuracy", Annotated[Accuracy, meta], None))
+        entries.append(("accuracy", Annotated[Stated, meta], None))
     entries += [(table, structure, structure()) for table, structure in tables_of(verb).items()]
     scene = msgspec.defstruct(
         f"{kind.capitalize()}Scene", entries, bases=(Scene,), frozen=True, kw_only=True, tag=kind, tag_field="kind",

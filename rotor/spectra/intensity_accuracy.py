@@ -6,13 +6,13 @@ intensity of the decade before (docs/accuracy.md), so that lines below the finer
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
 from rotor.requests.budget import ROUNDING
 from rotor.requests.field import declared_fields
-from rotor.requests.knob import NOTHING_CHEAPER, Choice
+from rotor.requests.knob import Choice, Sought
 
 SPARE = 1.25
 MOST_DECADES = 12  # largest lowering of a cut
@@ -39,22 +39,21 @@ class Cut:
     left_out: Callable[[Any, Any], float]
     answer: Callable[[Any], Any]
 
-    def choose(self, scene: Any, request: Any, accuracy: float) -> Choice:
-        """The cut unchanged if weaker lines hold less than the accuracy; else the highest cut, in decades, for which they do.
+    def choices(self, sought: Sought) -> Iterator[Choice]:
+        """The cut, then lower ones by decades, with the intensity that weaker lines hold; of a cut that the user set, that cut alone.
 
-        A higher cut would be cheaper but leave out requested lines. A cut set by the user is not changed.
+        A higher cut would be cheaper but leave out requested lines. No lower cut helps if the intensities of lines are not good enough.
         """
-        structure: Any = type(request)
-        field, cut = declared_fields(structure)[self.name], getattr(request, self.name)
+        structure: Any = type(sought.request)
+        field, cut = declared_fields(structure)[self.name], getattr(sought.request, self.name)
         if cut is None:
-            return Choice(request, NOTHING_CHEAPER)
+            return
         for decades in range(MOST_DECADES + 1 if cut == field.default else 1):
-            chosen = replace(request, **{self.name: self.lower(cut, decades)})
+            chosen = replace(sought.request, **{self.name: self.lower(cut, decades)})
             answer = self.answer(chosen)
             finer = self.answer(replace(chosen, **{self.name: self.lower(cut, decades + FINER)}))
             missing, line_error = SPARE * self.left_out(answer, finer), intensity_error(answer)
-            error = missing + line_error
-            if error <= accuracy or line_error > accuracy:
-                break
-        how = f"{field.last} {getattr(chosen, self.name):g}, weaker lines hold {missing:.1g} %"
-        return Choice(chosen, how, error)
+            how = f"{field.last} {getattr(chosen, self.name):g}, weaker lines hold {missing:.1g} %"
+            yield Choice(chosen, how, missing + line_error)
+            if line_error > sought.accuracy:
+                return

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.estimates.accuracy import (
-    choose_spins,
     distortion,
     energies_like,
     hyperfine,
@@ -21,10 +20,10 @@ from rotor.quantum.estimates.left_out import neglected_in_levels
 from rotor.quantum.estimates.plans import SHORT_J, effect_texts, level_parts, plan_fields
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Growth, LeftOut, Plan, largest_first, plan_complete_run
+from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
 from rotor.spectra.intensity_accuracy import Cut, intensity_error
-from rotor.spectra.raman_request import SECTION, answer_raman, section_left_out
-from rotor.spectra.request import INTENSITY, answer_spectrum, intensity_left_out
+from rotor.spectra.raman_request import RELATIVE_CUT, SECTION, answer_raman, section_left_out
+from rotor.spectra.request import CUT, INTENSITY, answer_spectrum, intensity_left_out
 from rotor.spectra.widths import doppler, pressure_width
 
 if TYPE_CHECKING:
@@ -74,21 +73,24 @@ def _knobs(of: str, lost: Measure, error: Callable[[Any, Any], float]) -> tuple[
 def _line_numerics(
     names: tuple[str, str],
     cut: Cut,
+    weakest: Knob,
     knobs: tuple[Knob, ...],
-    plan: Callable[[Any], Plan],
+    describe: Callable[[Any, Any], Mapping[str, Any]],
+    cost: Callable[[Any], Cost] | None,
     rounding: Callable[[Any], float],
 ) -> Numerics:
-    """Numerics of a list of lines; names of its frequencies and of its intensities."""
+    """Numerics of a list of lines. names: of frequencies and intensities. weakest: knob of the cut. knobs: the last is that of spins."""
     frequencies, intensities = names
     return Numerics(
         {
-            "MHz": Goal(frequencies, choose_spins, list_error),
-            "%": Goal(intensities, cut.choose, intensity_error),
+            "MHz": Goal(frequencies, list_error, knobs[-1:]),
+            "%": Goal(intensities, intensity_error, (replace(weakest, search=cut.choices),)),
         },
         knobs=knobs,
         prepare=lambda request: replace(request, jmax=cut.answer(request).lines.jmax),
         remarks=lambda request: reason_of_no_distortion_sweep(request.top),
-        plan=plan,
+        describe=describe,
+        cost=cost,
         rounding=rounding,
     )
 
@@ -147,23 +149,25 @@ def _flipped(species: str, flip: tuple[bool, bool]) -> str:
     )
 
 
-def plan_spectrum(request: Any) -> Plan:
-    """The plan of a line list."""
+def spectrum_cost(request: Any) -> Cost:
+    """The cost of a line list, from lists to lower J."""
+    jmax, power = _spectrum_jmax(request)[0], 3 if request.top.kind == "asymmetric" else 1
+    return Growth(
+        lambda j: answer_spectrum(replace(request, jmax=j)),
+        jmax,
+        (max(SHORT_J[0], jmax // 3), max(SHORT_J[1], jmax // 2)),
+        lambda j: (j + 1.0) ** power,
+        lambda j: (j + 1.0) ** (1 if request.top.kind == "linear" else 2),
+    ).cost
+
+
+def describe_spectrum(request: Any, _: Any) -> dict[str, Any]:
+    """What a line list does."""
     from rotor.quantum.estimates.limits import populated_j
 
     top, kelvin = request.top, request.temperature_k
     jmax, why = _spectrum_jmax(request)
     j = min(populated_j(top, kelvin), max(jmax, 1))
-    cost = Growth(
-        lambda j: answer_spectrum(replace(request, jmax=j)),
-        jmax,
-        (max(SHORT_J[0], jmax // 3), max(SHORT_J[1], jmax // 2)),
-        # levels of an asymmetric top cost the cube of J, of closed forms its first power
-        lambda j: (j + 1.0) ** (3 if top.kind == "asymmetric" else 1),
-        lambda j: (j + 1.0) ** (1 if top.kind == "linear" else 2),
-    )
-    seconds = cost.seconds
-    lines = allowed_lines(top, jmax)  # after the calibration, which rejects an impossible J
     _, b, c = top.rotational_constants_mhz
     pressure = request.layer.pressure_bar if request.layer else None
     lowest, highest = request.range_mhz or (0.0, math.inf)
@@ -174,29 +178,23 @@ def plan_spectrum(request: Any) -> Plan:
     ]
     described = plan_fields(top, j, request.effects)
     neglected = largest_first([*described.pop("left_out"), *(part for part in widths if part is not None)])
-    return Plan(
-        kind="spectrum",
+    lines = allowed_lines(top, jmax)
+    return {
         **described,
-        parts=(("J max", f"{jmax}: {why}"), *level_parts(top, jmax, request.effects)),
-        counts={"allowed lines of one state, without spins, before range and cut": lines},
-        seconds=seconds,
-        memory_mb=cost.memory_mb,
-        left_out=neglected,
-    )
+        "parts": (("J max", f"{jmax}: {why}"), *level_parts(top, jmax, request.effects)),
+        "counts": {"allowed lines of one state, without spins, before range and cut": lines},
+        "left_out": neglected,
+    }
 
 
-def plan_raman(request: Any) -> Plan:
-    """The plan of Raman lines, from a complete run."""
+def describe_raman(request: Any, answer: Any) -> dict[str, Any]:
+    """What Raman lines are, with J max of the answer."""
     from rotor.quantum.estimates.limits import populated_j
 
-    def describe(answer: Any) -> dict[str, Any]:
-        """Fields of the plan; J max is that of the answer."""
-        top, jmax = request.top, answer.lines.jmax
-        parts = (("J max", f"{jmax}: {answer.jmax_source}"), *level_parts(top, jmax, request.effects))
-        described = plan_fields(top, populated_j(top, request.temperature_k), request.effects)
-        return {**described, "parts": parts, "counts": {"lines": len(answer.lines)}}
-
-    return plan_complete_run("raman", lambda: answer_raman(request), describe)
+    top, jmax = request.top, answer.lines.jmax
+    parts = (("J max", f"{jmax}: {answer.jmax_source}"), *level_parts(top, jmax, request.effects))
+    described = plan_fields(top, populated_j(top, request.temperature_k), request.effects)
+    return {**described, "parts": parts, "counts": {"lines": len(answer.lines)}}
 
 
 def _raman_rounding(request: Any) -> float:
@@ -214,29 +212,25 @@ def _lower_factor(cut: float, decades: int) -> float:
 SPECTRUM = _line_numerics(
     ("frequencies", "intensities"),
     Cut("min_lgint", _lower_decades, intensity_left_out, answer_spectrum),
+    CUT,
     _knobs("frequency of a line", INTENSITY, line_error),
-    plan_spectrum,
+    describe_spectrum,
+    spectrum_cost,
     lambda request: rounding_of(request.top, _spectrum_jmax(request)[0]),
 )
 RAMAN = _line_numerics(
     ("shifts", "cross sections"),
     Cut("min_relative", _lower_factor, section_left_out, answer_raman),
+    RELATIVE_CUT,
     _knobs("shift of a line", SECTION, shift_error),
-    plan_raman,
+    describe_raman,
+    None,
     _raman_rounding,
 )
 
 
-def plan_emission(request: Any) -> Plan:
-    """The plan of a source, from a complete run, which takes at most seconds."""
-    from rotor.spectra.emission_request import answer_emission
-
-    return plan_complete_run(
-        "emission", lambda: answer_emission(request), lambda answer: _source_facts(request, answer)
-    )
-
-
-def _source_facts(request: Any, answer: Any) -> dict[str, Any]:
+def describe_emission(request: Any, answer: Any) -> dict[str, Any]:
+    """What a source does."""
     from rotor.quantum.estimates.limits import populated_j
     from rotor.tops.top import Top
 
@@ -263,4 +257,4 @@ def _source_facts(request: Any, answer: Any) -> dict[str, Any]:
     }
 
 
-EMISSION = Numerics({"K": Goal("brightness")}, plan=plan_emission)
+EMISSION = Numerics({"K": Goal("brightness")}, describe=describe_emission)

@@ -33,7 +33,6 @@ remainder of the sum, exp(-π² T/n²Θ) by Poisson's summation, with the larges
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import permutations, product
 from typing import TYPE_CHECKING, overload
 
@@ -42,6 +41,7 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.frozen import dataclass
 from rotor.quantum.effects.watson import centrifugal_operators
 from rotor.quantum.wang.spherical_top import scalar_and_tensor
 from rotor.thermodynamics.species import weights_in_species

@@ -15,15 +15,16 @@ of ln Q (`rotor.thermodynamics.classical_limit`).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure, refuse_set, with_whole
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure, Sought, with_whole
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Growth, LeftOut, Plan, largest_first
+from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
 
 if TYPE_CHECKING:
     from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest
@@ -65,30 +66,23 @@ def relative_spread(unit: str, degrees: int) -> float:
     return math.sqrt(2.0 / degrees) if unit == "K" else math.sqrt(2.0 + 12.0 / degrees)
 
 
-def choose_molecules(unit: str, request: GasRequest, allowed: float) -> Choice:
-    """The request with enough molecules for an accuracy of the temperature (K), of the heat capacity (%), or of C1 and C2."""
+def _enough_molecules(unit: str, sought: Sought) -> Iterator[Choice]:
+    """As many molecules as an accuracy of the temperature (K), the heat capacity (%), or C1 and C2 needs, at most those of a run."""
     from rotor.thermodynamics.classical_gas import MOST_MOLECULES
 
-    refuse_set(request, "molecules")
-    z = quantile(request.confidence)
-    count = max(math.ceil((z * _spread(request, allowed, unit) / allowed) ** 2), 2)
-    if count > MOST_MOLECULES:
-        raise ValueError(
-            f"accuracy: {allowed:g} {unit}".rstrip()
-            + f" would need {count:.2g} molecules, more than the {MOST_MOLECULES:g} of a run; choose a lower accuracy"
-        )
-    return Choice(replace(request, molecules=count), f"{count} molecules, at a confidence of {request.confidence:g}")
+    request = sought.request
+    deviation = quantile(request.confidence) * _spread(request, unit)
+    count = min(max(math.ceil((deviation / sought.accuracy) ** 2), 2), MOST_MOLECULES)
+    error = deviation / math.sqrt(count) if count == MOST_MOLECULES else 0.0  # else the answer states it
+    how = f"{count} molecules, at a confidence of {request.confidence:g}"
+    yield Choice(replace(request, molecules=count), how, error)
 
 
-def _spread(request: GasRequest, allowed: float, unit: str) -> float:
+def _spread(request: GasRequest, unit: str) -> float:
     """Standard error times √N, in the unit of the accuracy."""
     if unit:
         scale = request.temperature_k if unit == "K" else 100.0
         return scale * relative_spread(unit, count_degrees_per_molecule(request))
-    if request.times_ps is None:
-        raise ValueError(
-            f"accuracy: {allowed:g}: an accuracy without a unit is one of correlation functions; give observables.times, or the unit K or %"
-        )
     from rotor.thermodynamics.classical_gas import answer_gas
 
     pilot = answer_gas(replace(request, molecules=PILOT_MOLECULES))
@@ -204,36 +198,48 @@ def neglected_in_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
     )
 
 
-def plan_gas(request: Any) -> Plan:
-    """The plan of a classical gas."""
+def gas_cost(request: Any) -> Cost:
+    """The cost of a classical gas, from smaller ones."""
     from rotor.classical.gas.ensembles import PIECE
     from rotor.thermodynamics.classical_gas import answer_gas
 
     together = min(request.molecules, PIECE)
     cost = Growth(lambda n: answer_gas(replace(request, molecules=n)), request.molecules, SHORT_GAS)
     rest = BYTES_A_MOLECULE * (request.molecules - together) / 1e6
-    return Plan(
-        kind="gas",
-        effects=("free rotation of rigid molecules", "free flight"),
-        good=("energy and angular momentum of every molecule",),
-        parts=(("method", "exact free motion of every molecule (theta functions); no step"),),
-        counts={"molecules": request.molecules, "times": len(request.times_ps or ())},
-        seconds=cost.seconds,
-        memory_mb=replace(cost, size=together).memory_mb + rest,
-        left_out=neglected_in_gas(request.top, request.temperature_k),
-    )
+    return Cost(cost.seconds, replace(cost, size=together).memory_mb + rest)
 
 
-def _goal(quantity: str, unit: str) -> Goal:
-    return Goal(
-        quantity, lambda _, request, allowed: choose_molecules(unit, request, allowed), partial(gas_error, unit)
-    )
+def describe_gas(request: Any, _: Any) -> dict[str, Any]:
+    """What a classical gas does."""
+    return {
+        "effects": ("free rotation of rigid molecules", "free flight"),
+        "good": ("energy and angular momentum of every molecule",),
+        "parts": (("method", "exact free motion of every molecule (theta functions); no step"),),
+        "counts": {"molecules": request.molecules, "times": len(request.times_ps or ())},
+        "left_out": neglected_in_gas(request.top, request.temperature_k),
+    }
+
+
+def _goal(quantity: str, unit: str, knob: Knob, unfit: Callable[[Any], str] = lambda request: "") -> Goal:
+    searched = replace(knob, search=partial(_enough_molecules, unit))
+    return Goal(quantity, partial(gas_error, unit), (searched,), ("numerics.molecules",), unfit)
+
+
+def _without_times(request: Any) -> str:
+    """Why an accuracy without a unit does not suit a request."""
+    reason = "an accuracy without a unit is one of correlation functions; give observables.times, or the unit K or %"
+    return reason if request.times_ps is None else ""
 
 
 GAS = Numerics(
-    {"K": _goal("temperature", "K"), "%": _goal("heat capacity", "%"), "": _goal("C1 and C2", "")},
-    percent=lambda scene: "%" if scene.observables.times is None else "",  # C1 and C2 are 1 at first
+    {
+        "K": _goal("temperature", "K", KINETIC),
+        "%": _goal("heat capacity", "%", KINETIC),
+        "": _goal("C1 and C2", "", CURVES, _without_times),
+    },
+    percent=lambda entries: "%" if entries.values.get("observables.times") is None else "",  # C1 and C2 are 1 at first
     knobs=(KINETIC, CURVES),
     remarks=lambda request: (f"the motion of each molecule: {NOTHING_CHEAPER}; theta functions, round-off alone",),
-    plan=plan_gas,
+    describe=describe_gas,
+    cost=gas_cost,
 )

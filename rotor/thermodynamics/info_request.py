@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.frozen import dataclass
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import limit_facts, populated_j
 from rotor.requests.budget import ErrorBudget

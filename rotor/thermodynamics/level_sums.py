@@ -18,7 +18,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -26,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators
 from rotor.quantum.levels import Levels, weights_of_levels

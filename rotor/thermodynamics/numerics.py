@@ -8,48 +8,42 @@ from typing import Any
 from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.estimates.plans import plan_fields
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import LeftOut, Plan, peak_mb, plan_complete_run, timed
+from rotor.requests.plan import Cost, LeftOut, peak_mb, whole_cost
 
 
-def plan_thermo(request: Any) -> Plan:
-    """The plan of thermodynamic functions; levels and seconds refer to the highest temperature."""
+def thermo_cost(request: Any) -> Cost:
+    """The cost of thermodynamic functions, and those at the highest temperature, whose levels take the time."""
     from rotor.thermodynamics.request import answer_thermo
 
-    hottest = max(request.temperatures_k)
-    answers: list[Any] = []
-    seconds = timed(lambda: answers.append(answer_thermo(replace(request, temperatures_k=(hottest,)))))
-    jmax = int(answers[-1].functions.jmax.max())
+    hottest = replace(request, temperatures_k=(max(request.temperatures_k),))
+    return replace(whole_cost(lambda: answer_thermo(hottest)), memory_mb=peak_mb(lambda: answer_thermo(request)))
+
+
+def describe_thermo(request: Any, hot: Any) -> dict[str, Any]:
+    """What thermodynamic functions are, from those at the highest temperature."""
+    hottest, jmax = max(request.temperatures_k), int(hot.functions.jmax.max())
     summed = f"levels summed to J = {jmax} at {hottest:g} K" if jmax >= 0 else "classical with corrections: no levels"
-    described = plan_fields(request.top, populated_j(request.top, hottest), answers[-1].effects)
+    described = plan_fields(request.top, populated_j(request.top, hottest), hot.effects)
     vibration = [] if request.vibrations else [LeftOut("vibration", None, "", "no states given")]
-    return Plan(
-        kind="thermo",
-        effects=described["effects"],
-        good=described["good"],
-        parts=(("method", f"{summed}, to {request.relative_error:g} of Q, U and C_v"),),
-        counts={"temperatures": len(request.temperatures_k)},
-        seconds=seconds,
-        memory_mb=peak_mb(lambda: answer_thermo(request)),
-        left_out=(*described["left_out"], *vibration),
-    )
+    return {
+        "effects": described["effects"],
+        "good": described["good"],
+        "parts": (("method", f"{summed}, to {request.relative_error:g} of Q, U and C_v"),),
+        "counts": {"temperatures": len(request.temperatures_k)},
+        "left_out": (*described["left_out"], *vibration),
+    }
 
 
-def plan_torsion(request: Any) -> Plan:
-    """The plan of a torsion."""
-    from rotor.thermodynamics.torsion_request import answer_torsion
-
-    def describe(answer: Any) -> dict[str, Any]:
-        """Describe the basis and potential of the answer."""
-        scanned = "" if answer.scan is None else f"; {len(answer.scan.angles) + 1} relaxed geometries"
-        return {
-            "effects": (f"potential: {answer.source}, barrier {answer.facts()['barrier_cm']:.4g} cm⁻¹",),
-            "good": ("species",) if answer.torsion.fold > 1 else (),
-            "parts": (("basis", f"exp(imα) up to m = {answer.waves}, {answer.torsion.fold} species{scanned}"),),
-            "counts": {"levels": len(answer.levels), "temperatures": len(request.temperatures_k)},
-            "left_out": (LeftOut("coupling with other vibrations and the whole rotation", None, "", "not estimated"),),
-        }
-
-    return plan_complete_run("torsion", lambda: answer_torsion(request), describe)
+def describe_torsion(request: Any, answer: Any) -> dict[str, Any]:
+    """What a torsion is: basis and potential."""
+    scanned = "" if answer.scan is None else f"; {len(answer.scan.angles) + 1} relaxed geometries"
+    return {
+        "effects": (f"potential: {answer.source}, barrier {answer.facts()['barrier_cm']:.4g} cm⁻¹",),
+        "good": ("species",) if answer.torsion.fold > 1 else (),
+        "parts": (("basis", f"exp(imα) up to m = {answer.waves}, {answer.torsion.fold} species{scanned}"),),
+        "counts": {"levels": len(answer.levels), "temperatures": len(request.temperatures_k)},
+        "left_out": (LeftOut("coupling with other vibrations and the whole rotation", None, "", "not estimated"),),
+    }
 
 
 def _remark_on_basis(request: Any) -> tuple[str, ...]:
@@ -63,6 +57,7 @@ def _remark_on_basis(request: Any) -> tuple[str, ...]:
 THERMO = Numerics(
     {"": Goal("Q, U and C_v")},
     remarks=lambda request: ("vibration: its states are summed in closed form",) if request.vibrations else (),
-    plan=plan_thermo,
+    describe=describe_thermo,
+    cost=thermo_cost,
 )
-TORSION = Numerics({"MHz": Goal("levels")}, remarks=_remark_on_basis, plan=plan_torsion)
+TORSION = Numerics({"MHz": Goal("levels")}, remarks=_remark_on_basis, describe=describe_torsion)

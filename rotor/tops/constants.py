@@ -10,11 +10,11 @@ import difflib
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
 from rotor.checks import Renamed, first_names
+from rotor.frozen import dataclass
 from rotor.tops.kind_of_constants import (
     KNOWN,
     RIGID,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
+from rotor.frozen import dataclass
 from rotor.tops.constants import Constants
 
 _NEGATIVE = 1e-4  # rounding of printed correlation matrices may make eigenvalues negative by this much

@@ -15,12 +15,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import product
 from types import MappingProxyType
 from typing import Any
 
 from rotor.checks import did_you_mean, first_names
+from rotor.frozen import dataclass
 from rotor.units import parse_quantity
 
 BARRIERS = ("V3", "V6", "V9")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rotor.frozen import dataclass
 from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW
 
 if TYPE_CHECKING:

@@ -8,10 +8,11 @@ magnetisability χ is in 1e-6 erg/(G² mol), as in tables, negative for diamagne
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from rotor.frozen import dataclass
 
 Vector = tuple[float, float, float]
 Tensor = tuple[Vector, Vector, Vector]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import same
+from rotor.frozen import dataclass
 from rotor.geometry.inertia import EQUAL_MOMENTS, LINEAR_BELOW, Body, PrincipalFrame, point_masses, principal_frame
 from rotor.tops.allowed import (
     allowed_dipole,

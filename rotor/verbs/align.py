@@ -13,8 +13,9 @@ from rotor.requests.field import CONDITIONS, REQUIRED, all_fields
 from rotor.requests.fill import Entries, NamedError, read_fields
 from rotor.table import counted
 from rotor.verbs.molecule import NUCLEI, REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
+from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Extra, Report, Subject, Verb, picture, tables
+from rotor.verbs.verb import Extra, Subject, Verb
 
 if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.fitting.publication import value_text
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom, Range, Text
 from rotor.table import counted
+from rotor.verbs.outputs import Output, Report, picture
 from rotor.verbs.subjects import saved_inputs
-from rotor.verbs.verb import Output, Place, Report, Subject, SubjectKind, Verb, picture
+from rotor.verbs.verb import Place, Subject, SubjectKind, Verb
 
 EXAMPLES = """\b
 Examples:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from rotor.classical.driven import BODY_EFFECTS, DEFAULT_TOLERANCE
+from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, NUMERICS, all_fields, declared
 from rotor.requests.readers import Custom, Grid, Quantity, Reader, Whole
 from rotor.units import parse_grid

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, json_text, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.verbs.cat_request import CatRequest
@@ -20,8 +20,9 @@ from rotor.verbs.comparing import (
     read_catalogue,
     temperature_note,
 )
+from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import ErrorsShown, Output, Report, Work, draw_answer, picture, tables
+from rotor.verbs.verb import ErrorsShown, Work
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.text.catalogue import Catalogue

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rotor.frozen import dataclass
 from rotor.requests.field import OUTPUT, REQUIRED, changed_fields, declared
 from rotor.requests.readers import INFINITE, Flag, Names, Quantity, Range, Text, Whole
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
 from rotor.table import Table as Columns
+from rotor.verbs.outputs import Output
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import ErrorsShown, Output, Work
+from rotor.verbs.verb import ErrorsShown, Work
 
 if TYPE_CHECKING:
     from rotor.requests.budget import ErrorBudget

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import NoAnswerError
+from rotor.frozen import dataclass
 from rotor.table import counted
 from rotor.verbs.molecule import with_some_dipole
 from rotor.verbs.subjects import top_of_word

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Text, Whole
 from rotor.tops.facts import top_facts
 from rotor.verbs.molecule import refuse_weights_of_another_kind
+from rotor.verbs.outputs import Output, Report
 from rotor.verbs.subjects import top_of_word
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import ErrorsShown, Note, Output, Report, Work, silent
+from rotor.verbs.verb import ErrorsShown, Note, Work, silent
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile

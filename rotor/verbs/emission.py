@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from msgspec import NODEFAULT
 
+from rotor.frozen import dataclass
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.sources import short_source
@@ -33,9 +33,10 @@ from rotor.verbs.molecule import (
     with_some_dipole,
 )
 from rotor.verbs.observed_file import SeveralInput, is_catalogue
+from rotor.verbs.outputs import Output, Report, picture, tables
 from rotor.verbs.subjects import beside, saved_molecule
 from rotor.verbs.tables import defined, described, entries_of
-from rotor.verbs.verb import Output, Place, Report, Shown, Subject, SubjectKind, Verb, picture, tables
+from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb
 
 if TYPE_CHECKING:
     from rotor.spectra.emitters import CatalogueLines

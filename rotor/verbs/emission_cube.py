@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part, record_table
 from rotor.requests.field import changed_fields
 from rotor.requests.readers import INFINITE
 from rotor.verbs.observed_request import ObservedRequest, components_of, fit_choices, sight_of, species_in
-from rotor.verbs.verb import Report, Work
+from rotor.verbs.outputs import Report
+from rotor.verbs.verb import Work
 
 if TYPE_CHECKING:
     from rotor.formats.spectra.cube_file import Cube

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.verbs import emission_cube
 from rotor.verbs.emission_cell import cell_fit, refuse_telescope
 from rotor.verbs.emission_cube import Mapped
 from rotor.verbs.observed_file import json_of, spectrum_facts
 from rotor.verbs.observed_request import ObservedRequest, components_of, fit_choices, sight_of, species_in
+from rotor.verbs.outputs import PICTURES, Output, Report
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import PICTURES, Output, Report, Work
+from rotor.verbs.verb import Work
 
 if TYPE_CHECKING:
     from rotor.observed.fit import Contribution, SourceFit

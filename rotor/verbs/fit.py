@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,13 +20,15 @@ from rotor.formats.fit_request import (
     write_fitted_par,
     write_fitted_toml,
 )
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Flag, NameList, Text, Whole
 from rotor.table import Table as Columns
 from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
-from rotor.verbs.verb import ErrorsShown, Extra, Output, Report, Verb, Work, picture, tables
+from rotor.verbs.outputs import Output, Report, picture, tables
+from rotor.verbs.verb import ErrorsShown, Extra, Verb, Work
 
 if TYPE_CHECKING:
     from rotor.fitting.choose import Suggestion, Trial

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, fields, replace
 from math import isnan
 from pathlib import Path
 from tempfile import gettempdir
@@ -15,14 +15,16 @@ from rotor.checks import NoAnswerError, RunStopped
 from rotor.fluids.request import WATER_G_CM3, FluidAnswer, FluidRequest, NewBox, answer_fluid
 from rotor.fluids.run import Outputs
 from rotor.fluids.settings import Settings
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, declared
 from rotor.requests.fill import Entries, NamedError, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
+from rotor.verbs.outputs import Output, Report, draw_answer, picture
 from rotor.verbs.subjects import beside
-from rotor.verbs.verb import Output, Place, Report, Shown, Subject, SubjectKind, Verb, Work, draw_answer, picture
+from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb, Work
 
 if TYPE_CHECKING:
     from ase import Atoms

@@ -15,8 +15,9 @@ from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.fill import Entries
 from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
 from rotor.verbs.molecule import NUCLEI, POLARIZABILITY, REFINEMENT, STATES
+from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Report, Verb, Work, picture, tables
+from rotor.verbs.verb import Verb, Work
 
 if TYPE_CHECKING:
     from rotor.classical.gas.ensembles import Correlations
@@ -31,7 +32,7 @@ Examples:
 
 def adapt(request: GasRequest, outputs: Mapping[str, Any], entries: Entries) -> GasRequest:
     """Add times until the correlation functions have settled, if files need them and none are given."""
-    if request.times_ps is None and outputs.keys() & {"csv", "parquet", "json", "plot"}:
+    if request.times_ps is None and any(map(outputs.get, ("csv", "parquet", "json", "plot"))):
         return replace(request, times_ps=settling_times_ps(request.top, request.temperature_k))
     return request
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, record_table
 from rotor.reports.top_facts import error_facts
@@ -14,8 +14,9 @@ from rotor.requests.field import CONDITIONS, REQUIRED, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
 from rotor.table import counted
 from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
+from rotor.verbs.outputs import PICTURES, Output, Report
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import PICTURES, ErrorsShown, Output, Report, Work
+from rotor.verbs.verb import ErrorsShown, Work
 
 if TYPE_CHECKING:
     from rotor.observed.identify import Identification

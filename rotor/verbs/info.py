@@ -15,8 +15,9 @@ from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 from rotor.verbs.molecule import POLARIZABILITY
+from rotor.verbs.outputs import Report, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Report, Subject, Verb, Work, tables
+from rotor.verbs.verb import Subject, Verb, Work
 
 EXAMPLES = """\b
 Examples:

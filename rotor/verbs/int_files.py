@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.requests.fill import Entries, NamedError
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
-from rotor.verbs.verb import Note, Report
+from rotor.verbs.outputs import Report
+from rotor.verbs.verb import Note
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.predict import Prediction

@@ -11,8 +11,9 @@ from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.isotopes.isotopologues import Isotopologue
 from rotor.tops.top import Top
 from rotor.verbs.molecule import POLARIZABILITY, REFINEMENT, STATES
+from rotor.verbs.outputs import Report, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import ErrorsShown, Report, Verb, tables
+from rotor.verbs.verb import ErrorsShown, Verb
 
 EXAMPLES = """\b
 Examples:

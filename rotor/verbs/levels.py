@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rotor.frozen import dataclass
 from rotor.quantum.request import LevelsAnswer, LevelsRequest, answer_levels
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title
@@ -15,8 +15,9 @@ from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Text, Whole, whole_range
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY
+from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Extra, Output, Report, Shown, Verb, draw_answer, picture, tables
+from rotor.verbs.verb import Extra, Shown, Verb
 
 COLUMNS = {
     "MHz": ("energy_mhz", "{energy:.4f}"),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.reports.progress import progress_bar
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
 from rotor.requests.fill import Entries, NamedError, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole

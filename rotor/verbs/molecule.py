@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, renamed
 from rotor.requests.readers import Names, Numbers, Pairs, Quantity, Text

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import cache
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, plain
 from rotor.requests.field import declared
 from rotor.requests.readers import Text

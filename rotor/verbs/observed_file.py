@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, declared
 from rotor.requests.readers import INFINITE, Names, Numbers, Quantity, Text, Whole
 from rotor.verbs.molecule import with_some_dipole

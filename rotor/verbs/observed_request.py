@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.requests.field import changed_fields, declared, declared_fields, identical, part
 from rotor.requests.readers import INFINITE, NameList, Quantity, Text, Whole
 from rotor.spectra.emission_request import LayerInput, WindowInput

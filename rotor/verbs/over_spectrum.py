@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rotor.assignment.intensities import Intensities
     from rotor.assignment.peaks import PeakList
     from rotor.spectra.lines import Lines
-    from rotor.verbs.verb import Report
+    from rotor.verbs.outputs import Report
 
 CACHE_KEY = "over"
 

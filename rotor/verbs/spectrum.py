@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from rotor.frozen import dataclass
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part
@@ -19,9 +20,10 @@ from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectr
 from rotor.verbs import int_files
 from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_json
 from rotor.verbs.molecule import POLARIZABILITY, range_without_unit, with_some_dipole
+from rotor.verbs.outputs import PICTURES, Output, Report, draw_answer, picture
 from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Place, Report, Shown, Subject, Verb, Work, draw_answer, picture
+from rotor.verbs.verb import Place, Shown, Subject, Verb, Work
 
 MOST_FACTS_OF_STATES = 10  # in the head of a line list; rotor info shows all
 HITRAN_K = 296.0

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.quantum.fields.stark_request import StarkAnswer, StarkRequest, answer_stark
 from rotor.reports import top_facts
 from rotor.reports.field_maps import SHOWN, accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
@@ -17,8 +18,9 @@ from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.table import counted
 from rotor.verbs.molecule import REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
+from rotor.verbs.outputs import PICTURES, Output, Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import PICTURES, Output, Report, Shown, Verb, picture, tables
+from rotor.verbs.verb import Shown, Verb
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap

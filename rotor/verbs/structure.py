@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import NoAnswerError
 from rotor.formats.family_file import FamilyFile, read_family
 from rotor.formats.structure_request import StructureAnswer, StructureRequest, answer_structure
+from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import MOLECULE, all_fields, declared
@@ -19,19 +19,9 @@ from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom
 from rotor.structures.family import Family
 from rotor.table import counted
+from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.subjects import saved_inputs
-from rotor.verbs.verb import (
-    ErrorsShown,
-    Output,
-    Place,
-    Report,
-    Subject,
-    SubjectKind,
-    Verb,
-    draw_answer,
-    picture,
-    tables,
-)
+from rotor.verbs.verb import ErrorsShown, Place, Subject, SubjectKind, Verb
 
 if TYPE_CHECKING:
     from rotor.structures.consistency import PlanarMoment, Without

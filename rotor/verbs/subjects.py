@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from rotor.frozen import dataclass
 from rotor.requests.field import Field, all_fields
 from rotor.requests.fill import Entries, read_instance, written_fields
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of

@@ -11,7 +11,7 @@ from msgspec import Meta, Struct
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, Field, all_fields
 from rotor.requests.readers import Each, Flag, NameList, Names, Quantity, Text
-from rotor.verbs.verb import Output
+from rotor.verbs.outputs import Output
 
 
 class Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):

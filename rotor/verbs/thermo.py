@@ -12,8 +12,9 @@ from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import CONDITIONS
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT
+from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Extra, Report, Verb, Work, picture, tables
+from rotor.verbs.verb import Extra, Verb, Work
 
 if TYPE_CHECKING:
     from rotor.thermodynamics import ThermoFunctions

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from rotor.frozen import dataclass
 from rotor.reports.screen import json_text
 from rotor.requests.fill import Entries, read_instance
-from rotor.verbs.verb import NOTHING, Output, Place, Subject, SubjectKind, Verb
+from rotor.verbs.outputs import Output
+from rotor.verbs.verb import NOTHING, Place, Subject, SubjectKind, Verb
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -14,8 +14,9 @@ from rotor.reports.progress import progress_bar
 from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
+from rotor.verbs.outputs import Output, Report, picture
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Output, Report, Shown, Verb, Work, picture
+from rotor.verbs.verb import Shown, Verb, Work
 
 if TYPE_CHECKING:
     from rotor.thermodynamics.classical_torsion import ClassicalTorsion

@@ -12,8 +12,9 @@ from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
+from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.turning_body import TurningBody, build
-from rotor.verbs.verb import Output, Report, Verb, draw_answer, picture, tables
+from rotor.verbs.verb import Verb
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats

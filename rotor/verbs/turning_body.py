@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.requests.fill import Entries, NamedError, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, Grid, Quantity
 from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL

@@ -5,20 +5,21 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from rotor.reports.screen import Part, json_text, json_with_rows, plain
+from rotor.frozen import dataclass
+from rotor.reports.screen import Part, json_text, json_with_rows
 from rotor.requests.field import Field, all_fields, declared
 from rotor.requests.fill import Entries, called, naming, read_fields, read_instance, renaming, written_fields
 from rotor.requests.readers import Flag
 from rotor.table import Table
 from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
 from rotor.verbs.names import declared_verbs as declared_verbs
-from rotor.version import version
+from rotor.verbs.outputs import Output, Report
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -26,8 +27,6 @@ if TYPE_CHECKING:
     from rotor.requests.numerics import Numerics
 
 
-HYPERFINE = "effects.hyperfine"  # identity of the option that adds hyperfine structure
-PICTURES = (".png", ".pdf", ".svg")
 Note = Callable[[str], None]
 
 
@@ -82,70 +81,6 @@ class Work:
     view: Any = None
     at_end: Callable[[Callable[[], object]], object] = lambda end: None
     from_scene: bool = False
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Report:
-    """Data of a report and its files.
-
-    content: of the JSON. shown: display options. entries: as entered. provenance: of files. view: of a picture.
-    sources: whether to print them in full. with_spins: the command that adds hyperfine structure.
-    executor: shares the work of derived tables. cache: derived tables that several files need.
-    """
-
-    content: Mapping[str, Any]
-    shown: Any
-    entries: Entries = field(default_factory=Entries)
-    provenance: Mapping[str, Any] = field(default_factory=dict)
-    view: Any = None
-    sources: bool = False
-    with_spins: str = ""
-    executor: Executor | None = None
-    cache: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def command(self) -> dict[str, Any]:
-        """The provenance of pictures: the command or the scene alone."""
-        return {name: self.provenance[name] for name in ("command", "scene") if name in self.provenance}
-
-    @property
-    def picture_options(self) -> Mapping[str, Any]:
-        """The options of a picture that follow from its view."""
-        from rotor.plots.view import WHOLE
-
-        if isinstance(self.view, Mapping):
-            return self.view
-        return {} if self.view in (None, WHOLE) else {"view": self.view}
-
-
-Writer = Callable[[Any, Path, Report], None]
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Output:
-    """A file that a verb writes.
-
-    name: of the option, and of the key in [outputs]. write: by default writes the table in the format of the suffix.
-    of: returns the written table if it is not that of the verb. grows: written during the calculation. many: repeatable.
-    scene: whether scenes have it too. required: whether the verb exists to write this file.
-    """
-
-    name: str
-    suffixes: tuple[str, ...]
-    help: str
-    write: Writer | None = None
-    example: str = ""
-    of: Callable[[Any], Any] | None = None
-    option: str = ""
-    grows: bool = False
-    many: bool = False
-    scene: bool = True
-    required: bool = False
-
-    @property
-    def flag(self) -> str:
-        """The option."""
-        return self.option or "--" + self.name.replace("_", "-")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -401,64 +336,8 @@ def verb_of(name: str) -> Verb:
     return verb
 
 
-def report_of(
-    verb: Verb,
-    answer: Any,
-    head: Mapping[str, Any],
-    entries: Entries,
-    view: Any = None,
-    executor: Executor | None = None,
-) -> Report:
-    """Data of the report, the JSON and the files. head: command or scene, and input."""
-    shown = verb.read_shown(entries)
-    content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, shown)}
-    stated = {name: plain(content[name]) for name in ("errors", *verb.stated) if name in content}
-    with_spins = f"rotor {verb.name if HYPERFINE in verb.fields else 'spectrum'} --hyperfine"
-    sources = bool(getattr(shown, "sources", False))
-    return Report(content, shown, entries, {**head, **stated}, view, sources, with_spins, executor)
-
-
-def tables(what: str, stem: str) -> tuple[Output, Output]:
-    """Outputs for a table as CSV and as Parquet. stem: of the file names in a template."""
-    return (
-        Output("csv", (".csv",), f"Write {what} as CSV", example=f"{stem}.csv"),
-        Output("parquet", (".parquet",), f"Write {what} as Parquet", example=f"{stem}.parquet"),
-    )
-
-
-def draw_answer(answer: Any, path: Path, report: Report, **options: Any) -> None:
-    """Draw an answer, or an object of it. options: of the picture."""
-    from rotor.plots.show import write_picture
-
-    write_picture(answer, path, report.command, **report.picture_options, **options)
-
-
-def picture(help: str, example: str = "", draw: Writer = draw_answer) -> Output:
-    """Output for the picture of an answer."""
-    return Output("plot", PICTURES, f"{help} (.png, .pdf, .svg)", draw, example)
-
-
 def check_early(structure: type, entries: Entries) -> None:
     """Raise ValueError for a value that is wrong for every subject, before any file is read."""
     for declaration in all_fields(structure).values():
         if entries.has(declaration):
             declaration.read(entries.of(declaration), entries.style)
-
-
-def files_of(verb: Verb, answer: Any, report: Report) -> dict[str, Callable[[Path], None]]:
-    """Functions that write the files of a verb, by output."""
-    return {output.name: file_writer(verb, output, answer, report) for output in verb.outputs if not output.grows}
-
-
-def file_writer(verb: Verb, output: Output, answer: Any, report: Report) -> Callable[[Path], None]:
-    """A function that writes an output by its function, or writes its table."""
-    if (by_function := output.write) is not None:
-        return lambda path: by_function(answer, path, report)
-
-    def rows(path: Path) -> None:
-        """Write the table."""
-        from rotor.formats import write
-
-        write((output.of or verb.table)(answer), path, settings=dict(report.provenance))
-
-    return rows

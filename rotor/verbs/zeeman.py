@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.quantum.fields.zeeman_request import ZeemanAnswer, ZeemanRequest, answer_zeeman
 from rotor.reports import top_facts
 from rotor.reports.field_maps import accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
@@ -15,8 +16,9 @@ from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Numbers
 from rotor.table import counted
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
+from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Report, Verb, picture, tables
+from rotor.verbs.verb import Verb
 
 if TYPE_CHECKING:
     from rotor.tops.magnetic import Tensor

@@ -108,10 +108,10 @@ def test_an_accuracy_that_needs_endless_steps_is_refused(call, folder):
 @pytest.mark.parametrize("moments", [(0.3, 0.35, 0.4), (6e-4, 0.6, 1.0)])
 def test_steps_are_expected_by_a_short_part(moments):
     """The expected number is near the count where the count can be made."""
-    from rotor.scenes.calculation import Calculation
+    from rotor.scenes.run import scene_calculation
 
     scene = parse_scene(tumble(moments=moments))
-    request = Calculation(scene).request()
+    request = scene_calculation(scene).request
     assert 0.0 < first_share(request) <= 0.05
     np.testing.assert_allclose(
         expected_steps(request), count_first_steps(request, 1.0), rtol=0.3

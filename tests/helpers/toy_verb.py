@@ -12,8 +12,9 @@ from rotor.requests.field import check_fields, declared
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Grid, Quantity, Text, Whole
 from rotor.table import Table
+from rotor.verbs.outputs import Output
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Output, Verb
+from rotor.verbs.verb import Verb
 
 
 @dataclass(frozen=True)

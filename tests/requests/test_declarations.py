@@ -171,7 +171,7 @@ def test_one_knob_serves_sweep_accuracy_and_plan(ring, call, folder):
     assert content["accuracy"] == {"asked": 1.0, "error": 0.5, "unit": "MHz", "how": "tolerance 1"}
     assert call("plan", "t.toml")[0] == 0
     (folder / "u.toml").write_text('schema = 1\nkind = "ring"\naccuracy = "1e-9 MHz"\nmolecule = "CO"\n')
-    assert "the finest that is possible here is 1e-06" in call("run", "u.toml")[2]
+    assert "cannot be given: the error here is 1e-06 (tolerance 1e-06)" in call("run", "u.toml")[2]
     (folder / "v.toml").write_text(
         'schema = 1\nkind = "ring"\naccuracy = "1 MHz"\nmolecule = "CO"\n[numerics]\ntolerance = "2 MHz"\n'
     )

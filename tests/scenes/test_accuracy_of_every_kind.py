@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from rotor.scenes.accuracy import accuracy_of
+from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene_file import parse_scene
 
 LINES_OF_CO = (
@@ -80,21 +80,21 @@ def test_the_intensity_of_all_lines_is_within_what_is_stated(kind, body, accurac
 
 def test_a_cut_is_lowered_where_it_leaves_out_too_much():
     """The accuracy of one that is given by hand is refused instead."""
-    from rotor.scenes.calculation import Calculation
-    from rotor.spectra.numerics import RAMAN
 
-    choose_cut = RAMAN.goals["%"].choose
-    scene = parse_scene(HEAD.format("raman", "2e-4 %") + 'molecule = "N2"\n')
-    request = Calculation(scene).request()
-    assert choose_cut(scene, request, 1e-3).request.min_relative == request.min_relative
-    lowered = choose_cut(scene, request, 8e-5)
-    assert lowered.request.min_relative < request.min_relative
-    assert lowered.error <= 8e-5
+    enough, more = (
+        scene_calculation(parse_scene(HEAD.format("raman", text) + 'molecule = "N2"\n'))
+        for text in ("1e-3 %", "8e-5 %")
+    )
+    assert enough.choice.request.min_relative == enough.request.min_relative
+    assert more.choice.request.min_relative < more.request.min_relative
+    assert more.choice.error <= 8e-5
 
 
 @pytest.mark.parametrize(("accuracy", "value"), [("1 mK", 1e-3), ("2 K", 2.0)])
 def test_brightness_is_asked_for_in_kelvin(accuracy, value):
-    assert accuracy_of(parse_scene(HEAD.format("emission", accuracy) + EMISSION)) == pytest.approx(value)
+    assert scene_calculation(parse_scene(HEAD.format("emission", accuracy) + EMISSION)).accuracy.value == pytest.approx(
+        value
+    )
 
 
 def test_a_decade_coarser_misses(folder):
@@ -102,13 +102,12 @@ def test_a_decade_coarser_misses(folder):
     from dataclasses import replace
 
     from rotor.formats.fit_request import answer_fit
-    from rotor.scenes.calculation import Calculation
     from rotor.spectra.emission_request import answer_emission
 
     def taken(kind, accuracy, body):
         scene = parse_scene(HEAD.format(kind, accuracy) + body)
-        calculation = Calculation(scene)
-        return calculation.choice(calculation.request()).request
+        calculation = scene_calculation(scene)
+        return calculation.choice.request
 
     (folder / "l.csv").write_text(LINES_OF_CO)
     for accuracy, kelvin in (("100 mK", 0.1), ("1 mK", 1e-3), ("0.05 mK", 5e-5)):

@@ -5,13 +5,17 @@ from __future__ import annotations
 import json
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from places import PROJECT
 
 from rotor.quantum.estimates.accuracy import energies_like, to_order
-from rotor.requests.knob import Knob, Measure, Setting, Sweep
+from rotor.requests.accuracy import read_accuracy
+from rotor.requests.fill import Entries
+from rotor.requests.knob import Choice, Knob, Measure, Setting, Sweep
+from rotor.requests.numerics import Goal, Numerics
 from rotor.scenes import accuracy_sweep
 from rotor.scenes.accuracy_panels import panels_of
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, sweep, work_precision
@@ -205,7 +209,7 @@ def test_the_numerics_of_every_kind_can_be_loaded(kind):
     entry = verb_of(kind).load_numerics()
     assert entry.goals
     assert all(callable(goal.error) for goal in entry.goals.values())
-    assert callable(entry.plan or verb_of(kind).answer)
+    assert callable(entry.describe or verb_of(kind).answer)
 
 
 def test_a_fit_and_a_source():
@@ -285,9 +289,23 @@ def test_a_toy_knob_is_swept_and_searched_without_further_code():
     def error(answer: float) -> float:
         return math.pi**2 / 6 - answer
 
-    choice = knob.search("", knob.key, 30, 0.05, total, error)
-    assert (choice.request, choice.how) == (range(1, 101), "terms 100")
-    assert knob.search("", knob.key, 30, 0.7, total, error).how == "terms 1, nothing cheaper: the loosest there is"
+    numerics = Numerics({"": Goal("sum", error, (knob,), ("numerics.terms",))})
+
+    def chosen(accuracy: float, entries: Entries = Entries()) -> Choice:  # noqa: B008
+        return read_accuracy(accuracy, numerics, entries).chosen(30, entries, total)
+
+    choice = chosen(0.05)
+    assert (choice.request, choice.how, choice.answer) == (range(1, 101), "terms 100", total(range(1, 101)))
+    assert chosen(0.7).how == "terms 1, nothing cheaper: the loosest there is"
+    with pytest.raises(
+        ValueError, match=r"accuracy: 0.001 cannot be given: the error here is 0.01 \(terms 100\); ask for less"
+    ):
+        chosen(1e-3)
+    with pytest.raises(ValueError, match=r"accuracy and numerics.terms: give one of them"):
+        chosen(0.05, Entries({"numerics.terms": 3}))
+    unknown = replace(numerics, goals={"": replace(numerics.goals[""], unfit=lambda request: "of another sum")})
+    with pytest.raises(ValueError, match=r"accuracy: 0.05: of another sum"):
+        read_accuracy(0.05, unknown).chosen(30, Entries(), total)
 
 
 def test_the_command(call, folder):

@@ -24,8 +24,8 @@ from rotor.geometry.rotations import distance
 from rotor.quantum.estimates.convergence import warnings_of
 from rotor.quantum.estimates.left_out import stray_field
 from rotor.quantum.solve import solve_levels
-from rotor.scenes.calculation import Calculation
 from rotor.scenes.plan import plan_of
+from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import FluidScene, LevelsScene, SpectrumScene
 from rotor.scenes.scene_file import read_scene
 from rotor.scenes.sections import (
@@ -169,12 +169,12 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
     from rotor.fluids.motion.dynamics import RigidDynamics
     from rotor.fluids.motion.thermostats import Langevin
     from rotor.fluids.request import make_box
-    from rotor.scenes.calculation import Calculation
+    from rotor.scenes.run import scene_calculation
 
     box = FluidConditions(molecules=64, ensemble="langevin", friction=5.0, steps=100)
     scene = FluidScene(conditions=box, numerics=FluidNumerics(cutoff="6 Å"))
     planned = {neglected.name: neglected.size for neglected in plan_of(scene).left_out}
-    request = Calculation(scene).request()
+    request = scene_calculation(scene).request
     atoms, kelvin, step_fs = make_box(request), 298.15, 2.0
     thermostat = Langevin(kelvin, 5e-3 / ase_units.fs, np.random.default_rng(1))
     dynamics = RigidDynamics(atoms, step_fs * ase_units.fs, thermostat=thermostat)
@@ -191,7 +191,7 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
 def driven(name: str, **changes) -> DrivenRequest:
     scene = read_scene(SCENES / f"{name}.toml")
     fields = {name: getattr(scene, name) for name in scene.__struct_fields__}
-    return replace(Calculation(type(scene)(**{**fields, "accuracy": None}), SCENES).request(), **changes)
+    return replace(scene_calculation(type(scene)(**{**fields, "accuracy": None}), SCENES).request, **changes)
 
 
 @pytest.mark.parametrize(

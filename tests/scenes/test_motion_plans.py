@@ -12,9 +12,8 @@ import pytest
 from rotor.classical import motion_steps, tolerance_search
 from rotor.classical.driven import answer_driven
 from rotor.geometry.rotations import distance
-from rotor.scenes.calculation import Calculation
 from rotor.scenes.plan import plan_of
-from rotor.scenes.run import run_scene
+from rotor.scenes.run import run_scene, scene_calculation
 from rotor.scenes.scene import TumbleScene
 from rotor.scenes.sections import (
     ConstantTorqueSection,
@@ -76,7 +75,7 @@ def test_steps_of_a_body_that_is_spun_up_are_expected_to_grow(monkeypatch):
     body = TumbleBody(moments=[100.0, 100.0, 180.0], angular_velocity=[0.0, 0.0, 0.0])
     when = TumbleConditions(times="0:3000:3")
     scene = TumbleScene(body=body, effects=[ConstantTorqueSection(vector=[0.05, 0.0, 2.0])], conditions=when)
-    request = Calculation(scene).request()
+    request = scene_calculation(scene).request
     monkeypatch.setattr(motion_steps, "MORE_COMPILED", 0)
     monkeypatch.setattr(motion_steps, "ENOUGH_STEPS", 10)
     assert 0.5 < motion_steps.expected_steps(request) / answer_driven(request).motion.steps < 2.0

@@ -10,7 +10,6 @@ import pytest
 from places import ORACLES
 
 from rotor.scenes.accuracy_sweep import work_precision
-from rotor.scenes.calculation import NoResultError
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import EmissionScene, FitScene
@@ -24,6 +23,7 @@ from rotor.scenes.sections import (
     FitParameters,
     MoleculeSection,
 )
+from rotor.verbs.calculation import NoResultError
 
 DATA = ORACLES / "fits"
 OCS = ("--constants", "B=6081 D=0.001 H=0 MHz")

@@ -6,16 +6,18 @@ import inspect
 import os
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import typer
 
 from rotor.cli.shared.options import PlainCommand
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_fields
+from rotor.frozen import dataclass
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, Field
 from rotor.requests.readers import Flag
-from rotor.verbs.verb import Extra, Output, Verb
+from rotor.verbs.outputs import Output
+from rotor.verbs.verb import Extra, Verb
 
 JSON_HELP = "Everything printed, as JSON; - is standard output"
 SCENE_HELP = "Write down the scene, which 'rotor run' gives again (.toml)"

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import field
 from pathlib import Path
 
 from rotor.checks import NoAnswerError
+from rotor.frozen import dataclass
 from rotor.temporary import locked_file
 
 Writer = Callable[[Path], None]
@@ -23,19 +24,6 @@ def release_files() -> None:
 def at_end(done: Callable[[], object]) -> None:
     """Call a function at the end of the command."""
     _HELD.callback(done)
-
-
-@contextmanager
-def answering() -> Iterator[None]:
-    """Context in which a ValueError is no mistake of the user, whose input has been checked: it becomes a NoAnswerError."""
-    try:
-        yield
-    except ValueError as error:
-        raise NoAnswerError(str(error)) from error
-    except MemoryError as error:
-        raise NoAnswerError(
-            "not enough memory for so many lines; a lower J max, a range or a higher cut needs less"
-        ) from error
 
 
 def note(text: str) -> None:

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.checks import NoAnswerError
 from rotor.cli.shared import process
-from rotor.cli.shared.output import Files, answering, at_end, deliver, note
+from rotor.cli.shared.output import Files, at_end, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings, picture_style
-from rotor.reports.progress import elapsed_time
 from rotor.reports.screen import show_parts
 from rotor.requests.fill import Entries
+from rotor.verbs.calculation import Calculation, Outcome, answering
 from rotor.verbs.molecule import is_file
-from rotor.verbs.verb import Place, Report, Subject, Verb, Work, files_of, report_of
+from rotor.verbs.outputs import Report
+from rotor.verbs.verb import Verb, Work
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -39,37 +40,28 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
         if files.paths:
             refuse_overwriting(files, inputs)
     view = picture_settings(verb, places, "plot" in files.paths)
-    request, subject = verb.read(entries, Place(".", note))
-    if missing := next((output.flag for output in verb.outputs if output.required and output.name not in places), ""):
-        raise ValueError(f"{missing} is missing; --help shows what the command takes")
-    outputs = {**files.paths}
-    request = request if verb.adapt is None else verb.adapt(request, outputs, entries)
-    outputs |= dict.fromkeys(files.on_screen, ())
-    if verb.check is not None:
-        verb.check(request, outputs, shown)
-    if verb.short(request):
+    outputs = {**files.paths, **dict.fromkeys(files.on_screen, ())}
+    work = Work(None, shown, outputs, note, True, {"command": str(context.obj)}, view, at_end)
+    calculation = Calculation(verb, entries, work)
+    if verb.short(calculation.request):
         process.leave_compiler_out()
     process.begin_work()
-    head = {"command": str(context.obj), "input": subject.text}
     with picture_style(places), working(verb, places.get("workers", 1)) as executor:
-        with answering() if verb.sound else verb.naming("option"):
-            work = Work(executor, shown, outputs, note, True, head, view, at_end)
-            with nullcontext() if verb.stepwise else elapsed_time("computing"):
-                answer = verb.answer(request, work)
+        outcome = calculation.run(executor)
+        answer = outcome.answer
         with answering():
-            report = report_of(verb, answer, head, entries, view, executor)
+            report = outcome.report
         refuse_nothing_to_draw(verb, answer, files)
         for text in verb.notes(answer):
             note(text)
         withhold(verb, answer, files)
         report.content["files"] = files.names  # type: ignore[index]
-        writers = files_of(verb, answer, report)
+        writers = dict(outcome.writers)
         if "save_scene" in files.paths:
             named = {name: places[name] for name in files.paths}
-            writers["save_scene"] = scene_writer(verb, request, subject, entries, named)
-        show = partial(show_answer, verb, answer, report)
+            writers["save_scene"] = scene_writer(outcome, named)
         with verb.naming("option"):
-            deliver(files, writers, lambda: verb.json(answer, report.content), show)
+            deliver(files, writers, outcome.json, partial(show_answer, verb, answer, report))
         if reason := verb.failure(answer):
             raise NoAnswerError(reason)
 
@@ -186,8 +178,9 @@ def working(verb: Verb, workers: Any) -> Any:
     return executor
 
 
-def scene_writer(verb: Verb, request: Any, subject: Subject, entries: Entries, typed: Mapping[str, Any]) -> Any:
+def scene_writer(outcome: Outcome, typed: Mapping[str, Any]) -> Any:
     """A function that writes the scene of the command; a note names files that a scene does not write."""
+    verb = outcome.verb
     outputs = {output.name: typed[output.name] for output in verb.outputs if output.scene and output.name in typed}
     if left := [output.flag for output in verb.outputs if not output.scene and output.name in typed]:
         note(f"the scene writes no {', '.join(left)}; its other files are those of this command")
@@ -197,7 +190,6 @@ def scene_writer(verb: Verb, request: Any, subject: Subject, entries: Entries, t
         from rotor.scenes.saved import saved_scene
         from rotor.scenes.scene_file import write_scene
 
-        folder = Path(typed["save_scene"]).parent
-        write_scene(saved_scene(verb, request, subject, folder, outputs, entries), path)
+        write_scene(saved_scene(outcome, Path(typed["save_scene"]).parent, outputs), path)
 
     return write

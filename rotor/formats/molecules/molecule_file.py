@@ -97,7 +97,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from rotor.formats.magnetic_table import read_magnetic
@@ -123,6 +123,7 @@ from rotor.formats.molecules.molecule_tables import (
 from rotor.formats.molecules.spin_table import read_spins
 from rotor.formats.molecules.state_table import read_states
 from rotor.formats.toml import parse_toml
+from rotor.frozen import dataclass
 from rotor.molecules.molecule import Molecule
 from rotor.tops.components import Tensor
 from rotor.tops.constants import Constants

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import symmetric_from_lower
 from rotor.formats.molecules.level_table import read_level_table
+from rotor.frozen import dataclass
 from rotor.geometry.inertia import PrincipalFrame, point_masses, principal_frame
 from rotor.molecules.molecule import ELECTRONIC, Molecule
 from rotor.tops.components import Tensor

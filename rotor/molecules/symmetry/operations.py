@@ -8,12 +8,12 @@ then fitted to this matching.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 
 MATCH_WITHIN = (
     0.45  # of the shortest distance of like points: below one half, so that two points cannot match the same image

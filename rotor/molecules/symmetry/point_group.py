@@ -7,12 +7,12 @@ reported with the displacement that would make it exact, but not used.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.molecules.molecule import CLOSEST_ANGSTROM, Molecule
 from rotor.molecules.symmetry.operations import (
     Operation,

@@ -7,15 +7,16 @@ of known spin couplings that are neglected, and the estimated error of an approx
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum.estimates.plans import plan_levels
+from rotor.quantum.estimates.plans import describe_levels, levels_cost
 from rotor.requests.budget import ROUNDING
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics, numerical_error
 
 if TYPE_CHECKING:
@@ -27,43 +28,35 @@ EXACT, FOR_METHOD = "exact", 0.9  # default treatment of spins; share of an accu
 SPINS = frozenset({"nuclear quadrupole", "spin-rotation", "spin-spin", "hyperfine method"})
 
 
-def choose_spins(scene: Any, request: Any, allowed: float) -> Choice:
-    """Include spins with known constants if their size exceeds the requested accuracy; several spins by the cheapest treatment.
+def _treatments(sought: Sought) -> Iterator[Choice]:
+    """Treatments of spins with known constants, cheapest first: left out, of several spins the cheapest method, and exact.
 
-    All orders of distortion remain: for water up to J = 40 (13 ms) orders above J⁴ cost 3 ms, and they are not small against 1 kHz.
-    """
-    top, present = request.top, request.effects
-    has_spins = any(effect.spins(top) for effect in present)
-    if top.spin_constants is None or not (has_spins or scene.effects.hyperfine is None):
-        return Choice(request, NOTHING_CHEAPER)
-    size = _spin_size(top)
-    if size <= allowed and not has_spins:
-        return Choice(request, f"spins of nuclei left out, {size:.2g} MHz")
-    if len(top.spin_constants.twice) > 1 and scene.effects.hyperfine_method == EXACT:
-        return _cheapest_method(request, size, allowed)
-    if has_spins:
-        return Choice(request, "with spins of nuclei: exact, nothing cheaper")
-    from rotor.quantum.effects.of_top import effects_of
-
-    return Choice(
-        replace(request, effects=effects_of(top, True)), f"with spins of nuclei, {size:.2g} MHz: exact, nothing cheaper"
-    )
-
-
-def _cheapest_method(request: Any, size: float, allowed: float) -> Choice:
-    """Spins by the cheapest treatment whose estimated error is within the requested accuracy; the stated error contains the estimate.
-
-    A single nucleus is exact at the same cost (docs/accuracy.md).
+    All orders of distortion remain: for water up to J = 40 (13 ms) orders above J⁴ cost 3 ms, and they are not small against 1 kHz. A
+    single nucleus is exact at the same cost (docs/accuracy.md). Spins that the user turned on or off remain so.
     """
     from rotor.quantum.effects.of_top import effects_of
     from rotor.quantum.effects.watson import Centrifugal
 
-    tolerance = FOR_METHOD * allowed
-    taken = effects_of(request.top, True, "auto", tolerance)
-    if not any(isinstance(effect, Centrifugal) for effect in request.effects):
-        taken = tuple(effect for effect in taken if not isinstance(effect, Centrifugal))
-    how = f"with spins of nuclei, {size:.2g} MHz, by the cheapest method to {tolerance:g} MHz"
-    return Choice(replace(request, effects=taken), how)
+    request, entries = sought.request, sought.entries.values
+    top = request.top
+    present = any(effect.spins(top) for effect in request.effects)
+    if top.spin_constants is None or not (present or entries.get("effects.hyperfine") is None):
+        return
+    size = _spin_size(top)
+    if not present:
+        yield Choice(request, f"spins of nuclei left out, {size:.2g} MHz", size)
+    if len(top.spin_constants.twice) > 1 and entries.get("effects.hyperfine_method", EXACT) == EXACT:
+        tolerance = FOR_METHOD * sought.accuracy
+        effects = effects_of(top, True, "auto", tolerance)
+        if not any(isinstance(effect, Centrifugal) for effect in request.effects):
+            effects = tuple(effect for effect in effects if not isinstance(effect, Centrifugal))
+        how = f"with spins of nuclei, {size:.2g} MHz, by the cheapest method to {tolerance:g} MHz"
+        yield Choice(replace(request, effects=effects), how)  # its answer states the error of the method
+    elif present:
+        yield Choice(request, "with spins of nuclei: exact, nothing cheaper")
+    else:
+        how = f"with spins of nuclei, {size:.2g} MHz: exact, nothing cheaper"
+        yield Choice(replace(request, effects=effects_of(top, True)), how)
 
 
 def _spin_size(top: Any) -> float:
@@ -172,6 +165,8 @@ def hyperfine(measure: Measure) -> Knob:
         title="method of hyperfine structure",
         value=_treatment,
         label=lambda place: TREATMENTS[place],
+        search=_treatments,
+        series=False,
     )
 
 
@@ -209,17 +204,19 @@ ENERGY = Measure(
     "MHz",
     lambda answer, reference: level_error(answer.table.levels, reference.table.levels),
 )
+HYPERFINE = hyperfine(ENERGY)
 LEVELS = Numerics(
     {
         "MHz": Goal(
-            "energies", choose_spins, lambda answer: levels_error(answer, answer.request.top, answer.table.levels)
+            "energies", lambda answer: levels_error(answer, answer.request.top, answer.table.levels), (HYPERFINE,)
         )
     },
-    knobs=(distortion(ENERGY), hyperfine(ENERGY)),
+    knobs=(distortion(ENERGY), HYPERFINE),
     remarks=lambda request: (
         f"observables.jmax: {NOTHING_CHEAPER}; it says which levels, not how well",
         *reason_of_no_distortion_sweep(request.top),
     ),
-    plan=plan_levels,
+    describe=describe_levels,
+    cost=levels_cost,
     rounding=lambda request: rounding_of(request.top, request.jmax),
 )

@@ -9,9 +9,9 @@ factor of 3 for 25 of 30 orders (tests/scenes/test_scene_plans.py names the othe
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.requests.budget import two_digits
 

@@ -18,12 +18,11 @@ docs/validation/estimates.md compares with measured lines.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.frozen import dataclass
 from rotor.quantum.internal_rotation.frames import RhoAxis
 from rotor.quantum.torsion import TorsionalPotential, torsional_states
 

@@ -28,11 +28,11 @@ upper bound.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.molecules.molecule import Molecule
 from rotor.quantum.estimates.internal_rotation import InternalRotor, rotor_of_moments
 from rotor.units import MHZ_PER_CM

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.estimates.left_out import neglected_in_levels
-from rotor.requests.plan import Growth, Plan
+from rotor.requests.plan import Cost, Growth
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
@@ -91,26 +91,27 @@ def torsional_parts(top: Top, constants: InternalRotationConstants, jmax: int) -
     ]
 
 
-def plan_levels(request: Any) -> Plan:
-    """The plan of a list of levels."""
+def levels_cost(request: Any) -> Cost:
+    """The cost of a list of levels: blocks of an asymmetric top are diagonalised, other tops have closed forms."""
     from rotor.quantum.request import answer_levels
 
-    top, jmax, first = request.top, request.jmax, request.jmin
     plain = replace(request, jmin=0, kmin=None, kmax=None, max_energy_mhz=None)
+    power = 3 if request.top.kind == "asymmetric" else 1
 
     def work(j: int) -> float:
-        """Cost by J: blocks of an asymmetric top are diagonalised, other tops have closed forms."""
-        return (j + 1.0) ** (3 if top.kind == "asymmetric" else 1)
+        return (j + 1.0) ** power
 
+    return Growth(lambda j: answer_levels(replace(plain, jmax=j)).table.columns, request.jmax, SHORT_J, work, work).cost
+
+
+def describe_levels(request: Any, _: Any) -> dict[str, Any]:
+    """What a list of levels is."""
+    top, jmax, first = request.top, request.jmax, request.jmin
     count = (jmax + 1) ** 2 - first**2 if top.kind == "asymmetric" else jmax + 1 - first
     if top.kind in ("prolate", "oblate"):
         count = (jmax + 1) * (jmax + 2) // 2 - first * (first + 1) // 2
-    cost = Growth(lambda j: answer_levels(replace(plain, jmax=j)).table.columns, jmax, SHORT_J, work, work)
-    return Plan(
-        kind="levels",
+    return {
         **plan_fields(top, max(jmax, 1), request.effects),
-        parts=tuple(level_parts(top, jmax, request.effects)),
-        counts={"levels": count},
-        seconds=cost.seconds,
-        memory_mb=cost.memory_mb,
-    )
+        "parts": tuple(level_parts(top, jmax, request.effects)),
+        "counts": {"levels": count},
+    }

@@ -20,12 +20,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.frozen import dataclass
 from rotor.quantum.wigner import six_j
 from rotor.tops.isotopes.isotopic_spins import chi_tensor
 

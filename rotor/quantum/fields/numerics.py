@@ -18,7 +18,7 @@ from rotor.quantum.fields.stark_request import answer_stark
 from rotor.quantum.fields.zeeman_request import answer_zeeman
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Growth, LeftOut, Plan, largest_first
+from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
 
 MORE_J = 6  # values of J that the reference has beyond the basis
 SHORT_FIELDS = (2, 20)  # numbers of fields from which the cost is extrapolated
@@ -52,18 +52,28 @@ def _basis(steps: Callable[[Any], Iterable[int]], measure: Measure, answer: Call
     )
 
 
-def plan_in_field(request: Any, answer: Callable[[Any], Any], words: dict[str, str]) -> Plan:
-    """The plan of levels in a field, with J max and error at the ends of the fields."""
-    name, top, j = request.map.kind.name, request.top, max(request.j_highest, 1)
-    fields = getattr(request, name)
+def _at(request: Any, answer: Callable[[Any], Any], values: tuple[float, ...]) -> Any:
+    """The answer at other fields."""
+    return answer(replace(request, **{request.map.kind.name: values}))
 
-    def at(values: tuple[float, ...]) -> Any:
-        """The answer at some of the fields."""
-        return answer(replace(request, **{name: values}))
 
-    facts = at(tuple(dict.fromkeys((min(fields), max(fields))))).facts()
+def _cost_in_field(answer: Callable[[Any], Any], request: Any) -> Cost:
+    """The cost of levels in a field, from fewer fields; and the answer at the ends of the fields."""
+    fields = getattr(request, request.map.kind.name)
+    ends = _at(request, answer, tuple(dict.fromkeys((min(fields), max(fields)))))
     lasting = sorted(fields, key=abs, reverse=True)  # the highest fields need the largest basis
-    cost = Growth(lambda n: at(tuple(lasting[:n])).states.columns, len(fields), SHORT_FIELDS)
+    cost = Growth(lambda n: _at(request, answer, tuple(lasting[:n])).states.columns, len(fields), SHORT_FIELDS)
+    return Cost(cost.seconds, cost.memory_mb, ends)
+
+
+def _describe_in_field(acts: str, good: str, within: str, request: Any, ends: Any) -> dict[str, Any]:
+    """What levels in a field are. acts: what acts in the field, with its strength. within: effect that the field contains."""
+    top, j, fields, facts = (
+        request.top,
+        max(request.j_highest, 1),
+        getattr(request, request.map.kind.name),
+        ends.facts(),
+    )
     described = plan_fields(top, j, request.effects or SEMI_RIGID)
     known_names = {limit.name for limit in described["left_out"]}
     field_limits = [
@@ -71,42 +81,24 @@ def plan_in_field(request: Any, answer: Callable[[Any], Any], words: dict[str, s
         for limit in facts["limits"]
         if limit["name"] not in known_names
     ]
-    acts = words["acts"].format(max(map(abs, fields)))
     error = f"{facts['accuracy_mhz']:.1e} MHz at the ends of the fields: by which energies move with a higher J max, and round-off"
-    return Plan(
-        kind=words["kind"],
-        effects=(*described["effects"], acts),
-        good=() if getattr(request, "tilted", False) else ("M_F" if request.hyperfine else "M",),
-        parts=(
+    others = (part for part in described["left_out"] if part.name != within)
+    return {
+        "effects": (*described["effects"], acts.format(max(map(abs, fields)))),
+        "good": () if getattr(request, "tilted", False) else ("M_F" if request.hyperfine else "M",),
+        "parts": (
             ("basis", f"J to {facts['jmax']}: the tolerance of {request.tolerance_mhz:g} MHz at the highest field"),
-            ("method", f"exact blocks of one {words['good']} (and K, or D2 species), every field diagonalised"),
+            ("method", f"exact blocks of one {good} (and K, or D2 species), every field diagonalised"),
             ("error", error),
         ),
-        counts={"fields": len(fields), "states": len(fields) * facts["curves"]},
-        seconds=cost.seconds,
-        memory_mb=cost.memory_mb,
-        left_out=largest_first(
-            [*field_limits, *(part for part in described["left_out"] if part.name != words.get("within"))]
-        ),
-    )
-
-
-def _plan_stark(request: Any) -> Plan:
-    """The plan of levels in an electric field."""
-    words = {
-        "kind": "stark",
-        "acts": "dipole in the field, up to {:g} kV/cm",
-        "good": "|M|",
-        "within": "Stark shift of a stray field",
+        "counts": {"fields": len(fields), "states": len(fields) * facts["curves"]},
+        "left_out": largest_first([*field_limits, *others]),
     }
-    followed = replace(request, diabatic_gap_mhz=None)
-    return plan_in_field(followed, answer_stark, words)
 
 
-def _plan_zeeman(request: Any) -> Plan:
-    """The plan of levels in a magnetic field."""
-    words = {"kind": "zeeman", "acts": "magnetic moments in the field, up to {:g} T", "good": "M"}
-    return plan_in_field(request, answer_zeeman, words)
+def _stark_cost(request: Any) -> Cost:
+    """The cost of levels in an electric field."""
+    return _cost_in_field(answer_stark, replace(request, diabatic_gap_mhz=None))
 
 
 ENERGIES = Measure("energy", "MHz", largest_difference)
@@ -114,10 +106,14 @@ STARK = Numerics(
     {"MHz": Goal("energies")},
     knobs=(_basis(lambda request: range(request.j_highest + 2, request.jmax + 1), ENERGIES, _energies),),
     prepare=_with_basis,
-    plan=_plan_stark,
+    describe=partial(
+        _describe_in_field, "dipole in the field, up to {:g} kV/cm", "|M|", "Stark shift of a stray field"
+    ),
+    cost=_stark_cost,
 )
 ZEEMAN = Numerics(
     {"MHz": Goal("energies")},
     knobs=(_basis(lambda request: (), ENERGY, answer_zeeman),),
-    plan=_plan_zeeman,
+    describe=partial(_describe_in_field, "magnetic moments in the field, up to {:g} T", "M", ""),
+    cost=partial(_cost_in_field, answer_zeeman),
 )

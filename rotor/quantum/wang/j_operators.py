@@ -12,7 +12,6 @@ J_m∓ raises and lowers k). In a left-handed representation the frame x, -y, z 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from types import MappingProxyType
 
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
+from rotor.frozen import dataclass
 from rotor.quantum.wang.basis import WangBlock
 from rotor.tops.operators import axis_order
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import os
-from dataclasses import dataclass
 from pathlib import Path
 
+from rotor.frozen import dataclass
 from rotor.molecules.readers.sdf_entries import SDF_SUFFIXES, entry_names
 from rotor.scenes.scene import within
 

@@ -13,12 +13,13 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from rotor.frozen import dataclass
 from rotor.scenes.outputs import check_path, checked_paths, suffixes_of
 from rotor.scenes.scene import Scene
 from rotor.scenes.scene_file import scene_of

@@ -8,13 +8,13 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
 from rotor.checks import NoAnswerError
 from rotor.formats.atomic_write import FULL
+from rotor.frozen import dataclass
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import Scene, SceneResult
 from rotor.scenes.scene_file import scene_text

@@ -11,12 +11,12 @@ deuterium by some per cent and of heavier nuclei by less than one per cent. Cons
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.frozen import dataclass
 from rotor.molecules.nuclei import Isotope
 from rotor.tops.spins.spin_constants import SpinConstants, spin_names
 

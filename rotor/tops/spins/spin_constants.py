@@ -11,10 +11,11 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.molecules.nuclei import isotope
 from rotor.tops.spins.tensor_elements import plain_elements
 from rotor.units import parse_quantity

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Ints
+from rotor.frozen import dataclass
 from rotor.molecules.molecule import CLOSEST_ANGSTROM, Molecule
 from rotor.molecules.symmetry.operations import Operation, shortest_distance
 from rotor.molecules.symmetry.point_group import TOLERANCE, Symmetry, find_symmetry, molecule_symmetry

@@ -7,7 +7,6 @@ their common divisor, in levels and in Q alike.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import reduce
 from math import gcd
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.checks import Renamed
+from rotor.frozen import dataclass
 
 SPECIES = ("ee", "eo", "oe", "oo")  # parities of Ka and Kc
 MOST_WEIGHT = 2**53  # weights up to here add up exactly

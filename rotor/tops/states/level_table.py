@@ -6,12 +6,13 @@ A table belongs to a set of constants and an isotopologue; it is dropped when ei
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.table import Table
 
 

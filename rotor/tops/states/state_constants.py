@@ -14,11 +14,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from types import MappingProxyType
 from typing import Any
 
 from rotor.checks import Renamed
+from rotor.frozen import dataclass
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.units import parse_quantity
 

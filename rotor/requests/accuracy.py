@@ -1,0 +1,207 @@
+"""Accuracy as an input: the cheapest settings that reach the requested accuracy, and the error that is reached.
+
+| kind | accuracy of | what is chosen | error stated |
+|---|---|---|---|
+| spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins, left out if smaller; method of several | rounding, and these |
+| stark, zeeman | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max, round-off |
+| align | cosines, 1e-4 | the loosest tolerance (steps, populations), the smallest J max | steps, edge, populations, phases |
+| thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
+| tumble | attitude, "1e-6 rad" | see `rotor.classical.tolerance_search`; free motion is exact | from finer steps |
+| spectrum, raman | intensities, "0.1 %" | see `rotor.spectra.intensity_accuracy` | of the sum Q, of rounding, of weaker lines |
+| emission | brightness, "1 mK" | the largest least depth, in decades | lines left out, Q |
+| fit | frequencies, "1 kHz"; constants, "1 %" of their standard errors | the loosest tolerance of the search, in decades | the next step |
+| torsion | levels | nothing: exact | functions, terms of the series |
+| gas, fluid | see `rotor.thermodynamics.gas_numerics`, `rotor.fluids.numerics` | | |
+
+The accuracy concerns the numerical error with the constants as given. Uncertain constants and missing orders of distortion are listed
+in the plan. An accuracy beyond double precision is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from typing import Annotated, Any
+
+import msgspec
+
+from rotor.frozen import dataclass
+from rotor.requests.budget import ErrorBudget, ErrorTerm
+from rotor.requests.field import Field
+from rotor.requests.fill import Entries
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Sought, knobs_of_fields
+from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.readers import Quantity
+
+CONVERTED = ("MHz", "K", "Å")  # units of an accuracy for which others may stand
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+class TotalAccuracy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """An accuracy of the whole error budget, not of its numerical part alone."""
+
+    total: Annotated[str | float, msgspec.Meta(description="of all sources of error together")]
+
+
+Stated = str | float | TotalAccuracy | None
+
+
+@dataclass(frozen=True)
+class Reached:
+    """The requested accuracy and the error that was reached, in `unit`. how: the chosen settings."""
+
+    asked: float
+    error: float
+    unit: str
+    how: str
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """A requested accuracy. value: in `unit`. total: whether it holds for the whole error budget."""
+
+    value: float
+    unit: str
+    total: bool
+    numerics: Numerics
+
+    def chosen(
+        self, request: Any, entries: Entries, compute: Callable[[Any], Any], *, confirmed: bool = True
+    ) -> Choice:
+        """The cheapest settings that reach the accuracy: of each knob the first, coarsest first, whose error is within it.
+
+        confirmed: whether errors that take a run are estimated too. Raises ValueError if no setting suffices, and for a knob that is
+        set as well.
+        """
+        goal = self.numerics.goals[self.unit]
+        if reason := goal.unfit(request):
+            raise ValueError(f"accuracy: {self.text}: {reason}")
+        sets = goal.sets if any(knob.used(request) for knob in goal.knobs) else ()
+        if stated := next((key for key in sets if entries.values.get(key) is not None), ""):
+            raise ValueError(f"accuracy and {stated}: give one of them")
+        chosen, words = Choice(goal.prepare(request), NOTHING_CHEAPER), list[str]()
+        for knob, field in self._knobs(goal, request, entries):
+            sought = Sought(chosen.request, self.value, compute, goal.error, entries, chosen.answer)
+            choice = self._first_within(knob.choices(sought, field), confirmed)
+            if choice is not None:
+                words.append(choice.how)
+                chosen = replace(choice, how=", and ".join(words))
+        return chosen
+
+    def _knobs(self, goal: Goal, request: Any, entries: Entries) -> Iterator[tuple[Knob, Field | None]]:
+        """The knobs of a goal, or the first of a field that can be set, with that field."""
+        yield from ((knob, None) for knob in goal.knobs)
+        if goal.knobs or self.unit == "%":
+            return
+        for field, knob in knobs_of_fields(request):
+            if knob.least is not None or knob.tried:
+                if entries.has(field):
+                    raise ValueError(f"accuracy and {field.identity}: give one of them")
+                yield knob, field
+                return
+
+    def _first_within(self, choices: Iterable[Choice], confirmed: bool) -> Choice | None:
+        """The first choice within the accuracy; None without any choice."""
+        choice, error = None, 0.0
+        for choice in choices:
+            if callable(choice.error) and not confirmed:
+                return choice
+            error = choice.error() if callable(choice.error) else choice.error
+            if error <= self.value:
+                return replace(choice, error=error)
+        if choice is not None:
+            raise self.out_of_reach(error, choice.how)
+        return None
+
+    @property
+    def text(self) -> str:
+        """The accuracy with its unit."""
+        return f"{self.value:g} {self.unit}".rstrip()
+
+    def reached(self, answer: Any, choice: Choice) -> Reached:
+        """The error that an answer reached; ValueError, with the reason, if it exceeds the accuracy."""
+        error = max(self.numerics.goals[self.unit].error(answer), choice.estimate)
+        if error > self.value:
+            raise self.out_of_reach(error, choice.how)
+        if self.total:
+            refuse_total(_with_error(answer.errors, choice), self.value, self.unit)
+        return Reached(self.value, error, self.unit, choice.how)
+
+    def out_of_reach(self, error: float, how: str) -> ValueError:
+        """The error for an accuracy that the settings, or double precision, do not reach."""
+        return ValueError(f"accuracy: {self.text} cannot be given: the error here is {error:.2g} ({how}); ask for less")
+
+
+def read_accuracy(stated: Stated, numerics: Numerics, entries: Entries = Entries()) -> Accuracy | None:  # noqa: B008
+    """An accuracy as stated, in the unit of a goal; None if none is stated. entries: may decide on the meaning of a percentage.
+
+    >>> from rotor.requests.numerics import Goal
+    >>> frequencies = Numerics({"MHz": Goal("frequencies")})
+    >>> [read_accuracy(text, frequencies).value for text in ("1 kHz", 0.001)]
+    [0.001, 0.001]
+    >>> [read_accuracy(text, Numerics({"": Goal("Q")})).value for text in ("0.1 %", 0.02)]
+    [0.001, 0.02]
+    """
+    if stated is None:
+        return None
+    total = isinstance(stated, TotalAccuracy)
+    plain = stated.total if isinstance(stated, TotalAccuracy) else stated
+    goals, text = numerics.goals, str(plain).strip()
+    unit, percent = _unit_of(text, numerics, entries), text.endswith("%")
+    if unit not in goals:
+        units = ", or ".join(f"{unit} of the {goal.of}" for unit, goal in goals.items())
+        raise ValueError(f"accuracy: {plain!r}: expected a unit: {units}")
+    if percent and unit not in ("", "%"):
+        raise ValueError(f"accuracy: {plain!r}: expected {unit}, not a percentage")
+    reader = Quantity(unit if unit in CONVERTED else "")
+    number: float = Field(reader, "", "accuracy").read(text.removesuffix("%").removesuffix("rad").strip(), "key")
+    if not number > 0.0:
+        raise ValueError(f"accuracy: {plain!r}: expected more than 0")
+    return Accuracy(0.01 * number if percent and not unit else number, unit, total, numerics)
+
+
+def _unit_of(text: str, numerics: Numerics, entries: Entries) -> str:
+    """The unit of an accuracy.
+
+    >>> from rotor.requests.numerics import Goal
+    >>> gas = Numerics({unit: Goal() for unit in ("K", "%", "")})
+    >>> [_unit_of(text, gas, Entries()) for text in ("1 K", "0.1 %", "0.02")]
+    ['K', '%', '']
+    """
+    first = next(iter(numerics.goals))
+    if text.endswith("%"):
+        unit = numerics.percent(entries)
+        return unit if unit in numerics.goals else first
+    return "" if _NUMBER.fullmatch(text) and ("" in numerics.goals or not numerics.bare) else first
+
+
+def _with_error(budget: ErrorBudget, choice: Choice) -> ErrorBudget:
+    """The budget with the error estimated during the choice of settings, if the answer has no truncation error."""
+    if not choice.estimate or budget.truncation.value is not None:
+        return budget
+    return replace(budget, truncation=ErrorTerm(choice.estimate, choice.how))
+
+
+def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:
+    """Raise ValueError if the total of a budget exceeds the accuracy or is not estimated; the text has the terms and remedies."""
+    requested = f"accuracy.total: {accuracy:g} {unit}".rstrip()
+    if budget.unit != unit:
+        raise ValueError(
+            f"{requested}: the errors here are of {budget.of} in {budget.unit or 'parts of 1'}; use that unit"
+        )
+    alone = "an accuracy without total is that of the numerical error alone"
+    unestimated = [(name, term) for name, term in budget.shown() if term.value is None]
+    if unestimated:
+        texts = [
+            f"{name} {term.text(unit)}" + (f" ({term.remedy} would lower it)" if term.remedy else "")
+            for name, term in unestimated
+        ]
+        larger = filter(None, (budget.shortfall(accuracy), *texts))
+        raise ValueError(f"{requested} cannot be given: {'; '.join(larger)}; {alone}")
+    total = budget.total
+    if total is not None and total > accuracy:
+        largest = budget.shortfall(accuracy) or budget.line()
+        raise ValueError(
+            f"{requested} cannot be given: the total is {total:.2g} {unit}".rstrip() + f"; {largest}; {alone}"
+        )

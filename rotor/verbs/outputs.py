@@ -1,0 +1,100 @@
+"""Files of a verb, and the data of its report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rotor.frozen import dataclass
+from rotor.requests.fill import Entries
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+PICTURES = (".png", ".pdf", ".svg")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Report:
+    """Data of a report and its files.
+
+    content: of the JSON. shown: display options. entries: as entered. provenance: of files. view: of a picture.
+    sources: whether to print them in full. with_spins: the command that adds hyperfine structure.
+    executor: shares the work of derived tables. cache: derived tables that several files need.
+    """
+
+    content: Mapping[str, Any]
+    shown: Any
+    entries: Entries = field(default_factory=Entries)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    view: Any = None
+    sources: bool = False
+    with_spins: str = ""
+    executor: Executor | None = None
+    cache: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def command(self) -> dict[str, Any]:
+        """The provenance of pictures: the command or the scene alone."""
+        return {name: self.provenance[name] for name in ("command", "scene") if name in self.provenance}
+
+    @property
+    def picture_options(self) -> Mapping[str, Any]:
+        """The options of a picture that follow from its view."""
+        from rotor.plots.view import WHOLE
+
+        if isinstance(self.view, Mapping):
+            return self.view
+        return {} if self.view in (None, WHOLE) else {"view": self.view}
+
+
+Writer = Callable[[Any, Path, Report], None]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Output:
+    """A file that a verb writes.
+
+    name: of the option, and of the key in [outputs]. write: by default writes the table in the format of the suffix.
+    of: returns the written table if it is not that of the verb. grows: written during the calculation. many: repeatable.
+    scene: whether scenes have it too. required: whether the verb exists to write this file.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    help: str
+    write: Writer | None = None
+    example: str = ""
+    of: Callable[[Any], Any] | None = None
+    option: str = ""
+    grows: bool = False
+    many: bool = False
+    scene: bool = True
+    required: bool = False
+
+    @property
+    def flag(self) -> str:
+        """The option."""
+        return self.option or "--" + self.name.replace("_", "-")
+
+
+def tables(what: str, stem: str) -> tuple[Output, Output]:
+    """Outputs for a table as CSV and as Parquet. stem: of the file names in a template."""
+    return (
+        Output("csv", (".csv",), f"Write {what} as CSV", example=f"{stem}.csv"),
+        Output("parquet", (".parquet",), f"Write {what} as Parquet", example=f"{stem}.parquet"),
+    )
+
+
+def draw_answer(answer: Any, path: Path, report: Report, **options: Any) -> None:
+    """Draw an answer, or an object of it. options: of the picture."""
+    from rotor.plots.show import write_picture
+
+    write_picture(answer, path, report.command, **report.picture_options, **options)
+
+
+def picture(help: str, example: str = "", draw: Writer = draw_answer) -> Output:
+    """Output for the picture of an answer."""
+    return Output("plot", PICTURES, f"{help} (.png, .pdf, .svg)", draw, example)
