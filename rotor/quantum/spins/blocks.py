@@ -22,8 +22,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import Block, SolvedBlock, Used
-from rotor.quantum.spins.axial import are_axial, contracted_operators
-from rotor.quantum.spins.contraction import Contracted, Stack, stacks_of, within_blocks
+from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, stacks_of, within_blocks
 from rotor.quantum.spins.families import families_of, links_of_stacks
 from rotor.quantum.spins.many_f import Frame, Group, frame_of, groups_of
 from rotor.quantum.spins.parts import SpinPart, named_states
@@ -67,7 +66,7 @@ class Shared:
     @property
     def axial(self) -> bool:
         """Whether the functions are |N K⟩ instead of Wang functions."""
-        return are_axial(self.stacks[0].blocks)
+        return self.stacks[0].axial
 
 
 @dataclass(frozen=True)
@@ -218,9 +217,7 @@ def contracted_plan(
     for rank in {channel.rank for channel in distinct}:
         same_rank = [channel for channel in distinct if channel.rank == rank]
         pieces = [distinct[channel] for channel in same_rank]
-        by_channel |= zip(
-            same_rank, contracted_operators(stacks, min(reach, rank), pieces, representation), strict=True
-        )
+        by_channel |= zip(same_rank, operators_of_stacks(stacks, min(reach, rank), pieces, representation), strict=True)
     contracted = [(by_channel[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
     if hamiltonians:
         contracted.append(([within_blocks(stack, hamiltonians) for stack in stacks], [ALONE]))

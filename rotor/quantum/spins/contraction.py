@@ -2,19 +2,21 @@
 
 Blocks that have the same states v and kinds of Wang functions, and differ only in N, form a stack, padded with zeros to one shape.
 Elements between two stacks with a fixed N' - N are one array, computed for all N by the formulas of `tensors` and `operators` and
-contracted by one matrix product.
+contracted by one matrix product. Functions |N K⟩ of axial tops, K a good quantum number, are blocks of one function; those of a state v
+are one stack.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.spins.operators import Basis, Rotor
+from rotor.quantum.spins.operators import AxialState, Basis, Rotor
 from rotor.quantum.spins.rotor import Piece, acts
 from rotor.quantum.spins.stack_elements import Pairs, Section, rotor_elements, tensor_elements_of_pairs
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
@@ -38,6 +40,11 @@ class Stack(NamedTuple):
     sizes: list[int]
     blocks: list[SolvedBlock]
     single: list[bool]
+
+    @property
+    def axial(self) -> bool:
+        """Whether the functions are |N K⟩ instead of Wang functions."""
+        return isinstance(self.sections[0].basis, AxialState)
 
 
 Element = tuple[Section, Section, Floats]
@@ -97,7 +104,8 @@ def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: list[int], contrac
         sizes,
         members,
         [
-            size == 1 or any(part.basis.size == 1 for part in block.parts)
+            isinstance(sections[0].basis, WangBlock)
+            and (size == 1 or any(part.basis.size == 1 for part in block.parts))
             for size, block in zip(sizes, members, strict=True)
         ],
     )
@@ -147,9 +155,10 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contrac
     """
     rank = rank_of(tensors)
 
-    alike = all(tensors.get((v, w), tensor) == tensor for (w, v), tensor in tensors.items())
+    axial = stacks[0].axial
+    alike = not axial and all(tensors.get((v, w), tensor) == tensor for (w, v), tensor in tensors.items())
     forward, back = list[Contracted | None](), list[Contracted | None]()
-    for up, low, pairs in _near(stacks, rank):
+    for up, low, pairs in _near(stacks, rank, range(-rank, rank + 1) if axial else range(1)):
         elements = _contracted(up, low, pairs, _tensor_elements(tensors, up, low, pairs))
         forward.append(elements)
         if alike:
@@ -189,23 +198,29 @@ def _tensor_elements(tensors: Tensors, up: Stack, low: Stack, pairs: Pairs) -> l
     ]
 
 
-def _near(stacks: Sequence[Stack], reach: int) -> Iterator[tuple[Stack, Stack, Pairs]]:
-    """Pairs of stacks with the pairs of their blocks whose N differ by at most `reach`."""
-    for up in stacks:
-        for low in stacks:
-            for rise in range(reach + 1):
-                pairs = _pairs(up, low, rise)
-                if len(pairs.up):
-                    yield up, low, pairs
+def _near(
+    stacks: Sequence[Stack], reach: int, rises_of_k: Sequence[int] = (0,)
+) -> Iterator[tuple[Stack, Stack, Pairs]]:
+    """Pairs of stacks with the pairs of their blocks whose N differ by at most `reach`, and K of |N K⟩ by one of `rises_of_k`."""
+    for up, low, rise, rise_of_k in product(stacks, stacks, range(reach + 1), rises_of_k):
+        pairs = _pairs(up, low, rise, rise_of_k)
+        if len(pairs.up):
+            yield up, low, pairs
 
 
-def _pairs(up: Stack, low: Stack, rise: int) -> Pairs:
+def _pairs(up: Stack, low: Stack, rise: int, rise_of_k: int) -> Pairs:
     """The blocks with N' - N = rise; for equal N, those whose first number is not below the second."""
-    a, b = _alike(up.n, low.n + rise)
+    if up.axial:
+        k_up, k = (np.array([part.basis.axial_k for part in stack.sections[0].parts]) for stack in (up, low))
+        width = 1 + max(int(k_up.max()), int(k.max())) + abs(rise_of_k)
+        rows_up, rows = up.n * width + k_up, (low.n + rise) * width + k + rise_of_k
+        _, a, b = np.intersect1d(rows_up, rows, assume_unique=True, return_indices=True)
+    else:
+        a, b = _alike(up.n, low.n + rise)
     if not rise and up is not low:
         ordered = up.numbers[a] > low.numbers[b]
         a, b = a[ordered], b[ordered]
-    return Pairs(a, b, up.n[a][:, None], low.n[b][:, None])
+    return Pairs(a, b, up.n[a][:, None], low.n[b][:, None], (k_up[a], k[b]) if up.axial else None)
 
 
 def _alike(left: Ints, right: Ints) -> tuple[Ints, Ints]:
@@ -276,7 +291,9 @@ class _Pieces:
             return None
         m, n = self._pairs.m[:, :, None].astype(float), self._pairs.n[:, :, None].astype(float)
         factor = piece.value * ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
-        if piece.nz2:
+        if piece.nz2 and self._pairs.k is not None:
+            factor = factor * (self._pairs.k[1] ** (2.0 * piece.nz2))[:, None, None]
+        elif piece.nz2:
             bra, ket = (section.basis.k.astype(float) ** (2 * piece.nz2) for section in (left, right))
             factor = factor * ((bra[:, None] + ket) / 2)
         return np.asarray(factor * element)

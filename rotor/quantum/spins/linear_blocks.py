@@ -20,11 +20,11 @@ from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
-from rotor.quantum.spins.axial import are_axial, contracted_operators, powers_of_axial
 from rotor.quantum.spins.blocks import Shared, SpinBlock
-from rotor.quantum.spins.contraction import Contracted, Stack, stacks_of
+from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, stacks_of
 from rotor.quantum.spins.many_f import Frame, Group
 from rotor.quantum.spins.many_f_lines import groups_of_blocks
+from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.pattern_tables import couplings_by_f
 from rotor.quantum.spins.rotor import ALONE, Piece, parameter_channels
 
@@ -129,7 +129,7 @@ def function_tables(top: Top, effects: Sequence[QuantumEffect], names: Sequence[
         }
         units = dict.fromkeys(_unit(piece) for of_channel in pieces.values() for each in of_channel for piece in each)
         alone = [[unit] for unit in units]
-        contracted = contracted_operators(stacks, min(_REACH, rank), alone, shared.representation)
+        contracted = operators_of_stacks(stacks, min(_REACH, rank), alone, shared.representation)
         by_unit = dict(zip(units, contracted, strict=True))
         for channel, of_channel in pieces.items():
             elements = _spin_elements(of_channel, by_unit, frame)
@@ -152,7 +152,7 @@ def _vectors(
 ) -> dict[int, Floats]:
     """Eigenvectors of the rotational blocks by kind, (table rows, functions, states)."""
     out = {}
-    if are_axial(blocks):
+    if isinstance(blocks[0].parts[0].basis, AxialState):
         return {kind: np.ones((len(energies), 1, 1)) for kind, energies in frame.energies_mhz.items()}
     for stack in stacks:
         count, states = frame.energies_mhz[stack.kind].shape
@@ -167,11 +167,22 @@ def rotation_blocks(
     terms: StateTerms, count: int, blocks: Sequence[SolvedBlock], representation: str
 ) -> list[LinearBlock]:
     """Linear blocks of the rotation alone, `count` parameters, over the functions of rotational blocks."""
-    if not are_axial(blocks):
+    if not isinstance(blocks[0].parts[0].basis, AxialState):
         return blocks_of_terms(terms, count, representation, blocks)
     first, parameters = np.zeros(1, dtype=np.int64), np.arange(count)
-    rows = powers_of_axial(terms, count, blocks)
+    rows = _powers_of_axial(terms, count, blocks)
     return [LinearBlock(1, first, first, np.ones((1, 1)), row[None], parameters) for row in rows]
+
+
+def _powers_of_axial(terms: StateTerms, count: int, blocks: Sequence[SolvedBlock]) -> Floats:
+    """Diagonal elements [N(N+1)]^p K^2q by function and parameter, (blocks, count); operators that change K do not contribute."""
+    parts = [block.parts[0] for block in blocks]
+    v, n, k = np.array([(part.v, part.basis.j, part.basis.axial_k) for part in parts]).T
+    x, out = n * (n + 1.0), np.zeros((len(parts), count))
+    for state, (p, q, order), column, factor in terms.by_power():
+        if not order:
+            out[:, column] += np.where(v == state, factor * x**p * k ** (2.0 * q), 0.0)
+    return out
 
 
 def _rotation_elements(
@@ -183,7 +194,7 @@ def _rotation_elements(
         whole = {kind: np.zeros((len(frame.n_of_rows), 1, count)) for kind in frame.energies_mhz}
         numbers = np.array(frame.kinds)
         for kind, values in whole.items():
-            values[frame.rows[numbers == kind], 0] = powers_of_axial(terms, count, blocks)[numbers == kind]
+            values[frame.rows[numbers == kind], 0] = _powers_of_axial(terms, count, blocks)[numbers == kind]
         first, parameters = np.zeros(1, dtype=np.int64), np.arange(count)
         return {(kind, kind, 0): UnitElements(first, first, values, parameters) for kind, values in whole.items()}
     of_kind: dict[int, list[tuple[int, Ints, Ints, LinearBlock]]] = {}

@@ -17,15 +17,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Indices, Ints
+from rotor.arrays import Floats, Indices, Ints, runs_of_similar_size
 from rotor.quantum.reduced import Connections
-from rotor.quantum.spins.axial import contracted_tensors
 from rotor.quantum.spins.blocks import Shared, SpinBlock
+from rotor.quantum.spins.contraction import tensors_of_stacks
 from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, consecutive, tables_of
 from rotor.quantum.spins.pattern_tables import tensors_by_f
 from rotor.quantum.tensors import Tensors, rank_of
 
-_ELEMENT, _PRODUCT = 1.5e-4, 2e-6  # time of an element, and of one step of its products, relative to that of a call
+_LIKE, _SMALL, _MOST = (
+    1.5,
+    24,
+    1 << 20,
+)  # ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
 _IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that lie side by side: 32 MB
 
 
@@ -101,7 +105,7 @@ class GroupStates:
 def tensor_moments(shared: Shared, tensors: Tensors) -> Moments:
     """A tensor of the molecule by pairs of states."""
     rank, frame = rank_of(tensors), shared.cache["frame"]
-    return Moments(rank, [[Acting(tables_of(contracted_tensors(shared.stacks, tensors), frame), rank)]])
+    return Moments(rank, [[Acting(tables_of(tensors_of_stacks(shared.stacks, tensors), frame), rank)]])
 
 
 def amplitudes_of_groups(
@@ -173,7 +177,7 @@ def _between(
         return
     lefts = np.array([up.places[row + step] for row in chosen])
     rights = np.array([low.places[row] for row in chosen])
-    for run in _runs_of_similar_size(low.sizes[rights].tolist()):
+    for run in runs_of_similar_size(low.sizes[rights].tolist(), _LIKE, _SMALL, _MOST):
         bra, ket, in_group = up.vectors(lefts[run]), low.vectors(rights[run]), low.in_group[rights[run]]
         each = [_elements(up.group, low.group, in_group, step, terms, frame, bra, ket) for terms in sums if terms]
         amplitudes = each[0] if len(each) == 1 else np.sqrt(sum(elements**2 for elements in each))
@@ -200,15 +204,3 @@ def _range_of_f(shared: Shared) -> tuple[int, int]:
     """The first and the last doubled F of a calculation."""
     twice_f = shared.cache["frame"].twice_f
     return twice_f[0], twice_f[-1]
-
-
-def _runs_of_similar_size(sizes: Sequence[int]) -> Iterator[slice]:
-    """Runs of blocks of rising size for one call each: a run ends where its padding would cost more than another call."""
-    first, cost_of_run = 0, 0.0
-    for last, size in enumerate(sizes):
-        cost = size**2 * (_ELEMENT + size * _PRODUCT)
-        if (last - first) * cost - cost_of_run > 1.0:
-            yield slice(first, last)
-            first, cost_of_run = last, 0.0
-        cost_of_run += cost
-    yield slice(first, len(sizes))

@@ -36,12 +36,16 @@ class Section(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Pairs of blocks of two stacks: places in the stacks (pairs,), and N' and N as columns (pairs, 1)."""
+    """Pairs of blocks of two stacks: places in the stacks (pairs,), and N' and N as columns (pairs, 1).
+
+    k: K' and K (pairs,) of functions |N K⟩, None for Wang functions.
+    """
 
     up: Ints
     low: Ints
     m: Ints
     n: Ints
+    k: tuple[Ints, Ints] | None = None
 
     @property
     def rise(self) -> int:
@@ -50,7 +54,7 @@ class Pairs(NamedTuple):
 
     def turned(self) -> Pairs:
         """The pairs in the opposite order."""
-        return Pairs(self.low, self.up, self.n, self.m)
+        return Pairs(self.low, self.up, self.n, self.m, None if self.k is None else self.k[::-1])
 
 
 def power_matrices(section: Section, units: Sequence[tuple[int, int]]) -> Floats:
@@ -66,6 +70,8 @@ def power_matrices(section: Section, units: Sequence[tuple[int, int]]) -> Floats
 
 def rotor_elements(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
     """Elements (pairs, functions', functions) of an operator between two sections; None where it does not act."""
+    if pairs.k is not None:
+        return _axial_elements(rotor, pairs, pairs.k[1], representation)
     if isinstance(rotor, Cosines):
         tensor = tensor_of(rotor.components, rotor.rank, representation)
         elements = None if tensor is None else tensor_elements_of_pairs(tensor, left.basis, right.basis, pairs)
@@ -135,6 +141,8 @@ def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, 
     rank, rise = tensor.rank, pairs.rise
     if rank > MOST_RANK:
         raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
+    if pairs.k is not None:
+        return _axial_tensor_elements(tensor, pairs, *pairs.k)
     steps, parts_of_n = _signed_parts(tensor, up, low, rise)
     if abs(rise) > rank or not steps:
         return None
@@ -194,3 +202,43 @@ def _add_folded(
             if k and k_up and k + k_up <= rank:
                 turned = _couplings(all_n, rise, rank, k + k_up, -k, 1)[:, 0]
                 elements[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]
+
+
+def _axial_elements(rotor: Rotor, pairs: Pairs, k: Ints, representation: str) -> Floats | None:
+    """⟨N'K‖X‖N K⟩ of an operator that leaves K good, (pairs, 1, 1)."""
+    n, rise = pairs.n[:, 0].astype(float), pairs.rise
+    if isinstance(rotor, Scalar):
+        x = n * (n + 1)
+        along = [factor * x**p * k ** (2.0 * q) for (p, q, _), factor in rotor.operators]
+        return np.sum(along, axis=0)[:, None, None] if not rise else None
+    assert isinstance(rotor, Cosines | CosinesWithN)
+    tensor = tensor_of(rotor.components, 2, representation)
+    along_axis = tensor.components[2].real if tensor else 0.0
+    closes = 2 * n + rise >= 2
+    elements = np.zeros(len(n))
+    if along_axis and abs(rise) <= 2:
+        elements[closes] = along_axis * closed_coupling(n[closes], rise, 2, 0, k[closes].astype(float))
+    if isinstance(rotor, Cosines):
+        return elements[:, None, None]
+    stretch, _, length = factors_with_n(n + rise, n)
+    trace = float(np.trace(np.array(rotor.components))) / 3
+    if abs(rise) > 1:
+        return None
+    return np.asarray(stretch * elements + (0 if rise else trace * length))[:, None, None]
+
+
+def _axial_tensor_elements(tensor: BodyTensor, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
+    """⟨N'K'‖T‖N K⟩ times √(number of components), so that squares count both signs of K, (pairs, 1, 1).
+
+    A component across the axis enters with its absolute value.
+    """
+    q = int(k_up[0] - k[0])
+    part = tensor.components[tensor.rank + q]
+    closes = (pairs.m + pairs.n)[:, 0] >= tensor.rank
+    if not part or not closes.any():
+        return None
+    out, n = np.zeros((len(k), 1, 1)), pairs.n[closes, 0].astype(float)
+    values = closed_coupling(n, pairs.rise, tensor.rank, q, k[closes].astype(float))
+    both_signs = np.where((k[closes] > 0) | (k_up[closes] > 0), np.sqrt(2.0), 1.0)
+    out[closes, 0, 0] = (abs(part) if q else part.real) * values * both_signs
+    return out

@@ -7,7 +7,6 @@ import pytest
 
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.spins.axial import tensors_of_axial_stacks
 from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of, tensors_of_stacks
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar, tensor_elements
 from rotor.quantum.spins.rotor import Piece, acts, solved_rotor
@@ -137,7 +136,7 @@ def test_tensors_of_axial_tops_are_those_of_pairs(body):
     blocks, representation = solved_rotor(Top(Constants(A=9400.0, B=3100.0)), SEMI_RIGID, [], 0, 6, None)
     rank = np.ndim(body)
     tensors = {(0, 0): body_tensor(body, rank, representation)}
-    computed = by_numbers(tensors_of_axial_stacks(stacks_of(blocks), tensors))
+    computed = by_numbers(tensors_of_stacks(stacks_of(blocks), tensors))
     count = 0
     for i, up in enumerate(blocks):
         for k, low in enumerate(blocks):
