@@ -328,8 +328,8 @@ def option_rows() -> list[str]:
     )
     rows.append("| DIAG 0 to 5: the names of levels | yes |")
     rows.append(
-        "| DIAG below 0: diagonal elements in place of eigenvalues | yes, with a note; fits, and symmetric tops with "
-        "spins or several states: eigenvalues and a note, refused with --as-spcat |"
+        "| DIAG below 0: diagonal elements in place of eigenvalues | yes, with a note, fits too; refused for "
+        "l-doubled states and three equivalent spins |"
     )
     return [*rows, "| IXX: elements with ΔN ≠ 0, ΔJ ≠ 0, ... left out | yes |"]
 
