@@ -41,9 +41,13 @@ def _matrices_of_group(
         places, height = np.arange(run.start, run.stop), int(group.heights[run].max())
         shape = len(places), group.columns, height, group.columns, height
         whole = space.array("whole", *shape)
-        whole.fill(0.0)
-        for tables, coefficients in acting:
-            whole += between(group, group, places, 0, tables, coefficients, frame, space.array("elements", *shape))
+        if not acting:
+            whole.fill(0.0)
+        for number, (tables, coefficients) in enumerate(acting):
+            out = space.array("elements", *shape) if number else whole
+            between(group, group, places, 0, tables, coefficients, frame, out)
+            if number:
+                whole += out
         energies = np.zeros(shape[:3])
         for rotation in group.rotations:
             of_kind = frame.energies_mhz[rotation.kind][frame.rows_of(group.twice_rows[run], rotation), :height]

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Indices, Ints, runs_of_similar_size
+from rotor.arrays import Floats, Indices, Ints, Workspace, runs_of_similar_size
 from rotor.quantum.reduced import Connections
 from rotor.quantum.spins.blocks import Shared, SpinBlock
 from rotor.quantum.spins.contraction import tensors_of_stacks
@@ -118,11 +118,12 @@ def amplitudes_of_groups(
     shared = blocks[0].shared
     frame: Frame = shared.cache["frame"]
     groups = groups_of_blocks(blocks, levels)
+    space = Workspace()
     rises_of_k = range(-moments.rank, moments.rank + 1) if shared.axial else range(1)
     for rise, rise_of_k, (place, low) in product(range(0, 2 * moments.rank + 1, 2), rises_of_k, enumerate(groups)):
         if rise or both_orders or rise_of_k >= 0:
             for up in groups if rise or both_orders or rise_of_k else groups[place:]:
-                yield from _between(up, low, rise, rise + 2 * frame.count * rise_of_k, moments, shared)
+                yield from _between(up, low, rise, rise + 2 * frame.count * rise_of_k, moments, shared, space)
 
 
 def connections_of(blocks: Sequence[Any], moments: Moments) -> Connections:
@@ -159,8 +160,9 @@ def _states_of_group(blocks: list[SpinBlock], frame: Frame, levels: int) -> Grou
 
 
 def _between(
-    up: GroupStates, low: GroupStates, rise: int, step: int, moments: Moments, shared: Shared
-) -> Iterator[Rows]:
+    up: GroupStates, low: GroupStates, rise: int, step: int, moments: Moments, shared: Shared,
+    space: Workspace,
+) -> Iterator[Rows]:  # fmt: skip
     """Elements between two groups, whose doubled F differ by `rise` and doubled rows by `step`."""
     frame, first, last = shared.cache["frame"], *_range_of_f(shared)
     chosen = [row for row in low.places if row + step in up.places]
@@ -179,7 +181,9 @@ def _between(
     rights = np.array([low.places[row] for row in chosen])
     for run in runs_of_similar_size(low.sizes[rights].tolist(), _LIKE, _SMALL, _MOST):
         bra, ket, in_group = up.vectors(lefts[run]), low.vectors(rights[run]), low.in_group[rights[run]]
-        each = [_elements(up.group, low.group, in_group, step, terms, frame, bra, ket) for terms in sums if terms]
+        each = [
+            _elements(up.group, low.group, in_group, step, terms, frame, bra, ket, space) for terms in sums if terms
+        ]
         amplitudes = each[0] if len(each) == 1 else np.sqrt(sum(elements**2 for elements in each))
         up_rows, low_rows = up.rows[lefts[run], : bra.shape[3]], low.rows[rights[run], : ket.shape[3]]
         yield Rows(up_rows, low_rows, amplitudes, up is low and not step)
@@ -187,14 +191,14 @@ def _between(
 
 def _elements(
     up: Group, low: Group, chosen: Ints, step: int, terms: Sequence[tuple[Tables, Floats]], frame: Frame,
-    bra: Floats, ket: Floats,
+    bra: Floats, ket: Floats, space: Workspace,
 ) -> Floats:  # fmt: skip
     """Σ V' c ⟨r'‖X‖r⟩ V of operators between blocks of two groups, (blocks, n_up, n_low)."""
     shape = len(bra), *bra.shape[1:3], *ket.shape[1:3]
-    whole = np.empty(shape)
+    whole = space.array("whole", *shape)
     between(up, low, chosen, step, *terms[0], frame, whole)
     for term in terms[1:]:
-        whole += between(up, low, chosen, step, *term, frame, np.empty(shape))
+        whole += between(up, low, chosen, step, *term, frame, space.array("elements", *shape))
     functions_up, functions_low = bra.shape[1] * bra.shape[2], ket.shape[1] * ket.shape[2]
     moved = np.matmul(whole.reshape(-1, functions_up, functions_low), ket.reshape(len(ket), functions_low, -1))
     return np.asarray(np.matmul(bra.reshape(len(bra), functions_up, -1).transpose(0, 2, 1), moved))
