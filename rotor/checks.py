@@ -24,21 +24,8 @@ def require_positive(name: str, value: float, unit: str = "") -> float:
 def require_whole(name: str, value: int | None, least: int, most: int | None = None) -> None:
     """Raise ValueError for a whole number out of bounds; None passes.
 
-    Parameters
-    ----------
-    name : str
-        Name of the number in the error.
-    value : int or None
-        The number.
-    least : int
-        Smallest allowed value.
-    most : int, optional
-        Largest allowed value.
-
-    Raises
-    ------
-    ValueError
-        With name, value and bounds.
+    name: name of the number in the error. value: the number. least: smallest allowed value. most: largest allowed value.
+    Raises ValueError with name, value and bounds.
     """
     if value is not None and not hasattr(value, "__index__"):
         raise ValueError(f"{name}: {value!r}: expected a whole number, of type int")
@@ -50,24 +37,9 @@ def require_whole(name: str, value: int | None, least: int, most: int | None = N
 def require_between(name: str, value: float, low: float, high: float) -> float:
     """The value; ValueError unless it lies strictly between two bounds.
 
-    Parameters
-    ----------
-    name : str
-        Name of the number in the error.
-    value : float
-        The number.
-    low, high : float
-        Bounds, excluded.
-
-    Returns
-    -------
-    float
-        The value.
-
-    Raises
-    ------
-    ValueError
-        With name, value and bounds.
+    name: name of the number in the error. value: the number. low, high: bounds, excluded.
+    Returns: the value.
+    Raises ValueError with name, value and bounds.
     """
     if not low < value < high:
         raise ValueError(f"{name}: {value:g}: expected a number between {low:g} and {high:g}")

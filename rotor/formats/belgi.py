@@ -61,20 +61,9 @@ def is_belgi_file(path: str | os.PathLike[str]) -> bool:
 def read_belgi(path: str | os.PathLike[str]) -> Top:
     """The top with the constants at the head of an output of BELGI.
 
-    Parameters
-    ----------
-    path : path
-        The output.
-
-    Returns
-    -------
-    Top
-        Top with constants of internal rotation in the frame RAM.
-
-    Raises
-    ------
-    ValueError
-        With the file, for missing constants, and for unsupported terms that are not 0.
+    path: the output.
+    Returns: top with constants of internal rotation in the frame RAM.
+    Raises ValueError with the file, for missing constants, and for unsupported terms that are not 0.
     """
     text = Path(path).read_text(encoding="utf-8", errors="replace")
     head = text.partition("&CSTE")[2].partition("\n /")[0]

@@ -180,28 +180,11 @@ def lines_request(
 ) -> FitRequest:
     """The request of assigned lines and starting constants.
 
-    Parameters
-    ----------
-    lines : path
-        .lin, .csv, .cat or .cat.gz; or assigned lines; or rows of the numbers of the upper state, of the lower state, frequency and error
-        (MHz).
-    top : Top
-        Top with the starting constants.
-    free : sequence of str, optional
-        Constants to fit; by default those with an error. A constant that the top does not have starts at 0.
-    ties, priors_mhz : optional
-        As in `rotor.fitting.parameters.parameters`.
-    start : path, optional
-        File of the top, whose other tables are copied into a file of the result.
-
-    Returns
-    -------
-    FitRequest
-
-    Raises
-    ------
-    ValueError
-        For invalid lines or names, and without a constant to fit.
+    lines: .lin, .csv, .cat or .cat.gz; or assigned lines; or rows of the numbers of the upper state, of the lower state, frequency and
+    error (MHz). top: top with the starting constants. free: constants to fit; by default those with an error. A constant that the top
+    does not have starts at 0. ties, priors_mhz: as in `rotor.fitting.parameters.parameters`. start: file of the top, whose other tables
+    are copied into a file of the result.
+    Raises ValueError for invalid lines or names, and without a constant to fit.
     """
     if isinstance(lines, os.PathLike):
         lines = os.fspath(lines)

@@ -244,29 +244,12 @@ def write_hitran(lines: HitranLines, path: str | os.PathLike[str]) -> None:
 def hitran_lines(lines: Lines, *, molecule: int, isotopologue: int = 1, abundance: float = 1.0) -> HitranLines:
     """Records of a line list made at 296 K.
 
-    Parameters
-    ----------
-    lines : Lines
-        n lines with intensities at 296 K.
-    molecule, isotopologue : int
-        HITRAN's numbers for the species (CO is 5, its main isotopologue 1).
-    abundance : float, optional
-        Abundance of the isotopologue, a factor of all intensities in HITRAN; 1 for the pure isotopologue.
-
-    Returns
-    -------
-    HitranLines
-        n records, rising in wavenumber.
-
-    Raises
-    ------
-    ValueError
-        For another temperature than 296 K, for an abundance that is not from above 0 to 1, and for lines split by spins.
-
-    Notes
-    -----
-    Not in a rotor's line list, and written as 0: broadening, shift, codes of uncertainty and of reference. Weights
-    are those of the list, without a divisor common to all levels.
+    lines: n lines with intensities at 296 K. molecule, isotopologue: HITRAN's numbers for the species (CO is 5, its main isotopologue 1).
+    abundance: abundance of the isotopologue, a factor of all intensities in HITRAN; 1 for the pure isotopologue.
+    Returns: n records, rising in wavenumber.
+    Raises ValueError for another temperature than 296 K, for an abundance that is not from above 0 to 1, and for lines split by spins.
+    Not in a rotor's line list, and written as 0: broadening, shift, codes of uncertainty and of reference. Weights are those of the list,
+    without a divisor common to all levels.
     """
     if lines.temperature_k != TEMPERATURE_K:
         raise ValueError(

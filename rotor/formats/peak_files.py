@@ -37,20 +37,8 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
     found. A spectrum may have gaps: then at least 300 rows, of which nine in ten lie on grids of equal steps; its peaks are found piece
     by piece. A FITS file is always a spectrum.
 
-    Parameters
-    ----------
-    path : path
-    band_mhz : (float, float), optional
-        First and last recorded frequency; peaks outside are left out.
-
-    Returns
-    -------
-    PeakList
-
-    Raises
-    ------
-    ValueError
-        With file and rule, for unreadable input.
+    band_mhz: first and last recorded frequency; peaks outside are left out.
+    Raises ValueError with file and rule, for unreadable input.
     """
     name = os.fspath(path)
     if not Path(path).is_file():

@@ -55,16 +55,8 @@ def write_parquet(table: Table, path: str | os.PathLike[str], settings: Settings
 def write_json(table: Table, path: str | os.PathLike[str], settings: Settings, key: str = "rows") -> None:
     """Write a table as JSON: `provenance`, and under `key` a record for each row.
 
-    Parameters
-    ----------
-    table : Table
-        Columns by name.
-    path : path
-        The file; it is replaced when it is whole.
-    settings : mapping
-        Of the command or call that made the table; part of the provenance.
-    key : str, optional
-        Key of the rows.
+    table: columns by name. path: the file; it is replaced when it is whole. settings: of the command or call that made the table; part of
+    the provenance. key: key of the rows.
     """
     columns = dict(table.columns)
     rows = [dict(zip(columns, row, strict=True)) for row in _rows(columns)]

@@ -79,20 +79,9 @@ def is_westerfit_file(path: str | os.PathLike[str]) -> bool:
 def read_westerfit(path: str | os.PathLike[str]) -> Top:
     """The top of an input file of westerfit.
 
-    Parameters
-    ----------
-    path : path
-        A .inp file.
-
-    Returns
-    -------
-    Top
-        Top with constants of internal rotation in the frame RAM, labels as in westerfit, and for S > 0 constants of the spin I1.
-
-    Raises
-    ------
-    ValueError
-        With the file, for invalid lines, tops that are not threefold, and unsupported terms.
+    path: a .inp file.
+    Returns: top with constants of internal rotation in the frame RAM, labels as in westerfit, and for S > 0 constants of the spin I1.
+    Raises ValueError with the file, for invalid lines, tops that are not threefold, and unsupported terms.
     """
     try:
         return _top(Path(path).stem, _sections(Path(path).read_text(encoding="utf-8")))
@@ -231,20 +220,9 @@ def _constant(term: _Term) -> tuple[str, float] | None:
 def read_line_table(path: str | os.PathLike[str]) -> tuple[Ints, Ints, Floats, Floats]:
     """Labels of the upper and the lower states, frequencies and errors of a .lne file.
 
-    Parameters
-    ----------
-    path : path
-        A .lne file: J N Ka Kc m of both states, frequency, error.
-
-    Returns
-    -------
-    (n, 6) arrays of int, (n, 6) array of int, (n,) array, (n,) array
-        2F, N, Ka, Kc, species (0 A, 1 E) and v_t of both states; MHz.
-
-    Raises
-    ------
-    ValueError
-        With file and line, for another number of columns, and for excited A states, whose order of m is not documented.
+    path: a .lne file: J N Ka Kc m of both states, frequency, error.
+    Returns: 2F, N, Ka, Kc, species (0 A, 1 E) and v_t of both states; MHz.
+    Raises ValueError with file and line, for another number of columns, and for excited A states, whose order of m is not documented.
     """
     rows = []
     for number, line in enumerate(Path(path).read_text(encoding="utf-8").splitlines(), 1):

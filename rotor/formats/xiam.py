@@ -58,20 +58,9 @@ _SETTING = {"reduc": "reduc", "reduct": "reduc", "ntop": "ntop", "nfold": "nfold
 def read_xiam(path: str | os.PathLike[str]) -> Top:
     """The top of an input or output file of XIAM.
 
-    Parameters
-    ----------
-    path : path
-        A .xi or .xo file.
-
-    Returns
-    -------
-    Top
-        Top with constants of internal rotation in the frame PAM, and of one nucleus named I1.
-
-    Raises
-    ------
-    ValueError
-        With the file, for missing or unsupported constants.
+    path: a .xi or .xo file.
+    Returns: top with constants of internal rotation in the frame PAM, and of one nucleus named I1.
+    Raises ValueError with the file, for missing or unsupported constants.
     """
     text = load(path)[0].decode("utf-8", errors="replace")
     settings, values = _content(text)

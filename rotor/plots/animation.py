@@ -96,31 +96,11 @@ def animate(
     Left: the body in space, with L upright, drawn as its atoms or, without them, as the uniform box with its moments. Right: the
     path of L on the momentum sphere in the body.
 
-    Parameters
-    ----------
-    motion : FreeMotion
-        Motion of one body, in any units.
-    times : (n,) array
-        In the units of the motion; only their range counts.
-    path : path
-        A .gif or .mp4 file.
-    atoms : Atoms, optional
-        Drawn instead of the box.
-    axis_names : (str, str, str), optional
-        Names of the principal axes.
-    time_unit : str, optional
-        Unit of the displayed times.
-    time_factor : float, optional
-        Factor of the displayed times.
-    frames : int, optional
-        Number of frames.
-    provenance : mapping, optional
-        Content of the comment (.gif) or comment tag (.mp4) in addition to program and version.
-
-    Raises
-    ------
-    ValueError
-        For a suffix that cannot be written here, and for equal times.
+    motion: motion of one body, in any units. times (n,): in the units of the motion; only their range counts. path: a .gif or .mp4 file.
+    atoms: drawn instead of the box. axis_names: names of the principal axes. time_unit: unit of the displayed times. time_factor: factor
+    of the displayed times. frames: number of frames. provenance: content of the comment (.gif) or comment tag (.mp4) in addition to
+    program and version.
+    Raises ValueError for a suffix that cannot be written here, and for equal times.
     """
     check_film(path)
     times = np.asarray(times, dtype=np.float64)

@@ -38,18 +38,9 @@ def picture(comparison: Comparison, *, names: tuple[str, str] = ("", ""), view: 
 def comparison_figure(comparison: Comparison, *, names: tuple[str, str] = ("", "")) -> Any:
     """A matplotlib figure of two lists and the differences of their matched lines.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        The reference is drawn upwards, the other list downwards, as log10 of intensity; unmatched lines in
-        another colour.
-    names : (2,) strings
-        Names of the reference and the other list.
-
-    Raises
-    ------
-    ValueError
-        If both lists are empty.
+    comparison: the reference is drawn upwards, the other list downwards, as log10 of intensity; unmatched lines in another colour. names
+    (2,): names of the reference and the other list.
+    Raises ValueError if both lists are empty.
     """
     if not len(comparison.reference) and not len(comparison.ours):
         raise ValueError("neither list has a line to draw; widen the range or lower the cut")

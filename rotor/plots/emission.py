@@ -35,32 +35,11 @@ def emission_figure(
 ) -> Any:
     """A matplotlib figure of T_B against the observed frequency.
 
-    Parameters
-    ----------
-    answer : EmissionAnswer
-        One curve for each molecule; several molecules also have a grey curve of their sum.
-    title : str, optional
-        Instead of the names and the source.
-    unit : "MHz", "GHz", "THz" or "cm-1", optional
-        Unit of the frequency axis, by default GHz.
-    range_mhz : (2,), optional
-        Range of frequencies; by default that of the request.
-    log : bool, optional
-        Whether the T_B axis is logarithmic.
-    vertical : (2,), optional
-        Range of T_B in K.
-    axes : matplotlib.axes.Axes, optional
-        Drawn on instead of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One panel.
-
-    Raises
-    ------
-    ValueError
-        For a logarithmic axis that starts at 0 or less.
+    answer: one curve for each molecule; several molecules also have a grey curve of their sum. title: instead of the names and the
+    source. unit: unit of the frequency axis, by default GHz. range_mhz (2,): range of frequencies; by default that of the request. log:
+    whether the T_B axis is logarithmic. vertical (2,): range of T_B in K. axes: drawn on instead of a new figure.
+    Returns: one panel.
+    Raises ValueError for a logarithmic axis that starts at 0 or less.
     """
     mhz = UNITS[unit or "GHz"]
     first, last = range_mhz or answer.request.range_mhz

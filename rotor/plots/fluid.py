@@ -47,19 +47,8 @@ def _shells(atoms: Any, centres: Any) -> PairDistribution | None:
 def fluid_figure(record: FluidRecord, shells: PairDistribution | None, molecules: int, *, title: str = "") -> Any:
     """A matplotlib figure of a run.
 
-    Parameters
-    ----------
-    record : FluidRecord
-    shells : PairDistribution or None
-        g(r) of centres of mass; None draws temperatures and energy only.
-    molecules : int
-        Number of molecules, which divides the energy.
-    title : str
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Temperatures and energy over time, g(r) beside them.
+    shells: g(r) of centres of mass; None draws temperatures and energy only. molecules: number of molecules, which divides the energy.
+    Returns: temperatures and energy over time, g(r) beside them.
     """
     with styled():
         figure = new_figure((WIDTH_INCHES, 4.2))

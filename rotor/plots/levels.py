@@ -79,30 +79,10 @@ def levels_figure(
 ) -> Any:
     """A matplotlib figure of a term diagram: columns of Ka (asymmetric top; Kc if nearer to oblate), of |K| (symmetric top), or of J.
 
-    Parameters
-    ----------
-    table : SelectedLevels
-        Levels to draw.
-    top : Top, optional
-        Top of the levels; without it an asymmetric top has columns of Ka.
-    unit : str, optional
-        Unit of the energies.
-    title : str, optional
-        Instead of the name of the top.
-    view : View
-        Range of columns and energies.
-    axes : matplotlib.axes.Axes, optional
-        Drawn on instead of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One panel.
-
-    Raises
-    ------
-    ValueError
-        For an unknown unit, and for a table without levels in the view.
+    table: levels to draw. top: top of the levels; without it an asymmetric top has columns of Ka. unit: unit of the energies. title:
+    instead of the name of the top. view: range of columns and energies. axes: drawn on instead of a new figure.
+    Returns: one panel.
+    Raises ValueError for an unknown unit, and for a table without levels in the view.
     """
     require_choice("unit", unit, UNITS)
     if not len(table):

@@ -25,16 +25,8 @@ class Peak:
 def name_peaks(axes: Any, peaks: Sequence[Peak], drawn: Floats, most: int = 12) -> None:
     """Write names above peaks, from the tallest down, without overlap with other names or with the drawing.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        With final limits, and space above the tallest peak.
-    peaks : sequence of Peak
-        Peaks outside the limits are not named.
-    drawn : (n, 2) array
-        Tips of everything drawn, in axis units.
-    most : int
-        Largest number of names.
+    axes: with final limits, and space above the tallest peak. peaks: peaks outside the limits are not named. drawn (n, 2): tips of
+    everything drawn, in axis units. most: largest number of names.
     """
     axes.figure.canvas.draw()  # computes the layout, so that pixel sizes are valid
     (first, last), (low, high) = sorted(axes.get_xlim()), axes.get_ylim()
@@ -49,16 +41,8 @@ def name_peaks(axes: Any, peaks: Sequence[Peak], drawn: Floats, most: int = 12) 
 def leave_or_remove(text: Any, axes: Any, boxes: list[Any], drawn: Floats) -> None:
     """Leave a name if nothing is in the way, else remove it; the first name always stays, moved inside the axes if needed.
 
-    Parameters
-    ----------
-    text : matplotlib.text.Annotation
-        The written name.
-    axes : matplotlib.axes.Axes
-        Axes of the name.
-    boxes : list of Bbox
-        Boxes of the names so far, in pixels; the box of a name that stays is added.
-    drawn : (n, 2) array
-        Tips of everything drawn, in pixels.
+    text: the written name. axes: axes of the name. boxes: boxes of the names so far, in pixels; the box of a name that stays is added.
+    drawn (n, 2): tips of everything drawn, in pixels.
     """
     if not boxes:
         move_inside(text, axes)
@@ -89,18 +73,8 @@ def move_inside(text: Any, axes: Any) -> None:
 def fits(box: Any, frame: Any, boxes: Sequence[Any], drawn: Floats) -> bool:
     """Whether a name lies inside the axes without overlap with other names or the drawing.
 
-    Parameters
-    ----------
-    box, frame : matplotlib.transforms.Bbox
-        Boxes of the name and of the axes, in pixels.
-    boxes : sequence of Bbox
-        Boxes of the names so far.
-    drawn : (n, 2) array
-        Tips of everything drawn, in pixels.
-
-    Returns
-    -------
-    bool
+    box, frame: boxes of the name and of the axes, in pixels. boxes: boxes of the names so far. drawn (n, 2): tips of everything drawn, in
+    pixels.
     """
     inside = box.x0 >= frame.x0 and box.x1 <= frame.x1 and box.y1 <= frame.y1
     crossed = (drawn[:, 0] > box.x0) & (drawn[:, 0] < box.x1) & (drawn[:, 1] > box.y0)

@@ -37,25 +37,9 @@ def plot_overlay(
 ) -> None:
     """Draw an observed spectrum with a model; a .pdf has as many pages as needed, .png and .svg one long page.
 
-    Parameters
-    ----------
-    spectrum : ObservedSpectrum
-    components : sequence of Component
-        The model; empty for the spectrum alone.
-    path : path
-    sight : Sight, optional
-    unidentified_mhz : sequence of float, optional
-        Marked with triangles.
-    panels : int, optional
-        Number of panels; by default one for every 1500 channels.
-    title : str, optional
-    provenance : mapping, optional
-        Written into the metadata of the file.
-
-    Raises
-    ------
-    ValueError
-        For another suffix.
+    components: the model; empty for the spectrum alone. unidentified_mhz: marked with triangles. panels: number of panels; by default one
+    for every 1500 channels. provenance: written into the metadata of the file.
+    Raises ValueError for another suffix.
     """
     suffix = checked_suffix(path)
     requested = panels or max(1, round(len(spectrum) / CHANNELS))

@@ -190,21 +190,9 @@ class Picture:
 def save(figure: Any, path: str | os.PathLike[str], title: str, facts: Mapping[str, Any]) -> None:
     """Write a figure with title and facts (as JSON) in its metadata; without a date, so that equal pictures give equal files.
 
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-        Figure to write.
-    path : path
-        A .png, .pdf or .svg file.
-    title : str
-        Title; dollar signs of formulas are removed.
-    facts : mapping
-        Content of the metadata.
-
-    Raises
-    ------
-    ValueError
-        For another suffix.
+    figure: figure to write. path: a .png, .pdf or .svg file. title: title; dollar signs of formulas are removed. facts: content of the
+    metadata.
+    Raises ValueError for another suffix.
     """
     description = json.dumps(dict(facts), ensure_ascii=False, default=str)
     suffix, plain, program = checked_suffix(path), title.replace("$", ""), f"rotor {version()}"

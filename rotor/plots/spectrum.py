@@ -65,35 +65,15 @@ def spectrum_figure(
 ) -> Any:
     """A matplotlib figure of lines as sticks, or of a spectrum as a curve.
 
-    Parameters
-    ----------
-    thing : Lines or Spectrum
-        Sticks are integrated absorption in nm² MHz, a curve is the cross section in nm².
-    range_mhz : (2,), optional
-        Frequencies shown. By default the range of the request; without one, that of the lines above 0.4 % of the strongest.
-    title : str, optional
-        By default name, formula and temperature.
-    labels : int
-        Greatest number of lines that are named: the strongest first, others where there is space.
-    unit : "MHz", "GHz", "THz" or "cm-1", optional
-        Unit of the frequency axis; by default the one that gives numbers below 2000.
-    log : bool, optional
-        Whether the axis of intensity is logarithmic; by default where fewer than ten lines would be seen on a linear one.
-    vertical : (2,), optional
-        Lowest and highest intensity shown, in the unit of the axis.
-    axes : matplotlib.axes.Axes, optional
-        Axes to draw on; by default those of a new figure.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One panel. Lines of one rotational transition are named by the quantum numbers of their spins alone; the transition
-        stands above the picture.
-
-    Raises
-    ------
-    ValueError
-        For a spectrum without lines or with nothing in the range, an unknown unit, a logarithmic axis from 0 or less.
+    thing: sticks are integrated absorption in nm² MHz, a curve is the cross section in nm². range_mhz (2,): frequencies shown. By default
+    the range of the request; without one, that of the lines above 0.4 % of the strongest. title: by default name, formula and
+    temperature. labels: greatest number of lines that are named: the strongest first, others where there is space. unit: unit of the
+    frequency axis; by default the one that gives numbers below 2000. log: whether the axis of intensity is logarithmic; by default where
+    fewer than ten lines would be seen on a linear one. vertical (2,): lowest and highest intensity shown, in the unit of the axis. axes:
+    axes to draw on; by default those of a new figure.
+    Returns: one panel. Lines of one rotational transition are named by the quantum numbers of their spins alone; the transition stands
+    above the picture.
+    Raises ValueError for a spectrum without lines or with nothing in the range, an unknown unit, a logarithmic axis from 0 or less.
     """
     if unit is not None:
         require_choice("unit", unit, UNITS)

@@ -65,16 +65,8 @@ def draw_sphere(axes: Any) -> None:
 def draw_curve(axes: Any, view: View, curve: Floats, **style: Any) -> None:
     """Draw a curve on the sphere, its hidden parts faint and thin.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        Axes to draw on.
-    view : View
-        Direction from which the sphere is seen.
-    curve : (n, 3) array
-        Points on the unit sphere.
-    style : object
-        Options of `Axes.plot`: colour, width, label.
+    axes: axes to draw on. view: direction from which the sphere is seen. curve (n, 3): points on the unit sphere. style: options of
+    `Axes.plot`: colour, width, label.
     """
     flat, front = view.flat(curve), view.depth(curve) >= 0.0
     width = style.pop("linewidth", 1.0)
@@ -92,16 +84,8 @@ def draw_family(axes: Any, view: View, moments: Floats, per_side: int = 5) -> No
     A symmetric top has circles and an equator of points at rest, drawn dotted; a spherical or linear body has no
     polhodes.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        Axes to draw on.
-    view : View
-        Direction from which the sphere is seen.
-    moments : (3,) array
-        Moments of inertia, any unit.
-    per_side : int, optional
-        Energies on each side of the separatrix.
+    axes: axes to draw on. view: direction from which the sphere is seen. moments (3,): moments of inertia, any unit. per_side: energies
+    on each side of the separatrix.
     """
     if np.any(moments == 0.0):
         _draw_equator(axes, view, int(np.argmin(moments)))
@@ -122,16 +106,8 @@ def draw_family(axes: Any, view: View, moments: Floats, per_side: int = 5) -> No
 def draw_axes(axes: Any, view: View, moments: Floats, names: tuple[str, str, str]) -> None:
     """Draw the ends of the principal axes with their names: filled where rotation about them is stable, else open.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        Axes to draw on.
-    view : View
-        Direction from which the sphere is seen.
-    moments : (3,) array
-        Moments of inertia, any unit.
-    names : (str, str, str)
-        Names of the axes, as TeX.
+    axes: axes to draw on. view: direction from which the sphere is seen. moments (3,): moments of inertia, any unit. names: names of the
+    axes, as TeX.
     """
     values = np.sort(moments)
     for axis, name in enumerate(names):

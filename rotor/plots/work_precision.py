@@ -85,21 +85,9 @@ def plot_work_precision(
 ) -> None:
     """Draw `work_precision_figure` into a .png, .pdf or .svg file.
 
-    Parameters
-    ----------
-    panels : sequence of Panel
-        Panels, at least one with a point.
-    path : path
-        Its suffix chooses the format.
-    title : str
-        Title of the picture.
-    facts : mapping, optional
-        Entries of the metadata.
-
-    Raises
-    ------
-    ValueError
-        Where there is no point to draw, and for a suffix other than .png, .pdf, .svg.
+    panels: panels, at least one with a point. path: its suffix chooses the format. title: title of the picture. facts: entries of the
+    metadata.
+    Raises ValueError where there is no point to draw, and for a suffix other than .png, .pdf, .svg.
     """
     checked_suffix(path)
     save(work_precision_figure(panels, title), path, title or "work and precision", facts or {})

@@ -18,26 +18,10 @@ PANEL_INCHES = (2.6, 2.3)
 def zeeman_figure(field_map: FieldMap, title: str = "", spins: int = 0, view: View = WHOLE) -> Any:
     """A matplotlib figure of a map of levels in a magnetic field.
 
-    Parameters
-    ----------
-    field_map : FieldMap
-        A map of at least two fields.
-    title : str
-        Title of the picture.
-    spins : int
-        Number of spins, whose quantum numbers end each label.
-    view : View
-        Fields (T) and shifts (MHz) shown in every panel; its title is not used here.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One panel for each level of the free top without its spins.
-
-    Raises
-    ------
-    ValueError
-        For a map of one field.
+    field_map: a map of at least two fields. title: title of the picture. spins: number of spins, whose quantum numbers end each label.
+    view: fields (T) and shifts (MHz) shown in every panel; its title is not used here.
+    Returns: one panel for each level of the free top without its spins.
+    Raises ValueError for a map of one field.
     """
     if len(field_map.fields) < 2:
         raise ValueError("a picture of a map needs two fields or more")

@@ -226,24 +226,10 @@ def ladder(
 ) -> tuple[Setting, ...]:
     """Settings in order from coarse to fine, including the scene's value.
 
-    Parameters
-    ----------
-    values : iterable of float
-        Coarsest first.
-    scene_value : float or None
-        The value of the scene; None where it has none.
-    make : callable
-        Returns the request for a value.
-    text : callable
-        Formats a value.
+    values: coarsest first. scene_value: the value of the scene; None where it has none. make: returns the request for a value. text:
+    formats a value.
+    Returns: each value once.
 
-    Returns
-    -------
-    tuple of Setting
-        Each value once.
-
-    Examples
-    --------
     >>> [(setting.label, setting.in_scene) for setting in ladder([1e-2, 1e-4], 1e-3, lambda tolerance: None)]
     [('0.01', False), ('0.001', True), ('0.0001', False)]
     """

@@ -120,31 +120,12 @@ def work_precision(
 ) -> WorkPrecision:
     """Sweep every knob of a scene.
 
-    Parameters
-    ----------
-    scene : Scene
-        Without a sweep.
-    folder : path
-        Folder of the files that the scene reads.
-    limit_seconds : float
-        Processor time for all knobs together; each knob gets an equal share of the remainder.
-    progress : callable
-        Called with the knob and the setting before each calculation.
-    on_knob : callable
-        Called with the table so far after each knob.
+    scene: without a sweep. folder: folder of the files that the scene reads. limit_seconds: processor time for all knobs together; each
+    knob gets an equal share of the remainder. progress: called with the knob and the setting before each calculation. on_knob: called
+    with the table so far after each knob.
+    Returns: without rows if nothing can be swept; the remarks say why.
+    Raises ValueError as a run of the scene.
 
-    Returns
-    -------
-    WorkPrecision
-        Without rows if nothing can be swept; the remarks say why.
-
-    Raises
-    ------
-    ValueError
-        As a run of the scene.
-
-    Examples
-    --------
     >>> from rotor.scenes.scene import LevelsScene
     >>> table = work_precision(LevelsScene(molecule="CO"))
     >>> [row.setting for row in table.rows], table.rows[0].error > table.rows[-1].error == 0.0

@@ -71,33 +71,11 @@ def open_session(
 ) -> Service:
     """The session of a spectrum with molecules and lines; a saved session is resumed.
 
-    Parameters
-    ----------
-    source : path
-        A spectrum (text, FITS, .npy), or the file of a session.
-    molecules : sequence of str
-        Names, files or SMILES:... of species; those that the session has already are not added again.
-    lines : path, optional
-        Assigned lines (.lin, .csv, .cat) of the first molecule.
-    session : path, optional
-        The session file; by default SPECTRUM.view.json beside the spectrum.
-    temperature_k : float, optional
-        Of the added species.
-    axis_unit, unit, noise : optional
-        What the file of the spectrum does not state.
-    save : bool, optional
-        Whether the session is written to its file.
-    note : callable, optional
-        Takes remarks.
-
-    Returns
-    -------
-    Service
-
-    Raises
-    ------
-    ValueError
-        With file and rule for what cannot be read, and where another program has the session.
+    source: a spectrum (text, FITS, .npy), or the file of a session. molecules: names, files or SMILES:... of species; those that the
+    session has already are not added again. lines: assigned lines (.lin, .csv, .cat) of the first molecule. session: the session file; by
+    default SPECTRUM.view.json beside the spectrum. temperature_k: of the added species. axis_unit, unit, noise: what the file of the
+    spectrum does not state. save: whether the session is written to its file. note: takes remarks.
+    Raises ValueError with file and rule for what cannot be read, and where another program has the session.
     """
     path = Path(source)
     file = path if is_session(path) else Path(session) if session is not None else _session_beside(path)

@@ -80,29 +80,11 @@ def add_sources(
 ) -> list[Added]:
     """Add sources to a catalogue, which is created if it does not exist.
 
-    Parameters
-    ----------
-    path : path
-        Path of the catalogue.
-    sources : sequence of str
-        Files (.cat, .cat.gz, .par or .hitran of HITRAN, .states of ExoMol), folders of them, or `library`.
-    facts : SourceFacts, optional
-    catdir : path, optional
-        Table of species with Q(T); by default those beside each .cat file.
-    progress : callable, optional
-        Called with the name of each source.
-
-    Returns
-    -------
-    list of Added
-        One for each file or molecule, in order; those with a fault gave no lines.
-
-    Raises
-    ------
-    FileNotFoundError
-        A source that does not exist.
-    ValueError
-        A folder without a file of a known kind; a file that is no catalogue in the place of the catalogue.
+    path: path of the catalogue. sources: files (.cat, .cat.gz, .par or .hitran of HITRAN, .states of ExoMol), folders of them, or
+    `library`. catdir: table of species with Q(T); by default those beside each .cat file. progress: called with the name of each source.
+    Returns: one for each file or molecule, in order; those with a fault gave no lines.
+    Raises FileNotFoundError for a source that does not exist. Raises ValueError for a folder without a file of a known kind; a file that
+    is no catalogue in the place of the catalogue.
     """
     target, entries = Path(path), None if catdir is None else read_catdir(catdir)
     jobs = [job for source in sources for job in _jobs(source, entries)]

@@ -68,22 +68,8 @@ def species_from_catalogue(
 ) -> SpeciesLines:
     """A catalogue as a species.
 
-    Parameters
-    ----------
-    catalogue : Catalogue
-    entries, name, partition :
-        As in `read_cat_species`.
-    source : str, optional
-        File of the catalogue.
-
-    Returns
-    -------
-    SpeciesLines
-
-    Raises
-    ------
-    ValueError
-        For a catalogue with several tags.
+    entries, name, partition: as in `read_cat_species`. source: file of the catalogue.
+    Raises ValueError for a catalogue with several tags.
     """
     tags = np.unique(np.abs(catalogue.tag))
     if len(tags) != 1:

@@ -124,21 +124,9 @@ class LineCatalogue:
     def species_between(self, first_mhz: float, last_mhz: float, words: Sequence[str] = ()) -> list[SpeciesLines]:
         """Species with lines in a range of frequencies, in order of their numbers.
 
-        Parameters
-        ----------
-        first_mhz, last_mhz : float
-        words : sequence of str, optional
-            Names, tags, formulas or InChIKeys; all species by default. A formula may mean several.
-
-        Returns
-        -------
-        list of SpeciesLines
-            Species with their lines in the range only.
-
-        Raises
-        ------
-        ValueError
-            For a word without a species.
+        words: names, tags, formulas or InChIKeys; all species by default. A formula may mean several.
+        Returns: species with their lines in the range only.
+        Raises ValueError for a word without a species.
         """
         rows = self.lines(first_mhz, last_mhz, words)
         self._read_texts(np.unique(np.concatenate([rows["upper"], rows["lower"]])))

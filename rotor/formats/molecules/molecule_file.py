@@ -224,31 +224,12 @@ def parse_molecule_file(
 ) -> MoleculeFile:
     """Parse the text of a molecule file.
 
-    Parameters
-    ----------
-    text : str
-        TOML, see the head of the module.
-    where : str, optional
-        Names the file in errors.
-    default_name : str, optional
-        Name for a file without one.
-    folder : Path, optional
-        Folder of a relative path to a file of levels.
-    listed : bool, optional
-        Whether to read only what a list of molecules shows of a file with constants: constants, dipole, range of lines, sources.
+    text: TOML, see the head of the module. where: names the file in errors. default_name: name for a file without one. folder: folder of
+    a relative path to a file of levels. listed: whether to read only what a list of molecules shows of a file with constants: constants,
+    dipole, range of lines, sources.
+    Returns: the content of the file.
+    Raises ValueError with file, table and key, for unknown, missing or contradictory entries.
 
-    Returns
-    -------
-    MoleculeFile
-        The content of the file.
-
-    Raises
-    ------
-    ValueError
-        With file, table and key, for unknown, missing or contradictory entries.
-
-    Examples
-    --------
     >>> parse_molecule_file("constants = { B = 57635.96804, D = 0.1835 }").constants.text()
     'B=57635.96804 D=0.1835 MHz'
     """

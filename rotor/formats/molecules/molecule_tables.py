@@ -114,26 +114,9 @@ class TableReader:
     def quantity(self, key: str, value: Any, unit: str, expected: str) -> float:
         """A number in the unit of the table, or text with a unit, converted to the expected unit.
 
-        Parameters
-        ----------
-        key : str
-            Key, for messages.
-        value : object
-            Value of the key.
-        unit : str
-            Unit of a bare number.
-        expected : str
-            Unit of the result.
-
-        Returns
-        -------
-        float
-            The number in the expected unit.
-
-        Raises
-        ------
-        ValueError
-            With file, table and key, unless it is a finite number with a suitable unit.
+        key: key, for messages. value: value of the key. unit: unit of a bare number. expected: unit of the result.
+        Returns: the number in the expected unit.
+        Raises ValueError with file, table and key, unless it is a finite number with a suitable unit.
         """
         if not is_number(value) and not isinstance(value, str):
             raise self.error(key, f"expected a finite number of {unit}, or text with a unit")
@@ -166,26 +149,10 @@ def geometry(
 ) -> Molecule | None:
     """The molecule of a `[geometry]` table, with the dipole turned into its frame.
 
-    Parameters
-    ----------
-    table : TableReader or None
-        The geometry, where the file has one.
-    name : str
-        Name of the molecule.
-    dipole : (float, float, float) or None
-        Dipole along a, b, c in debye.
-    dipole_table : TableReader or None
-        Table of the dipole, for messages.
-
-    Returns
-    -------
-    Molecule or None
-        None without a table.
-
-    Raises
-    ------
-    ValueError
-        With file, table and key, for unknown entries or an invalid molecule.
+    table: the geometry, where the file has one. name: name of the molecule. dipole: dipole along a, b, c in debye. dipole_table: table of
+    the dipole, for messages.
+    Returns: none without a table.
+    Raises ValueError with file, table and key, for unknown entries or an invalid molecule.
     """
     if table is None:
         return None

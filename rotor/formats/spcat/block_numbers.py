@@ -51,17 +51,8 @@ class Blocks:
     def numbers(self, levels: Sequence[SubBlock], n: Ints, k: Ints, twice_f: Ints) -> tuple[Ints, Ints]:
         """Block and place of levels.
 
-        Parameters
-        ----------
-        levels : sequence of SubBlock
-            Sub-block of each of n levels.
-        n, k, twice_f : (n,) arrays of int
-            N, |K| and doubled F.
-
-        Returns
-        -------
-        block, rank : (n,) arrays of int
-            As in the first two columns of an .egy file.
+        levels: sub-block of each of n levels. n, k, twice_f (n,): N, |K| and doubled F.
+        Returns: as in the first two columns of an .egy file.
         """
         starts = {f: self._starts(f) for f in sorted(set(twice_f.tolist()))}
         block, rank = list[int](), list[int]()

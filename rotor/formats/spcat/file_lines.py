@@ -50,19 +50,8 @@ _COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper"
 def group_transitions(group: Group, levels: Levels, request: Request) -> Transitions:
     """The transitions between existing levels of equal weight in a group that may pass the cut of an .int file.
 
-    Parameters
-    ----------
-    group : Group
-        The connected states.
-    levels : Levels
-        Their levels.
-    request : Request
-        Temperature, partition function and limits.
-
-    Returns
-    -------
-    Transitions
-        Frequencies in MHz and strengths in D². Lines between unequal weights are left out, as in SPCAT.
+    group: the connected states. levels: their levels. request: temperature, partition function and limits.
+    Returns: frequencies in MHz and strengths in D². Lines between unequal weights are left out, as in SPCAT.
     """
     if not (group.effect.moments or group.effect.others):
         none = np.zeros(0, dtype=np.int32)  # int32 halves the memory of rows
@@ -110,19 +99,8 @@ def _wide_cut(levels: Levels, request: Request) -> IntensityCut | None:
 def share_a_weight(group: Group, levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:
     """Whether SPCAT lists transitions of a top with an n-fold axis: those between blocks with a common weight.
 
-    Parameters
-    ----------
-    group : Group
-        The connected states.
-    levels : Levels
-        Their levels.
-    upper, lower : (n,) arrays of int
-        Rows of the levels of each transition.
-
-    Returns
-    -------
-    (n,) array of bool
-        Whether a weight of A or B species or of E species is that of one of these in the other block.
+    group: the connected states. levels: their levels. upper, lower (n,): rows of the levels of each transition.
+    Returns: whether a weight of A or B species or of E species is that of one of these in the other block.
     """
     if levels.kind in ("prolate", "oblate"):  # both weights are equal
         return np.ones(len(upper), dtype=bool)
@@ -186,25 +164,10 @@ def group_lines(
 ) -> GroupLines:
     """The lines of a group within the limits of an .int file, one for each component of a K doublet.
 
-    Parameters
-    ----------
-    group : Group
-        The connected states.
-    levels : Levels
-        Their levels.
-    spread : (levels, k) array or None
-        ∂E/∂p F in MHz; the length of a difference of rows is the error of a line. Without it errors are 0.
-    transitions : Transitions
-        Frequencies in MHz and strengths in D² between them.
-    form : Format
-        Which quantum numbers there are.
-    request : Request
-        Temperature, partition function and limits.
-
-    Returns
-    -------
-    GroupLines
-        Frequencies and lower energies in MHz, intensities in nm² MHz.
+    group: the connected states. levels: their levels. spread (levels, k): ∂E/∂p F in MHz; the length of a difference of rows is the error
+    of a line. Without it errors are 0. transitions: frequencies in MHz and strengths in D² between them. form: which quantum numbers
+    there are. request: temperature, partition function and limits.
+    Returns: frequencies and lower energies in MHz, intensities in nm² MHz.
     """
     intensity = _intensity(group, levels, transitions, request)
     listed = within(request, transitions.frequency_mhz, intensity)
@@ -264,26 +227,10 @@ def _single_component(
 def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, *, linear: bool) -> Catalogue:
     """Lines of all groups, each with its QNFMT, in order of frequency.
 
-    Parameters
-    ----------
-    lines : list of (GroupLines, int)
-        Lines of each group, and the code of its quantum numbers.
-    form : Format
-        Which quantum numbers there are.
-    tag : int
-        Tag of the species.
-    linear : bool
-        Whether all states are linear, so that DR is 2.
-
-    Returns
-    -------
-    Catalogue
-        Frequencies in MHz, lower energies in cm⁻¹, log10 of intensities in nm² MHz.
-
-    Raises
-    ------
-    ValueError
-        For a tag of more than six digits.
+    lines: lines of each group, and the code of its quantum numbers. form: which quantum numbers there are. tag: tag of the species.
+    linear: whether all states are linear, so that DR is 2.
+    Returns: frequencies in MHz, lower energies in cm⁻¹, log10 of intensities in nm² MHz.
+    Raises ValueError for a tag of more than six digits.
     """
     joined = {name: end_to_end([getattr(each, name) for each, _ in lines]) for name in _COLUMNS}
     qnfmt = np.concatenate([np.full(len(each.frequency_mhz), code) for each, code in lines])
@@ -322,18 +269,8 @@ _RANKS = 9999  # the largest number of four digits
 def as_level_list(solved: Sequence[SolvedGroup], form: Format, blocks: Blocks | None = None) -> LevelList:
     """The levels of all groups as in an .egy file: ±K separate, by block and place, with all quantum numbers.
 
-    Parameters
-    ----------
-    solved : sequence of SolvedGroup
-        The groups with their levels and spreads; the lengths of rows of a spread are the errors of the energies, else they are 0.
-    form : Format
-        Which quantum numbers there are.
-    blocks : Blocks, optional
-        Block numbers of SPCAT; without them a block has 9999 levels, by F and energy.
-
-    Returns
-    -------
-    LevelList
+    solved: the groups with their levels and spreads; the lengths of rows of a spread are the errors of the energies, else they are 0.
+    form: which quantum numbers there are. blocks: block numbers of SPCAT; without them a block has 9999 levels, by F and energy.
     """
     tables: list[list[Any]] = []
     for group, levels, spread in solved:

@@ -261,23 +261,8 @@ def allowed(
 ) -> tuple[list[CodedLine], list[str]]:
     """The parameter lines that the declared symmetry allows, as in SPCAT, and why others are left out.
 
-    Parameters
-    ----------
-    lines : list of CodedLine
-        All supported parameters.
-    states : tuple of StateOptions
-        All states of the file.
-    doubled : list of Pair
-        The l-doubled pairs.
-    oblate : bool
-        Whether z is the c axis.
-
-    Returns
-    -------
-    lines : list of CodedLine
-        Lines that act.
-    reasons : list of str
-        A sentence for each line that is left out.
+    lines: all supported parameters. states: all states of the file. doubled: the l-doubled pairs. oblate: whether z is the c axis.
+    Returns: lines that act; a sentence for each line that is left out.
     """
     l_of = l_values(states, doubled)
     acting, reasons = list[CodedLine](), list[str]()

@@ -89,21 +89,9 @@ def quanta_format(file: ParameterFile, groups: list[Group]) -> Format:
 def listed_quanta(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:
     """The quantum numbers of each row as the file lists them, for one component of ±K.
 
-    Parameters
-    ----------
-    group : Group
-        The connected states of the levels.
-    levels : Levels
-        n solved levels.
-    form : Format
-        Which columns there are.
-    negative : bool, optional
-        Whether to list the component -K of a K doublet whose levels differ in species.
-
-    Returns
-    -------
-    (n, width) array of int
-        Half-integers rounded up.
+    group: the connected states of the levels. levels: n solved levels. form: which columns there are. negative: whether to list the
+    component -K of a K doublet whose levels differ in species.
+    Returns: half-integers rounded up.
     """
     quanta, n = levels.quanta, levels.rotational
     v = levels.quantum("v")

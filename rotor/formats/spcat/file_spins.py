@@ -56,21 +56,10 @@ def coupled_spin_lines(
 ) -> tuple[CodedLine, ...]:
     """The lines of connected states in functions of the total spin of equivalent nuclei.
 
-    Parameters
-    ----------
-    lines : iterable of CodedLine
-        All lines between these states and within them.
-    states : sequence of StateOptions
-        The connected states, which have the same spins.
-    by_exchange : bool
-        Whether levels of a state with even and odd total spin of two nuclei have different weights; not for l-doubled states.
-    axes : str
-        Axes x, y, z of the basis.
-
-    Returns
-    -------
-    tuple of CodedLine
-        Lines without those of spins that these states do not have.
+    lines: all lines between these states and within them. states: the connected states, which have the same spins. by_exchange: whether
+    levels of a state with even and odd total spin of two nuclei have different weights; not for l-doubled states. axes: axes x, y, z of
+    the basis.
+    Returns: lines without those of spins that these states do not have.
     """
     first = states[0]
     usable = tuple(line for line in lines if _highest_spin(line) <= len(first.spins))

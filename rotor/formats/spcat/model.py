@@ -76,19 +76,8 @@ def _fold_weights(options: Options, plus: int, minus: int, symmetric: bool) -> S
 def fold_parts(fold: int, plus: int, minus: int, e_weight: int) -> list[int]:
     """Twice the weights of K = 0 with J even and odd and of the E levels; if one of the first is 0, only half of the E levels exist.
 
-    Parameters
-    ----------
-    fold : int
-        n of the n-fold axis.
-    plus, minus : int
-        WTPL and WTMN.
-    e_weight : int
-        Weight of E levels in EWT.
-
-    Returns
-    -------
-    list of int
-        Weights of 0even, 0odd, 1, ..., n - 1.
+    fold: n of the n-fold axis. plus, minus: WTPL and WTMN. e_weight: weight of E levels in EWT.
+    Returns: weights of 0even, 0odd, 1, ..., n - 1.
     """
     return [2 * plus, 2 * minus, *[2 * e_weight if min(plus, minus) > 0 else e_weight] * (fold - 1)]
 

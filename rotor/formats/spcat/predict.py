@@ -83,29 +83,12 @@ def predict(
     weight, its frequency lies below FQLIM, and its intensity, that of one component of a K doublet, is above
     10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz.
 
-    Parameters
-    ----------
-    parameters : ParameterFile
-        The .var or .par file.
-    intensities : IntensityFile
-        The .int file.
-    as_spcat : bool, optional
-        Reproduce SPCAT's numbers even where it errs: QROT below 1, some moments.
-    full_basis : bool, optional
-        Ignore KNMIN and KNMAX: the basis has all K up to N. By default K runs from KNMIN to KNMAX.
+    parameters: the .var or .par file. intensities: the .int file. as_spcat: reproduce SPCAT's numbers even where it errs: QROT below 1,
+    some moments. full_basis: ignore KNMIN and KNMAX: the basis has all K up to N. By default K runs from KNMIN to KNMAX.
+    Returns: catalogue, lines, levels, Q, and notes on input that SPCAT ignores silently and on the effect of KNMAX.
+    Raises ValueError for an empty range of F, for Q or a temperature not above 0, and for unsupported input, which docs/spcat_codes.md
+    lists.
 
-    Returns
-    -------
-    Prediction
-        Catalogue, lines, levels, Q, and notes on input that SPCAT ignores silently and on the effect of KNMAX.
-
-    Raises
-    ------
-    ValueError
-        For an empty range of F, for Q or a temperature not above 0, and for unsupported input, which docs/spcat_codes.md lists.
-
-    Examples
-    --------
     >>> from rotor.formats.spcat.text.int_file import read_int
     >>> from rotor.formats.spcat.text.par import read_par
     >>> file = read_par(b"OCS\n 1 0 0 0\nl -1 1 0 0\n 100 6081.492 0\n")

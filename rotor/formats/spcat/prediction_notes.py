@@ -83,19 +83,8 @@ def _has_unlike_orders(dipoles: Dipoles, others: Iterable[DipoleCode]) -> bool:
 def basis_notes(groups: list[Group], whole: list[Group], request: Request) -> list[str]:
     """Levels that KNMIN and KNMAX exclude, and the shifts of the remaining levels.
 
-    Parameters
-    ----------
-    groups : list of Group
-        Groups with the basis of the file.
-    whole : list of Group
-        Groups with all K.
-    request : Request
-        Highest F.
-
-    Returns
-    -------
-    list of str
-        One sentence for each group whose basis is cut.
+    groups: groups with the basis of the file. whole: groups with all K. request: highest F.
+    Returns: one sentence for each group whose basis is cut.
     """
     cut = [group for group in groups if any(state.is_cut for state in group.states)]
     return [_cut_note(group, [other for other in whole if _share_a_state(group, other)], request) for group in cut]

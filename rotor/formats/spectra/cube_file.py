@@ -64,22 +64,9 @@ class Cube:
 def read_cube(path: Path, choices: ReadChoices | None = None) -> Cube:
     """The cube in a FITS file, in K.
 
-    Parameters
-    ----------
-    path : path
-    choices : ReadChoices, optional
-        Settings that the header does not state. By default the noise of each pixel is estimated from its line-free channels.
-
-    Returns
-    -------
-    Cube
-
-    Raises
-    ------
-    ValueError
-        With file and rule: no image of three axes, no spectral axis, missing or unknown units, Jy/beam without a beam.
-    ImportError
-        Without astropy.
+    choices: settings that the header does not state. By default the noise of each pixel is estimated from its line-free channels.
+    Raises ValueError with file and rule: no image of three axes, no spectral axis, missing or unknown units, Jy/beam without a beam.
+    Raises ImportError without astropy.
     """
     fits, choices, name = astropy_fits(), choices or ReadChoices(), str(path)
     try:

@@ -71,22 +71,9 @@ def astropy_fits() -> Any:
 def read_fits_spectrum(path: Path, choices: ReadChoices | None = None) -> ObservedSpectrum:
     """The spectrum in a FITS file.
 
-    Parameters
-    ----------
-    path : path
-    choices : ReadChoices, optional
-        Settings that the header does not state; `row` of a table of several spectra, `pixel` of a cube.
-
-    Returns
-    -------
-    ObservedSpectrum
-
-    Raises
-    ------
-    ValueError
-        With file and rule: no spectrum, several spectra without a choice, missing or unknown units, velocities without rest frequency.
-    ImportError
-        Without astropy.
+    choices: settings that the header does not state; `row` of a table of several spectra, `pixel` of a cube.
+    Raises ValueError with file and rule: no spectrum, several spectra without a choice, missing or unknown units, velocities without rest
+    frequency. Raises ImportError without astropy.
     """
     fits, choices = astropy_fits(), choices or ReadChoices()
     try:

@@ -30,21 +30,8 @@ _NOISE = re.compile(r"noise|error|sigma|uncertainty|rms", re.IGNORECASE)
 def read_text_spectrum(path: Path, choices: ReadChoices | None = None) -> ObservedSpectrum:
     """The spectrum in a text file.
 
-    Parameters
-    ----------
-    path : path
-        Packed with gzip or not.
-    choices : ReadChoices, optional
-        Settings that the file does not state.
-
-    Returns
-    -------
-    ObservedSpectrum
-
-    Raises
-    ------
-    ValueError
-        With file, line and rule: a line without two or three numbers, or an unknown unit.
+    path: packed with gzip or not. choices: settings that the file does not state.
+    Raises ValueError with file, line and rule: a line without two or three numbers, or an unknown unit.
     """
     choices = choices or ReadChoices()
     text, name = load(path)

@@ -129,25 +129,12 @@ def _listed(scene: Scene, folder: str | os.PathLike[str]) -> str | None:
 def points(scene: Scene, folder: str | os.PathLike[str] = ".") -> Points:
     """All combinations of the values of a sweep; the last name varies fastest.
 
-    Parameters
-    ----------
-    scene : Scene
-        With a sweep, or with a list of molecules (an SDF file of several, a CSV file) as its molecule.
-    folder : path
-        Folder of the files that the scene reads.
+    scene: with a sweep, or with a list of molecules (an SDF file of several, a CSV file) as its molecule. folder: folder of the files
+    that the scene reads.
+    Returns: an iterable with a length.
+    Raises ValueError for a name without values, for braces in a file name without a swept name, and for two points that would write the
+    same file.
 
-    Returns
-    -------
-    Points
-        An iterable with a length.
-
-    Raises
-    ------
-    ValueError
-        For a name without values, for braces in a file name without a swept name, and for two points that would write the same file.
-
-    Examples
-    --------
     >>> from rotor.scenes.scene import LevelsScene
     >>> [p.scene.molecule for p in points(LevelsScene(molecule="CO", sweep={"molecule": ["CO", "HCl"]}))]
     ['CO', 'HCl']

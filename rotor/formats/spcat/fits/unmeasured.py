@@ -24,12 +24,7 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
     The states are the same as the measured line's (v), N is at most the highest measured, the frequency within the measured range,
     where spins do not count. Raises ValueError where a file has so many quantum numbers that labels cannot be counted.
 
-    Parameters
-    ----------
-    file : ParameterFile
-        Parameters near the fitted ones.
-    measured : Assignments
-        Measured lines; F below 0 and energies are ignored.
+    file: parameters near the fitted ones. measured: measured lines; F below 0 and energies are ignored.
     """
     groups = groups_for_fit(file)
     form = quanta_format(file, groups)

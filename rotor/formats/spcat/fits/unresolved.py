@@ -36,23 +36,9 @@ def spelled_out(labels: Ints, form: Format) -> Ints:
 def refuse_far_f(labels: Ints, reduced: Ints, form: Format, names: tuple[str, ...], twice_spins: int) -> None:
     """Refuse labels with F below 0 whose |F| cannot result from N and the spins.
 
-    Parameters
-    ----------
-    labels : (n, quanta) array
-        Quantum numbers by level, N first.
-    reduced : (m,) array
-        Places of labels with F below 0.
-    form : Format
-        Format of the quantum numbers of the file.
-    names : tuple of str
-        Names of the columns.
-    twice_spins : int
-        Twice the sum of all spins.
-
-    Raises
-    ------
-    MissingLevelsError
-        With the first such label, and the places of all.
+    labels (n, quanta): quantum numbers by level, N first. reduced (m,): places of labels with F below 0. form: format of the quantum
+    numbers of the file. names: names of the columns. twice_spins: twice the sum of all spins.
+    Raises MissingLevelsError with the first such label, and the places of all.
     """
     reduced_labels = labels[reduced]
     far = reduced[np.abs(-spelled_out(reduced_labels, form) - reduced_labels[:, 0]) > (twice_spins + 1) // 2]

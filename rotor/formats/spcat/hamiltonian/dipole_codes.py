@@ -87,32 +87,12 @@ def line_moment(
     SYM 1 to 3 in D, SYM 0 in Bohr magnetons, with TYP 8 in D, as documented, but in Bohr magnetons with `as_spcat`. A moment between
     two states leads from the one with the higher number to the other.
 
-    Parameters
-    ----------
-    dipole : Dipole
-        The line of the .int file, its value in D or Bohr magnetons.
-    code : DipoleCode
-        Fields of its code.
-    states : (int, int)
-        Numbers of the states in their group, the higher number of the file first.
-    spins : int
-        Number of spins in SPIND.
-    oblate : bool, optional
-        Whether z is the c axis.
-    as_spcat : bool, optional
-        Whether to reproduce SPCAT where it differs from its documentation: N, spins with TYP 1 and 2.
-    series : Series, optional
-        Constants of the Fourier series of the file.
-
-    Returns
-    -------
-    Moment
-        The moment in debye.
-
-    Raises
-    ------
-    ValueError
-        For any other code, with its meaning.
+    dipole: the line of the .int file, its value in D or Bohr magnetons. code: fields of its code. states: numbers of the states in their
+    group, the higher number of the file first. spins: number of spins in SPIND. oblate: whether z is the c axis. as_spcat: whether to
+    reproduce SPCAT where it differs from its documentation: N, spins with TYP 1 and 2. series: constants of the Fourier series of the
+    file.
+    Returns: the moment in debye.
+    Raises ValueError for any other code, with its meaning.
     """
     if not as_spcat and states[0] == states[1] and _is_turned(code):
         raise ValueError(f"dipole {dipole.code}: {_TURNED}")

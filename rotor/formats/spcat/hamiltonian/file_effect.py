@@ -75,24 +75,10 @@ def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) ->
     Parameters of value zero are skipped, as are those between a state and 9 (99, 999), which are place holders in SPFIT, those of states
     that do not exist (`ignored_states`), and constants of series.
 
-    Parameters
-    ----------
-    file : ParameterFile
-        Codes, values in MHz, and labels; NVIB below 0 for the oblate basis, XOPT.
-    states : int
-        Number of states, |NVIB|.
-    pairs : sequence of Pair, optional
-        l-doubled pairs, in which an odd operator acts with the sign of l.
-
-    Returns
-    -------
-    list of CodedLine
-        Operators and the states that they connect.
-
-    Raises
-    ------
-    ValueError
-        With the line, for an unknown operator or one that violates time reversal.
+    file: codes, values in MHz, and labels; NVIB below 0 for the oblate basis, XOPT. states: number of states, |NVIB|. pairs: l-doubled
+    pairs, in which an odd operator acts with the sign of l.
+    Returns: operators and the states that they connect.
+    Raises ValueError with the line, for an unknown operator or one that violates time reversal.
     """
     options = file.options[0]
     if not 0 <= options.xopt < 80:
@@ -172,26 +158,10 @@ def real_lines(
 ) -> tuple[list[CodedLine], list[str]]:
     """The lines that are real in the phases of a file, and reasons why imaginary ones within one state are left out.
 
-    Parameters
-    ----------
-    lines : sequence of CodedLine
-        Supported parameters.
-    odd : frozenset of str
-        The axes along which operators within one state are odd, see `phases`.
-    doubled : frozenset of int
-        l-doubled states, in which odd operators act with the sign of l.
-
-    Returns
-    -------
-    lines : list of CodedLine
-        Lines that act.
-    reasons : list of str
-        A sentence for each line that is left out.
-
-    Raises
-    ------
-    ValueError
-        For an odd operator that is invariant under all half turns, which is imaginary in any phases.
+    lines: supported parameters. odd: the axes along which operators within one state are odd, see `phases`. doubled: l-doubled states, in
+    which odd operators act with the sign of l.
+    Returns: lines that act; a sentence for each line that is left out.
+    Raises ValueError for an odd operator that is invariant under all half turns, which is imaginary in any phases.
     """
     acting, reasons = list[CodedLine](), list[str]()
     for line in lines:

@@ -81,28 +81,11 @@ def over_real_states(
 ) -> list[RealPart]:
     """Parts of a parameter over real states, if at least one of its states is l-doubled (table of this module).
 
-    Parameters
-    ----------
-    states : (int, int)
-        Numbers, the lower one first.
-    odd : bool
-        Whether the operator changes sign under time reversal.
-    reversed_ : bool
-        Whether V2 > V1 in the code, Δk Δl < 0.
-    pairs : sequence of Pair
-        The l-doubled states of the file.
-    what : str, optional
-        Kind of operator for messages; an odd "spin operator" between different states is not supported.
-
-    Returns
-    -------
-    list of RealPart
-        Real states, factors and kinds of operator.
-
-    Raises
-    ------
-    ValueError
-        For operators that symmetry forbids or this package does not support.
+    states: numbers, the lower one first. odd: whether the operator changes sign under time reversal. reversed_: whether V2 > V1 in the
+    code, Δk Δl < 0. pairs: the l-doubled states of the file. what: kind of operator for messages; an odd "spin operator" between
+    different states is not supported.
+    Returns: real states, factors and kinds of operator.
+    Raises ValueError for operators that symmetry forbids or this package does not support.
     """
     low, high = states
     firsts, seconds = {pair.first: pair for pair in pairs}, {pair.second: pair for pair in pairs}

@@ -26,28 +26,10 @@ def spin_terms_with_pairs(
 ) -> list[SpinTerm]:
     """A spin term of a file over real states, if at least one of its states is l-doubled (table of `l_doubled`).
 
-    Parameters
-    ----------
-    term : SpinTerm
-        The term for states that are not l-doubled.
-    states : (int, int)
-        Numbers, the lower one first.
-    reversed_ : bool
-        Whether V2 > V1 in the code, Δk Δl < 0.
-    pairs : sequence of Pair
-        The l-doubled states of the file.
-    axes : str
-        The axes x, y, z: bca or bac.
-
-    Returns
-    -------
-    list of SpinTerm
-        Terms over x and y.
-
-    Raises
-    ------
-    ValueError
-        For terms that are not supported between such states.
+    term: the term for states that are not l-doubled. states: numbers, the lower one first. reversed_: whether V2 > V1 in the code, Δk Δl
+    < 0. pairs: the l-doubled states of the file. axes: the axes x, y, z: bca or bac.
+    Returns: terms over x and y.
+    Raises ValueError for terms that are not supported between such states.
     """
     odd = term.rotor.odd
     if odd and states[0] == states[1] and axes[2] == "c":

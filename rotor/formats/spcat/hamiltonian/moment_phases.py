@@ -41,23 +41,9 @@ def turned_moments(
     """The moments in functions that time reversal with half a turn about an axis leaves as they are: those along it, and the others
     apart, each component by itself.
 
-    Parameters
-    ----------
-    moments : dict of (int, int) to (float, float, float)
-        Plain dipoles by pairs of states.
-    beside : tuple of Moment
-        Other moments.
-    turned : str
-        The axis whose half turn accompanies time reversal; "" if there is none.
-    phases : Phases
-        Phases that decide which components have the factor i.
-
-    Returns
-    -------
-    plain : dict of (int, int) to (float, float, float)
-        Unchanged plain dipoles.
-    others : tuple of Moment
-        All other moments.
+    moments: plain dipoles by pairs of states. beside: other moments. turned: the axis whose half turn accompanies time reversal; "" if
+    there is none. phases: phases that decide which components have the factor i.
+    Returns: unchanged plain dipoles; all other moments.
     """
     if any(moment.written or moment.with_i or (moment.along_abc and moment.spin) for moment in beside):
         raise ValueError(

@@ -37,23 +37,10 @@ def imaginary(oblate: bool) -> complex:
 def type_words(typ: int, sym: int, oblate: bool, with_spin: bool = False, as_spcat: bool = False) -> Words:
     """The words of a TYP without its powers of N².
 
-    Parameters
-    ----------
-    typ : int
-        TYP 0, 1, 2, 4, 6, 11 or 12; for 11 the operator in the commutator.
-    sym : int
-        SYM: 0 for magnetic moments, 1 to 3 for a, b, c.
-    oblate : bool
-        Whether z is the c axis.
-    with_spin : bool, optional
-        Whether a spin multiplies the words, which then contain no cosine.
-    as_spcat : bool, optional
-        Whether N is ½(2 φ_z N_z - φ_x N_x - φ_y N_y), as SPCAT computes it, except for TYP 6.
-
-    Returns
-    -------
-    tuple of Word
-        Words in debye or magnetons, for a value of 1.
+    typ: TYP 0, 1, 2, 4, 6, 11 or 12; for 11 the operator in the commutator. sym: SYM: 0 for magnetic moments, 1 to 3 for a, b, c. oblate:
+    whether z is the c axis. with_spin: whether a spin multiplies the words, which then contain no cosine. as_spcat: whether N is ½(2 φ_z
+    N_z - φ_x N_x - φ_y N_y), as SPCAT computes it, except for TYP 6.
+    Returns: words in debye or magnetons, for a value of 1.
     """
     x, y, z = moment_axes(oblate)
     if typ == 4:

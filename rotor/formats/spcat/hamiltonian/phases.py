@@ -69,21 +69,10 @@ def read_phases(file: ParameterFile, states: int, doubled: frozenset[int]) -> Ph
 def with_dipoles(phases: Phases, dipoles: Iterable[tuple[int, bool]], oblate: bool, as_spcat: bool) -> Phases:
     """Phases that include dipoles between states, from the dipoles within states.
 
-    Parameters
-    ----------
-    phases : Phases
-        Phases of the parameters.
-    dipoles : iterable of (int, bool)
-        For each dipole within a state, the axis (1 to 3) and whether it is a commutator with N².
-    oblate : bool
-        Whether z is the c axis.
-    as_spcat : bool
-        Whether phases along undecided axes make most dipoles real, as SPCAT (but not SPFIT) chooses them.
-
-    Returns
-    -------
-    Phases
-        Phases with `between_i`.
+    phases: phases of the parameters. dipoles: for each dipole within a state, the axis (1 to 3) and whether it is a commutator with N².
+    oblate: whether z is the c axis. as_spcat: whether phases along undecided axes make most dipoles real, as SPCAT (but not SPFIT)
+    chooses them.
+    Returns: phases with `between_i`.
     """
     axes, within_states = AXES_OF_PHASE[oblate], list(dipoles)
     least, best = len(within_states), (phases.odd, False)

@@ -64,22 +64,10 @@ def falls_with_k(
 def connected_groups(groups: Ints, k: Ints, amplitudes: Floats, energies: Floats, diag: int) -> Ints:
     """The groups of functions that label levels, divided into connected parts.
 
-    Parameters
-    ----------
-    groups : (functions,) array of int
-        A group for each function, such as its Wang block.
-    k : (functions,) array of int
-    amplitudes : (functions, states) array
-        Eigenvectors in columns.
-    energies : (states,) array
-        Eigenvalues of H, or of -H in an oblate basis.
-    diag : int
-        DIAG; with 0 each function whose diagonal element falls is a separate group.
-
-    Returns
-    -------
-    (functions,) array of int
-        Group numbers from 0 on.
+    groups (functions,): a group for each function, such as its Wang block. k (functions,). amplitudes (functions, states): eigenvectors
+    in columns. energies (states,): eigenvalues of H, or of -H in an oblate basis. diag: DIAG; with 0 each function whose diagonal element
+    falls is a separate group.
+    Returns: group numbers from 0 on.
     """
     hamiltonian = (amplitudes * (energies - energies.mean())) @ amplitudes.T
     # elements of round-off link nothing

@@ -53,24 +53,10 @@ class Series:
 def file_series(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]] = ()) -> Series:
     """The constants of the series of a file.
 
-    Parameters
-    ----------
-    file : ParameterFile
-        Codes and values; NOFC and G12 in its first option line.
-    states : int
-        Number of states.
-    pairs : iterable of (int, int), optional
-        l-doubled states, which share the constants of the one with the lower number.
-
-    Returns
-    -------
-    Series
-        Constants; those without a parameter are 0.
-
-    Raises
-    ------
-    ValueError
-        For a code with TYP 91 to 99 that is not a constant.
+    file: codes and values; NOFC and G12 in its first option line. states: number of states. pairs: l-doubled states, which share the
+    constants of the one with the lower number.
+    Returns: constants; those without a parameter are 0.
+    Raises ValueError for a code with TYP 91 to 99 that is not a constant.
     """
     options = file.options[0]
     series = Series(nofc=options.nofc, g12=options.g12)
@@ -110,26 +96,9 @@ def _set(series: Series, d: Digits, parameter: Parameter, pair: tuple[int, int])
 def series_term(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> CodedOperator:
     """The operator of a code with a series, between two states, lower first.
 
-    Parameters
-    ----------
-    d : Digits
-        Fields of the code.
-    axes : str
-        The axes x, y, z: bca or bac.
-    series : Series
-        The constants of the file.
-    states : (int, int)
-        States whose constants apply.
-
-    Returns
-    -------
-    CodedOperator
-        The operator by its elements over |J k⟩.
-
-    Raises
-    ------
-    ValueError
-        For two series at once, and for an unsupported base operator.
+    d: fields of the code. axes: the axes x, y, z: bca or bac. series: the constants of the file. states: states whose constants apply.
+    Returns: the operator by its elements over |J k⟩.
+    Raises ValueError for two series at once, and for an unsupported base operator.
     """
     euler = d.kind is Kind.EULER
     if euler and d.spins and d.typ != d.row.first:
@@ -173,21 +142,8 @@ def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
 def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
     """Factor of an element in a Fourier term: a single K with NOFC; ½(K' + K'') for the sine of n = 0, as in the program.
 
-    Parameters
-    ----------
-    n : int
-        The harmonic.
-    sine : bool
-        Sine or cosine.
-    series : Series
-        The constants of the file.
-    states : (int, int)
-        The states of K' and of K''.
-
-    Returns
-    -------
-    callable
-        Function of J, K' and K''.
+    n: the harmonic. sine: sine or cosine. series: the constants of the file. states: the states of K' and of K''.
+    Returns: function of J, K' and K''.
     """
     if sine and n == 0:
         return lambda j, above, below: (above + below) / 2

@@ -124,21 +124,9 @@ def _commutator(frame: tuple[str, str, str], sign: int, operator: Complexes, whe
 def multiplied(rotor: Rotor, factor: FactorOfBoth, whole: complex, odd: bool) -> ByElements:
     """An operator times a number, its elements times a function.
 
-    Parameters
-    ----------
-    rotor : Rotor
-        The operator.
-    factor : callable
-        Function of N', N, K' and K.
-    whole : complex
-        The number.
-    odd : bool
-        Whether time reversal changes the sign of the result.
-
-    Returns
-    -------
-    ByElements
-        The operator by its elements over |N k⟩.
+    rotor: the operator. factor: function of N', N, K' and K. whole: the number. odd: whether time reversal changes the sign of the
+    result.
+    Returns: the operator by its elements over |N k⟩.
     """
     base = over_k(rotor)
 

@@ -94,19 +94,9 @@ class StateOptions:
     def weights(self, ka: Ints, kc: Ints, k: Ints, odd_spins: Ints | int = 0) -> Ints:
         """Nuclear-spin weight of one component of levels, as in the file; zero or less for a level that does not exist.
 
-        Parameters
-        ----------
-        ka, kc : (n,) arrays of int
-            Labels.
-        k : (n,) array of int
-            K along the axis of the basis.
-        odd_spins : (n,) array of int or int, optional
-            Odd if a half turn across the axis changes the sign of the function of equivalent spins, which exchanges the two weights.
-
-        Returns
-        -------
-        (n,) array of int
-            WTPL, WTMN or EWT, by the axis of the file.
+        ka, kc (n,): labels. k (n,): K along the axis of the basis. odd_spins (n,): odd if a half turn across the axis changes the sign of
+        the function of equivalent spins, which exchanges the two weights.
+        Returns: WTPL, WTMN or EWT, by the axis of the file.
         """
         weight = self.class_weight(ka, kc, odd_spins)
         fold = _FOLDS.get(self.iax)

@@ -33,23 +33,10 @@ def forbidden(
 ) -> str:
     """The reason why symmetry forbids an operator between two states, or within one; empty if it is allowed.
 
-    Parameters
-    ----------
-    symmetry : Symmetry
-        Of its code.
-    low, high : StateOptions
-        Of the two states; the same twice within one state.
-    del_l : int
-        |Δl|, negative where Δk Δl < 0.
-    doubled : bool
-        Whether one of the states is l-doubled; the species of its levels are not tested.
-    spins : sequence of int, optional
-        Numbers, from 1, of the spins on which it acts.
-
-    Returns
-    -------
-    str
-        The reason.
+    symmetry: of its code. low, high: of the two states; the same twice within one state. del_l: |Δl|, negative where Δk Δl < 0. doubled:
+    whether one of the states is l-doubled; the species of its levels are not tested. spins: numbers, from 1, of the spins on which it
+    acts.
+    Returns: the reason.
     """
     if (low.fold, low.i_tot) != (high.fold, high.i_tot):
         return "the axes of the two states differ"
@@ -77,19 +64,9 @@ def exchange_part(axis: str, low: StateOptions, high: StateOptions) -> int:
 def weights_agree(axis: str, low: StateOptions, high: StateOptions, odd_spins: int = 0) -> bool:
     """Whether an operator along an axis connects levels of equal weight.
 
-    Parameters
-    ----------
-    axis : str
-        Its axis, "" for none.
-    low, high : StateOptions
-        Of the two states; the same twice within one state.
-    odd_spins : int, optional
-        1 if it also changes the sign of the function of equivalent spins.
-
-    Returns
-    -------
-    bool
-        Whether such levels exist.
+    axis: its axis, "" for none. low, high: of the two states; the same twice within one state. odd_spins: 1 if it also changes the sign
+    of the function of equivalent spins.
+    Returns: whether such levels exist.
     """
     turn = TURNS[axis]
     for species in SPECIES:

@@ -44,25 +44,11 @@ _LADDERS = {
 def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, errors: bool = False) -> Top:
     """The top of files with several states or spins.
 
-    Parameters
-    ----------
-    file : ParameterFile
-        A .par or .var file.
-    intensities : IntensityFile, optional
-        Dipoles of the states and between them.
-    errors : bool, optional
-        Whether errors of parameters become uncertainties of constants that are one parameter.
-
-    Returns
-    -------
-    Top
-        Constants of state 0, `states` and `spin_constants`; `notes` says which parameters are left out, as SPCAT
-        leaves them out. The Hamiltonian is that of the files with every K to N in the basis.
-
-    Raises
-    ------
-    ValueError
-        With the field or the parameter, for terms without a name.
+    file: a .par or .var file. intensities: dipoles of the states and between them. errors: whether errors of parameters become
+    uncertainties of constants that are one parameter.
+    Returns: constants of state 0, `states` and `spin_constants`; `notes` says which parameters are left out, as SPCAT leaves them out.
+    The Hamiltonian is that of the files with every K to N in the basis.
+    Raises ValueError with the field or the parameter, for terms without a name.
     """
     states, first = file_states(file), file.options[0]
     _refuse(file, states)

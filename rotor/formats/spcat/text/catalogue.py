@@ -127,28 +127,11 @@ def predicted_catalogue(
 ) -> Catalogue:
     """The catalogue of predicted lines.
 
-    Parameters
-    ----------
-    numbers : mapping
-        frequency_mhz, lgint, energy_lower_cm, g_upper, each (n,), and error_mhz (0 if unknown).
-    quanta_upper, quanta_lower : (n, 6) array or wider
-        Quantum numbers of both states.
-    qnfmt : int or (n,) array
-        Format of the quantum numbers, for all lines or each.
-    tag : int, optional
-        Tag of the species.
-    linear : bool, optional
-        Whether Q rises as for a linear molecule, DR = 2.
-
-    Returns
-    -------
-    Catalogue
-        (n,) lines, in the order given.
-
-    Raises
-    ------
-    ValueError
-        For a tag of more than six digits.
+    numbers: frequency_mhz, lgint, energy_lower_cm, g_upper, each (n,), and error_mhz (0 if unknown). quanta_upper, quanta_lower (n, 6):
+    quantum numbers of both states. qnfmt (n,): format of the quantum numbers, for all lines or each. tag: tag of the species. linear:
+    whether Q rises as for a linear molecule, DR = 2.
+    Returns: (n,) lines, in the order given.
+    Raises ValueError for a tag of more than six digits.
     """
     if not 0 <= tag <= MAX_TAG:
         raise ValueError(f"tag {tag}: a catalogue's tag has at most six digits")

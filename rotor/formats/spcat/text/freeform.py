@@ -73,35 +73,13 @@ def read_words(
 ) -> tuple[list[Word], int]:
     """At most `count` numbers from column `start` on, and where what follows them begins.
 
-    Parameters
-    ----------
-    line : Line
-    start : int
-        Column, from 0.
-    count : int
-        How many numbers at most.
-    remark_from : int, optional
-        After this many numbers a word ends the list even without a slash before it. A letter that looks like a digit (O.5, l0) does not
-        count as a word.
-    abutting : bool, optional
-        Whether a number may begin with its point or sign directly after another, as in full fixed columns: 0.01000.0 is 0.01000 and .0,
-        as SPFIT reads it.
-
-    Returns
-    -------
-    (list of Word, int)
-
-    Raises
-    ------
-    ValueError
-        With file, line and column, for what is no number.
-
-    Notes
-    -----
+    start: column, from 0. count: how many numbers at most. remark_from: after this many numbers a word ends the list even without a slash
+    before it. A letter that looks like a digit (O.5, l0) does not count as a word. abutting: whether a number may begin with its point or
+    sign directly after another, as in full fixed columns: 0.01000.0 is 0.01000 and .0, as SPFIT reads it.
+    Raises ValueError with file, line and column, for what is no number.
     Numbers are separated by blanks or a comma; two commas in a row leave a default, one before the first number does not, as the field's
-    programs read such lines; a slash ends the list. Anything
-    else where a number may stand is an error: the field's programs skip it in silence and take the next digits,
-    those of a comment for instance.
+    programs read such lines; a slash ends the list. Anything else where a number may stand is an error: the field's programs skip it in
+    silence and take the next digits, those of a comment for instance.
     """
     text, at, words = line.body, start, list[Word]()
     pending_comma = False
