@@ -76,7 +76,7 @@ def test_the_same_request_gives_the_same_answer(answer: AssignAnswer) -> None:
     assert json.dumps(again.facts()) == json.dumps(answer.facts())
 
 
-def test_two_species() -> None:
+def test_two_species_in_one_list_are_both_assigned() -> None:
     computed = answer_assign(AssignRequest(spectrum(second=True), species=2, seconds=120))
     assert len(computed.species) == 2
     assert is_right(computed, 0, TRUTH)

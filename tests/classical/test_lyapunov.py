@@ -124,7 +124,7 @@ def test_quadratic_form_is_found_and_refused():
     ("values", "dimension"),
     [([0.1, 0.0, -0.5], 2.2), ([-1.0, -2.0], 0.0), ([1.0, -1.0], 2.0), ([0.0, -1.0, -2.0], 1.0)],
 )
-def test_kaplan_yorke(values, dimension):
+def test_the_kaplan_yorke_dimension_of_known_spectra(values, dimension):
     assert kaplan_yorke(values) == pytest.approx(dimension)
 
 
@@ -149,7 +149,7 @@ def test_orbit_agrees_with_the_exact_motion():
     assert np.allclose(path, free_motion([1.0, 1.875, 2.875], [0.5, 0.75, 1.0]).at(times)[0], atol=1e-9)
 
 
-def test_refusals():
+def test_exponents_refuse_impossible_settings():
     flow = Flow(leipnik_newton, np.zeros(3))
     with pytest.raises(ValueError, match="count=4"):
         lyapunov_exponents(flow, 10.0, count=4)

@@ -451,11 +451,11 @@ def test_help_shows_examples_and_every_option_is_documented(call):
     assert call()[1] == call("--help")[1]
 
 
-def test_version(call):
+def test_version_prints_the_version(call):
     assert call("--version") == (0, f"rotor {rotor.__version__}\n", "")
 
 
-def test_standard_input(folder):
+def test_a_molecule_is_read_from_standard_input(folder):
     ran = in_own_process("info", "-", "--json", "-", input=WATER_XYZ.replace("\n", "\r\n").encode(), cwd=folder)
     assert ran.returncode == 0, ran.stderr
     assert json.loads(ran.stdout)["formula"] == "H2O"

@@ -108,7 +108,7 @@ def test_constants_alone_and_times_chosen(call, folder):
     assert printed["tested_at_ps"] == printed["correlation"][-1]["t"]
 
 
-def test_the_report(call):
+def test_the_report_of_a_gas_has_its_numbers(call):
     code, out, err = call("gas", "HCl", *SMALL, "--times", "0:1:101")
     assert (code, err) == (0, "")
     for words in (
@@ -131,7 +131,7 @@ def test_a_rejected_gas_is_an_answer(call):
     assert printed["confidence"] == 0.01
 
 
-def test_the_picture(call, folder):
+def test_the_picture_of_a_gas_is_written(call, folder):
     assert call("gas", "water", *SMALL, "--plot", "w.png", "--times", "0:2:21")[0] == 0
     assert call("gas", "water", *SMALL, "--plot", "w.svg")[0] == 0
     assert (folder / "w.png").stat().st_size > 20_000

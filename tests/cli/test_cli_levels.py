@@ -39,7 +39,7 @@ def test_the_same_request_gives_the_same_answer(call):
     assert len(content["levels"]) == content["level_count"] > 10
 
 
-def test_the_contract(call):
+def test_json_of_levels_has_the_documented_keys(call):
     content = json.loads(call("levels", "water", "--json", "-")[1])
     info = json.loads(call("info", "water", "--json", "-")[1])
     assert set(content) == KEYS | set(info) - {"partition_function"}
@@ -112,7 +112,7 @@ def test_k_of_a_linear_top_is_refused(call):
     assert (code, err) == (2, "error: --k: the levels of a linear top have no K; give J alone\n")
 
 
-def test_files(call, folder):
+def test_files_of_levels_hold_every_row(call, folder):
     assert call("levels", "CH3CN", "--jmax", "4", "--csv", "a.csv", "--egy", "a.egy", "--plot", "a.png")[0] == 0
     with open(folder / "a.csv", newline="") as handle:
         rows = list(csv.DictReader(handle))

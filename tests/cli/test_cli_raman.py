@@ -106,7 +106,7 @@ def test_no_lines_is_an_answer_and_a_picture_of_none_is_not(call):
         (("spectrum", "CO", "--pressure", "1", "--path", "1", "--profile", "sticks"), "error: --profile: an optical depth needs a width"),
     ],
 )  # fmt: skip
-def test_mistakes(call, arguments, said):
+def test_mistakes_are_one_line_and_write_nothing(call, arguments, said):
     code, out, err = call(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith(said)

@@ -9,7 +9,7 @@ DOCS = PROJECT / "docs"
 
 
 @pytest.mark.parametrize("page", ["classical", "gas", "hamiltonian", "potential", "scenes", "spins_and_states"])
-def test_blocks_run(page):
+def test_blocks_of_code_in_pages_run(page):
     blocks = re.findall(r"```python\n(.*?)```", (DOCS / f"{page}.md").read_text(encoding="utf-8"), re.DOTALL)
     assert blocks
     names: dict[str, object] = {}

@@ -114,7 +114,7 @@ def test_sections_agree_with_signatures(folder: str) -> None:
         ("        The sum.", "        The sum.\n\n    >>> add(1, 2)\n    3", "text after Returns without a heading"),
     ],
 )
-def test_what_is_found(old: str, new: str, fault: str | None) -> None:
+def test_faults_of_a_docstring_are_found(old: str, new: str, fault: str | None) -> None:
     """A complete docstring has no fault; each change of it has the fault expected."""
     source = f"def add(a, b, *rest, sign=1) -> int:\n    {GOOD.replace(old, new) if old else GOOD}\n"
     (function,) = functions(ast.parse(source))

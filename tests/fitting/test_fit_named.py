@@ -263,7 +263,7 @@ def test_ties_of_names_with_brackets():
     assert (by_name["A[1]"], by_name["chi_bb-cc(14N)"], by_name["G_a[0,1]"]) == (-1.0, -1.0, 6.0)
 
 
-def test_the_command(case, call):
+def test_the_command_fit_names_constants_of_states_and_spins(case, call):
     code, _, err = call(*COMMAND)
     assert code == 0, err
     table = (case / "t.md").read_text()

@@ -31,7 +31,7 @@ def test_a_path_and_a_name_at_once_are_an_error(tmp_path, monkeypatch):
         rotor.read("water")
 
 
-def test_files(tmp_path):
+def test_molecule_files_are_read_by_suffix(tmp_path):
     (tmp_path / "w.xyz").write_text(XYZ)
     (tmp_path / "co.toml").write_text(TOML)
     assert rotor.read(tmp_path / "w.xyz").kind == "asymmetric"
@@ -40,7 +40,7 @@ def test_files(tmp_path):
 
 
 @pytest.mark.parametrize(("text", "kind"), [(XYZ, "asymmetric"), (TOML, "linear")])
-def test_standard_input(monkeypatch, text, kind):
+def test_standard_input_is_read_as_xyz_or_toml(monkeypatch, text, kind):
     monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=io.BytesIO(text.encode())))
     assert rotor.read("-").kind == kind
 
@@ -86,12 +86,12 @@ def test_isotopes_of_constants_alone_cannot_change(tmp_path):
         (".", "folder"), (3.14, "is not a molecule"),
     ],
 )  # fmt: skip
-def test_nonsense(source, words):
+def test_nonsense_is_refused_with_the_source(source, words):
     with pytest.raises(ValueError, match=words):
         rotor.read(source)
 
 
-def test_empty_file(tmp_path):
+def test_an_empty_file_is_refused(tmp_path):
     (tmp_path / "empty.xyz").write_text("")
     with pytest.raises(ValueError, match="empty"):
         rotor.read(tmp_path / "empty.xyz")

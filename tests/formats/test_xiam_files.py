@@ -63,7 +63,7 @@ def test_an_axis_on_the_other_side_of_a_has_a_delta_below_zero(mtbe):
 
 
 @pytest.mark.parametrize("ntop", [2, 3])
-def test_several_tops(tmp_path, ntop):
+def test_xiam_files_of_several_tops_are_read(tmp_path, ntop):
     path = tmp_path / "several.xi"
     tops = " F0_1 158.\n delta_1 0.5\n V1n_1 9000.\n F0_2 160.\n delta_2 2.4\n epsil_2 0.1\n V1n_2 7000.\n"
     third = " F0_3 159.\n delta_3 1.4\n V1n_3 8000.\n"

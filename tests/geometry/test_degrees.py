@@ -95,7 +95,7 @@ def test_no_degree_has_no_temperature():
         (WATER, 0, "have shape"),
     ],
 )
-def test_wrong_input(moments, removed, said):
+def test_degrees_of_freedom_refuse_wrong_input(moments, removed, said):
     with pytest.raises(ValueError, match=said):
         count_degrees(moments, removed=removed)
 

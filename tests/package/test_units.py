@@ -24,7 +24,7 @@ def test_the_edition_is_codata_2022():
     assert codata("electron mass") == units.ELECTRON_MASS_KG
 
 
-def test_constants():
+def test_constants_are_those_of_codata_2022():
     assert codata("speed of light in vacuum") == units.SPEED_OF_LIGHT_M_PER_S
     assert codata("Planck constant") == units.PLANCK_J_S
     assert codata("Boltzmann constant") == units.BOLTZMANN_J_PER_K
@@ -46,7 +46,7 @@ def test_constants():
         ("−5 D", "D", -5.0), ("2e3 kHz", "MHz", 2.0), ("300 mK", "K", 0.3),
     ],
 )  # fmt: skip
-def test_quantities(text, unit, value):
+def test_quantities_are_converted_to_the_expected_unit(text, unit, value):
     assert units.parse_quantity(text, unit) == pytest.approx(value, rel=1e-15)
 
 
@@ -64,7 +64,7 @@ def test_there_and_back(value, unit):
         ("", "MHz", "not a number"), ("nan", "K", "not a number"), ("1e999", "K", "not a finite number"),
     ],
 )  # fmt: skip
-def test_bad_quantities(text, unit, words):
+def test_quantities_without_a_meaning_are_refused(text, unit, words):
     with pytest.raises(ValueError, match=words):
         units.parse_quantity(text, unit)
 
@@ -78,13 +78,13 @@ def test_ranges_and_grids():
 
 
 @pytest.mark.parametrize("text", ["5", "5:", ":5", "7:3GHz", "1:2:3:4", "a:b", "2:18 D"])
-def test_bad_ranges(text):
+def test_ranges_without_a_meaning_are_refused(text):
     with pytest.raises(ValueError, match=r"range|number|unit"):
         units.parse_range(text, "MHz")
 
 
 @pytest.mark.parametrize("text", ["0:10", "0:10:1", "0:10:x", "1,,2"])
-def test_bad_grids(text):
+def test_grids_without_a_meaning_are_refused(text):
     with pytest.raises(ValueError, match=r"grid|number"):
         units.parse_grid(text, "MHz")
 

@@ -86,7 +86,7 @@ def test_the_part_asked_for_is_drawn(call, folder, catalogue, figures, verb):
     [(("raman", "N2", "--jmax", "12"), "y"), (("thermo", "CO", "--temperature", "10,100"), "x")],
 )
 @pytest.mark.parametrize("scale", ["linear", "log"])
-def test_scales(call, folder, figures, command, axis, scale):
+def test_plot_scales_reach_the_axes(call, folder, figures, command, axis, scale):
     assert call(*command, "--plot", "a.png", "--plot-scale", scale)[0] == 0
     axes = figures[0].axes[0]
     assert getattr(axes, f"get_{axis}scale")() == scale
@@ -121,7 +121,7 @@ def test_scales(call, folder, figures, command, axis, scale):
         ),
     ],
 )
-def test_mistakes(call, folder, catalogue, command, said):
+def test_plot_options_that_exclude_each_other_are_refused(call, folder, catalogue, command, said):
     code, _, err = call(*command)
     assert code == 2
     assert f"error: {said}" in err

@@ -72,7 +72,7 @@ def test_three_j_is_qutip_s(arguments):
     assert float(three_j(*arguments)) == pytest.approx(slow, abs=1e-8)  # QuTiP's sum alternates in sign
 
 
-def test_known_values():
+def test_symbols_have_values_of_racahs_sum():
     """(1 1 2; 0 0 0)² = 2/15, {1 1 1; 1 1 1} = 1/6, {1 1 2; 1 1 2} = 1/30, all from Racah's sum by hand."""
     assert three_j(1, 1, 2, 0, 0, 0) == pytest.approx(math.sqrt(2 / 15), rel=ROUND_OFF)
     assert three_j(0.5, 0.5, 0, 0.5, -0.5, 0) == pytest.approx(math.sqrt(0.5), rel=ROUND_OFF)

@@ -40,7 +40,7 @@ def assert_same(command: Mapping, facts: Mapping, but: frozenset[str] = frozense
             assert command[key] == value, key
 
 
-def test_spectrum(call):
+def test_a_spectrum_from_python_is_that_of_the_command(call):
     command = answer_of(
         call, "spectrum", "OCS", "--temperature", "150", "--range", "10:400GHz", "--min-lgint", "-6.5", "--jmax", "40",
         "--vibration", "859,520x2,2062", "--pressure", "2mbar", "--path", "1m", "--fwhm", "3MHz",
@@ -74,13 +74,13 @@ def test_spectrum_of_constants_with_a_given_q(call):
     assert_same(command, {**answer.facts(), "lines": table_records(answer.lines)})
 
 
-def test_raman(call):
+def test_raman_lines_from_python_are_those_of_the_command(call):
     command = answer_of(call, "raman", "CO2", "--laser", "488", "--temperature", "500K", "--min-relative", "1e-3")
     answer = answer_raman(RamanRequest(rotor.read("CO2"), temperature_k=500, laser_nm=488, min_relative=1e-3))
     assert_same(command, {**answer.facts(), "lines": table_records(answer.lines)})
 
 
-def test_thermo(call):
+def test_thermo_from_python_is_that_of_the_command(call):
     command = answer_of(
         call, "thermo", "water", "--species", "ortho", "--temperature", "100:300K:5", "--gas", "--pressure", "1atm",
         "--vibration", "1595,3657,3756",
@@ -117,7 +117,7 @@ def test_tumble_of_a_body(call):
     assert_same(command, facts)
 
 
-def test_gas(call):
+def test_a_gas_from_python_is_that_of_the_command(call):
     command = answer_of(
         call, "gas", "OCS", "--molecules", "2000", "--temperature", "200", "--seed", "5", "--times", "0:1:6"
     )
@@ -127,7 +127,7 @@ def test_gas(call):
     assert len(settling_times_ps(request.top, 200.0)) == 101
 
 
-def test_fluid(call):
+def test_a_fluid_from_python_is_that_of_the_command(call):
     command = answer_of(
         call, "fluid", "water", "--molecules", "27", "--density", "0.5", "--ensemble", "langevin", "--steps", "20",
         "--cutoff", "5", "--seed", "3", "--temperature", "320",

@@ -308,7 +308,7 @@ def test_a_toy_knob_is_swept_and_searched_without_further_code():
         read_accuracy(0.05, unknown).chosen(30, Entries(), total)
 
 
-def test_the_command(call, folder):
+def test_the_command_accuracy_sweeps_a_scene(call, folder):
     write_scene(ThermoScene(molecule="CO", conditions=ThermoConditions(temperature=[20.0])), "s.toml")
     code, out, _ = call("accuracy", "s.toml", "--plot", "a.png", "--csv", "a.csv")
     assert code == 0

@@ -171,7 +171,7 @@ def test_levels_are_counted(j, kind):
     assert plan_of(scene).counts["levels"] == len(run_scene(scene).table)
 
 
-def test_the_command(call):
+def test_the_command_plan_prints_method_and_cost(call):
     code, out, err = call("plan", str(FOLDER / "water_300k.toml"))
     assert code == 0, err
     for word in ("effects", "good numbers", "method", "seconds", "memory", "left out", "Doppler width"):

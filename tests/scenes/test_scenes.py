@@ -14,7 +14,7 @@ def test_no_scene_is_missing():
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda path: path.stem)
-def test_scene(scene, monkeypatch):
+def test_a_published_scene_runs_with_its_asserts(scene, monkeypatch):
     monkeypatch.setattr(sys, "argv", [str(scene)])  # no --plot
     assert "assert " in scene.read_text(encoding="utf-8")
     assert runpy.run_path(str(scene), run_name="__main__")

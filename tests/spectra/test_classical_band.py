@@ -145,7 +145,7 @@ def test_what_stays_is_no_absorption():
         ),
     ],
 )
-def test_wrong_input(call, said):
+def test_classical_bands_refuse_wrong_input(call, said):
     with pytest.raises(ValueError, match=said):
         call()
 

@@ -65,7 +65,7 @@ def test_conversion_is_that_of_hitran():
     )
 
 
-def test_loschmidt():
+def test_the_density_of_a_gas_is_that_of_loschmidt():
     assert column_density_per_cm2(1.01325, 1.0, 273.15) == pytest.approx(2.686780111e19, rel=1e-9)  # CODATA
 
 
@@ -95,7 +95,7 @@ def test_area_and_saturation():
     assert thick.intensity == pytest.approx(thin.intensity * 1e15, rel=1e-12, abs=0)  # Lambert and Beer
 
 
-def test_refusals():
+def test_optical_depth_refuses_wrong_input():
     lines = line_list(CO, jmax=1)
     for pressure, path, said in ((0.0, 1.0, "pressure"), (1.0, -1.0, "path"), (math.nan, 1.0, "pressure")):
         with pytest.raises(ValueError, match=said):

@@ -23,7 +23,7 @@ HCN_STATES = "711.98x2, 1411.41, 1426.53x2, 2096.85, 2113.45x2, 2143.76x2, 3311.
 HCN_FUNDAMENTALS = "711.98x2, 2096.85, 3311.48 cm-1"
 
 
-def test_by_hand():
+def test_vibrational_sums_are_those_by_hand():
     """One state at kT ln 2 and, doubly degenerate, at kT ln 4: 1 + 1/2 + 2/4 = 2, or (1/2)⁻¹ (3/4)⁻² = 32/9."""
     kt_cm = 300.0 / HC_OVER_K
     energies = [kt_cm * math.log(2), kt_cm * math.log(4)]
@@ -103,7 +103,7 @@ def test_a_factor_lowers_every_line_alike():
     ("text", "energies", "degeneracies"),
     [("667.4x2,1388,2349 cm-1", (667.4, 1388, 2349), (2, 1, 1)), ("100", (100,), (1,)), ("3×2 THz, 10 cm-1", (100.0692, 10), (2, 1))],
 )  # fmt: skip
-def test_texts(text, energies, degeneracies):
+def test_texts_of_vibrations_are_parsed(text, energies, degeneracies):
     parsed = VibrationalStates.parse(text)
     assert parsed.energies_cm == pytest.approx(energies, rel=1e-6)
     assert parsed.degeneracies == degeneracies
@@ -119,7 +119,7 @@ def test_texts_that_mean_nothing(text, said):
         VibrationalStates.parse(text)
 
 
-def test_contradictions():
+def test_vibrations_that_contradict_are_refused():
     with pytest.raises(ValueError, match="give one of them"):
         line_list(rotor.read("CO"), jmax=2, vibrational_factor=2.0, vibrations=VibrationalStates((2143.0,)))
     with pytest.raises(ValueError, match="above 0 K"):

@@ -237,7 +237,7 @@ def test_energy_about_an_axis_without_a_degree_is_an_error():
         ({"x": [1.0]}, 1.0, {"confidence": 1.0}, "between 0 and 1"),
     ],
 )
-def test_wrong_input(energies, kt, options, said):
+def test_equipartition_refuses_wrong_input(energies, kt, options, said):
     with pytest.raises(ValueError, match=said):
         equipartition(energies, kt, **options)
 

@@ -130,7 +130,7 @@ def test_the_command_and_its_scene(call, folder):
         (("--gas", "--electronic", "a"), "--electronic: 'a': expected degeneracies such as '3'"),
     ],
 )
-def test_refusals(call, options, said):
+def test_wrong_electronic_states_are_one_line(call, options, said):
     code, out, err = call("thermo", "CO", *options)
     assert (code, out) == (2, "")
     assert said in err

@@ -439,7 +439,7 @@ def test_rare_gases_by_sackur_and_tetrode(mass, published):
     )  # uncertainty given: 0.002, 0.003
 
 
-def test_impossible_input():
+def test_thermodynamic_functions_refuse_impossible_input():
     top = Top.from_constants("B=1 cm-1")
     for temperatures in ([0.0], [-5.0], [math.nan], [10.0, math.inf]):
         with pytest.raises(ValueError, match="a temperature is above 0 K"):

@@ -126,7 +126,7 @@ def test_cold_methane_of_nasa():
     assert without == pytest.approx(33.473, abs=6e-3)
 
 
-def test_the_page():
+def test_the_page_of_thermodynamics_is_what_its_script_finds():
     """docs/validation/thermo.md says what docs/make_thermo.py finds now."""
     assert MAKE.page() == MAKE.PAGE.read_text(encoding="utf-8")
 

@@ -80,7 +80,7 @@ def test_representation_follows_kappa():
         Constants(B=3, representation="Ir")
 
 
-def test_kappa():
+def test_kappa_is_minus_one_and_one_in_the_limits():
     assert ray_kappa(3, 1, 1) == -1
     assert ray_kappa(3, 3, 1) == 1
     assert ray_kappa(float("inf"), 2, 2) == -1

@@ -97,7 +97,7 @@ def test_replace_takes_terms():
         (RIGID | {"J5": 1.0}, "not a rotational constant"),
     ],
 )
-def test_terms_refused(values, says):
+def test_terms_without_a_meaning_are_refused(values, says):
     with pytest.raises(ValueError, match=says):
         Constants(**values)
 

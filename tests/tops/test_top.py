@@ -77,7 +77,7 @@ def same_cloud(cloud: np.ndarray, other: np.ndarray) -> bool:
     return bool((distances.min(axis=1) < 1e-4).all() and len(set(distances.argmin(axis=1))) == len(cloud))
 
 
-def test_water():
+def test_water_from_its_geometry_has_constants_to_one_per_cent():
     """r0 geometry of CCCBDB against its constants, to the 1 % that vibration makes; planar; dipole along b."""
     top = Top.from_molecule(WATER)
     assert top.kind == "asymmetric"

@@ -211,7 +211,7 @@ def test_exact_drift_with_a_weak_torque_takes_long_steps():
         (lambda: flatten_system(MOMENTS, [EVERY["inertia"], EVERY["inertia"]]), "2 effects set the moments"),
     ],
 )
-def test_refusals(make, message):
+def test_impossible_effects_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
 

@@ -160,7 +160,7 @@ def test_sample_of_random_cases():
 
 
 @pytest.mark.slow
-def test_all_240_cases():
+def test_all_240_cases_meet_the_reference_motion():
     rng = np.random.default_rng(2026)
     groups = {"random": random_bodies(rng, 200), **hard_bodies(rng)}
     assert sum(len(bodies) for bodies in groups.values()) == 240

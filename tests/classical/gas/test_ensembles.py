@@ -217,13 +217,13 @@ def test_streaming_does_not_depend_on_threads_and_says_how_far_it_is():
         ({"vector": (1, 0, 0), "kt": -1.0}, "above 0"),
     ],
 )
-def test_wrong_input(options, said):
+def test_correlations_refuse_wrong_input(options, said):
     settings = {"moments": TOPS["asymmetric"], "kt": KT, "times": [0.0, 1.0], "molecules": 10, "rng": rng()} | options
     with pytest.raises(ValueError, match=said):
         free_gas_correlations(**settings)
 
 
-def test_other_wrong_input():
+def test_ensembles_and_stepped_gases_refuse_wrong_input():
     with pytest.raises(ValueError, match="take a shorter step"):
         stepped_gas_correlations(TOPS["prolate"], KT, 9.0, 3, vector=(1, 0, 0), molecules=10, rng=rng())
     with pytest.raises(ValueError, match="whole numbers"):

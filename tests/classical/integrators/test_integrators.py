@@ -152,7 +152,7 @@ def test_symmetric_top_splitting_is_exact_for_symmetric_tops_spheres_and_linear_
 
 
 @pytest.mark.parametrize("method", METHODS[1:], ids=lambda m: type(m).__name__)
-def test_linear_rotor(method):
+def test_a_linear_rotor_moves_as_the_free_motion(method):
     moments, momentum = [2.0, 0.0, 2.0], [0.6, 0.0, 0.9]
     end = integrate(method, moments, momentum, [0.0, 10.0])
     bound = 1e-4 if isinstance(method, MoserVeselov) else 1e-9  # orders 6 and 8: truncation at h|ω| = 0.16

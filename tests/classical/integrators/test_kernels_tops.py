@@ -105,7 +105,7 @@ def test_polynomials_of_sine_and_cosine():
     assert np.max(np.abs(c - np.cos(x))) < 2.3e-16
 
 
-def test_refusals():
+def test_batches_refuse_long_steps_and_wrong_shapes():
     with pytest.raises(ValueError, match="shorter step"):
         batch.propagate([1.0, 2.0, 3.0], [[0.0, 0.0, 20.0]], [1.0, 0, 0, 0], 0.1, 1)
     with pytest.raises(ValueError, match="about its own axis"):

@@ -156,7 +156,9 @@ def test_table_of_channels_as_specutils_writes_it(tmp_path: Path) -> None:
         ("! MHz K\n100.0D0  1.0E0 \n101.0   2\n102 3\n", [100, 101, 102], "K"),
     ],
 )
-def test_text(tmp_path: Path, text: str, frequency: list[float], unit: str) -> None:
+def test_text_spectra_are_read_with_units_of_their_headings(
+    tmp_path: Path, text: str, frequency: list[float], unit: str
+) -> None:
     (tmp_path / "a.txt").write_text(text)
     spectrum = read_spectrum(tmp_path / "a.txt", ReadChoices(noise=1.0))
     assert spectrum.frequency_mhz.tolist() == pytest.approx(frequency)

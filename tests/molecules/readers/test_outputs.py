@@ -164,7 +164,7 @@ def test_orca_tensors_share_the_axes_of_the_input(tmp_path):
     assert molecule.notes == ()
 
 
-def test_psi4(tmp_path):
+def test_psi4_outputs_give_geometry_and_moments(tmp_path):
     molecule = read_output(written(tmp_path, psi4(), "water.out"))
     assert np.allclose(molecule.positions_angstrom, AXES, atol=1e-10)  # printed to 1e-12 Å
     assert_tensors(molecule, TURN, polarizability=False)

@@ -17,7 +17,7 @@ from rotor.units import DEBYE_PER_E_ANGSTROM
 XYZ = "2\n\nC 0 0 0\nO 0 0 1.128\n"
 
 
-def test_every_door(tmp_path, monkeypatch):
+def test_every_reader_gives_the_same_molecule(tmp_path, monkeypatch):
     from rdkit import Chem
     from rdkit.Chem import rdDistGeom
 

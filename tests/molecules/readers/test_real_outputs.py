@@ -28,7 +28,7 @@ def top_of(name: str) -> rotor.Top:
 
 
 @with_cclib
-def test_gaussian_09():
+def test_a_real_output_of_gaussian_09_is_read():
     top = top_of("trithiolane_g09.log")
     # coordinates to 1e-6 Å, and constants of 2006
     assert top.rotational_constants_mhz == pytest.approx((3698.1615, 2533.1054, 1646.0769), rel=1e-6)

@@ -121,7 +121,7 @@ def test_an_open_configuration_is_told():
     assert not any("configuration" in note for note in from_smiles("CC(F)Cl").notes)  # the mirror image is as good
 
 
-def test_charge():
+def test_charges_of_a_smiles_are_added():
     assert from_smiles("[NH4+]").charge == 1
     assert from_smiles("[NH4+]").formula == "H4N+"
 
@@ -143,7 +143,7 @@ def v3000(x="0.917"):
     return "\n".join([*head, *rows[:3], *atoms, *rows[3:], "M  END"]) + "\n"
 
 
-def test_v3000():
+def test_v3000_blocks_are_read_and_bad_coordinates_named():
     molecule = parse_sdf(v3000(), "hf.sdf")
     assert molecule.formula == "F[2H]"
     assert molecule.positions_angstrom[1].tolist() == [0.917, 0, 0]
@@ -153,7 +153,7 @@ def test_v3000():
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_sdf_text(end):
+def test_sdf_text_is_read_with_any_line_end(end):
     molecule = parse_sdf((sdf(extra="M  ISO  1   2   2\n") + "$$$$\n").replace("\n", end), "w.sdf")
     assert molecule.formula == "H[2H]O"
     assert molecule.name == "water"

@@ -307,7 +307,7 @@ def test_bad_tolerances_are_told(tolerance):
         find_symmetry("HH", [1, 1], [[0, 0, 0], [0, 0, 0.74]], tolerance)
 
 
-def test_one_atom():
+def test_a_single_atom_has_spherical_symmetry():
     computed = find_symmetry(["He"], [4.0], [[1, 2, 3]])
     assert (computed.point_group, computed.rotation_group, computed.symmetry_number, computed.equivalent) == (
         "Kh",

@@ -52,7 +52,7 @@ def test_ocs_to_a_hertz(shared):
 
 
 @pytest.mark.oracle
-def test_ch3cn(shared):
+def test_stark_levels_of_ch3cn_meet_the_reference(shared):
     """To 2e-6 MHz, the accuracy of the file; signs of K and M there are those of the other sign of the field here or there."""
     reference = table(shared, "stark_ch3cn")
     stark = stark_map(CH3CN, reference[:, 0], j_highest=6, m_values=(0, 1, 2))
@@ -67,7 +67,7 @@ def test_ch3cn(shared):
 
 
 @pytest.mark.oracle
-def test_h2co(shared):
+def test_stark_levels_of_h2co_meet_the_reference(shared):
     """The lowest 16 states of M = 0, 1, 2 to 1e-5 MHz, the accuracy of the file, from the ground state without field."""
     reference = table(shared, "stark_H2CO_Jmax15")
     stark = stark_map(H2CO, reference[::5, 0], j_highest=9, m_values=(0, 1, 2), tolerance_mhz=1e-4)
@@ -327,7 +327,7 @@ def test_two_crossings_between_two_fields_are_seen():
         ({"top": Top.from_constants("B=6000 MHz", dipole_abc_debye=(0, 0, 0))}, "no dipole"),
     ],
 )
-def test_bad_input(change, message):
+def test_stark_maps_refuse_bad_input(change, message):
     arguments = {"top": OCS, "fields_kv_per_cm": [0.0, 10.0], "j_highest": 1, **change}
     with pytest.raises(ValueError, match=message):
         stark_map(arguments.pop("top"), arguments.pop("fields_kv_per_cm"), **arguments)

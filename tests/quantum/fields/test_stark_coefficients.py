@@ -80,7 +80,7 @@ def test_series_are_the_derivatives_of_the_eigenvalues(kind, levels):
     assert (np.abs(computed.coefficients - exact) <= 20 * computed.errors + 1e-13 * scale).all()
 
 
-def test_a_linear_top():
+def test_a_linear_top_has_minus_mu_squared_over_6b():
     """c2 of J = 0 is -μ²/6B, and parity leaves no odd power, whatever fields the map has (9 % and 0.097 from a polynomial)."""
     computed, rows = table_of(ROD, 3, GRID)
     unit = (0.715 * MHZ_PER_DEBYE_KV_PER_CM) ** 2 / (2 * 6081.5)

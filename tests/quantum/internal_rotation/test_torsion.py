@@ -132,7 +132,7 @@ def test_two_methyl_groups_turn_about_the_line_of_a_triple_bond():
 # levels
 
 
-def test_free_rotor():
+def test_levels_without_a_barrier_are_those_of_a_free_rotor():
     levels = np.concatenate([BondTorsion(constant(F), constant(0.0), 3).species_levels(s, 3) for s in range(3)])
     assert np.sort(levels) == pytest.approx(F * np.array([0, 1, 1, 4, 4, 9, 9, 16, 16]), abs=1e-6)  # F m²; MHz of 1e6
 
@@ -149,7 +149,7 @@ def test_mathieu_characteristic_values(v3):
     assert (levels - v3 / 2) * 4 / (9 * F) == pytest.approx(expected, rel=1e-9, abs=1e-8)  # scipy's have ten digits
 
 
-def test_harmonic_limit():
+def test_high_barriers_reach_the_harmonic_limit():
     """E_v = hν (v + ½) - 9F/16 (2v² + 2v + 1) of the quartic term to first and the cubic-free second order; hν = 3√(V3 F)."""
     v3, v = 1e11, np.arange(3)
     expected = 3 * math.sqrt(v3 * F) * (v + 0.5) - 9 * F / 16 * (2 * v**2 + 2 * v + 1)

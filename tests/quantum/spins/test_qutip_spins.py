@@ -113,7 +113,7 @@ SLOW = [pytest.param(name, marks=[] if "orders" in name else pytest.mark.slow) f
 
 
 @pytest.mark.parametrize("name", SLOW)
-def test_levels(name):
+def test_levels_are_those_of_a_direct_product_in_qutip(name):
     constants = _named(name)
     top = Top.from_constants(dict(zip("ABC", ABC, strict=True)), spin_constants=constants)
     levels = solve_levels(top, TOP_N, effects=effects_of(top, True))

@@ -107,7 +107,7 @@ def test_levels_and_labels(name):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_strengths(name):
+def test_strengths_between_two_f_add_up(name):
     """Σ of line strengths between all levels of two F with N ≤ 6, level by level."""
     options, effects, lines = CASES[name]
     case = _case(f"{options} 1 0 30 0 1 1 1 0 1 0", [*LINES, *lines])
@@ -140,7 +140,7 @@ def _label(levels, row: int) -> tuple[int, tuple[int, ...]]:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_derivatives(name):
+def test_derivatives_of_split_levels_are_differences(name):
     """∂E/∂c against central differences, of the rotation's constants and of every spin parameter."""
     _, effects, _ = CASES[name]
     all_effects = (*SEMI_RIGID, *effects)
@@ -313,7 +313,7 @@ def test_a_scheme_names_its_sums():
         (lambda: InteractingStates({"A[0]": 1.0}), "states are numbered from 1"),
     ],
 )
-def test_refusals(make, message):
+def test_impossible_spins_and_states_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
 

@@ -275,7 +275,7 @@ def test_partition_function():
     assert with_spins.q == pytest.approx(2 * without.q, rel=1e-6)
 
 
-def test_derivatives():
+def test_derivatives_with_three_equivalent_spins_are_differences():
     effects, step = _effects(2)[:2], 1e-3
     levels = solve_levels(PROLATE, 1, effects=(*SEMI_RIGID, *effects))
     for name in ("chi_ac(X1)", "C_bb(X1)"):

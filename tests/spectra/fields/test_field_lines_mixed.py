@@ -171,7 +171,7 @@ def test_executors_change_nothing():
     assert (plain.mu_eff_debye == mixed.mu_eff_debye).all()
 
 
-def test_lights():
+def test_light_is_an_angle_or_three_components():
     assert light_components((0, 0, 2)).about((1.0, 0.0, 1.0)).angle_degrees == pytest.approx(45.0)  # round-off
     for wrong in ((0, 0, 0), (1, 2), "up", float("nan")):
         with pytest.raises(ValueError, match="three components"):

@@ -154,7 +154,7 @@ def test_mean_and_difference_codes_make_the_same_constants():
     assert mean == Constants(A=a, B=b, C=c, representation="IIIl")
 
 
-def test_kinds():
+def test_the_kind_of_top_follows_from_the_codes():
     assert codes.file_constants(file_of((100, 5.0), (1000, -2.0))).kind == "oblate"
     assert codes.file_constants(file_of((100, 5.0), (200, -1e-3))).kind == "spherical"
     assert codes.file_constants(read_par(SAMPLES / "ocs.var")).kind == "linear"

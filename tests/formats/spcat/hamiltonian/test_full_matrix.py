@@ -131,7 +131,7 @@ def _printed_lines(folder: Path) -> dict[tuple, list[tuple[float, float]]]:
      ("hcn_quad", 20), ("two_state_coriolis", 12), ("three_states_fermi_coriolis", 6), ("tunnelling_doublet_quad", 8),
      ("h2co", 40), ("pyridine_oblate_s", 20)],
 )  # fmt: skip
-def test_intensities(shared, name, top):
+def test_every_printed_line_has_the_strength_of_the_full_matrix(shared, name, top):
     """Every printed line up to an F: its frequency, and LGINT of lines within 1 kHz of each other in sum.
 
     Such lines mostly end in two levels so close that rounding (1e-15 of the largest element) shares their strength out.

@@ -145,7 +145,7 @@ def casimir(f: float, i: float, n: int) -> float:
 
 
 @pytest.mark.parametrize("spin2", [2, 3, 5, 7])
-def test_casimir(spin2):
+def test_a_linear_molecule_has_casimir_energies_in_first_order(spin2):
     """A linear molecule in first order: the diagonal elements of each N are -eqQ Y."""
     case = _case(f"l -{spin2 + 1} 1 0 0 0 1 1 1 0 1 0", (100, 1e5), (110010000, 1.5 * -4.0))
     for f2 in range(spin2 % 2, 14, 2):
@@ -170,7 +170,7 @@ def test_centre_of_gravity():
     np.testing.assert_allclose(list(total.values()), 0.0, atol=1e-9)  # sums of a hundred numbers of 1e2 MHz
 
 
-def test_symbols():
+def test_symbols_of_3_6_and_9_j_are_orthogonal_and_symmetric():
     """3j, 6j and 9j: known values, orthogonality, symmetry."""
     assert wigner_3j(2, 2, 0, 0, 0, 0) == pytest.approx(-(3**-0.5), abs=1e-15)
     assert wigner_6j(2, 2, 2, 2, 2, 2) == pytest.approx(1 / 6, abs=1e-15)

@@ -90,7 +90,7 @@ def test_levels_are_those_of_signed_k_and_l(pair, ground):
         )  # round-off
 
 
-def test_labels():
+def test_l_doubled_labels_name_each_k_once_with_each_parity():
     """K l > 0 in the first state, K l ≤ 0 in the second, each K once with each parity; E levels without a sign."""
     levels = predict(_file(COMMON + PAIR), _wanted(), as_spcat=True).levels
     for j in range(6):

@@ -57,7 +57,7 @@ def _by_label(lines: Catalogue) -> dict[tuple[int, ...], list[int]]:
     "name",
     [pytest.param(name, marks=pytest.mark.slow) if name == "h2coh" else name for name in (*RANGES, *WRITTEN_KINDS)],
 )
-def test_lines(name):
+def test_lines_of_every_kind_agree_to_the_printed_digits(name):
     """Frequencies to the digits printed, intensities to 1e-4 of LGINT and half a digit, E″, degeneracies, labels."""
     ours, reference = _predicted(name), read_cat(KINDS / name / "sample.cat")
     rows = _by_label(ours)

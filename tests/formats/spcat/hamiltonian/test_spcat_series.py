@@ -35,7 +35,7 @@ def _plain(j):
 
 
 @pytest.mark.parametrize("j", [1, 4, 7])
-def test_cosines(j):
+def test_cosines_act_at_the_mean_k(j):
     """c cos(2π n ρ K/3) along the diagonal, and of an operator at the mean of both K."""
     of, rigid = _plain(j)
     k = np.arange(-j, j + 1)

@@ -347,7 +347,7 @@ def test_columns_that_do_not_fit_are_refused(columns, words):
         catalogue_of(**columns)
 
 
-def test_packed_files(tmp_path):
+def test_packed_catalogues_are_written_and_read(tmp_path):
     path = tmp_path / "a.cat.gz"
     write_cat(catalogue_of(), path)
     assert gzip.decompress(path.read_bytes()) == format_lines(catalogue_of())

@@ -238,7 +238,7 @@ def test_a_negative_error_means_wavenumbers():
     assert lines.weight[0] == 0.5
 
 
-def test_blends():
+def test_neighbours_of_one_frequency_and_error_are_a_blend():
     frequency = [10.0, 10.0, 10.0, 20.0, 20.0, 30.0, 30.0, 30.0]
     error = [0.1, 0.1, 0.5, 0.1, 0.3, 0.1, 0.1, 0.15]
     zeros = np.zeros((8, 12), dtype=np.int16)
