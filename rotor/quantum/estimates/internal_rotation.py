@@ -23,7 +23,6 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Floats
 from rotor.frozen import dataclass
-from rotor.quantum.internal_rotation.frames import RhoAxis
 from rotor.quantum.torsion import TorsionalPotential, torsional_states
 
 A_SPECIES, E_SPECIES = 0, 1  # σ
@@ -82,6 +81,9 @@ def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRot
     >>> (levels - levels[0]).round(6).tolist()  # above 1(0,1): B - C of 1(1,1) with A - B
     [0.0, 5.0, 6.0]
     """
+    # the package of internal rotation is loaded for tops that have one alone
+    from rotor.quantum.internal_rotation.frames import RhoAxis
+
     axes = RhoAxis(rotor.f_mhz, np.array(rotor.rho)).axes if any(rotor.rho) else np.eye(3)
     frame = axes[[1, 2, 0]]  # x, y, z with z along ρ
     tensor = frame @ np.diag(constants_mhz) @ frame.T
