@@ -52,7 +52,7 @@ nuclear-spin weights, J by J until Q, the energy and the heat capacity are all c
 constants in `data/molecules`, vibration that of harmonic oscillators at the fundamentals, one set of rotational
 constants for all vibrational states, closed shells.
 
-Full line: rotation alone; dashed: with vibration; grey: classical; dotted: classical with its first two quantum
+Full line: rotation alone; dashed: with vibration; grey: classical; dotted: expansion, the classical value with its first two quantum
 corrections and the quartic distortion; circles: published.
 """
 WORDS = """

@@ -98,7 +98,7 @@ def _draw(axes: Any, panel: Panel) -> None:
             color="black",
             linestyle=":",
             linewidth=1.1,
-            label="classical, corrected",
+            label="expansion",
         )
     colour = dict(zip(panel.curves, PALETTE * len(panel.curves), strict=False))
     for label, functions in panel.curves.items():

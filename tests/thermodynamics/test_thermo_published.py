@@ -134,10 +134,8 @@ def test_the_page_of_thermodynamics_is_what_its_script_finds():
 def test_the_picture_has_every_curve_and_point():
     figure = heat_capacity_figure(MAKE.panels())
     labels = [{text.get_text() for text in axes.get_legend().get_texts()} for axes in figure.axes]
-    assert labels[0] == {"classical", "classical, corrected", "para", "ortho", "normal", "equilibrium"}
-    assert all(
-        label == {"classical", "classical, corrected", "quantum", "with vibration", "published"} for label in labels[1:]
-    )
+    assert labels[0] == {"classical", "expansion", "para", "ortho", "normal", "equilibrium"}
+    assert all(label == {"classical", "expansion", "quantum", "with vibration", "published"} for label in labels[1:])
     with pytest.raises(ValueError, match="needs a panel"):
         heat_capacity_figure([])
     with pytest.raises(ValueError, match=r"\.png, \.pdf or \.svg"):
