@@ -517,6 +517,15 @@ def _is_loaded(name: str) -> bool:
     return name in sys.modules
 
 
+@pytest.mark.parametrize("name", ["OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"])
+def test_workers_have_one_thread_of_blas(name, monkeypatch):
+    """Processes with several threads each wait for one another, whatever this process has."""
+    monkeypatch.setenv(name, "4")
+    with worker_processes(1) as pool:
+        assert pool.submit(_setting, name).result() == "1"
+    assert os.environ[name] == "4"
+
+
 def test_workers_have_the_environment_of_now_and_the_modules_of_the_work(monkeypatch):
     with worker_processes(1) as pool:
         assert pool.submit(_setting, "ROTOR_MOLECULES").result() == os.environ.get("ROTOR_MOLECULES")
