@@ -84,7 +84,7 @@ def test_n_of_0_among_large_blocks(monkeypatch):
     monkeypatch.setattr(contracted, "_LARGE", 0)
     monkeypatch.setattr(contracted, "_WIDE", np.inf)
     model = top_levels(constants, labels)
-    assert not model.labelled.tracked
+    assert not model.tracked
     assert [type(part.blocks) for part in model.others] == [ContractedLevels]
     computed, derivatives = model.levels(values)
     assert computed == pytest.approx(energies, abs=1e-6)  # TOLERANCE_MHZ of the contraction
