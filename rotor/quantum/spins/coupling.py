@@ -168,18 +168,29 @@ def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, b
     The vector is S for L = 0, where T^0 is a plain matrix and not a reduced one, and Σ_q T²_pq S_q for L = 2. Without a spin, as for the
     dipole, it is the product over the chain of A. R. Edmonds (1957), eq. (7.1.7).
     """
-    left, right = bra[..., :, None, :], ket[..., None, :, :]
-    total = np.ones(np.broadcast_shapes(left.shape[:-1], right.shape[:-1]))
+    left, right = np.broadcast_arrays(bra[..., :, None, :], ket[..., None, :, :])
+    near = np.ones(left.shape[:-1], dtype=bool)
+    # an operator of rank K changes no intermediate angular momentum by more than K
+    for column in range(left.shape[-1]):
+        near &= np.abs(left[..., column] - right[..., column]) <= 2 * max(rank, 1)
+    out = np.zeros(near.shape)
+    out[near] = _moment_products(spins, rank, acting, left[near], right[near])
+    return out
+
+
+def _moment_products(spins: tuple[int, ...], rank: int, acting: int | None, left: Ints, right: Ints) -> Floats:
+    """The coefficients of pairs of patterns (pairs, columns)."""
+    total = np.ones(len(left))
     if acting is not None:
-        alike = left[..., 0] == right[..., 0]
-        total = total * (np.where(alike, np.sqrt(left[..., 0] + 1.0), 0.0) if rank == 0 else _RECOUPLED[2])
+        alike = left[:, 0] == right[:, 0]
+        total = total * (np.where(alike, np.sqrt(left[:, 0] + 1.0), 0.0) if rank == 0 else _RECOUPLED[2])
     for place, spin in enumerate(spins):
-        pair = left[..., place : place + 2], right[..., place : place + 2]
+        pair = left[:, place : place + 2], right[:, place : place + 2]
         if place == acting:
             total = total * _opened(*pair, spin, rank) * reduced_spin(spin, 1)
         else:
             total = total * _passed_on(*pair, spin, rank if acting is None or place < acting else 1)
-    return np.asarray(total)
+    return total
 
 
 _AT_ONCE = 200_000  # elements computed at a time; intermediate arrays then fit the processor's cache
