@@ -275,8 +275,9 @@ def fit(_: Path | None) -> list[Panel]:
     """Constants of a fit to 500 synthetic lines from a start 1 % off, after so many iterations, beside a fit with a tolerance of 1e-12."""
     from bench_fit import TRUE, lines_of
 
-    from rotor.fitting.fit import Fit, FitOptions, fit_lines
+    from rotor.fitting.fit import FitOptions, fit_lines
     from rotor.fitting.parameters import parameters
+    from rotor.fitting.result import Fit
 
     lines, rng = lines_of(TRUE, 500, jmax=20), np.random.default_rng(1)
     start = TRUE.replace(**{name: value * (1 + 0.01 * rng.uniform(-1, 1)) for name, value in TRUE.values.items()})

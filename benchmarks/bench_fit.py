@@ -19,8 +19,9 @@ from typing import Any
 import numpy as np
 
 from rotor.fitting.assignment import Assignments, assignments, levels_in
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import Parameters, parameters
+from rotor.fitting.result import Fit
 from rotor.fitting.search import Search
 from rotor.quantum.labelled import LevelModel, level_model
 from rotor.quantum.solve import solve_levels

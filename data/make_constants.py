@@ -21,8 +21,9 @@ from pathlib import Path
 import numpy as np
 
 from rotor.fitting.assignment import Assignments, assignments, merged
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
+from rotor.fitting.result import Fit
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.molecules.molecule_file import MoleculeFile, read_molecule_file

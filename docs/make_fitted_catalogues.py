@@ -17,8 +17,9 @@ import rotor
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.choose import Trial, choose_constants
 from rotor.fitting.criteria import aicc
-from rotor.fitting.fit import Fit, FitOptions
+from rotor.fitting.fit import FitOptions
 from rotor.fitting.parameters import with_names
+from rotor.fitting.result import Fit
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.tops.constants import Constants
 

@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from rotor.fitting.choose import choose_constants
-from rotor.fitting.fit import Fit, FitOptions
+from rotor.fitting.fit import FitOptions
+from rotor.fitting.result import Fit
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.family_file import read_family
 from rotor.molecules.molecule import Molecule

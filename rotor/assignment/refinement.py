@@ -15,8 +15,9 @@ from rotor.assignment.growth import OPEN, SMALLEST_MHZ, Grown, quartic_sizes
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import PARAMETERS, RigidTable
 from rotor.fitting.assignment import Assignments, assignments
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
+from rotor.fitting.result import Fit
 from rotor.tops.constants import Constants
 
 REJECTED = 5.0  # standard errors beyond which a line does not count

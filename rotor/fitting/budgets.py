@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from rotor.fitting.fit import Fit
+from rotor.fitting.result import Fit
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.table import counted
 

@@ -21,9 +21,10 @@ from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments
 from rotor.fitting.criteria import aicc, cross_validated_rms, f_test
 from rotor.fitting.first_values import beside_zero, line_evaluator, weighted_derivatives
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.orders import j_order
 from rotor.fitting.parameters import Parameters, parameters, with_names
+from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import ConstantSet
 from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import LevelModel

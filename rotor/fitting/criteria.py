@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from rotor.fitting.fit import Fit
+from rotor.fitting.result import Fit
 
 ROUNDING = 1e-12  # weighted residuals below this are rounding, not scatter
 

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments, levels_in
-from rotor.fitting.fit import Fit, missing_level
+from rotor.fitting.fit import missing_level
 from rotor.fitting.parameters import Parameters, parameters, with_names
+from rotor.fitting.result import Fit
 from rotor.fitting.search import FitOptions, Search, line_errors
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.fitting.top_levels import label_model

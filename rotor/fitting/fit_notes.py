@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from rotor.fitting.assignment import Assignments, duplicates
+from rotor.fitting.result import Fit
 from rotor.statistics.least_squares import BENT
 from rotor.table import counted
 
@@ -46,14 +46,14 @@ def unlikely_lines(lines: Assignments) -> list[str]:
     return out
 
 
-def _bent(fit: Any) -> list[str]:
+def _bent(fit: Fit) -> list[str]:
     """Parameters with the largest steps left in the linear model, in units of the lengths of their columns."""
     statistics = fit.statistics
     moved = np.abs((fit.residuals @ statistics.left) @ statistics.inverse) * statistics.scale
     return [fit.parameters.names[i] for i in np.flatnonzero(moved > moved.max(initial=0.0) / 2)]
 
 
-def fit_notes(fit: Any) -> list[str]:
+def fit_notes(fit: Fit) -> list[str]:
     """Notes for the user, in sentences."""
     lines, notes = fit.lines, list[str]()
     for i, why in fit.left_out.items():

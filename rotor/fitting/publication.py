@@ -10,7 +10,7 @@ from decimal import Decimal
 
 import numpy as np
 
-from rotor.fitting.fit import Fit
+from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import DIPOLES
 from rotor.table import counted
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.fitting.assignment import Assignments
-from rotor.fitting.fit import Fit
 from rotor.fitting.orders import j_order
 from rotor.fitting.publication import value_text
+from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import DIPOLES
 from rotor.table import counted
 from rotor.tops.operators import distortion_terms

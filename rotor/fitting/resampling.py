@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
+from rotor.fitting.result import Fit
 from rotor.quantum.labelled import LevelModel
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotor.arrays import Ints
 from rotor.fitting.assignment import Assignments
-from rotor.fitting.fit import Fit
+from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import TopConstants
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.spectra.lines import line_list

@@ -32,8 +32,9 @@ from typing import Any
 
 import numpy as np
 
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
+from rotor.fitting.result import Fit
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.toml import parse_toml
 from rotor.molecules.molecule import Molecule

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from rotor.fitting.choose import Suggestion, Trial, choose_constants, suggest_lines, try_constants
-from rotor.fitting.fit import Fit, FitOptions
+from rotor.fitting.fit import FitOptions
 from rotor.fitting.parameters import with_names
+from rotor.fitting.result import Fit
 from rotor.fitting.unmeasured import unmeasured
 from rotor.formats.fit_request import FitAnswer, FitRequest, answer_fit
 

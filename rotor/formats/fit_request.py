@@ -18,10 +18,11 @@ from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, merged
 from rotor.fitting.budgets import constants_budget, predictions_budget
 from rotor.fitting.first_values import beside_zero
-from rotor.fitting.fit import Fit, FitOptions, determined_covariance, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import Parameters, parameters, with_names
 from rotor.fitting.publication import publication_table
 from rotor.fitting.report import fit_facts, report_text
+from rotor.fitting.result import Fit, determined_covariance
 from rotor.fitting.top_constants import DIPOLES, ConstantSet, TopConstants
 from rotor.formats.assigned_lines import QUANTA, names_field, names_sums, read_assigned_lines
 from rotor.formats.spcat.fits.fit_input import SpfitInput, fitted_file, read_fit

@@ -32,7 +32,7 @@ from rotor.verbs.verb import ErrorsShown, Extra, Verb, Work
 
 if TYPE_CHECKING:
     from rotor.fitting.choose import Suggestion, Trial
-    from rotor.fitting.fit import Fit
+    from rotor.fitting.result import Fit
 
 EXAMPLES = """\b
 Examples:

@@ -13,8 +13,9 @@ import numpy as np
 
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.first_values import beside_zero
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters, with_names
+from rotor.fitting.result import Fit
 from rotor.viewer.prediction import Model
 from rotor.viewer.records import FitSummary, Line, Species
 

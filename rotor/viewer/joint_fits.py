@@ -23,8 +23,9 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.first_values import beside_zero
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import Parameters, parameters, with_names
+from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import ConstantSet
 from rotor.fitting.top_levels import label_model
 from rotor.quantum.labelled import LevelModel, MissingLevelsError

@@ -142,7 +142,7 @@ def test_several_molecules_add_their_depths(call, tmp_path):
     assert "hydrogen cyanide, cyanoacetylene: brightness temperature" in out
     text = (tmp_path / "b.svg").read_text(encoding="utf-8")
     assert "together" in text
-    assert "excitation 50 K" in text
+    assert "Excitation 50 K" in text
     content = json.loads((tmp_path / "all.json").read_text(encoding="utf-8"))
     assert {line["molecule"] for line in content["lines"]} == {"hydrogen cyanide", "cyanoacetylene"}
     assert {row.split(",")[0] for row in (tmp_path / "l.csv").read_text(encoding="utf-8").splitlines()[1:]} == {

@@ -15,10 +15,11 @@ import pytest
 
 import rotor
 from rotor.fitting.assignment import Assignments, assignments
-from rotor.fitting.fit import Fit, determined_covariance, fit_lines
+from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import Parameters, parameters
 from rotor.fitting.publication import publication_table
 from rotor.fitting.resampling import bootstrap
+from rotor.fitting.result import Fit, determined_covariance
 from rotor.fitting.top_constants import TopConstants
 from rotor.fitting.top_levels import top_levels
 from rotor.formats.assigned_lines import write_assigned_lines

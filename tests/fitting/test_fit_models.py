@@ -13,10 +13,11 @@ import rotor
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.choose import choose_constants, promised, try_constants
 from rotor.fitting.criteria import chi_squared, f_test
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters, with_names
 from rotor.fitting.report import report_text
 from rotor.fitting.resampling import bootstrap
+from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.assigned_lin import as_lin, lin_notes
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines

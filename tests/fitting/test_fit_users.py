@@ -10,10 +10,11 @@ import pytest
 import rotor
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.fitting.choose import choose_constants
-from rotor.fitting.fit import Fit, FitOptions, fit_lines
+from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.report import dfbetas, influential
 from rotor.fitting.resampling import bootstrap
+from rotor.fitting.result import Fit
 from rotor.formats import fit_further
 from rotor.formats.fit_request import answer_fit, lines_request
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input

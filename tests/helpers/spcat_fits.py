@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from rotor.fitting.fit import Fit, fit_lines
+from rotor.fitting.fit import fit_lines
+from rotor.fitting.result import Fit
 from rotor.formats.spcat.fits.fit_input import SpfitInput, spfit_input
 from rotor.formats.spcat.predict import Prediction
 from rotor.formats.spcat.text.lin import read_lin

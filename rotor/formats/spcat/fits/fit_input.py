@@ -16,8 +16,9 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.fitting.assignment import Assignments, assignments
-from rotor.fitting.fit import Fit, FitOptions
+from rotor.fitting.fit import FitOptions
 from rotor.fitting.parameters import Parameters
+from rotor.fitting.result import Fit
 from rotor.formats.assigned_lin import with_excluded_lines
 from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, is_held

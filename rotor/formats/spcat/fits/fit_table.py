@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rotor.fitting.fit import Fit
 from rotor.fitting.publication import Row, value_text
+from rotor.fitting.result import Fit
 from rotor.formats.spcat.fits.fit_input import SpfitInput
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, join_code, split_code
 from rotor.formats.spcat.hamiltonian.codes import (

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.fitting.fit import Fit
+from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.spcat.fits.fit_input import packed_correlations
 from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix
