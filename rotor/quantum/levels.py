@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
 
+AnyBlock = Any  # SolvedBlock, MomentBlock or SpinBlock
+Connections = tuple[list[tuple[AnyBlock, AnyBlock]], Callable[[AnyBlock, AnyBlock], Floats]]
+"""Pairs of blocks that an operator connects, and the function that returns the reduced elements between them."""
+
 FEW_LEVELS = 64  # among which one is found by looking at all
 
 

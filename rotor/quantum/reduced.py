@@ -7,17 +7,12 @@ of odd rank i times real, their squares summed over all M the line strengths.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum.levels import MomentBlock, SolvedBlock
+from rotor.quantum.levels import AnyBlock, Connections, MomentBlock, SolvedBlock
 from rotor.quantum.tensors import BodyTensor, Tensors, acting_on, add_acting_on, rank_of, tensor_between
-
-AnyBlock = Any  # SolvedBlock, MomentBlock or SpinBlock
-Connections = tuple[list[tuple[AnyBlock, AnyBlock]], Callable[[AnyBlock, AnyBlock], Floats]]
-"""Pairs of blocks that an operator connects, and the function that returns the reduced elements between them."""
 
 
 def connections(blocks: Sequence[AnyBlock], tensors: Tensors) -> Connections:

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
-from rotor.quantum.levels import Levels, MomentBlock, SolvedBlock
+from rotor.quantum.levels import AnyBlock, Connections, Levels, MomentBlock, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.reduced import AnyBlock, Connections, connections, pairs_where
+from rotor.quantum.reduced import connections, pairs_where
 
 Pair = tuple[int, int]  # numbers of blocks, the higher or equal F first
 

@@ -206,7 +206,7 @@ def contracted_plan(
     channels = channels_of(terms, scheme)
     hamiltonians = list[Floats]()
     if scheme.equivalent == 3:
-        from rotor.quantum.spins.three_equivalent import in_wang_functions
+        from rotor.quantum.spins.threefold_rotor import in_wang_functions
 
         blocks, hamiltonians = in_wang_functions(blocks)
     firsts = _alike(channels)

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Indices, Ints, Workspace, runs_of_similar_size
-from rotor.quantum.reduced import Connections
+from rotor.quantum.levels import Connections
 from rotor.quantum.spins.blocks import Shared, SpinBlock
 from rotor.quantum.spins.contraction import tensors_of_stacks
 from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, consecutive, tables_of

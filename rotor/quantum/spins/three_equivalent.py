@@ -20,44 +20,18 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, symmetric_from_lower
 from rotor.quantum.connected import part_numbers
-from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.blocks import Member, Plan, States, diagonalised
 from rotor.quantum.spins.hamiltonians import hamiltonians
 from rotor.quantum.spins.many_f import groups_of
 from rotor.quantum.spins.parts import SpinPart
 from rotor.quantum.spins.rotor import Exist
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
-from rotor.quantum.wang.basis import Part, WangBlock
+from rotor.quantum.spins.threefold_rotor import wang_functions
+from rotor.quantum.wang.basis import Part
 from rotor.quantum.wang.j_operators import phase
 from rotor.tops.operators import axis_order
 
 _ZERO = 1e-12  # smaller elements, relative to the largest, are round-off of sums that cancel
-_OF_THE_AXIS = 1e-9  # limit of elements that break the threefold axis, relative to the largest; round-off is smaller
-
-
-def in_wang_functions(blocks: Sequence[SolvedBlock]) -> tuple[list[SolvedBlock], list[Floats]]:
-    """Blocks of the rotation over Wang functions, since the threefold axis needs K, and their Hamiltonians without the diagonal.
-
-    Raises ValueError for a rotation without a threefold axis.
-    """
-    functions, hamiltonians = list[SolvedBlock](), list[Floats]()
-    for block in blocks:
-        hamiltonian = (block.vectors * block.energies_mhz) @ block.vectors.T
-        _check_axis(block, hamiltonian)
-        functions.append(SolvedBlock(block.parts, np.diag(hamiltonian).copy(), np.eye(len(hamiltonian))))
-        hamiltonians.append(hamiltonian - np.diag(np.diag(hamiltonian)))
-    return functions, hamiltonians
-
-
-def _check_axis(block: SolvedBlock, matrix: Floats) -> None:
-    """Raise ValueError if the rotation connects K with K' other than ±K + 3n."""
-    k = np.concatenate([_wang(part).k for part in block.parts])
-    apart = ((k[:, None] - k) % 3 != 0) & ((k[:, None] + k) % 3 != 0)
-    if np.abs(matrix[apart]).max(initial=0.0) > _OF_THE_AXIS * np.abs(matrix).max():
-        raise ValueError(
-            "three equivalent nuclei lie about a threefold axis, and the constants have none: expected a symmetric top about its a "
-            "or c axis, such as B = C"
-        )
 
 
 def allowed_states(
@@ -98,17 +72,10 @@ def _parts(plan: Plan, patterns: Ints) -> tuple[SpinPart, ...]:
     return tuple(parts)
 
 
-def _wang(part: Part) -> WangBlock:
-    """The Wang functions of a part; ValueError for a linear molecule."""
-    if not isinstance(part.basis, WangBlock):
-        raise ValueError("three equivalent nuclei need functions with K and a sign; a linear molecule has none")
-    return part.basis
-
-
 def _allowed(plan: Plan, patterns: Ints, parts: Sequence[SpinPart]) -> Allowed:
     """The allowed functions of one F, each one product of a Wang function and a pattern or the sum of two."""
     row_of = {tuple(pattern): row for row, pattern in enumerate(patterns.tolist())}
-    wang = [(part, wang_part, _wang(wang_part)) for part in parts for wang_part in part.rotor.parts]
+    wang = [(part, wang_part, wang_functions(wang_part)) for part in parts for wang_part in part.rotor.parts]
     partner = {
         (wang_part.v, basis.j, k, basis.sign): (part, at)
         for part, wang_part, basis in wang
