@@ -125,6 +125,7 @@ def test_units_of_the_classical_gas():
     assert scaled_moments(OCS)[0] == 0.0
 
 
+@pytest.mark.slow
 def test_classical_and_quantum_gas_agree_while_both_dephase():
     """At 50 K, up to 15 ps: far from any revival. 20,000 bodies scatter by 0.3/√20000 = 2e-3."""
     times = np.linspace(-0.2, 15, 60)

@@ -101,6 +101,7 @@ def test_degrees_of_freedom_say_what_they_count(folder: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_peaks_that_are_left_point_to_isotopologues(call: Call, folder: Path) -> None:
     """The option is named where it was not given; not where nothing is left or no species is known."""
     columns = spectrum().columns

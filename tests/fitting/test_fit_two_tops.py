@@ -46,7 +46,11 @@ def lines_of(top, jmax, error_mhz=0.005, noise=None):
 THIRD = {"F0_3": 159e3, "delta_3": 1.45, "V3_3": 200.0 * CM, "V23": 3 * CM}
 
 
-@pytest.mark.parametrize("further", [{}, {"epsilon_2": 0.3}, THIRD], ids=["plane", "no plane", "three tops"])
+@pytest.mark.parametrize(
+    "further",
+    [{}, {"epsilon_2": 0.3}, pytest.param(THIRD, marks=pytest.mark.slow)],
+    ids=["plane", "no plane", "three tops"],
+)
 def test_derivatives_by_constants_of_several_tops_are_those_of_finite_differences(further):
     values = DIFFERENT | further
     constants = TopConstants(two_tops(values | {"V12s": -2 * CM}))

@@ -98,6 +98,7 @@ def test_the_lie_group_method_is_that_of_the_plain_form(options, monkeypatch):
         )  # steps chosen from sums in another order: 1e-16/step², times 100
 
 
+@pytest.mark.slow
 def test_a_body_that_rolls_is_that_of_the_plain_form(monkeypatch):
     """Inertia and torque of the contact, with other torques and an inner momentum; about 1e3 smaller numbers than their parts."""
     effects = [ROLLING, ALL_EFFECTS["linear drag"], ALL_EFFECTS["drive"], SpinningRotor([0.2, 0.0, 0.5])]

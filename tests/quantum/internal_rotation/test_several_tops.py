@@ -241,6 +241,7 @@ def test_mistakes_in_constants_of_two_tops_are_named(tmp_path, change, text):
         rotor.read(path)
 
 
+@pytest.mark.slow
 def test_a_spectrum_of_two_tops_names_five_species(tmp_path, call):
     path = tmp_path / "dimethyl.toml"
     path.write_text(FILE)
