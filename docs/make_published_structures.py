@@ -48,9 +48,8 @@ PUBLISHED_RS = {"OCS": (1.16054, 1.55967), "HC3N": (1.0575, 1.2042, 1.3791, 1.15
 
 HEAVY = {"C": "13C", "N": "15N", "O": "18O", "Si": "29Si"}
 LEAST_ANGSTROM = 5e-4  # digits of the constants: what a coordinate may be off where Costain's error is smaller
-THREE_DIGITS = (
-    1e-3  # one unit of the last digit of a coordinate given with three, which is cut off in places, not rounded
-)
+# one unit of the last digit of a coordinate given with three, which is cut off in places, not rounded
+THREE_DIGITS = 1e-3
 
 
 @dataclass(frozen=True)

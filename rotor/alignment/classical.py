@@ -125,9 +125,8 @@ def _summed(
         listed = np.append(times[here], window.start_ps) - now
         momentum, attitude = _freely(moments, momentum, attitude, listed, measures, out, here)
         momentum, attitude = _through(top, window, times, moments, momentum, attitude, measures, out)
-        momentum = np.where(
-            moments > 0, momentum, 0.0
-        )  # a linear top has no angular momentum about its axis, except for round-off
+        # a linear top has no angular momentum about its axis, except for round-off
+        momentum = np.where(moments > 0, momentum, 0.0)
         now = window.stop_ps
     here = _between(times, now, np.inf)
     _freely(moments, momentum, attitude, times[here] - now, measures, out, here)

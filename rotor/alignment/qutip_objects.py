@@ -31,9 +31,8 @@ from rotor.tops.top import require_single_state
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-LONGEST_STEP = (
-    1 / 14
-)  # longest step, as a fraction of a window: half a width of a Gaussian pulse, whose window has seven widths
+# longest step, as a fraction of a window: half a width of a Gaussian pulse, whose window has seven widths
+LONGEST_STEP = 1 / 14
 BEST_OPTIONS = {"method": "vern7", "rtol": 1e-10, "atol": 1e-12, "nsteps": 1_000_000, "progress_bar": ""}
 
 

@@ -27,9 +27,8 @@ FIRST_CHANCE, LAST_CHANCE, RISE = 0.003, 0.05, 1.6  # this limit with more lines
 SMALLEST_MHZ = 0.003  # smallest standard error of a peak
 BLENDED_MHZ = 0.08  # predicted lines closer than this form one peak
 TEMPERATURES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 12.0)
-LEAST_SHARE = (
-    0.1  # smallest share of a peak for an assigned line; the peak does not measure the frequency of a weaker one
-)
+# smallest share of a peak for an assigned line; the peak does not measure the frequency of a weaker one
+LEAST_SHARE = 0.1
 MOST_LINES = 400
 MOST_OF_TYPE = 60  # strongest lines of a type that tell its intensity while lines are added
 OPEN = 1e-3  # relative standard error above which a constant is not determined

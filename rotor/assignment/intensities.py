@@ -26,10 +26,11 @@ STRONGEST = 300  # lines that are looked for
 HUBER = 1.5  # standard deviations beyond which the weight of a line decreases
 LEAST_SPREAD = 1.0  # smallest range of E″/k (K) that determines a temperature
 LEAST_LINES = 5
+# times the threshold of the peaks; share of a type's lines above this that must have a peak
 CLEARLY, LEAST_SEEN = (
     2.0,
     0.5,
-)  # times the threshold of the peaks; share of a type's lines above this that must have a peak
+)
 TURNS = 30
 
 

@@ -25,15 +25,15 @@ NEAR_MHZ = 0.5  # distance of a peak from a predicted line that counts as a hit:
 CHANCE = 0.025  # share of the band that is near a peak; limits the number of peaks to match
 RATIO = np.log(10.0)  # largest ratio of the intensities of a family's lines
 ROUGH_MHZ = 0.25  # standard error of rigid lines when roots are ranked
-SOFTNESS = (
-    2e-4  # standard error of a rigid line over B, if larger: distortion shifts scale as E² B/ω², with E of some kT
-)
+# standard error of a rigid line over B, if larger: distortion shifts scale as E² B/ω², with E of some kT
+SOFTNESS = 2e-4
 SPREAD = 0.6  # standard deviation of ln intensity about the model: response of the instrument, saturation
 DETECTED = 0.95  # probability that a line above the threshold is in the list
+# grid points of κ between tests for a crossing; least number of tests if the bounds are narrow
 STRIDE, FEWEST_POINTS = (
     4,
     12,
-)  # grid points of κ between tests for a crossing; least number of tests if the bounds are narrow
+)
 CHANCE_OF_FEW = 0.25
 SAME = 3e-4  # relative difference below which roots are the same
 

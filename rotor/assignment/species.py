@@ -23,10 +23,11 @@ CHUNK = 12  # families per chunk, after which candidates are examined
 PER_FAMILY, PER_CHUNK = 4, 5
 PATIENCE, OPEN_PATIENCE = 10, 40  # chunks without a better species after which a search ends; where constants are open
 BEYOND_ALIASES = 600.0  # evidence above which a species is not compared with tops whose lines it would be a part of
+# relative difference of constants of roots of which one is grown; of those near a species
 NEAR, GROWN_NEAR = (
     3e-4,
     2e-3,
-)  # relative difference of constants of roots of which one is grown; of those near a species
+)
 AROUND = 0.01  # relative difference below which roots may belong to one species
 MOST_ALIASES = 4
 SURELY_MOVED = 12  # peaks of lines with ΔJ ≠ 0: a wrong twin of Q branches has fewer, those that A + C, DJ, DJK and chance can match
@@ -47,10 +48,11 @@ class Stage:
 
 
 FIRST_STAGES = (Stage(60, 0, 150), Stage(60, 150, 600), Stage(110, 0, 60))
+# of a further species, while several of the strongest peaks are left
 STRONG_STAGES = (
     Stage(60, 0, 120),
     Stage(60, 120, 420),
-)  # of a further species, while several of the strongest peaks are left
+)
 GUESS_STAGES = (  # within narrow bounds
     Stage(60, 0, 60), Stage(180, 0, 90), Stage(60, 60, 200), Stage(400, 0, 60), Stage(180, 90, 400), Stage(60, 200, 1200),
 )  # fmt: skip

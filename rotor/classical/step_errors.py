@@ -17,23 +17,23 @@ from collections.abc import Callable, Sequence
 from rotor.classical.integrators.method import Motion
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 
+# most steps of a motion that is repeated for an estimate: compiled, and step by step
 MOST_STEPS, MOST_CALLED = (
     20_000,
     500,
-)  # most steps of a motion that is repeated for an estimate: compiled, and step by step
+)
 FINEST = 1e-14  # a tolerance
 MORE_STEPS, USUAL_STEPS = 1.5, 2.4  # of a finer motion, times those of the coarse one: 10^(2/8) = 1.8 is usual
-OF_REFERENCE = (
-    1.25  # a reference a hundred times finer has at most a fifth of the error (largest of 1,000 motions: 13 %)
-)
+# a reference a hundred times finer has at most a fifth of the error (largest of 1,000 motions: 13 %)
+OF_REFERENCE = 1.25
 DENSE = 4  # steps between two times, below which these set the length of many steps
-OF_QUARTER = (
-    1.3  # of steps a quarter as long: 1/(1 - 4^-p) for order p, 1.07 of order 2, with a margin where steps are long
-)
+# of steps a quarter as long: 1/(1 - 4^-p) for order p, 1.07 of order 2, with a margin where steps are long
+OF_QUARTER = 1.3
+# a quarter of a step longer than the spacing of the times may give the same steps
 QUARTERS, TRIPLED = (
     [4.0**k for k in range(1, 40)],
     3,
-)  # a quarter of a step longer than the spacing of the times may give the same steps
+)
 EVALUATED = 8 * sys.float_info.epsilon  # of a step
 OF_REMEDY = "an accuracy, which is compared with a finer motion,"
 
@@ -78,9 +78,8 @@ def step_rounding(motion: Motion) -> float:
     """Rounding error of the attitude of a stepped motion, rad."""
     from rotor.geometry.rotations import distance
 
-    turned = float(
-        distance(motion.attitude[1:], motion.attitude[:-1]).sum()
-    )  # a lower bound if the times are far apart
+    # a lower bound if the times are far apart
+    turned = float(distance(motion.attitude[1:], motion.attitude[:-1]).sum())
     return EVALUATED * (motion.steps + math.sqrt(motion.steps) * max(turned, 0.1 * motion.steps))
 
 

@@ -165,9 +165,8 @@ def _loosest(motions: _Motions, allowed: float, misses: int = LOOSEST - 1) -> tu
     reaches = FINEST + 1
     while reaches > misses + 1:
         error = errors[decade] = motions.error(decade)
-        apart = max(
-            math.floor(abs(math.log10(max(error, 1e-30) / allowed))), 1
-        )  # decades, if the error is proportional to the tolerance
+        # decades, if the error is proportional to the tolerance
+        apart = max(math.floor(abs(math.log10(max(error, 1e-30) / allowed))), 1)
         if error <= allowed:
             reaches, decade = decade, max(decade - apart, misses + 1)
         else:

@@ -222,9 +222,8 @@ def _exit_code(error: ValueError | OSError) -> int:
 def _message(error: ValueError | OSError) -> str:
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
-    if (
-        error.filename is None and _exit_code(error) == NO_ANSWER
-    ):  # errors of files carry their names: this is the output
+    # errors of files carry their names: this is the output
+    if error.filename is None and _exit_code(error) == NO_ANSWER:
         _close_output()
         return f"standard output: {error.strerror}"
     return f"{error.filename}: {error.strerror}" if error.filename else error.strerror

@@ -279,9 +279,8 @@ def promised(fit: Fit, names: Sequence[str], options: FitOptions | None = None) 
     """
     search = line_evaluator(fit.lines, fit.named, fit.parameters, options or FitOptions(), fit.used)
     derivatives, columns = search.weighted(fit.values)[1], weighted_derivatives(fit, names, options)
-    columns = np.vstack(
-        [columns, np.zeros((len(derivatives) - len(columns), len(names)))]
-    )  # a-priori values do not depend on other constants
+    # a-priori values do not depend on other constants
+    columns = np.vstack([columns, np.zeros((len(derivatives) - len(columns), len(names)))])
     size = np.linalg.norm(columns, axis=0)
     columns = columns / np.where(size > 0, size, 1.0)
     # unit columns, so that no unit of a constant decides the rank

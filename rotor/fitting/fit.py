@@ -231,9 +231,8 @@ def _changed(search: Search, values: Floats, labels: Ints) -> tuple[str, ...]:
 def _verdict(fit: Fit, disorder: str, options: FitOptions) -> tuple[bool, str]:
     """Whether the fit is valid, and a sentence that says why or why not."""
     minimum = fit.minimum
-    rms = (
-        fit.weighted_rms if options.loss == "squares" else minimum.rms
-    )  # for a robust loss: of the function that was minimised
+    # for a robust loss: of the function that was minimised
+    rms = fit.weighted_rms if options.loss == "squares" else minimum.rms
     if disorder:
         return False, f"the constants that were reached are no set of constants: {disorder}"
     near = minimum.status == EXHAUSTED and minimum.distance <= NEARLY_THERE

@@ -62,9 +62,8 @@ def bootstrap(
     at = fit.parameters.moved(fit.values)
     settings = options or FitOptions()
     most = max(settings.most_iterations, FitOptions().most_iterations)
-    lenient = replace(
-        settings, poor_rms=1e12, most_iterations=most, pass_interrupt=True
-    )  # a poor rms does not reject a sample
+    # a poor rms does not reject a sample
+    lenient = replace(settings, poor_rms=1e12, most_iterations=most, pass_interrupt=True)
     out: list[Floats] = []
     fewer = astray = 0
 

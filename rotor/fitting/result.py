@@ -131,8 +131,7 @@ def determined_covariance(parameters: Parameters, statistics: Regression) -> Cov
     rows = np.flatnonzero(frequencies & parameters.matrix.any(axis=1) & ~parameters.matrix[:, open_].any(axis=1))
     if not len(rows):
         return None
-    finite = np.where(
-        np.isfinite(statistics.covariance), statistics.covariance, 0.0
-    )  # undetermined parameters do not contribute
+    # undetermined parameters do not contribute
+    finite = np.where(np.isfinite(statistics.covariance), statistics.covariance, 0.0)
     matrix = parameters.matrix[rows] @ finite @ parameters.matrix[rows].T
     return Covariance(tuple(parameters.constant_names[i] for i in rows), (matrix + matrix.T) / 2)

@@ -18,10 +18,8 @@ from rotor.quantum.labelled import LevelModel
 
 LOSSES = ("squares", "huber", "cauchy")
 POOR_RMS = 10.0  # default weighted rms above which the constants do not describe the lines
-_HUBER, _CAUCHY = (
-    1.345,
-    2.385,
-)  # residuals (in σ) beyond which a loss deviates from r²; gives 95 % efficiency for normal errors
+# residuals (in σ) beyond which a loss deviates from r²; gives 95 % efficiency for normal errors
+_HUBER, _CAUCHY = 1.345, 2.385
 _CANCELLED = 1e-12  # relative to the level derivatives: smaller differences between two levels are round-off
 _NONE = np.zeros(0, dtype=np.int64)
 

@@ -32,10 +32,11 @@ _LATELY = 6  # later iterations in which the weighted rms must halve
 _TURNED = 5  # parameters whose other sign is tried
 _TURNED_ITERATIONS = 8  # of such a search, before its progress is judged
 _BETTER = 0.99  # of the weighted rms: below it the other sign is taken
+# times its size at the start, and standard errors: a parameter that moved further may be in another minimum
 _FURTHER, _MANY_ERRORS = (
     0.5,
     20.0,
-)  # times its size at the start, and standard errors: a parameter that moved further may be in another minimum
+)
 _PUT_BACK = 3  # parameters that are reset to their start
 _LOWER = 1.0  # required decrease of χ² after a reset: one standard error of one parameter
 _AT_ZERO_MHZ = 1e-30  # how far a constant that starts at 0 may move in these stages
@@ -281,9 +282,8 @@ def _by_stages(search: Search, first: Minimum, progress: Progress | None, rough:
             )
             left = min(max(limit - len(last.iterations), 0), _STAGE_ITERATIONS)
             last = _continued(last, _minimised(stage, last.parameters, progress, left))
-            if (
-                last.status == INTERRUPTED
-            ):  # this minimum has only part of the lines; `first` remains the best point with all lines
+            # this minimum has only part of the lines; `first` remains the best point with all lines
+            if last.status == INTERRUPTED:
                 return _better(first, last, replaced=False)
         left = max(limit - len(last.iterations), 0)
         second = _continued(last, _minimised(search, last.parameters, progress, left, _makes_no_way(search.options)))

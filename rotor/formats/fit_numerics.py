@@ -22,10 +22,11 @@ if TYPE_CHECKING:
 ITERATIONS = (1, 2, 3, 4, 6, 10)
 TOLERANCES = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 FINEST_TOLERANCE = 1e-12
+# of the calibration; of fits whose start is near (tests/scenes/test_scene_fit.py)
 SHORT_ITERATIONS, USUAL_ITERATIONS = (
     1,
     6,
-)  # of the calibration; of fits whose start is near (tests/scenes/test_scene_fit.py)
+)
 
 
 def with_options(request: Any, **changes: Any) -> Any:

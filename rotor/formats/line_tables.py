@@ -65,9 +65,8 @@ def as_printed(quanta: Mapping[str, NDArray[Any]], halves: Collection[str]) -> t
     Raises ValueError for quantum numbers that a catalogue has no place for.
     """
     foreign = [name for name in quanta if name not in _IN_A_CATALOGUE]
-    rotation = tuple(
-        name for name in _BEFORE_SPINS if name != "j" or "n" not in quanta
-    )  # J beside N is a sum of spins, N + S
+    # J beside N is a sum of spins, N + S
+    rotation = tuple(name for name in _BEFORE_SPINS if name != "j" or "n" not in quanta)
     order = (*rotation, "j", *_IN_A_CATALOGUE[len(_BEFORE_SPINS) :])
     names = sorted(quanta, key=order.index) if not foreign else []
     if foreign or len(names) > MAX_QUANTA:

@@ -14,9 +14,8 @@ from typing import IO, Any
 
 MOST_BYTES = 1 << 32  # largest unpacked file
 HARMLESS_BYTES = 1 << 27  # unpacked size that is always allowed
-MOST_TIMES = (
-    100  # largest ratio to the packed size beyond that; lines of numbers shrink to a fifth, at best to a twentieth
-)
+# largest ratio to the packed size beyond that; lines of numbers shrink to a fifth, at best to a twentieth
+MOST_TIMES = 100
 _GZIP = b"\x1f\x8b"
 _PIECE = 1 << 22
 

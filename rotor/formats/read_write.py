@@ -85,9 +85,8 @@ def _meaning(word: str) -> Path | str:
     from rotor.formats.molecules.library import library_file
 
     library_path, path = library_file(word), Path(word)
-    if path.exists() and (
-        library_path or (not _looks_like_a_path(word) and word in _g2_names())
-    ):  # ASE takes 0.7 s to load
+    # ASE takes 0.7 s to load
+    if path.exists() and (library_path or (not _looks_like_a_path(word) and word in _g2_names())):
         what = "a molecule of the library" if library_path else "a molecule of ASE's g2 set"
         raise ValueError(
             f"{word!r} is ambiguous: it is a path here and {what}; write '{os.path.join('.', word)}' for the path, "

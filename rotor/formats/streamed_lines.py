@@ -350,9 +350,8 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
 
 def _ranges(plan: _Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
     """First and last lower J (or number of F) of the pieces, chosen for about `piece_lines` transitions in each."""
-    if (
-        plan.top.kind != "asymmetric" and not plan.twice_spins
-    ):  # closed forms start at J = 0; their lists, of about J² lines, are one piece
+    # closed forms start at J = 0; their lists, of about J² lines, are one piece
+    if plan.top.kind != "asymmetric" and not plan.twice_spins:
         yield 0, plan.jmax
         return
     components = sum(1 for mu in plan.dipole_abc if mu)

@@ -15,9 +15,8 @@ from rotor.molecules.molecule import Molecule
 from rotor.molecules.optimise import ase_atoms, calculator_by_name
 from rotor.units import AVOGADRO_PER_MOL, CM_PER_EV, ELEMENTARY_CHARGE_C
 
-MOST_FORCE_EV_PER_ANGSTROM = (
-    5e-4  # eV/Å; the energy, of second order in the force, is then converged to about 1e-6 eV, 0.01 cm⁻¹
-)
+# eV/Å; the energy, of second order in the force, is then converged to about 1e-6 eV, 0.01 cm⁻¹
+MOST_FORCE_EV_PER_ANGSTROM = 5e-4
 MOST_STEPS = 500
 EV_PER_KCAL_MOL = 4184.0 / AVOGADRO_PER_MOL / ELEMENTARY_CHARGE_C  # exact
 MMFF = "mmff"

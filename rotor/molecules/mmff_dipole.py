@@ -13,9 +13,8 @@ from rotor.arrays import Floats
 from rotor.molecules.molecule import Molecule
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
-GAS_SCALE = (
-    0.74  # least squares over 30 molecules (tests/molecules/test_dipoles.py): median error 0.2 D; without it 0.6 D
-)
+# least squares over 30 molecules (tests/molecules/test_dipoles.py): median error 0.2 D; without it 0.6 D
+GAS_SCALE = 0.74
 CHARGES_SOURCE = "estimate from MMFF94 partial charges"
 NO_DIPOLE_DEBYE = 1e-4  # smaller dipoles are round-off of a geometry whose symmetry forbids a dipole
 MOST_ATOMS = 200  # bond perception of larger geometries takes too long

@@ -154,9 +154,8 @@ def _fit_pixel(row: _Row, x: int, neighbour: tuple[Component, ...]) -> SourceFit
     for start in _starts(row, spectrum, neighbour):
         try:
             fit = fit_source(spectrum, start, row.sight, row.choices)
-        except (
-            ValueError
-        ):  # the search left the range of doubles, or the pixel has too few channels: the map marks it as not fitted
+        # the search left the range of doubles, or the pixel has too few channels: the map marks it as not fitted
+        except ValueError:
             continue
         if best is None or (fit.minimum.converged, -fit.chi_squared) > (best.minimum.converged, -best.chi_squared):
             best = fit

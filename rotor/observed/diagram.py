@@ -155,9 +155,8 @@ def _integrated(
             continue
         step = np.gradient(spectrum.frequency_mhz[part]) / centre * KM_PER_S
         area, sigma = float(spectrum.intensity[part] @ step), float(np.sqrt(np.sum((spectrum.noise[part] * step) ** 2)))
-        if (
-            float(alone[part] @ step) > _DETECTED * sigma and area > 0
-        ):  # the model decides, so that noise does not select
+        # the model decides, so that noise does not select
+        if float(alone[part] @ step) > _DETECTED * sigma and area > 0:
             out.append((row, area, sigma))
     return out
 

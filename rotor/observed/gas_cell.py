@@ -143,9 +143,8 @@ def fit_cell(spectrum: ObservedSpectrum, start: Sequence[Component]) -> CellFit:
     def evaluate(values: Floats) -> tuple[Floats, Floats]:
         parts = free.applied(start, values)
         depths = np.stack([component_depth(component, grid, slopes=True) for component in parts]) / _LN10
-        slopes = np.concatenate(
-            [depths[:, 1:], np.zeros_like(depths[:, :1])], axis=1
-        )  # the size of a source has no effect
+        # the size of a source has no effect
+        slopes = np.concatenate([depths[:, 1:], np.zeros_like(depths[:, :1])], axis=1)
         return (spectrum.intensity - depths[:, 0].sum(axis=0)) / noise, free.jacobian(parts, slopes) / noise[:, None]
 
     minimum = free.minimum(evaluate, start, tolerance=1e-3)

@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from rotor.spectra.lines import Lines
 
 CATALOGUE_K = 300.0  # temperature of LGINT in catalogues of JPL and CDMS
-_A_TO_STRENGTH = units.SPEED_OF_LIGHT_M_PER_S**2 / (
-    8 * math.pi
-)  # c²/8π in nm² MHz for A in 1/s and ν in MHz: 1e18 nm²/m², 1e-18
+# c²/8π in nm² MHz for A in 1/s and ν in MHz: 1e18 nm²/m², 1e-18
+_A_TO_STRENGTH = units.SPEED_OF_LIGHT_M_PER_S**2 / (8 * math.pi)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -65,9 +65,8 @@ def start_components(
     out = []
     for lines, bank, t, column in zip(species, templates, chosen, columns, strict=True):
         t = min(range(len(kelvin)), key=lambda i: abs(kelvin[i] - _MIDDLE_K)) if column == 0 else t
-        peak = float(
-            np.max(np.abs(bank[t] * spectrum.noise))
-        )  # templates are over the noise; peak in K per column density
+        # templates are over the noise; peak in K per column density
+        peak = float(np.max(np.abs(bank[t] * spectrum.noise)))
         floor = float(np.median(spectrum.noise)) / 3 / peak if peak > 0 else 1e12
         temperature = float(np.clip(kelvin[t], *lines.partition.range_k))
         out.append(Component(lines, max(float(column), floor), temperature, velocity, width, size_arcsec))

@@ -104,9 +104,8 @@ class Variables:
             for k in variable.components:
                 scale = getattr(components[k], variable.name) if variable.logarithmic else 1.0
                 out[:, column] += scale * slopes[k, place]
-            if (
-                variable.name == "size_arcsec"
-            ):  # a layer has a single size; each member has the slope of the whole layer
+            # a layer has a single size; each member has the slope of the whole layer
+            if variable.name == "size_arcsec":
                 out[:, column] /= _members(variable, components)
         return out
 

@@ -99,8 +99,7 @@ def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) 
         axes.axhline(1 / 3, color=GREY, linewidth=0.6, linestyle=":")
     axes.set_ylabel(", ".join(NAMES.get(name, name) for name in trace.cosines))
     axes.set_xlabel("Time (ps)")
-    axes.set_xlim(
-        trace.t_ps[0] - 0.01 * (trace.t_ps[-1] - trace.t_ps[0]), trace.t_ps[-1]
-    )  # a margin shows a pulse at the first time
+    # a margin shows a pulse at the first time
+    axes.set_xlim(trace.t_ps[0] - 0.01 * (trace.t_ps[-1] - trace.t_ps[0]), trace.t_ps[-1])
     if len(trace.cosines) > 1 or classical:
         axes.legend(frameon=False, fontsize=9)

@@ -25,9 +25,8 @@ FRAMES = 150
 FRAMES_PER_SECOND = 25
 DOTS_PER_INCH = 80
 LIMIT = 1.45  # half the width of each panel; the body fits into a sphere of radius 1.15
-_EYE = np.array(
-    [[0.0, 1.0, 0.0], [-0.3, 0.0, 0.954], [0.954, 0.0, 0.3]]
-)  # rows: right, up, towards the viewer; L points up
+# rows: right, up, towards the viewer; L points up
+_EYE = np.array([[0.0, 1.0, 0.0], [-0.3, 0.0, 0.954], [0.954, 0.0, 0.3]])
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 _FACES = ((0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5))
 _FACE_NORMALS = np.array([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], dtype=float)
@@ -194,9 +193,8 @@ def _upright(momentum: Floats) -> Floats:
     if np.linalg.norm(half_way) < 1e-8:  # L points straight down
         return np.diag([1.0, -1.0, -1.0])
     half_way /= np.linalg.norm(half_way)
-    half_turn = 2.0 * np.outer(half_way, half_way) - np.eye(
-        3
-    )  # takes L to the vertical, with an extra turn by π about it
+    # takes L to the vertical, with an extra turn by π about it
+    half_turn = 2.0 * np.outer(half_way, half_way) - np.eye(3)
     return np.asarray(np.diag([-1.0, -1.0, 1.0]) @ half_turn)
 
 

@@ -116,9 +116,8 @@ def _draw(axes: Any, panel: Panel) -> None:
     if t[-1] > LOG_FROM * t[0]:
         _make_logarithmic(axes)
     rows = -(-len(axes.get_legend_handles_labels()[0]) // 2)
-    axes.set_ylim(
-        bottom=0.0, top=_highest(panel, classical) * (1.0 + 0.12 * rows)
-    )  # the legend stands above all curves
+    # the legend stands above all curves
+    axes.set_ylim(bottom=0.0, top=_highest(panel, classical) * (1.0 + 0.12 * rows))
     axes.set_xlabel("Temperature (K)")
     axes.set_ylabel("Heat capacity $C_v/R$, no translation")
     axes.set_title(panel.title, loc="left")

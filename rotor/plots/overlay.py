@@ -142,9 +142,8 @@ def _name(
 ) -> None:
     """Name modelled lines in the colour of their species; a star marks a blend."""
     first, last = (1e3 * edge for edge in axes.get_xlim())
-    total, observed = (
-        lines[name] if name in lines else lines[f"{name}_k"] for name in ("total", "observed")
-    )  # brightness has its unit in the name
+    # brightness has its unit in the name
+    total, observed = (lines[name] if name in lines else lines[f"{name}_k"] for name in ("total", "observed"))
     rows = np.flatnonzero([first <= at <= last for at in lines["observed_mhz"].tolist()])
     peaks = [
         Peak(

@@ -121,9 +121,8 @@ def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
     by_j: dict[int, list[SolvedBlock]] = {}
     for j in sorted(all_j, reverse=True):
         here = elements.at(j)
-        zero = float(
-            here.mix[terms.first[0], 0]
-        )  # the part that is one number for J: taken out of the matrices for the sake of digits
+        # the part that is one number for J: taken out of the matrices for the sake of digits
+        zero = float(here.mix[terms.first[0], 0])
         here.mix[list(terms.first.values())] -= zero
         by_j[j] = []
         for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in here.links]):

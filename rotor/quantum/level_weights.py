@@ -49,9 +49,8 @@ def _asymmetric_weights(kind: str, j: Ints, ka: Ints, kc: Ints, weights: SpinWei
     """
     if kind in ("prolate", "oblate") and weights.rule == "K":
         k, other = (kc, ka) if kind == "oblate" else (ka, kc)
-        at_zero = np.array(
-            [weights.symmetric_weights(number, 0) for number in (0, 1)]
-        )  # of K = 0, whose other label is J
+        # of K = 0, whose other label is J
+        at_zero = np.array([weights.symmetric_weights(number, 0) for number in (0, 1)])
         both = weights.symmetric_weights(j, k, oblate=kind == "oblate") // np.where(k == 0, 1, 2)
         return np.where(k % weights.modulus == 0, at_zero[other % 2], both)
     by_parity = np.array([[weights.asymmetric_weight(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)

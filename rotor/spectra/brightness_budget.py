@@ -31,9 +31,8 @@ from rotor.spectra.emitters import CatalogueLines
 if TYPE_CHECKING:
     from rotor.quantum.estimates.beyond import Limit
 
-SPLITTING = frozenset(
-    {QUADRUPOLE, "spin-rotation", "spin-spin", ELECTRON_SPIN}
-)  # couplings that split lines about their centre of gravity
+# couplings that split lines about their centre of gravity
+SPLITTING = frozenset({QUADRUPOLE, "spin-rotation", "spin-spin", ELECTRON_SPIN})
 STEEPEST = math.sqrt(8 * math.log(2) / math.e)
 
 

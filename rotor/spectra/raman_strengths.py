@@ -163,9 +163,8 @@ def _axial_transitions(levels: Levels, delta_j: int, along: float) -> RamanTrans
     factor = np.empty(len(j))
     for value in np.unique(j).tolist():
         factor[j == value] = coupling(value, value + delta_j, 2, 0, k[j == value])
-    state = (
-        {"v": levels.quanta["v"][lower]} if "v" in levels.quanta else {}
-    )  # the polarizability connects no two vibrational states
+    # the polarizability connects no two vibrational states
+    state = {"v": levels.quanta["v"][lower]} if "v" in levels.quanta else {}
     first, second = np.flatnonzero(lower), levels.rows_of(j=j + delta_j, k=k, **state)
     strength = 1.5 * (along * factor) ** 2 * np.where(k == 0, 1, 2)  # ±K counts twice, K = 0 once
     return _ordered(levels, strength, first, second, _joint_weights(levels, first, second))

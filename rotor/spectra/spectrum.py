@@ -25,9 +25,8 @@ OUTSIDE = {"gaussian": 1e-12, "lorentzian": 1e-4, "voigt": 1e-4}
 PIECE = 1_000_000  # points computed at a time, to bound memory
 MOST_POINTS = 20_000_000  # of a grid that resolves every line
 
-_STEP = (
-    0.1  # a resolving grid has steps of a fortieth of the width at a centre, and of a tenth of the distance far from it
-)
+# a resolving grid has steps of a fortieth of the width at a centre, and of a tenth of the distance far from it
+_STEP = 0.1
 _BACKGROUND = 2001  # evenly spaced points in addition
 
 

@@ -136,9 +136,8 @@ def _strong_lines(
         at += b - a
     np.multiply(strength, strength, out=strength)
 
-    lowest = min(
-        [energy[start], *(product.low.energies_mhz[a] for product, a, _ in products)]
-    )  # energies rise within a block
+    # energies rise within a block
+    lowest = min([energy[start], *(product.low.energies_mhz[a] for product, a, _ in products)])
     highest = max([energy[stop - 1], *(product.low.energies_mhz[b - 1] for product, _, b in products)])
     span = max(min(highest - lowest, highest_mhz), SMALLEST_MHZ)
     scale = (1 - ROUND_OFF) / span  # the bound must not cut by round-off

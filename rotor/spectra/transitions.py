@@ -314,9 +314,8 @@ def _candidates(
     keep = frequency * strength >= np.minimum.outer(needed_up, needed[rows])
     if range_mhz != EVERYTHING:
         keep &= (frequency >= range_mhz[0]) & (frequency <= range_mhz[1])
-    places = np.flatnonzero(
-        np.tril(keep, -1) if up is lows[0] else keep
-    )  # a block with itself contains each pair twice
+    # a block with itself contains each pair twice
+    places = np.flatnonzero(np.tril(keep, -1) if up is lows[0] else keep)
     i, k = np.divmod(places, len(rows))
     return (i + up.start).astype(np.int32), rows[k], strength.ravel()[places]
 

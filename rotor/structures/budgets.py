@@ -48,9 +48,8 @@ def lengths_budget(method: str, values: Sequence[Value], fitted: FittedStructure
     """
     length_errors = [value.error for value in values if value.unit == "Å" and math.isfinite(value.error)]
     quantity = f"bond lengths ({method})"
-    no_scatter = (
-        fitted is not None and weights == "equal" and not fitted.degrees_of_freedom
-    )  # a held length has the error 0
+    # a held length has the error 0
+    no_scatter = fitted is not None and weights == "equal" and not fitted.degrees_of_freedom
     if not length_errors or no_scatter:
         return ErrorBudget(quantity, "Å", *(NO_LENGTH,) * 5)
     sigma = max(length_errors)

@@ -16,10 +16,11 @@ from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2
 
 AXES = "abc"
 CONSTANTS = "ABC"
+# ratios of measured constants to those of the geometry beyond which a mistake is assumed
 _FAR_OF_PARENT, _FAR = (
     3.0,
     1.5,
-)  # ratios of measured constants to those of the geometry beyond which a mistake is assumed
+)
 PLANAR_WITHIN_ANGSTROM = 1e-4  # distance below which an atom lies in the plane
 
 

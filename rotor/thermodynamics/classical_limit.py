@@ -251,9 +251,8 @@ def _distortion(top: Top) -> tuple[float, float, float]:
     first = operators  # the fourth-rank tensor of a spherical top averages to 0
     if top.kind == "spherical":
         first, _ = scalar_and_tensor(operators)
-    nodes, vectors = np.linalg.eigh(
-        np.diag(np.sqrt(np.arange(1.0, _NODES)), -1)
-    )  # Gauss-Hermite nodes by the method of Golub and Welsch
+    # Gauss-Hermite nodes by the method of Golub and Welsch
+    nodes, vectors = np.linalg.eigh(np.diag(np.sqrt(np.arange(1.0, _NODES)), -1))
     weight = np.array([math.prod(p) for p in product((vectors[0] ** 2).tolist(), repeat=3)])
     points = np.array(list(product(nodes.tolist(), repeat=3))).T * np.sqrt(_variances(top))[:, None]
     energies = [_classical_energy(first, order, *points) for order in (2, 3, 4)]

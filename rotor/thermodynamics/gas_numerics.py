@@ -86,9 +86,8 @@ def _spread(request: GasRequest, unit: str) -> float:
     from rotor.thermodynamics.classical_gas import answer_gas
 
     pilot = answer_gas(replace(request, molecules=PILOT_MOLECULES))
-    return (
-        1.1 * _largest_error(pilot) * math.sqrt(PILOT_MOLECULES)
-    )  # margin: the spread itself has an error of a few percent
+    # margin: the spread itself has an error of a few percent
+    return 1.1 * _largest_error(pilot) * math.sqrt(PILOT_MOLECULES)
 
 
 def _largest_error(answer: GasAnswer) -> float:

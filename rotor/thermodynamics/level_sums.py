@@ -351,9 +351,8 @@ def _summed(ladder: _Ladder, s: int, temperatures: Floats, enough: tuple[float, 
         tails[:, going], before[:, going] = _tail(smooth, before[:, going]), smooth
         if j < max(3, ground_j + 2):
             continue
-        if (
-            not ladder.semi_rigid and shell.kelvin.min() < ladder.at(j - 1).kelvin.min()
-        ):  # the energies of the distortion series decrease with J
+        # the energies of the distortion series decrease with J
+        if not ladder.semi_rigid and shell.kelvin.min() < ladder.at(j - 1).kelvin.min():
             tails[:, going] = ENDLESS
             break
         errors = relative_errors(moments[:, going], tails[:, going])[:kinds]

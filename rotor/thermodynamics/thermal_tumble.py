@@ -18,9 +18,8 @@ from rotor.tops.top import Top
 
 TEMPERATURE_K = 300.0
 TILT_DEGREES = 0.5
-MOLECULAR = Units(
-    "ps", "ħ", "cm-1", units.ASE_TIME_PS, 1.0 / units.HBAR_CLASSICAL, units.CM_PER_EV, "u Å²"
-)  # moments in u Å², energies in eV
+# moments in u Å², energies in eV
+MOLECULAR = Units("ps", "ħ", "cm-1", units.ASE_TIME_PS, 1.0 / units.HBAR_CLASSICAL, units.CM_PER_EV, "u Å²")
 
 
 @dataclass(frozen=True)

@@ -54,9 +54,8 @@ def potential_and_kinetic(
     misfit = np.sqrt(np.mean((potential.values(scan.angles) / units.MHZ_PER_CM - scan.energies_cm) ** 2))
     moments = np.array([rotation.reduced_moment(x) for x in scan.positions_angstrom])
     symmetry = rotation.symmetry_number()
-    if (
-        symmetry != period
-    ):  # isotopes: the masses have a longer period than the potential, so F comes from the rigidly turned geometry
+    # isotopes: the masses have a longer period than the potential, so F comes from the rigidly turned geometry
+    if symmetry != period:
         return potential, _rigid_kinetic(rotation, points), scan.source, scan, float(misfit)
     kinetic = FourierSeries.fitted(
         scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics, rotation.mirror_angle()

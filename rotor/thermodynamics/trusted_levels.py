@@ -108,9 +108,8 @@ def _above_the_ground(levels: Levels, ground_mhz: float | None) -> NDArray[np.bo
 
 def _trusted_by_rotation(top: Top, levels: Levels) -> NDArray[np.bool_]:
     """Which levels with spins (n,) belong to a trusted rotational level; solved without spins only if energies look wrong."""
-    energy = np.where(
-        levels.rotational > 0, levels.energy_mhz, 0.0
-    )  # N = 0 has no distortion; spins may move it up or down
+    # N = 0 has no distortion; spins may move it up or down
+    energy = np.where(levels.rotational > 0, levels.energy_mhz, 0.0)
     if top.level_table is None and not _untrusted(levels, energy, rigid_energies_mhz(top, levels)).any():
         return np.ones(len(levels), dtype=np.bool_)
     bare = replace(top, spin_constants=None)

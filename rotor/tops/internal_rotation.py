@@ -40,11 +40,12 @@ NUMBERED = {
     f"{name}_{top}": top for top in range(1, MOST_TOPS + 1) for name in ("F0", "delta", "epsilon", "V3", "V6")
 }  # constants of several tops, and the number of the top
 PAIRS = {"V12": 2, "V12s": 2, "V13": 3, "V13s": 3, "V23": 3, "V23s": 3}  # and of two of them, with the higher number
+# dimensionless, or angles in radians
 BARE = (
     "rho",
     "delta",
     *(name for name in NUMBERED if name.startswith(("delta", "epsilon"))),
-)  # dimensionless, or angles in radians
+)
 DEFAULT_FUNCTIONS = {
     1: 9,
     2: 25,

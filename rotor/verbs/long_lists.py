@@ -15,9 +15,8 @@ from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectr
 if TYPE_CHECKING:
     from rotor.formats.streamed_lines import SortedLines
 
-TRANSITIONS = (
-    2_000_000  # before the cut; longer lists are made on disk, since each transition takes about 0.3 kB of memory
-)
+# before the cut; longer lists are made on disk, since each transition takes about 0.3 kB of memory
+TRANSITIONS = 2_000_000
 STRONGEST = 1_000  # lines held in memory
 STREAMED = frozenset({"cat", "csv", "parquet"})  # outputs written from disk
 SMALL = frozenset({"json", "save_scene"})  # further allowed outputs: a scene has no lines, JSON only few

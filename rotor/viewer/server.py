@@ -198,9 +198,8 @@ class ViewServer:
             raise ValueError(f"{error.name} is not installed; {MISSING}") from None
         self.token = token or secrets.token_urlsafe(24)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        if (
-            os.name == "posix"
-        ):  # a port whose last connection has just ended is free; on Windows the option would share it
+        # a port whose last connection has just ended is free; on Windows the option would share it
+        if os.name == "posix":
             self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self.socket.bind((HOST, port))

@@ -15,9 +15,8 @@ from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.free.theta import SEPARATRIX, STEADY, Rows, moving_rows, steady_rows
 from rotor.geometry.rotations import IDENTITY, conjugate, multiply, normalised
 
-SMALLEST_MOMENT = (
-    1e-100  # of the largest moment: phases about the axis of a smaller nonzero moment would not fit into two doubles
-)
+# of the largest moment: phases about the axis of a smaller nonzero moment would not fit into two doubles
+SMALLEST_MOMENT = 1e-100
 SMALLEST_PART = 1e-120  # of |L|: a smaller component, not zero, would underflow when squared
 
 

@@ -17,9 +17,8 @@ BERNOULLI = (
     1 / 12, 1 / 720, 1 / 30240, 1 / 1209600, 1 / 47900160, 691 / 1307674368000, 1 / 74724249600, 3617 / 10670622842880000,
     43867 / 5109094217170944000, 174611 / 802857662698291200000, 77683 / 14101100039391805440000,
 )  # fmt: skip  # |B_2k|/(2k)! for k = 1, 2, ...
-SERIES_BELOW = (
-    1.0  # rad: below this angle cosine, sine and (1 - (θ/2) cot(θ/2))/θ² are summed as series, without a call
-)
+# rad: below this angle cosine, sine and (1 - (θ/2) cot(θ/2))/θ² are summed as series, without a call
+SERIES_BELOW = 1.0
 
 
 @njit(cache=True, nogil=True)

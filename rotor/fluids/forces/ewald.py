@@ -18,9 +18,8 @@ from rotor import units
 from rotor.arrays import Floats
 from rotor.fluids.forces.assembly import Integers
 
-COULOMB_EV_ANGSTROM = (
-    units.ELEMENTARY_CHARGE_C / (4 * math.pi * units.VACUUM_PERMITTIVITY_F_PER_M) * 1e10
-)  # e²/4πε0: 14.39964...
+# e²/4πε0: 14.39964...
+COULOMB_EV_ANGSTROM = units.ELEMENTARY_CHARGE_C / (4 * math.pi * units.VACUUM_PERMITTIVITY_F_PER_M) * 1e10
 
 
 @dataclass(frozen=True)

@@ -141,9 +141,8 @@ def equally_weighted(levels: Levels, upper: Indices, lower: Indices) -> NDArray[
     return np.asarray(weight[upper] == weight[lower])
 
 
-_NEARLY = (
-    0.999  # factor of a preliminary cut; the selected lines are tested with full precision and both terms of the cut
-)
+# factor of a preliminary cut; the selected lines are tested with full precision and both terms of the cut
+_NEARLY = 0.999
 _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
 
 

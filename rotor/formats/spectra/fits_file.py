@@ -149,9 +149,8 @@ def image_axis_mhz(
         )
     convention = choices.convention or _CONVENTION[kind[:4]] or RADIO
     if kind.startswith("VELO-") and choices.convention is None:
-        convention = (
-            RADIO if int(header.get("VELREF", 257)) > 256 else OPTICAL
-        )  # AIPS: 256 is added for radio velocities
+        # AIPS: 256 is added for radio velocities
+        convention = RADIO if int(header.get("VELREF", 257)) > 256 else OPTICAL
     return velocity_to_frequency(world * 1e-3, used, convention), used
 
 

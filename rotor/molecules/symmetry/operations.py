@@ -15,9 +15,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 
-MATCH_WITHIN = (
-    0.45  # of the shortest distance of like points: below one half, so that two points cannot match the same image
-)
+# of the shortest distance of like points: below one half, so that two points cannot match the same image
+MATCH_WITHIN = 0.45
 MOST_CANDIDATES = 400_000  # pairs of images tried; a minute's work for ten thousand points
 FEW_POINTS = 60  # up to which all distances are as quick as a k-d tree
 MOST_OPERATIONS = 480  # a ring of 120 like atoms has as many

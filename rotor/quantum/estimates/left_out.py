@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 STRAY_KV_PER_CM = 1e-3  # 1 V/cm
-HYPERFINE_KEY = (
-    "its constants are known, effects.hyperfine = true adds them"  # for scenes, whose keys no other text names
-)
+# for scenes, whose keys no other text names
+HYPERFINE_KEY = "its constants are known, effects.hyperfine = true adds them"
 
 
 def neglected_in_levels(top: Top, j: int, effects: Sequence[QuantumEffect]) -> tuple[LeftOut, ...]:

@@ -46,10 +46,11 @@ _MULTIPLETS = (
 )
 ZERO_POINT = "vibration-rotation difference"
 SPIN_LIMITS = frozenset({QUADRUPOLE, "magnetic coupling of nuclear spins", ELECTRON_SPIN})
+# the splittings of NH3 and ND3, see docs/limitations.md and data/molecules
 AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = (
     24_000.0,
     1_600.0,
-)  # the splittings of NH3 and ND3, see docs/limitations.md and data/molecules
+)
 
 
 def populated_j(top: Top, temperature_k: float) -> int:

@@ -34,9 +34,8 @@ if TYPE_CHECKING:
 
 # ½ α F² in MHz of 1 Å³ in 1 kV/cm
 MHZ_PER_ANGSTROM3 = 2 * math.pi * units.VACUUM_PERMITTIVITY_F_PER_M * 1e-30 * 1e10 / units.PLANCK_J_S * 1e-6
-ESTIMATED_DIPOLE_D = (
-    0.2 / 0.6745
-)  # standard deviation of a normal distribution with half of its values beyond ±0.2 D, as for the estimates
+# standard deviation of a normal distribution with half of its values beyond ±0.2 D, as for the estimates
+ESTIMATED_DIPOLE_D = 0.2 / 0.6745
 
 
 @dataclass(frozen=True, repr=False)

@@ -28,9 +28,8 @@ ANCHORS = 13  # fields solved by LAPACK
 DENSER = 1.5  # power of their spacing: they are denser at weak fields, where energies bend most
 SWEEPS = 4  # most Rayleigh quotient iterations
 CONVERGED = 1e-8  # last change of an energy relative to the smallest gap; vectors have an error of this size, energies of its square
-OFF_ZERO = (
-    1e-15  # shift of energies before a sweep, relative to the largest element, so that no pivot is 0 at zero field
-)
+# shift of energies before a sweep, relative to the largest element, so that no pivot is 0 at zero field
+OFF_ZERO = 1e-15
 TOGETHER = 1 << 19  # most numbers in memory where several chains are solved together
 
 

@@ -20,9 +20,8 @@ if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
 
-MOST_AT_EDGE = (
-    1e-6  # largest population of a state in the two highest J of the basis; the error of cosines is about as large
-)
+# largest population of a state in the two highest J of the basis; the error of cosines is about as large
+MOST_AT_EDGE = 1e-6
 
 
 class FieldKind(NamedTuple):

@@ -45,9 +45,8 @@ def at_fields(terms: Terms, fields: Floats) -> Matrix:
 def expectation(matrix: Matrix, vectors: Matrix) -> Floats:
     """⟨v|O|v⟩ (fields, states) of vectors (fields, n, states)."""
     fields, size, states = vectors.shape
-    columns = vectors.transpose(1, 0, 2).reshape(
-        size, fields * states
-    )  # one matrix product instead of one for each field
+    # one matrix product instead of one for each field
+    columns = vectors.transpose(1, 0, 2).reshape(size, fields * states)
     means = np.einsum("nk,nk->k", columns.conj(), matrix @ columns).real
     return np.asarray(means.reshape(fields, states))
 

@@ -25,9 +25,8 @@ from rotor.quantum.basis.labelled import Basis
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.torsion import TorsionalPotential, torsional_states
 
-NEARLY_FREE = (
-    5.0  # reduced barrier: between a torsion of 20 cm-1 (1.7) and methyl groups behind a barrier (17 and more)
-)
+# reduced barrier: between a torsion of 20 cm-1 (1.7) and methyl groups behind a barrier (17 and more)
+NEARLY_FREE = 5.0
 
 
 class Product(NamedTuple):

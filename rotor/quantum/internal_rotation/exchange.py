@@ -151,9 +151,8 @@ class SpinCounts:
         if sigma[0] != sigma[1]:
             return np.full(len(x), first * second * all_pairs * (1 if all(sigma) else 2))
         fermions = 3 * (n % 2 == 0) + sum(m % 2 == 0 for m in self.pairs)
-        y = x * (
-            -1 if fermions % 2 else 1
-        )  # sign of the spin function, so that the product is symmetric or antisymmetric as the nuclei demand
+        # sign of the spin function, so that the product is symmetric or antisymmetric as the nuclei demand
+        y = x * (-1 if fermions % 2 else 1)
         return np.asarray((first**2 * all_pairs + y * first * trace) // (2 if not any(sigma) else 1))
 
 

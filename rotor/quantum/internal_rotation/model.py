@@ -35,9 +35,8 @@ class RamModel:
     values: Mapping[str, float]
     fold: int = 3
     angle: float = 0.0
-    species: ClassVar[Mapping[str, int]] = MappingProxyType(
-        {"A": 0, "E": 1}
-    )  # σ; E stands for ±1, of equal energies at ∓K
+    # σ; E stands for ±1, of equal energies at ∓K
+    species: ClassVar[Mapping[str, int]] = MappingProxyType({"A": 0, "E": 1})
 
     def __post_init__(self) -> None:
         missing = [name for name in ("A", "B", "C", "F", "rho") if name not in self.values]

@@ -32,9 +32,8 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 BY_ANGLE = "angle {}"  # name of the derivative of all tensors of a nucleus by the angle of ρ
-TURN = np.array(
-    [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
-)  # derivative of the turn from a towards b at angle 0
+# derivative of the turn from a towards b at angle 0
+TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
 @dataclass(frozen=True, eq=False)

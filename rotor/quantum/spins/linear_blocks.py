@@ -32,11 +32,8 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
-_PADDED, _LIKE, _SMALL = (
-    1 << 18,
-    1.5,
-    24,
-)  # most numbers in an array of vectors (2 MB), ratio of sizes in it, sizes that all share one
+# most numbers in an array of vectors (2 MB), ratio of sizes in it, sizes that all share one
+_PADDED, _LIKE, _SMALL = 1 << 18, 1.5, 24
 Kinds = tuple[int, int, int]  # kinds of both blocks and the distance of their rows
 
 

@@ -29,14 +29,10 @@ Layout = tuple[tuple[NPattern, int], ...]
 """Order of the columns of a block: 2(N - F), class of patterns and kind of the rotational block of each."""
 Places = slice | Ints
 
-_LIKE, _SMALL, _MOST = (
-    1.5,
-    24,
-    1 << 21,
-)  # ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
-_SPARE = (
-    5  # rows of one K beyond those of the highest N or F, so that no operator of rank 2 reaches those of the next K
-)
+# ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
+_LIKE, _SMALL, _MOST = 1.5, 24, 1 << 21
+# rows of one K beyond those of the highest N or F, so that no operator of rank 2 reaches those of the next K
+_SPARE = 5
 
 
 class RotationColumns(NamedTuple):

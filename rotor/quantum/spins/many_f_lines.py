@@ -25,11 +25,8 @@ from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, betw
 from rotor.quantum.spins.pattern_tables import tensors_by_f
 from rotor.quantum.tensors import Tensors, rank_of
 
-_LIKE, _SMALL, _MOST = (
-    1.5,
-    24,
-    1 << 20,
-)  # ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
+# ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
+_LIKE, _SMALL, _MOST = 1.5, 24, 1 << 20
 _IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that lie side by side: 32 MB
 
 

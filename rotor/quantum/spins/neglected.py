@@ -31,9 +31,8 @@ from rotor.quantum.spins.coupling import coefficients, for_all_f, patterns, powe
 from rotor.quantum.spins.rotor import Channel
 from rotor.quantum.spins.scheme import Scheme
 
-_ROUND_OFF = 4 * float(
-    np.finfo(float).eps
-)  # difference of eigenvalues from two methods, relative to the highest energy
+# difference of eigenvalues from two methods, relative to the highest energy
+_ROUND_OFF = 4 * float(np.finfo(float).eps)
 _AT_ONCE = 100_000  # elements in one array; intermediate arrays then fit the processor's cache
 _TINY = float(np.finfo(float).tiny)
 

@@ -361,9 +361,8 @@ def merged(columns: dict[str, NDArray[Any]], fields: int) -> dict[str, NDArray[A
     """Merge lines of equal labels and |M| that coincide at every field, as do their lower states: strengths and intensities add up."""
     names = ("upper", "upper_m", "lower", "lower_m")
     keys = [np.unique(columns[name], return_inverse=True)[1].reshape(-1, fields)[:, 0] for name in names]
-    place = np.stack(
-        [columns[name].reshape(-1, fields) for name in ("lower_mhz", "frequency_mhz")]
-    )  # (2, lines, fields)
+    # (2, lines, fields)
+    place = np.stack([columns[name].reshape(-1, fields) for name in ("lower_mhz", "frequency_mhz")])
     first: list[int] = []  # first line of each group
     groups: dict[tuple[int, ...], list[int]] = {}
     number = np.zeros(place.shape[1], dtype=np.int64)

@@ -148,9 +148,8 @@ def character_rows(
     for operation, character in zip(symmetry.rotations, spin_characters(symmetry, spins, electronic), strict=True):
         key = _operation_name(symmetry, operation), cycles(operation.permutation, spins), character
         counts[key] = counts.get(key, 0) + 1
-    ordered = sorted(
-        counts.items(), key=lambda item: (item[0][0] != "E", item[0])
-    )  # rotations themselves are ordered by round-off
+    # rotations themselves are ordered by round-off
+    ordered = sorted(counts.items(), key=lambda item: (item[0][0] != "E", item[0]))
     return [CharacterRow(name, count, turns, character) for (name, turns, character), count in ordered]
 
 

@@ -23,9 +23,8 @@ from rotor.fluids.forces.ewald import (
 from rotor.fluids.forces.models import RigidModel, Site
 from rotor.fluids.forces.potential import RigidPotential
 
-MADELUNG_ROCK_SALT = (
-    1.7475645946331822  # J. M. Borwein et al., Lattice Sums Then and Now (2013), from nearest neighbours
-)
+# J. M. Borwein et al., Lattice Sums Then and Now (2013), from nearest neighbours
+MADELUNG_ROCK_SALT = 1.7475645946331822
 
 
 def test_madelung_constant_of_rock_salt() -> None:

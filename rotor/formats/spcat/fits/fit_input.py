@@ -108,10 +108,8 @@ def _named_constants(file: ParameterFile) -> tuple[Constants, Floats] | None:
         constants, matrix = constants_and_matrix(file)
     except AxisOrderError:
         return None
-    if file.options[0].diag < 0 and constants.kind in (
-        "asymmetric",
-        "spherical",
-    ):  # diagonal elements, over the functions of the codes
+    # diagonal elements, over the functions of the codes
+    if file.options[0].diag < 0 and constants.kind in ("asymmetric", "spherical"):
         return None
     by_k = file.options[0].spind < 0
     return None if (constants.kind in ("asymmetric", "spherical")) == by_k else (constants, matrix)

@@ -249,9 +249,8 @@ class FileEffect(QuantumEffect):
 
     def _plain(self, v: int) -> dict[str, Operators]:
         """Operators of a state that have powers (p, q, n), by parameter."""
-        named = next(
-            (pair.first for pair in self.pairs if pair.second == v), v
-        )  # parameters refer to the first state of a pair
+        # parameters refer to the first state of a pair
+        named = next((pair.first for pair in self.pairs if pair.second == v), v)
         return {
             line.name: line.operator.plain
             for line, states in self._group_lines

@@ -33,9 +33,8 @@ def spin_terms_with_pairs(
     """
     odd = term.rotor.odd
     if odd and states[0] == states[1] and axes[2] == "c":
-        term = replace(
-            term, factor=-term.factor
-        )  # the sign of what is odd is another between states than within a pair there
+        # the sign of what is odd is another between states than within a pair there
+        term = replace(term, factor=-term.factor)
     turned = turned_rotor(term.rotor, axes)
     return [
         replace(term, bra=part.bra, ket=part.ket, factor=term.factor * part.factor, rotor=rotor)

@@ -95,9 +95,8 @@ def turned_axis(used: Iterable[str], odd: frozenset[str]) -> str:
     ('c', 'c', 'b')
     """
     axes = sorted(set(used) - {""})
-    for g in sorted(
-        ("", "c", "b", "a"), key=lambda g: odd != turned_odd_axes(g)
-    ):  # the axis that fits unused axes too is preferred
+    # the axis that fits unused axes too is preferred
+    for g in sorted(("", "c", "b", "a"), key=lambda g: odd != turned_odd_axes(g)):
         if all((axis in odd) == (g not in ("", axis)) for axis in axes):
             return g
     along = ", ".join(f"{axis} {'odd' if axis in odd else 'even'}" for axis in axes)

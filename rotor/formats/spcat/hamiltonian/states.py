@@ -128,9 +128,8 @@ class StateOptions:
         steps = np.arange(0, 2 * fold.n, 2)  # K that stand in one Wang block, modulo n
         classes = (k[:, None] - self.l_code + steps) % fold.n
         alone = (classes == fold.alone).any(axis=1)
-        paired = np.isin(classes, fold.paired).any(axis=1) | (
-            self.iax == 7
-        )  # which names both kinds of blocks of a 4-fold axis
+        # which names both kinds of blocks of a 4-fold axis
+        paired = np.isin(classes, fold.paired).any(axis=1) | (self.iax == 7)
         return np.stack(
             [np.where(alone, class_weight, 0), np.where(paired & self._has_e(class_weight), self.e_weight, 0)], axis=1
         )

@@ -324,10 +324,11 @@ def _spins(
     if not sizes:
         return None
     totals = dict.fromkeys(called[len(called) - equivalent :], "I") if equivalent else {}
+    # whose functions WTPL and WTMN never count
     twice, weights_are_of_others = (
         dict(zip(called, sizes, strict=True)),
         equivalent == 2,
-    )  # whose functions WTPL and WTMN never count
+    )
     return SpinConstants(values, twice, uncertainties=spreads, totals=totals, weights_of_others=weights_are_of_others)
 
 

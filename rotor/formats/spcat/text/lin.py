@@ -145,9 +145,8 @@ def like_line_before(
     return near, np.abs(np.diff(error)) < 1e-7
 
 
-EXCLUDED = (
-    "lines that do not count, as rotor fit --reject left them out:"  # behind a blank line, where SPFIT reads nothing
-)
+# behind a blank line, where SPFIT reads nothing
+EXCLUDED = "lines that do not count, as rotor fit --reject left them out:"
 
 
 def excluded_lines(lines: LineList, per_state: int = 0) -> LineList | None:

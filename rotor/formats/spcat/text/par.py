@@ -173,9 +173,8 @@ def _parameter(line: Line) -> Parameter:
     code = whole(line, code_word, 0, "the parameter code")
     others, end = read_words(line, rest, 2)
     words = code_word + others
-    value = number(
-        line, words, 1, "the parameter's value"
-    )  # SPCAT takes a line without one for the last parameter, without a word
+    # SPCAT takes a line without one for the last parameter, without a word
+    value = number(line, words, 1, "the parameter's value")
     error = number(line, words, 2, "the parameter's error") if len(words) > 2 and words[2].text else None
     tail = line.body[end:]
     label = tail.partition("/")[2].strip() if "/" in tail else ""
