@@ -138,13 +138,13 @@ def _frame(axes: Any, view: View) -> None:
 
 
 def _make_logarithmic(axes: Any) -> None:
-    """Make the temperature axis logarithmic, with ticks such as 10, 20, 50, 100."""
+    """Make the temperature axis logarithmic, with ticks such as 10, 30, 100."""
     from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
     axes.set_xscale("log")
     lowest, highest = axes.dataLim.intervalx
-    few = highest <= 1e4 * lowest  # over more decades ticks at 2 and 5 would overlap
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    few = highest <= 1e4 * lowest  # over more decades ticks at 3 would overlap
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0) if few else (1.0,)))
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
 
