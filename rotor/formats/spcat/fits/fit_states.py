@@ -20,6 +20,7 @@ from rotor.formats.spcat.fits.at_zero import left_at_zero
 from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
 from rotor.formats.spcat.hamiltonian.l_spins import functions_by_l, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import has_other_names, named_by, naming_by, spin_naming_by
+from rotor.formats.spcat.hamiltonian.roll_over import Diagonal
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.estimates.derivatives import level_derivatives
@@ -175,9 +176,11 @@ def _assign_with_spins(
     parameters = tuple(group.effect.parameters(group.top))
 
     diagonal = group.diagonal(int(labels[here, 0].max()))
-    highest = unmixed_levels(group.top, (group.effect,), [int(twice.max())])
-    by_diag = not group.effect.pairs and has_other_names(highest, group.diag, diagonal)
-    naming = partial(spin_naming_by, group.diag, group.oblate, diagonal) if by_diag else None
+    naming = (
+        partial(spin_naming_by, group.diag, group.oblate, diagonal)
+        if _has_names_of_diag(group, int(twice.max()), diagonal)
+        else None
+    )
 
     def rows_of(levels: Levels, chosen: Ints) -> Ints:
         if group.effect.pairs:
@@ -189,6 +192,13 @@ def _assign_with_spins(
     functions = partial(_label_functions, group) if group.effect.pairs else None
     assigned = assigned_with_spins(group.top, (group.effect,), parameters, start, twice, rows_of, functions, naming)
     return [AssignedLevels(here[part.rows], columns, part.blocks) for part in assigned]
+
+
+def _has_names_of_diag(group: Group, twice_f: int, diagonal: Diagonal) -> bool:
+    """Whether DIAG names levels of this doubled F otherwise; three equivalent nuclei have names by sub-blocks, l-doubled states by l."""
+    if group.effect.pairs or any(state.equivalent == 3 for state in group.states):
+        return False
+    return has_other_names(unmixed_levels(group.top, (group.effect,), [twice_f]), group.diag, diagonal)
 
 
 def _label_rows(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
