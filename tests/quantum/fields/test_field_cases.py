@@ -163,7 +163,7 @@ def test_a_half_cycle_orients_an_oblate_top_of_m_1():
 
 @pytest.mark.parametrize("m", [1, 2])
 def test_maps_of_m_above_0_beside_a_laser(m):
-    """Three dipole components: M and -M in blocks of complex matrices; energies and cosines by rank."""
+    """Three dipole components: blocks of complex matrices for M and -M; energies and cosines by rank."""
     dipole, alpha = np.array([1.2, 0.8, 0.5]), np.diag([9.0, 6.0, 4.5])
     top = Top.from_constants("A=8100 B=3900 C=2900 MHz", dipole_abc_debye=tuple(dipole)).with_polarizability(alpha, "")
     stark = stark_map(top, [10.0], j_highest=3, m_values=(m,), intensity_w_per_cm2=2e9, tolerance_mhz=1e-5)
@@ -173,7 +173,7 @@ def test_maps_of_m_above_0_beside_a_laser(m):
     )
     energies, vectors = np.linalg.eigh(fixed - DIPOLE_MHZ * 10 * contracted_vectors(basis, dipole[ABC], Z))
     cosine = np.einsum("is,ik,ks->s", vectors.conj(), contracted_vectors(basis, Z, Z), vectors).real
-    assert set(stark.m.tolist()) == {m, -m}
+    assert set(stark.m.tolist()) == {m}  # of M and -M, which have one energy
     assert stark.energy_mhz == pytest.approx(
         energies[stark.rank], abs=stark.accuracy_mhz + 1e-8
     )  # round-off of QuTiP's sums
