@@ -105,6 +105,16 @@ def runs_of_similar_size(
         yield slice(start, len(sizes))
 
 
+def numbers_in_runs(counts: Ints, firsts: Ints | int = 0) -> tuple[Ints, Ints]:
+    """The number of each run, and the whole numbers of the run from its first one, over runs of these counts.
+
+    >>> [column.tolist() for column in numbers_in_runs(np.array([2, 1]), np.array([5, 0]))]
+    [[0, 0, 1], [5, 6, 0]]
+    """
+    run = np.repeat(np.arange(len(counts)), counts)
+    return run, np.arange(len(run)) + (firsts - np.cumsum(counts) + counts)[run]
+
+
 def end_to_end(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """One column of several tables, concatenated; that of a single table is not copied."""
     return np.concatenate(columns) if len(columns) > 1 else columns[0]

@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from rotor import units
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, numbers_in_runs
 from rotor.observed.species import SpeciesLines
 from rotor.spectra.emission import BACKGROUND_K, planck_k
 from rotor.spectra.opacity import NM2_IN_CM2
@@ -306,6 +306,4 @@ def _windows(grid: Floats, centre: Floats, reach: Floats) -> tuple[Ints, Ints]:
     """Pairs of lines and channels within the reach of the lines, (m,) each."""
     first = np.searchsorted(grid, centre - reach)
     count = np.searchsorted(grid, centre + reach) - first
-    line = np.repeat(np.arange(len(centre)), count)
-    offset = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
-    return line, first[line] + offset
+    return numbers_in_runs(count, first)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, numbers_in_runs
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import Block, SolvedBlock, Used
@@ -171,10 +171,9 @@ class Plan:
     @cached_property
     def placed(self) -> Placed:
         """All members of families, in order of N and class."""
-        counts = [len(family) for family in self.families]
+        counts: Ints = np.array([len(family) for family in self.families], dtype=np.int64)
         members = np.array([member for family in self.families for member in family]).reshape(-1, 2)
-        families = np.repeat(np.arange(len(counts)), counts)
-        places = np.arange(len(members)) - np.repeat(np.cumsum(counts) - counts, counts)
+        families, places = numbers_in_runs(counts)
         keys = _key(np.array([block.j for block in self.blocks])[members[:, 0]], members[:, 1])
         order = np.argsort(keys, kind="stable")
         return Placed(keys[order], families[order], places[order], members[order, 0])
@@ -238,8 +237,7 @@ def blocks_of_f(plan: Plan, patterns: Mapping[int, Ints]) -> list[tuple[int, tup
     """Doubled F and parts of each block, by F, then by family; an F whose patterns no rotational block has is left out."""
     runs, placed = _runs_of_patterns(plan, patterns), plan.placed
     low, high = (np.searchsorted(placed.keys, runs.keys, side) for side in ("left", "right"))
-    run = np.repeat(np.arange(len(low)), high - low)
-    member = np.arange(len(run)) + np.repeat(high - np.cumsum(high - low), high - low)
+    run, member = numbers_in_runs(high - low, low)
     family, place = placed.families[member], placed.places[member]
     order = np.lexsort((runs.first[run], place, family, runs.f[run]))
     run, family, numbers = run[order], family[order], placed.numbers[member[order]]
@@ -270,10 +268,10 @@ def _runs_of_patterns(plan: Plan, patterns: Mapping[int, Ints]) -> _Runs:
     counts = np.array([len(patterns_of_f) for patterns_of_f in patterns.values()], dtype=np.int64)
     if not counts.any():
         return _Runs(*np.zeros((4, 0), dtype=np.int64))
-    f, rows = np.repeat(list(patterns), counts), np.concatenate([each for each in patterns.values() if len(each)])
+    place, row = numbers_in_runs(counts)
+    f, rows = np.array(list(patterns))[place], np.concatenate([each for each in patterns.values() if len(each)])
     keys = _key(rows[:, 0] // 2, plan.shared.scheme.classes(rows))
     begins = np.flatnonzero(np.append(True, (f[1:] != f[:-1]) | (keys[1:] != keys[:-1])))
-    row = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
     lengths = np.diff(np.append(begins, len(rows)))
     return _Runs(f[begins], keys[begins], row[begins], row[begins] + lengths)
 

@@ -189,9 +189,9 @@ def _rotation_elements(
     frame: Frame = shared.cache["frame"]
     if shared.axial:
         whole = {kind: np.zeros((len(frame.n_of_rows), 1, count)) for kind in frame.energies_mhz}
-        numbers = np.array(frame.kinds)
+        powers, kinds = _powers_of_axial(terms, count, blocks), np.array(frame.kinds)
         for kind, values in whole.items():
-            values[frame.rows[numbers == kind], 0] = _powers_of_axial(terms, count, blocks)[numbers == kind]
+            values[frame.rows[kinds == kind], 0] = powers[kinds == kind]
         first, parameters = np.zeros(1, dtype=np.int64), np.arange(count)
         return {(kind, kind, 0): UnitElements(first, first, values, parameters) for kind, values in whole.items()}
     of_kind: dict[int, list[tuple[int, Ints, Ints, LinearBlock]]] = {}

@@ -156,11 +156,12 @@ def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -
     """Group blocks (doubled F and parts); each group comes with the numbers of its blocks."""
     layouts = [_layout(frame.patterns[f], parts, frame) for f, parts in members]
     rows = [frame.twice_row(f, parts[0].number) for f, parts in members]
+    columns = {layout: frozenset(layout) for layout in set(layouts)}
     layouts_and_members: list[tuple[Layout, dict[int, int]]] = []
     for number in sorted(range(len(members)), key=lambda number: -members[number][0]):
         row, layout = rows[number], layouts[number]
         for group_layout, by_row in layouts_and_members:
-            if row not in by_row and (layout == group_layout or set(layout) <= set(group_layout)):
+            if row not in by_row and columns[layout] <= columns[group_layout]:
                 by_row[row] = number
                 break
         else:

@@ -161,7 +161,8 @@ def _between(
     space: Workspace,
 ) -> Iterator[Rows]:  # fmt: skip
     """Elements between two groups, whose doubled F differ by `rise` and doubled rows by `step`."""
-    frame, first, last = shared.cache["frame"], *_range_of_f(shared)
+    frame: Frame = shared.cache["frame"]
+    first, last = frame.twice_f[0], frame.twice_f[-1]
     chosen = [row for row in low.places if row + step in up.places]
     chosen = [row for row in chosen if 2 * low.blocks[low.places[row]].twice_f + rise >= 2 * moments.rank]
     sums = [
@@ -199,9 +200,3 @@ def _elements(
     functions_up, functions_low = bra.shape[1] * bra.shape[2], ket.shape[1] * ket.shape[2]
     moved = np.matmul(whole.reshape(-1, functions_up, functions_low), ket.reshape(len(ket), functions_low, -1))
     return np.asarray(np.matmul(bra.reshape(len(bra), functions_up, -1).transpose(0, 2, 1), moved))
-
-
-def _range_of_f(shared: Shared) -> tuple[int, int]:
-    """The first and the last doubled F of a calculation."""
-    twice_f = shared.cache["frame"].twice_f
-    return twice_f[0], twice_f[-1]

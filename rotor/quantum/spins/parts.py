@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, numbers_in_runs
 from rotor.quantum.levels import SolvedBlock
 
 _AT_A_TIME = 1000  # entries of a table of weights that are examined together
@@ -112,12 +112,12 @@ def names_of_parts(parts: Sequence[SpinPart], patterns: Ints, first_rows: Ints |
     rows = np.asarray([part.patterns.start for part in parts], dtype=np.int64) + first_rows
 
     counts: Ints = np.array([len(names) for names in wang_names])  # Wang blocks of each rotational block
-    part, wang_part = _each(counts[rotor], _starts(counts)[rotor])
-    of_part, row = _each(repeats[part], rows[part])
+    part, wang_part = numbers_in_runs(counts[rotor], _starts(counts)[rotor])
+    of_part, row = numbers_in_runs(repeats[part], rows[part])
     wang_part = wang_part[of_part]
     names = [of_wang_part for of_rotor in wang_names for of_wang_part in of_rotor]
     lengths = np.array([len(of_wang_part) for of_wang_part in names])
-    sub_block, name = _each(lengths[wang_part], _starts(lengths)[wang_part])
+    sub_block, name = numbers_in_runs(lengths[wang_part], _starts(lengths)[wang_part])
     labels = np.empty((len(name), 3 + patterns.shape[1]), dtype=np.int64)
     labels[:, :3] = np.concatenate(names)[name]
     labels[:, 3:] = patterns[row[sub_block]]
@@ -127,16 +127,6 @@ def names_of_parts(parts: Sequence[SpinPart], patterns: Ints, first_rows: Ints |
 def _starts(counts: Ints) -> Ints:
     """The first place of each run of these counts."""
     return np.asarray(np.cumsum(counts) - counts)
-
-
-def _each(counts: Ints, firsts: Ints) -> tuple[Ints, Ints]:
-    """The number of each run, and the whole numbers of the run from its first one, over runs of these counts.
-
-    >>> [column.tolist() for column in _each(np.array([2, 1]), np.array([5, 0]))]
-    [[0, 0, 1], [5, 6, 0]]
-    """
-    run = np.repeat(np.arange(len(counts)), counts)
-    return run, np.arange(len(run)) + (firsts - np.cumsum(counts) + counts)[run]
 
 
 def assigned(shares: Floats, capacity: Ints) -> Ints:
