@@ -6,6 +6,7 @@ this package, and must see the folders that a scene reads and writes under the s
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -28,13 +29,7 @@ def dask_executor(address: str, security: Any = None) -> Iterator[Executor]:
         from distributed import Client
     except ImportError:
         raise ValueError(f"dask.distributed is not installed; {INSTALL} installs it") from None
-    try:
-        client = Client(address, timeout=WAIT_SECONDS, set_as_default=False, security=security)
-    except (OSError, TimeoutError, ValueError, TypeError) as error:
-        raise ValueError(
-            f"{address}: no scheduler of Dask answers within {WAIT_SECONDS} s ({error}); expected an address such as tcp://head:8786, "
-            "or tls://head:8786 with certificates"
-        ) from None
+    client = _connected(Client, address, security)
     pool = client.get_executor()
     try:
         yield pool
@@ -45,6 +40,21 @@ def dask_executor(address: str, security: Any = None) -> Iterator[Executor]:
         pool.shutdown()
     finally:
         client.close()
+
+
+def _connected(client: Any, address: str, security: Any) -> Any:
+    """A client of the scheduler at an address."""
+    try:
+        return client(address, timeout=WAIT_SECONDS, set_as_default=False, security=security)
+    except (OSError, TimeoutError, ValueError, TypeError) as error:
+        reason = str(error)
+    # Dask does not close a client whose start failed. Collected later, in the thread of the next client, it waits for a lock that
+    # the start of that next client holds (distributed.utils.LoopRunner): collected here, it ends at once.
+    gc.collect()
+    raise ValueError(
+        f"{address}: no scheduler of Dask answers within {WAIT_SECONDS} s ({reason}); expected an address such as tcp://head:8786, "
+        "or tls://head:8786 with certificates"
+    )
 
 
 def tls_security(authority: str, certificate: str, key: str) -> Any:

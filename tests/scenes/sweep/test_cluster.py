@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import gc
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import distributed
 import pytest
 
-from rotor.scenes.cluster import dask_executor
+from rotor.scenes.cluster import dask_executor, tls_security
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import LevelsScene, StarkScene
 from rotor.scenes.scene_file import write_scene
@@ -141,23 +143,50 @@ def certificate(tmp_path):
     return str(cert), str(cert), str(key)
 
 
-def test_an_encrypted_cluster_takes_a_client_with_certificates(call, folder, certificate):
+@contextmanager
+def dask_cluster(certificate):
+    """Address of a scheduler with one worker in this process that takes encrypted connections alone."""
     authority, cert, key = certificate
     security = distributed.Security(
         tls_ca_file=authority, tls_scheduler_cert=cert, tls_scheduler_key=key, tls_worker_cert=cert, tls_worker_key=key,
         tls_client_cert=cert, tls_client_key=key, require_encryption=True,
     )  # fmt: skip
-    write_scene(SWEEP, "s.toml")
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tls://", security=security
     ) as process:
-        address = process.scheduler_address
-        assert address.startswith("tls://")
+        assert process.scheduler_address.startswith("tls://")
+        yield process.scheduler_address
+
+
+def test_an_encrypted_cluster_takes_a_client_with_certificates(call, folder, certificate):
+    write_scene(SWEEP, "s.toml")
+    with dask_cluster(certificate) as address:
         code, _, err = call("run", "s.toml", "--dask", address)
         assert (code, "no scheduler of Dask answers" in err) == (2, True)
         code, _, err = call("run", "s.toml", "--dask", address, "--dask-tls", ",".join(certificate))
         assert code == 0, err
     assert len(list(folder.glob("*.csv"))) == 6
+
+
+def test_a_refused_client_does_not_stop_the_next(folder, certificate, monkeypatch):
+    """A client whose start failed is not left to the collector, which may run in the thread of the next client's loop."""
+    security = tls_security(*certificate)
+    plain = distributed.utils.get_loop_factory
+
+    def collected():
+        gc.collect()
+        return plain()
+
+    with dask_cluster(certificate) as address:
+        gc.disable()
+        try:
+            with pytest.raises(ValueError, match="no scheduler of Dask answers"), dask_executor(address):
+                pass
+            monkeypatch.setattr(distributed.utils, "get_loop_factory", collected)
+            with dask_executor(address, security) as pool:
+                assert pool.submit(len, "abc").result() == 3
+        finally:
+            gc.enable()
 
 
 def test_certificates_that_are_not_there(call, folder):
