@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from rotor.frozen import dataclass
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.requests.field import declared, part
 from rotor.requests.readers import Flag, Quantity, Text

@@ -8,7 +8,6 @@ anew; see `Follows` for what is looked at.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, Workspace
+from rotor.frozen import dataclass
 from rotor.quantum.labelled import ClosedForm, LevelModel
 from rotor.quantum.linear_stacks import LinearBlock, LinearStack, SolvedStack, stack_numbers
 from rotor.quantum.wang.basis import WangBlock

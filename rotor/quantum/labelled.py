@@ -17,12 +17,13 @@ import os
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, Workspace
+from rotor.frozen import dataclass
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.label_blocks import Chunk, chunks_of, expectations, occurring_blocks
 from rotor.quantum.solvers.tridiagonal import vectors_of_values

@@ -12,13 +12,13 @@ A line list needs squares of elements only. So thousands of small products becom
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.frozen import dataclass
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.tensors import BodyTensor, wang_coupling
 from rotor.quantum.wang.basis import WangBlock

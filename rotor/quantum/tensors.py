@@ -26,7 +26,6 @@ Line strengths: Σ_{M' M p} |⟨J'τ'M'|T^K_p|J τ M⟩|² is the square of the 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
@@ -34,6 +33,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
+from rotor.frozen import dataclass
 from rotor.quantum.symmetric_top_elements import coupling, coupling_of_existing, sign_of
 from rotor.quantum.wang.basis import WangBlock
 from rotor.tops.operators import axis_order as axis_order

@@ -9,7 +9,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_whole
+from rotor.frozen import dataclass
 from rotor.quantum.levels import Levels
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints, rising_order
 from rotor.checks import require_positive, require_whole
+from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.convergence import warnings_of

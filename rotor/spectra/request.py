@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_choice, require_top
+from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.limits import all_limits, limit_facts, populated_j
 from rotor.quantum.hamiltonian_input import effects_field

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices, Workspace
+from rotor.frozen import dataclass
 from rotor.quantum.levels import Block, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import connections, wang_columns

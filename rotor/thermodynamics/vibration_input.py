@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
+from rotor.frozen import dataclass
 from rotor.requests.field import declared, part
 from rotor.requests.readers import Custom
 from rotor.thermodynamics.vibration import VibrationalStates

@@ -134,6 +134,24 @@ def test_a_standard_dataclass_extends_ours():
         dataclasses.dataclass(type("Loose", (Stored,), {"__annotations__": {"c": "int"}, "c": 1}))
 
 
+def test_ours_extends_ours_and_one_of_the_standard_library():
+    for base in (frozen.dataclass, dataclasses.dataclass):
+        below = base(frozen=True)(type("Below", (), {"__annotations__": {"a": "int"}, "__module__": __name__}))
+        above = frozen.dataclass(frozen=True)(
+            type("Above", (below,), {"__annotations__": {"b": "int"}, "b": 2, "__module__": __name__})
+        )
+        extended = above(1)
+        assert (extended.a, extended.b, extended == above(1, 2), extended != above(1, 3)) == (1, 2, True, True)
+        assert (repr(extended), hash(extended)) == ("Above(a=1, b=2)", hash(above(1)))
+        for name in ("a", "b", "c"):
+            with pytest.raises(FrozenInstanceError):
+                setattr(extended, name, 3)
+    with pytest.raises(TypeError, match="non-frozen"):
+        frozen.dataclass(frozen=True)(
+            type("Strict", (dataclasses.dataclass(type("Loose", (), {"__annotations__": {"a": "int"}})),), {})
+        )
+
+
 def test_a_class_takes_less_time_than_one_of_the_standard_library():
     """Half of the processor time at the most, of 60 classes of six fields, best of five."""
     code = """

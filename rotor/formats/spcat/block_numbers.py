@@ -16,7 +16,6 @@ Not known here: l-doubled states and total spins of equivalent nuclei. Their lev
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
 
@@ -28,6 +27,7 @@ from rotor.formats.spcat.hamiltonian.code_table import TURNS, Digits, Kind, spli
 from rotor.formats.spcat.hamiltonian.states import SPECIES, StateOptions, species_numbers
 from rotor.formats.spcat.pattern_numbers import pattern_numbers, pattern_steps
 from rotor.formats.spcat.text.par import ParameterFile
+from rotor.frozen import dataclass
 from rotor.quantum.levels import Levels
 
 

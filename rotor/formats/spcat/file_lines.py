@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.int_file import Request
+from rotor.frozen import dataclass
 from rotor.quantum.levels import Levels
 from rotor.spectra.intensity import LGINT_NM2_MHZ, IntensityCut
 from rotor.spectra.transitions import Transitions, all_transitions

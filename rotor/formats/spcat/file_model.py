@@ -6,7 +6,7 @@ Each group of connected states has a top that represents its symmetry, and the o
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -42,6 +42,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
 from rotor.formats.spcat.hamiltonian.undiagonalized import refuse_other_functions, without_diagonalization
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
+from rotor.frozen import dataclass
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels

@@ -7,8 +7,6 @@ QNFMT = 100 Q + 10 H + NQN: Q is the kind of quanta, H in binary which of the la
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +15,7 @@ from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.hamiltonian.states import is_odd
 from rotor.formats.spcat.pattern_numbers import pattern_numbers
 from rotor.formats.spcat.text.par import ParameterFile
+from rotor.frozen import dataclass
 from rotor.quantum.levels import Levels
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, partial
 from pathlib import Path
 
@@ -31,6 +31,7 @@ from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.text.par import ParameterFile, read_par
+from rotor.frozen import dataclass
 from rotor.spectra.lines import Lines
 
 

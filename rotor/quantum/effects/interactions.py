@@ -11,10 +11,11 @@ G_c_J[0,1] with N², F_ab_K[0,1] with Nz². A state has only the constants that 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, Self
 
+from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.spin_effect import ParameterName, parse_name
 from rotor.quantum.effects.watson import operators_of_name

@@ -11,7 +11,7 @@ a Kronecker product for each pair of solved blocks. Blocks that no channel conne
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints, numbers_in_runs
+from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import Block, SolvedBlock, Used

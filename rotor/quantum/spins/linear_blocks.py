@@ -10,12 +10,13 @@ of levels use these matrices, `estimates.contracted` for large blocks too.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, runs_of_similar_size
+from rotor.frozen import dataclass
 from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock

@@ -9,12 +9,12 @@ rotation are tables with a row for each N (and K), coupling coefficients are tab
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, runs_of_similar_size
+from rotor.frozen import dataclass
 from rotor.quantum.spins.contraction import Contracted, Stack
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.parts import SpinPart

@@ -10,7 +10,6 @@ see `coupling.moment_coefficients`, which has the coefficients of magnetic momen
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from typing import Any, NamedTuple
@@ -18,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Indices, Ints, Workspace, runs_of_similar_size
+from rotor.frozen import dataclass
 from rotor.quantum.levels import Connections
 from rotor.quantum.spins.blocks import Shared, SpinBlock
 from rotor.quantum.spins.contraction import tensors_of_stacks

@@ -23,13 +23,13 @@ with the vector v_k = c_ij,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.quantum.symmetric_top_elements import coupling
 from rotor.quantum.tensors import BodyTensor, Complexes, block_elements, body_tensor, phase_exponent
 from rotor.quantum.wang.basis import WangBlock, character

@@ -7,7 +7,6 @@ Terms with the same spins, rank and power of N·S share all coupling coefficient
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 from itertools import repeat
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.quantum.coupled_levels import names_of_functions
 from rotor.quantum.effect import k_limits_of
 from rotor.quantum.levels import SolvedBlock

@@ -6,13 +6,14 @@ The scheme has the order of the spins and the names of the sums.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import accumulate
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.frozen import dataclass
 from rotor.quantum.spins.coupling import patterns, patterns_of_total, recoupling
 from rotor.quantum.spins.operators import EVERY_STATE, Rotor
 from rotor.quantum.spins.three_spins import patterns_of_three, recoupling_of_three

@@ -8,11 +8,12 @@ KSQ, NSQ and NS multiply it by powers of N_z², N² and N·S (half anticommutato
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
 from math import sqrt
 from typing import NamedTuple
+
+from rotor.frozen import dataclass
 
 
 class Kind(Enum):

@@ -6,7 +6,7 @@ For files with one state and no spin see `codes.constants_of`, which gives named
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -27,6 +27,7 @@ from rotor.formats.spcat.hamiltonian.series import (
 from rotor.formats.spcat.hamiltonian.spin_operators import single_j_operator
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
 from rotor.formats.spcat.text.par import Options, ParameterFile
+from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin

@@ -21,7 +21,7 @@ own levels.) Any other code is refused with its meaning.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -29,6 +29,7 @@ import numpy as np
 from rotor.formats.spcat.hamiltonian.code_table import SPIN_ALONG_Z, Digits, Kind, Tensor, square_typ
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, tensor_with_spins
+from rotor.frozen import dataclass
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector

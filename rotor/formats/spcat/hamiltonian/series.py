@@ -22,7 +22,7 @@ alone is turned around by it and has the factor i, and the reverse.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import pi
 
 import numpy as np
@@ -33,6 +33,7 @@ from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, code_operator
 from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, single_j_operator
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
+from rotor.frozen import dataclass
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
 

@@ -7,7 +7,7 @@ The first line sets the defaults of all states. If VSYM is negative another line
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from rotor.formats.spcat.hamiltonian.code_table import split_code
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
+from rotor.frozen import dataclass
 
 SPECIES = ((0, 0), (1, 0), (1, 1), (0, 1))  # A, Bx, By, Bz by the parities of K along the axis of the basis and across
 _NUMBER = np.array([[0, 3], [1, 2]])

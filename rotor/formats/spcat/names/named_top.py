@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from math import gcd
 
 import numpy as np
@@ -28,6 +28,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import halved_across
 from rotor.formats.spcat.model import NO_NAME, fold_parts, option_weights
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
+from rotor.frozen import dataclass
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
 from rotor.tops.constants import AxisOrderError, Constants
 from rotor.tops.spins.spin_constants import SpinConstants, is_isotope

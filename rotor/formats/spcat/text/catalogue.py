@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.line import Record
 from rotor.formats.spcat.text.rows import Columns
+from rotor.frozen import dataclass
 from rotor.table import Table
 
 MAX_TAG = 999_999

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rotor.formats.atomic_write import DoesNotFitError, open_atomic
 from rotor.formats.spcat.text.fields import BLANK, read_decimal, read_whole
 from rotor.formats.spcat.text.freeform import Line, encode, read_lines
+from rotor.frozen import dataclass
 
 _COLON = 63  # where the quantum numbers' colon stands
 

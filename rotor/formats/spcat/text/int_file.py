@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import source_name
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, whole
+from rotor.frozen import dataclass
 from rotor.spectra.intensity import MOST_LOG10
 from rotor.table import counted
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import source_name
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, spell, whole
+from rotor.frozen import dataclass
 from rotor.table import counted
 
 _LETTER = re.compile(r"[ \t]*(?:'([A-Za-z])'|([A-Za-z])?)")  # some write it in apostrophes
@@ -122,7 +123,7 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
         name = lines[0].file if lines else source_name(source)
         raise ValueError(f"{name}: {counted(len(lines), 'line')}; expected a title, limits, options and parameters")
     header = _header(lines[1])
-    options = [_options(lines[2])]
+    options = [_options(lines[2], Options())]
     while options[-1].vsym < 0:
         at = 2 + len(options)
         if at == len(lines):
@@ -155,7 +156,7 @@ def _header(line: Line) -> Header:
     return Header(**values, text=line.text)
 
 
-def _options(line: Line, defaults: Options = Options()) -> Options:
+def _options(line: Line, defaults: Options) -> Options:
     """An option line; the first one sets the defaults of those that follow, but for VSYM."""
     letter = _LETTER.match(line.body)
     start = letter.end() if letter else 0
