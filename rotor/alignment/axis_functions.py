@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.axial import AxialBlock, cosine_bands
-from rotor.quantum.fields.solved_space import SolvedFieldBlock
+from rotor.quantum.fields.axial import cosine_bands
+from rotor.quantum.fields.blocks import FieldBlock
+from rotor.quantum.fields.solved_space import SolvedSpace
 from rotor.quantum.tensors import frame_of, phase_exponent
 
 Complexes = NDArray[np.complex128]
@@ -29,7 +30,7 @@ EvenFunction = Callable[[Floats], Floats]
 ROUND_OFF = 1e-9  # largest imaginary part of an element, relative to the largest value of f
 
 
-def absolute_cosine(block: AxialBlock) -> Floats:
+def absolute_cosine(block: FieldBlock) -> Floats:
     """⟨J' k M| |cosθ| |J k M⟩ over a block (n, n) of a linear or symmetric top, θ of its figure axis; exact but for round-off.
 
     >>> from rotor.quantum.fields.operators import Contraction
@@ -40,7 +41,7 @@ def absolute_cosine(block: AxialBlock) -> Floats:
     >>> absolute_cosine(block).round(6).tolist()  # 1/2, √5/8; √5/8, 5/8
     [[0.5, 0.279508], [0.279508, 0.625]]
     """
-    return _between_functions(block.j, block.k, block.m, np.abs)
+    return _between_functions(block.j, block.members[0], int(block.m), np.abs)
 
 
 def _between_functions(j: Ints, k: int, m: int, function: EvenFunction) -> Floats:
@@ -82,19 +83,19 @@ def _symmetric_top_functions(jmax: int, k: int, m: int, x: Floats) -> Floats:
     return out
 
 
-def asymmetric_elements(block: SolvedFieldBlock, axis: int, function: EvenFunction = np.abs) -> Floats:
+def asymmetric_elements(block: FieldBlock, axis: int, function: EvenFunction = np.abs) -> Floats:
     """⟨a|f(cosθ)|b⟩ over a block (n, n) of an asymmetric top, θ between the axis a (0), b (1) or c (2) and Z, f even.
 
     Raises ValueError unless the block belongs to a field along Z with real phases.
     """
-    if not block.real:
+    space = block.space
+    if not block.real or not isinstance(space, SolvedSpace):
         raise ValueError(f"M = {block.m}: functions of an axis are made over blocks with real phases")
     by_k: dict[int, list[tuple[int, int, Complexes]]] = {}
     start = 0
     for number, colour in zip(block.members, block.colours, strict=True):
-        elements = block.space.elements
-        solved = elements.blocks[block.space.sectors[number].block]
-        columns = 1j**colour * _turned(solved.basis, axis, elements.representation) @ solved.vectors
+        solved = space.elements.blocks[space.sectors[number].block]
+        columns = 1j**colour * _turned(solved.basis, axis, space.elements.representation) @ solved.vectors
         for k, row in zip(range(-solved.basis.j, solved.basis.j + 1), columns, strict=True):
             if np.abs(row).max() > 0:  # K that symmetry excludes stays empty
                 by_k.setdefault(k, []).append((solved.basis.j, start, row))

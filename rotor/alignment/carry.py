@@ -16,7 +16,7 @@ from rotor.alignment.observables import Coherences, Observable
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
 from rotor.alignment.timeline import Window
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.axial import AxialBlock
+from rotor.quantum.fields.axial import AxialSpace
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
@@ -235,7 +235,7 @@ def block_task(problem: Problem, block: FieldBlock, plan: Plan, before: bool) ->
     """
     population = problem.populations(block.levels)[block.rows] * block.copies
     if problem.ensemble.m is not None:
-        population = population * (block.abs_m == problem.ensemble.m) / (2 if problem.ensemble.m else 1)
+        population = population * (block.space.abs_m(block) == problem.ensemble.m) / (2 if problem.ensemble.m else 1)
     columns = np.flatnonzero(population)
     if not len(columns):
         return None
@@ -255,7 +255,7 @@ def block_task(problem: Problem, block: FieldBlock, plan: Plan, before: bool) ->
         plan=plan,
         before=before,
         gradients=tuple(_gradient(problem.top, per_window[0]) for per_window in problem.contractions)
-        if isinstance(block, AxialBlock)
+        if isinstance(block.space, AxialSpace)
         else None,
     )
 

@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 
 from rotor.alignment.axis_functions import absolute_cosine, asymmetric_elements
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.axial import AxialBlock
+from rotor.quantum.fields.axial import AxialSpace
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.operators import Contraction
-from rotor.quantum.fields.solved_space import SolvedFieldBlock
+from rotor.quantum.fields.solved_space import SolvedSpace
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -51,9 +51,9 @@ class Observable:
         """The matrix (n, n) over the states of a block."""
         if self.contraction is not None:
             return block.matrix(self.contraction)
-        if isinstance(block, AxialBlock):
+        if isinstance(block.space, AxialSpace):
             return absolute_cosine(block)
-        if isinstance(block, SolvedFieldBlock) and block.space.m_is_good:
+        if isinstance(block.space, SolvedSpace) and block.space.m_is_good:
             return asymmetric_elements(block, self.axis)
         raise ValueError(f"{self.name} is made for fields with the symmetry of Z; use cos2theta")
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from rotor.quantum.fields.block_states import BlockStates, basis_order, solve_bl
 from rotor.quantum.fields.blocks import FieldBlock, FreeLevels
 from rotor.quantum.fields.field_map import smallest_jmax
 from rotor.quantum.fields.map_request import MapRequest
-from rotor.quantum.fields.solved_space import SolvedFieldBlock
+from rotor.quantum.fields.solved_space import SolvedSpace
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, label_value
@@ -126,7 +127,8 @@ class StarkLevels(LevelModel):
         columns = [i for i, name in enumerate(self.names) if name not in DIPOLES]
         for i, name in enumerate(self.names):
             if name in DIPOLES:
-                cosine = block.dense(dipole_derivative(top, DIPOLES.index(name), constants.effects))
+                derivative = dipole_derivative(top, DIPOLES.index(name), constants.effects)
+                cosine = block.space.dense(block, derivative)
                 mean = np.einsum("ln,ln->l", vectors.conj(), vectors @ cosine.T).real
                 slopes[:, i] = -MHZ_PER_DEBYE_KV_PER_CM * group.fields * mean
         slopes[:, columns] = self._constant_slopes(constants, block, vectors, [self.names[i] for i in columns])
@@ -135,17 +137,18 @@ class StarkLevels(LevelModel):
     def _constant_slopes(
         self, constants: TopConstants, block: FieldBlock, vectors: Floats, names: Sequence[str]
     ) -> Floats:
-        top = constants.top
-        if not isinstance(block, SolvedFieldBlock):  # free levels in closed form: no constant mixes them
+        top, space = constants.top, block.space
+        if not isinstance(space, SolvedSpace):  # free levels in closed form: no constant mixes them
             levels = solve_levels(top, int(block.j.max()), effects=constants.effects)
             quanta = {"k": np.abs(block.levels.quanta["k"][block.rows])} if "k" in levels.quanta else {}
             rows = levels.rows_of(j=block.j, **quanta)
             return np.asarray(vectors**2 @ level_derivatives(top, levels, names, rows))
-        elements, total = block.space.elements, np.zeros((len(vectors), len(names)))
-        blocks = [elements.blocks[block.space.sectors[i].block] for i in block.members]
+        elements, total = space.elements, np.zeros((len(vectors), len(names)))
+        blocks = [elements.blocks[space.sectors[i].block] for i in block.members]
         linear = linear_blocks_of(top, elements.levels, names, blocks)
-        for i, (solved, derivatives) in enumerate(zip(blocks, linear, strict=True)):
-            part = vectors[:, block.starts[i] : block.starts[i + 1]]
+        places = pairwise(space.starts(block).tolist())
+        for solved, derivatives, (start, stop) in zip(blocks, linear, places, strict=True):
+            part = vectors[:, start:stop]
             total[:, derivatives.parameters] += _expectation(derivatives, part @ solved.vectors.T)
         return total
 

@@ -52,77 +52,6 @@ def cosine_squared_bands(j: Ints, k: int, m: int) -> tuple[Floats, Floats, Float
     return d[:-1] ** 2 + below**2 + b**2, (b * (d[:-1] + d[1:]))[:-1], (b[:-1] * b[1:])[:-1]
 
 
-@dataclass(frozen=True)
-class AxialBlock(FieldBlock):
-    """States |J k M⟩ of one k and M of a linear or symmetric top.
-
-    step: 2 where the field does not connect even with odd J, else 1. axis: 0 if the figure axis is a, 2 if it is c.
-    """
-
-    m: int
-    k: int
-    copies: int
-    step: int
-    axis: int
-    rows: Ints = field(repr=False)
-    space: AxialSpace = field(repr=False)
-
-    @property
-    def even_in_field(self) -> bool:
-        """Whether a reversed field leaves the energies unchanged; for K M ≠ 0 it exchanges K and -K."""
-        return not self.k * self.m
-
-    @property
-    def label(self) -> str:
-        """k, and the parity of J where it is a good quantum number."""
-        parity = "" if self.step == 1 else (" J odd" if int(self.j[0]) % 2 else " J even")
-        return f"k={self.k}{parity}"
-
-    def bands(self, contraction: Contraction) -> list[Floats]:
-        """Diagonals of the matrix, the main one first; at most three."""
-        size = along(contraction.body, self.axis) * along(contraction.space, 2)
-        first, j = max(abs(self.k), abs(self.m)), self.j
-        skip = int(j[0]) - first
-        bands = _cosines(contraction.rank, first, int(j[-1]), self.k, self.m)
-        if contraction.rank == 1:
-            return [size * band[skip:] for band in bands]
-        d, next_j, second_j = (band[skip:] for band in bands)
-        main = contraction.scalar + size * (d[:: self.step] - 1 / 3)
-        return [main, size * second_j[::2]] if self.step == 2 else [main, size * next_j, size * second_j]
-
-    def dense(self, operator: FieldOperator) -> Floats:
-        """The operator over the states (n, n), real; a vector has no elements where even and odd J are separate."""
-        if isinstance(operator, Magnet):
-            return self._moment(operator.g)
-        if self.step == 2 and operator.rank == 1:
-            return np.zeros((len(self), len(self)))
-        size = len(self)
-        out = np.zeros(size * size)
-        for n, band in enumerate(self.bands(operator)):
-            out[n : size * (size - n) : size + 1] = out[n * size :: size + 1] = band
-        return out.reshape(size, size)
-
-    def between(self, operator: FieldOperator, low: FieldBlock) -> Floats:
-        """Elements of T_q of a vector along the axis; the block of k stands for that of -k at M = 0."""
-        out = np.zeros((len(self), len(low)))
-        place = {int(j): row for row, j in enumerate(self.j)}
-        size = along(operator.body, self.axis) if isinstance(operator, Contraction) else 0.0
-        for column, j in enumerate(low.j.tolist()):
-            for above in (j - 1, j, j + 1):
-                if above in place:
-                    in_body = float(coupling(j, above, 1, 0, self.k))
-                    in_space = space_factor(2 * above, 2 * j, 1, round(2 * low.m), round(self.m - low.m))
-                    out[place[above], column] = size * in_body * in_space
-        return out
-
-    def _moment(self, g: Floats) -> Floats:
-        """The magnetic moment g⊥ M + (g∥ - g⊥) k cosθ."""
-        across = (np.trace(g) - g[self.axis, self.axis]) / 2
-        diagonal, beside = cosine_bands(self.j, self.k, self.m)
-        chain = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
-        return np.asarray(across * self.m * np.eye(len(self)) + (g[self.axis, self.axis] - across) * self.k * chain)
-
-
 @lru_cache(maxsize=4096)
 def _cosines(power: int, first: int, last: int, k: int, m: int) -> tuple[Floats, ...]:
     """Bands of cosθ (power 1) or cos²θ (power 2) over J = first ... last."""
@@ -131,7 +60,10 @@ def _cosines(power: int, first: int, last: int, k: int, m: int) -> tuple[Floats,
 
 @dataclass(frozen=True)
 class AxialSpace(FieldSpace):
-    """States of a linear or symmetric top with tensors along its axis; `oriented` if a vector connects J with J ± 1."""
+    """States |J k M⟩ of a linear or symmetric top with tensors along its axis, in chains of J of one k, the member of each block.
+
+    axis: 0 if the figure axis is a, 2 if it is c. oriented: whether a vector connects J with J ± 1.
+    """
 
     levels: FreeLevels = field(repr=False)
     jmax: int
@@ -140,7 +72,10 @@ class AxialSpace(FieldSpace):
     magnetic: bool = False
 
     def blocks(self, m: float) -> list[FieldBlock]:
-        """The blocks of M. (k, M) has the energies of (-k, -M); without a dipole also of (-k, M), in a magnetic field only of (-k, M)."""
+        """The blocks of M. (k, M) has the energies of (-k, -M); without a dipole also of (-k, M), in a magnetic field only of (-k, M).
+
+        A reversed field exchanges K and -K for K M ≠ 0.
+        """
         out: list[FieldBlock] = []
         number = int(m)
         for k, rows in self._rows_by_k.items():
@@ -149,10 +84,13 @@ class AxialSpace(FieldSpace):
             if not len(rows) or (k < 0 and not both_signs):
                 continue
             copies = (2 if number and not self.magnetic else 1) * (2 if k and not both_signs else 1)
-            apart = not self.oriented and k * number == 0
-            for half in (rows[::2], rows[1::2]) if apart else (rows,):
+            if self.oriented or k * number:
+                out.append(FieldBlock(number, copies, f"k={k}", rows, (k,), self, not k * number))
+                continue
+            for half in (rows[::2], rows[1::2]):
                 if len(half):
-                    out.append(AxialBlock(number, k, copies, 2 if apart else 1, self.axis, half, self))
+                    parity = "odd" if int(self.levels.j[half[0]]) % 2 else "even"
+                    out.append(FieldBlock(number, copies, f"k={k} J {parity}", half, (k,), self))
         return out
 
     @cached_property
@@ -160,6 +98,49 @@ class AxialSpace(FieldSpace):
         """Rows of the levels by k."""
         k = self.levels.quanta.get("k", np.zeros(len(self.levels), dtype=np.int64))
         return {int(value): np.flatnonzero(k == value) for value in np.unique(k)}
+
+    def dense(self, block: FieldBlock, operator: FieldOperator) -> Floats:
+        """The operator over the states of a block (n, n), real; a vector has no elements where even and odd J are separate."""
+        if isinstance(operator, Magnet):
+            return self._moment(block, operator.g)
+        size = len(block)
+        out = np.zeros(size * size)
+        for n, band in enumerate(self._bands(block, operator)):
+            out[n : size * (size - n) : size + 1] = out[n * size :: size + 1] = band
+        return out.reshape(size, size)
+
+    def _bands(self, block: FieldBlock, contraction: Contraction) -> list[Floats]:
+        """Diagonals of the matrix over a block, the main one first; at most three."""
+        size = along(contraction.body, self.axis) * along(contraction.space, 2)
+        j, (k,), m = block.j, block.members, int(block.m)
+        first, apart = max(abs(k), abs(m)), len(j) > 1 and int(j[1] - j[0]) == 2
+        skip = int(j[0]) - first
+        bands = _cosines(contraction.rank, first, int(j[-1]), k, m)
+        if contraction.rank == 1:
+            return [] if apart else [size * band[skip:] for band in bands]
+        d, next_j, second_j = (band[skip:] for band in bands)
+        main = contraction.scalar + size * (d[:: 2 if apart else 1] - 1 / 3)
+        return [main, size * second_j[::2]] if apart else [main, size * next_j, size * second_j]
+
+    def between(self, up: FieldBlock, operator: FieldOperator, low: FieldBlock) -> Floats:
+        """Elements of T_q of a vector along the axis; the block of k stands for that of -k at M = 0."""
+        out = np.zeros((len(up), len(low)))
+        place, (k,) = {int(j): row for row, j in enumerate(up.j)}, up.members
+        size = along(operator.body, self.axis) if isinstance(operator, Contraction) else 0.0
+        for column, j in enumerate(low.j.tolist()):
+            for above in (j - 1, j, j + 1):
+                if above in place:
+                    in_body = float(coupling(j, above, 1, 0, k))
+                    in_space = space_factor(2 * above, 2 * j, 1, low.twice_m, round(up.m - low.m))
+                    out[place[above], column] = size * in_body * in_space
+        return out
+
+    def _moment(self, block: FieldBlock, g: Floats) -> Floats:
+        """The magnetic moment g⊥ M + (g∥ - g⊥) k cosθ."""
+        across, (k,), m = (np.trace(g) - g[self.axis, self.axis]) / 2, block.members, int(block.m)
+        diagonal, beside = cosine_bands(block.j, k, m)
+        chain = np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1)
+        return np.asarray(across * m * np.eye(len(block)) + (g[self.axis, self.axis] - across) * k * chain)
 
 
 def axial_levels(top: Top, jmax: int) -> FreeLevels:

@@ -55,22 +55,27 @@ class FreeLevels:
         return " ".join([*first, str(int(self.j[row])), *texts.values()])
 
 
-class FieldBlock(ABC):
-    """States |level, M⟩ that the operators of a `FieldSpace` connect among themselves.
+@dataclass(frozen=True, eq=False)
+class FieldBlock:
+    """States |level, M⟩ that the operators of a space connect among themselves; the space has the elements.
 
-    m: M of all states. copies: number of blocks with the same matrices (M and -M). rows: (n,) of the levels, rising in J. A matrix is
-    real where the block has real phases, else complex and Hermitian.
+    m: M of all states, -1 where it is mixed. copies: number of blocks with the same matrices (M and -M). label: name among the blocks of M.
+    rows: (n,) of the levels, rising in J. members: k of a chain of J, or sectors of a `SolvedSpace`, each of whose states is multiplied by
+    1 or i according to its colour 0 or 1. even_in_field: whether a reversed electric field leaves all energies unchanged. paired: whether
+    each state represents its mirror image too (K and -K, σ and -σ), so that M and -M differ in an electric field. real: whether all
+    matrices are real, else complex and Hermitian.
     """
 
     m: float
     copies: int
-    rows: Ints
-    space: FieldSpace
-
-    @property
-    @abstractmethod
-    def label(self) -> str:
-        """Name of the block among those of its M."""
+    label: str
+    rows: Ints = field(repr=False)
+    members: tuple[int, ...]
+    space: FieldSpace = field(repr=False)
+    even_in_field: bool = True
+    colours: tuple[int, ...] = ()
+    paired: bool = False
+    real: bool = True
 
     @property
     def levels(self) -> FreeLevels:
@@ -88,41 +93,25 @@ class FieldBlock(ABC):
         return self.levels.energy_mhz[self.rows]
 
     @property
-    def even_in_field(self) -> bool:
-        """Whether a reversed electric field leaves all energies unchanged.
-
-        A half turn about an axis across the field, combined with time reversal, conserves K and M.
-        """
-        return True
+    def twice_m(self) -> int:
+        """Twice M."""
+        return round(2 * self.m)
 
     @cached_property
     def free_order(self) -> Ints:
         """Places of the states in order of free energy, then J (n,)."""
         return np.lexsort((self.j, np.round(self.energies_mhz, 9)))
 
-    @property
-    def abs_m(self) -> Ints:
-        """|M| of the states (n,)."""
-        return np.full(len(self), abs(self.m))
-
     def __len__(self) -> int:
         return len(self.rows)
 
-    @abstractmethod
-    def between(self, operator: FieldOperator, low: FieldBlock) -> NDArray[Any]:
-        """Elements of T_q of an operator from the states of another block (n, n_low), q = M' - M."""
-
-    @abstractmethod
-    def dense(self, operator: FieldOperator) -> NDArray[Any]:
-        """The operator over the states (n, n), Hermitian."""
-
     def matrix(self, operator: FieldOperator) -> Any:
         """The operator over the states (n, n); a sparse one where most elements of many states are 0."""
-        return self.dense(operator)
+        return self.space.matrix(self, operator)
 
 
 class FieldSpace(ABC):
-    """The levels of a top up to J max, and the blocks with M into which operators along Z divide them."""
+    """The levels of a top up to J max, the blocks with M into which operators along Z divide them, and the elements between these."""
 
     levels: FreeLevels
     jmax: int
@@ -134,4 +123,23 @@ class FieldSpace(ABC):
 
     @abstractmethod
     def blocks(self, m: float) -> list[FieldBlock]:
-        """The blocks of M = ±m, m ≥ 0, where `copies` counts equal blocks; in a magnetic field the blocks of M = m."""
+        """The blocks of M = ±m, m ≥ 0, where `copies` counts equal blocks; in a magnetic field the blocks of M = m.
+
+        A half turn about an axis across an electric field, combined with time reversal, conserves K and M.
+        """
+
+    @abstractmethod
+    def between(self, up: FieldBlock, operator: FieldOperator, low: FieldBlock) -> NDArray[Any]:
+        """Elements of T_q of an operator from the states of a block to those of another (n_up, n_low), q = M' - M."""
+
+    @abstractmethod
+    def dense(self, block: FieldBlock, operator: FieldOperator) -> NDArray[Any]:
+        """The operator over the states of a block (n, n), Hermitian."""
+
+    def matrix(self, block: FieldBlock, operator: FieldOperator) -> Any:
+        """The operator over the states of a block (n, n); a sparse one where most elements of many states are 0."""
+        return self.dense(block, operator)
+
+    def abs_m(self, block: FieldBlock) -> Ints:
+        """|M| of the states of a block (n,)."""
+        return np.full(len(block), abs(block.m))

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.fields.axial import AxialBlock
+from rotor.quantum.fields.axial import AxialSpace
 from rotor.quantum.fields.block_states import BlockStates, basis_order, count_of, solve_blocks
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.chains import TOGETHER
@@ -270,7 +270,7 @@ def _lowest_jmax(request: MapRequest) -> int:
 def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
     """Whether all blocks are chains small enough for one sweep, which takes milliseconds and gains nothing from other processes."""
     states = sum(count_of(request, block, block.free_order) for block in blocks)
-    chains = all(isinstance(block, AxialBlock) for block in blocks)
+    chains = all(isinstance(block.space, AxialSpace) for block in blocks)
     return chains and max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
 
 
@@ -315,7 +315,7 @@ def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockState
         "truncation_mhz": np.where(followed, states.error, np.nan),
     }
     for name, operator in request.observables.items():
-        by_field[name] = expectation(over(block.dense(operator), states.places), vectors)
+        by_field[name] = expectation(over(block.space.dense(block, operator), states.places), vectors)
     listed = followed
     if request.diabatic_gap_mhz is not None:
         ranks = _diabatic_ranks(request, inside, len(labels), request.diabatic_gap_mhz)

@@ -58,138 +58,6 @@ class FieldSector(NamedTuple):
     projections: Any = None
 
 
-@dataclass(frozen=True)
-class SolvedFieldBlock(FieldBlock):
-    """States |F τ M⟩ of the sectors `members`, each multiplied by 1 or i according to its colour 0 or 1.
-
-    real: whether this makes all matrices real. paired: whether each state represents its mirror image too (K and -K, σ and -σ), so that M
-    and -M differ in an electric field. number: of the block among those of its M.
-    """
-
-    m: float
-    copies: int
-    number: int
-    members: tuple[int, ...]
-    colours: tuple[int, ...]
-    real: bool
-    paired: bool
-    rows: Ints = field(repr=False)
-    space: SolvedSpace = field(repr=False)
-
-    @property
-    def twice_m(self) -> int:
-        """Twice M."""
-        return round(2 * self.m)
-
-    @property
-    def even_in_field(self) -> bool:
-        """Whether a reversed field leaves the energies unchanged; with M ≠ 0 it exchanges mirror images."""
-        return not (self.paired and self.m)
-
-    @property
-    def label(self) -> str:
-        """Species of Wang functions, K where it is a good quantum number, else the lowest level; a number where M is mixed."""
-        if not self.space.m_is_good:
-            return f"block {self.number}"
-        blocks = [self.space.elements.blocks[sector.block] for sector in self._sectors]
-        if blocks[0].alone:
-            return "+".join(sorted({block.basis.species for block in blocks}))
-        k = blocks[0].axial_k
-        return f"from {self.levels.label(int(self.rows[0]))}" if k is None else f"k={k}"
-
-    @property
-    def abs_m(self) -> Ints:
-        """|M| of the states (n,)."""
-        parts = [
-            np.repeat(sector.projections.k, len(sector.rows) // sector.projections.size)
-            for sector in self._sectors
-            if sector.projections is not None
-        ]
-        return np.concatenate(parts) if parts else super().abs_m
-
-    @property
-    def _sectors(self) -> list[FieldSector]:
-        """The sectors of the members."""
-        return [self.space.sectors[i] for i in self.members]
-
-    @cached_property
-    def starts(self) -> Ints:
-        """First place of the states of each sector, and the number of states."""
-        return np.cumsum([0, *(len(sector.rows) for sector in self._sectors)])
-
-    @cached_property
-    def signs(self) -> Ints:
-        """(-1)^(F + c) of the states (n,), up to a common sign: v(-M) is v(M)* times it (see `rotor.quantum.in_field`)."""
-        sectors = self._sectors
-        odd = [(sector.twice_f - sectors[0].twice_f) // 2 + c for sector, c in zip(sectors, self.colours, strict=True)]
-        return np.repeat(np.where(np.array(odd) % 2, -1, 1), np.diff(self.starts))
-
-    def dense(self, operator: FieldOperator) -> NDArray[Any]:
-        """The operator over the states (n, n), real symmetric or complex Hermitian."""
-        out: NDArray[Any] = np.diag(np.full(len(self), operator.scalar))
-        for rows, columns, elements in self._elements(operator, self, triangle=True):
-            if elements.dtype != out.dtype and elements.dtype == np.complex128:
-                out = out.astype(np.complex128)
-            out[rows, columns] += elements
-            if rows != columns:
-                out[columns, rows] += elements.conj().T
-        return out
-
-    def matrix(self, operator: FieldOperator) -> Any:
-        """The operator over the states (n, n); in compressed rows for many states of mixed M."""
-        if self.space.m_is_good or len(self) <= SPARSE_ABOVE:
-            return self.dense(operator)
-        from scipy.sparse import csr_array, eye_array
-
-        pieces: list[tuple[Ints, Ints, Floats]] = []
-        for rows, columns, elements in self._elements(operator, self, triangle=True):
-            i, k = np.nonzero(elements)
-            pieces.append((rows.start + i, columns.start + k, elements[i, k]))
-            if rows != columns:
-                pieces.append((columns.start + k, rows.start + i, elements[i, k]))
-        places, others, values = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-        size = len(self)
-        return csr_array((values, (places, others)), shape=(size, size)) + operator.scalar * eye_array(
-            size, format="csr"
-        )
-
-    def between(self, operator: FieldOperator, low: FieldBlock) -> NDArray[Any]:
-        """⟨M'|T_q|M⟩ of an operator from the states of another block (n, n_low), q = M' - M."""
-        assert isinstance(low, SolvedFieldBlock)
-        out = np.zeros((len(self), len(low)), dtype=np.complex128)
-        for rows, columns, elements in self._elements(operator, low):
-            out[rows, columns] += elements
-        return out
-
-    def _elements(
-        self, operator: FieldOperator, low: SolvedFieldBlock, triangle: bool = False
-    ) -> Iterator[tuple[slice, slice, NDArray[Any]]]:
-        """Places of a member and of a member of `low`, and the elements between their states with the phases of their colours.
-
-        triangle: only from F to F' ≥ F. All others follow from T_q† = (-1)^q T_-q of Hermitian tensors.
-        """
-        space, q = self.space, (self.twice_m - low.twice_m) // 2
-        below, here, there = space.below(operator), self._placed, low._placed
-        for first in dict.fromkeys((*self.members, *low.members)):
-            for second, odd in below.get(first, ()):
-                if first in here and second in there:
-                    elements = space.between(operator, first, second, low.twice_m, q)
-                    if elements is not None:
-                        (rows, colour), (columns, other) = here[first], there[second]
-                        yield rows, columns, _turned(other - colour + odd, elements)
-                if not triangle and first != second and second in here and first in there:
-                    elements = space.between(operator, first, second, self.twice_m, -q)
-                    if elements is not None:
-                        (rows, colour), (columns, other) = here[second], there[first]
-                        yield rows, columns, _turned(other - colour - odd, (-1) ** q * elements.conj().T)
-
-    @cached_property
-    def _placed(self) -> dict[int, tuple[slice, int]]:
-        """Places of the states of each member, and its colour."""
-        places = [slice(a, b) for a, b in pairwise(self.starts.tolist())]
-        return dict(zip(self.members, zip(places, self.colours, strict=True), strict=True))
-
-
 def _turned(turns: int, matrix: NDArray[Any]) -> NDArray[Any]:
     """i^turns times a matrix; real if the factor is ±1."""
     if turns % 4 == 0:
@@ -217,7 +85,7 @@ class SolvedSpace(FieldSpace):
     def blocks(self, m: float) -> list[FieldBlock]:
         """Connected sets of sectors: in an electric field for ±M (M and -M apart where states are paired), in a magnetic one for M.
 
-        Where M is mixed all blocks are those of m = 0, since each contains all M.
+        Where M is mixed all blocks are those of m = 0, since each contains all M. With M ≠ 0 a reversed field exchanges mirror images.
         """
         if m and not self.m_is_good:
             return []
@@ -237,11 +105,12 @@ class SolvedSpace(FieldSpace):
             paired = self.elements.paired[self.sectors[members[0]].block]
             signs = (1, -1) if paired and twice_m and not magnetic else (1,)
             copies = 2 if paired or (twice_m and not magnetic) else 1
-            rows = np.concatenate([self.sectors[i].rows for i in members])
+            rows, label = np.concatenate([self.sectors[i].rows for i in members]), self._label(members, place)
             for sign in signs:
                 number = sign * twice_m / 2 if twice_m % 2 else sign * (twice_m // 2) if self.m_is_good else NO_M
+                even = not (paired and number)
                 out.append(
-                    SolvedFieldBlock(number, copies, place, tuple(members), tuple(colours), real, paired, rows, self)
+                    FieldBlock(number, copies, label, rows, tuple(members), self, even, tuple(colours), paired, real)
                 )
         return out
 
@@ -288,7 +157,7 @@ class SolvedSpace(FieldSpace):
         factor = space_factor(self.sectors[up].twice_f, self.sectors[low].twice_f, operator.rank, twice_m, q)
         return factor if q else operator.size * factor
 
-    def between(self, operator: FieldOperator, up: int, low: int, twice_m: int, q: int) -> NDArray[Any] | None:
+    def elements_between(self, operator: FieldOperator, up: int, low: int, twice_m: int, q: int) -> NDArray[Any] | None:
         """Elements of T_q from the states of M, or of all M, of a sector to those of another, F' ≥ F; None where all are 0."""
         first, second = self.sectors[up], self.sectors[low]
         factor = self.factor(operator, up, low, twice_m, q) if self.m_is_good else 1.0
@@ -310,6 +179,100 @@ class SolvedSpace(FieldSpace):
             space = operator.space * (mirror if operator.rank == 1 else np.outer(mirror, mirror))
             self._tensors[operator.key_in_space] = body_tensor(space, operator.rank, SPACE_AXES)
         return self._tensors[operator.key_in_space]
+
+    def abs_m(self, block: FieldBlock) -> Ints:
+        """|M| of the states of a block (n,)."""
+        if self.m_is_good:
+            return super().abs_m(block)
+        sectors = [self.sectors[i] for i in block.members]
+        return np.concatenate([np.repeat(s.projections.k, len(s.rows) // s.projections.size) for s in sectors])
+
+    def starts(self, block: FieldBlock) -> Ints:
+        """First place of the states of each sector of a block, and the number of states."""
+        return np.cumsum([0, *(len(self.sectors[i].rows) for i in block.members)])
+
+    def reversed_states(self, block: FieldBlock, places: Ints, vectors: NDArray[Any]) -> NDArray[Any]:
+        """v(-M) of states v(M) (fields, n, states) over some places of a block.
+
+        They are (-1)^(F + c) v(M)*, up to a common sign (see `rotor.quantum.in_field`).
+        """
+        twice_f = np.array([self.sectors[i].twice_f for i in block.members])
+        odd = ((twice_f - twice_f[0]) // 2 + np.array(block.colours)) % 2
+        signs = np.repeat(np.where(odd, -1, 1), np.diff(self.starts(block)))
+        return np.asarray(signs[places][:, None] * vectors.conj())
+
+    def dense(self, block: FieldBlock, operator: FieldOperator) -> NDArray[Any]:
+        """The operator over the states of a block (n, n), real symmetric or complex Hermitian."""
+        out: NDArray[Any] = np.diag(np.full(len(block), operator.scalar))
+        for rows, columns, elements in self._placed_elements(block, operator, block, triangle=True):
+            if elements.dtype != out.dtype and elements.dtype == np.complex128:
+                out = out.astype(np.complex128)
+            out[rows, columns] += elements
+            if rows != columns:
+                out[columns, rows] += elements.conj().T
+        return out
+
+    def matrix(self, block: FieldBlock, operator: FieldOperator) -> Any:
+        """The operator over the states of a block (n, n); in compressed rows for many states of mixed M."""
+        size = len(block)
+        if self.m_is_good or size <= SPARSE_ABOVE:
+            return self.dense(block, operator)
+        from scipy.sparse import csr_array, eye_array
+
+        pieces: list[tuple[Ints, Ints, Floats]] = []
+        for rows, columns, elements in self._placed_elements(block, operator, block, triangle=True):
+            i, k = np.nonzero(elements)
+            pieces.append((rows.start + i, columns.start + k, elements[i, k]))
+            if rows != columns:
+                pieces.append((columns.start + k, rows.start + i, elements[i, k]))
+        places, others, values = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+        return csr_array((values, (places, others)), shape=(size, size)) + operator.scalar * eye_array(
+            size, format="csr"
+        )
+
+    def between(self, up: FieldBlock, operator: FieldOperator, low: FieldBlock) -> NDArray[Any]:
+        """⟨M'|T_q|M⟩ of an operator from the states of a block to those of another (n_up, n_low), q = M' - M."""
+        out = np.zeros((len(up), len(low)), dtype=np.complex128)
+        for rows, columns, elements in self._placed_elements(up, operator, low):
+            out[rows, columns] += elements
+        return out
+
+    def _placed_elements(
+        self, up: FieldBlock, operator: FieldOperator, low: FieldBlock, triangle: bool = False
+    ) -> Iterator[tuple[slice, slice, NDArray[Any]]]:
+        """Places of a member and of a member of `low`, and the elements between their states with the phases of their colours.
+
+        triangle: only from F to F' ≥ F. All others follow from T_q† = (-1)^q T_-q of Hermitian tensors.
+        """
+        q = (up.twice_m - low.twice_m) // 2
+        below, here, there = self.below(operator), self._placed(up), self._placed(low)
+        for first in dict.fromkeys((*up.members, *low.members)):
+            for second, odd in below.get(first, ()):
+                if first in here and second in there:
+                    elements = self.elements_between(operator, first, second, low.twice_m, q)
+                    if elements is not None:
+                        (rows, colour), (columns, other) = here[first], there[second]
+                        yield rows, columns, _turned(other - colour + odd, elements)
+                if not triangle and first != second and second in here and first in there:
+                    elements = self.elements_between(operator, first, second, up.twice_m, -q)
+                    if elements is not None:
+                        (rows, colour), (columns, other) = here[second], there[first]
+                        yield rows, columns, _turned(other - colour - odd, (-1) ** q * elements.conj().T)
+
+    def _placed(self, block: FieldBlock) -> dict[int, tuple[slice, int]]:
+        """Places of the states of each member of a block, and its colour."""
+        places = [slice(a, b) for a, b in pairwise(self.starts(block).tolist())]
+        return dict(zip(block.members, zip(places, block.colours, strict=True), strict=True))
+
+    def _label(self, members: Sequence[int], place: int) -> str:
+        """Species of Wang functions, K where it is a good quantum number, else the lowest level; the place where M is mixed."""
+        if not self.m_is_good:
+            return f"block {place}"
+        blocks = [self.elements.blocks[self.sectors[i].block] for i in members]
+        if blocks[0].alone:
+            return "+".join(sorted({block.basis.species for block in blocks}))
+        k = blocks[0].axial_k
+        return f"from {self.levels.label(int(self.sectors[members[0]].rows[0]))}" if k is None else f"k={k}"
 
 
 def solved_space(

@@ -12,61 +12,44 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 from rotor.arrays import Floats
-from rotor.quantum.fields.axial import AxialBlock
+from rotor.quantum.fields.axial import AxialSpace
 from rotor.quantum.fields.block_states import BlockStates, solve_block
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.map_request import MapRequest
-from rotor.quantum.fields.solved_space import SolvedFieldBlock
-
-
-class BlockPair(NamedTuple):
-    """Places of two blocks between which μ_q acts, q = 0 or 1; copies: number of pairs with the same elements."""
-
-    up: int
-    low: int
-    q: int
-    copies: int
+from rotor.quantum.fields.solved_space import SolvedSpace
 
 
 def states_of_both_signs(request: MapRequest, block: FieldBlock, fields: Floats, jmax: int) -> list[BlockStates]:
     """The states of a block; for M = ½ also those of M = -½, which the block represents and μ_1 connects with it."""
     here = solve_block(request, block, fields, jmax)
-    if not isinstance(block, SolvedFieldBlock) or block.paired or block.twice_m != 1:
+    if not isinstance(block.space, SolvedSpace) or block.paired or block.twice_m != 1:
         return [here]
-    signs = block.signs[here.places][:, None]
-    minus = replace(block, m=-block.m, copies=1)
+    vectors = block.space.reversed_states(block, here.places, here.vectors)
     return [
         here._replace(block=replace(block, copies=1)),
-        here._replace(block=minus, vectors=signs * here.vectors.conj()),
+        here._replace(block=replace(block, m=-block.m, copies=1), vectors=vectors),
     ]
 
 
-def pairs_of_blocks(blocks: Sequence[FieldBlock]) -> Iterator[BlockPair]:
-    """Each block with itself, and those of M and M + 1."""
+def pairs_of_blocks(blocks: Sequence[FieldBlock]) -> Iterator[tuple[int, int, int, int]]:
+    """Each block with itself, and those of M and M + 1: places of both, q, and number of pairs with the same elements."""
     by_m: dict[float, list[int]] = {}
     for place, block in enumerate(blocks):
         by_m.setdefault(block.m, []).append(place)
     for m, lows in by_m.items():
         for low in lows:
-            paired = _is_paired(blocks[low])
-            yield BlockPair(low, low, 0, blocks[low].copies)
+            paired = blocks[low].paired
+            yield low, low, 0, blocks[low].copies
             if m > -1 or paired:
                 copies = 2 if paired or m >= 0 else 1
-                yield from (
-                    BlockPair(up, low, 1, copies) for up in by_m.get(m + 1, []) if _same_k(blocks[up], blocks[low])
-                )
-
-
-def _is_paired(block: FieldBlock) -> bool:
-    """Whether the states of a block represent their mirror images too."""
-    return isinstance(block, SolvedFieldBlock) and block.paired
+                yield from ((up, low, 1, copies) for up in by_m.get(m + 1, []) if _same_k(blocks[up], blocks[low]))
 
 
 def _same_k(up: FieldBlock, low: FieldBlock) -> bool:
     """Whether K is the same; at M = 0 the block of K represents that of -K too."""
-    if isinstance(up, AxialBlock) and isinstance(low, AxialBlock):
-        return abs(up.k) == abs(low.k) if low.m == 0 else up.k == low.k
-    return _is_paired(up) == _is_paired(low)
+    if isinstance(low.space, AxialSpace):
+        (k_up,), (k_low,) = up.members, low.members
+        return abs(k_up) == abs(k_low) if low.m == 0 else k_up == k_low
+    return up.paired == low.paired

@@ -32,7 +32,7 @@ from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.field_map import each_block, smallest_jmax
 from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.operators import Contraction
-from rotor.quantum.fields.transitions import BlockPair, pairs_of_blocks, states_of_both_signs
+from rotor.quantum.fields.transitions import pairs_of_blocks, states_of_both_signs
 from rotor.spectra.fields.light import Light, LightText, Vector, light_components
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table
@@ -243,23 +243,24 @@ def _largest_error(solved: Sequence[BlockStates], j_highest: int) -> float:
 
 def _strengths(
     dipole: Contraction, solved: list[BlockStates], light: Light, unit: Vector
-) -> Iterator[tuple[BlockPair, Floats]]:
-    """Pairs of blocks and S (fields, up, low) of their states in D²."""
+) -> Iterator[tuple[tuple[int, int], Floats]]:
+    """Places of pairs of blocks and S (fields, up, low) of their states in D²."""
     blocks = [states.block for states in solved]
-    if not blocks[0].space.m_is_good:
+    space = blocks[0].space
+    if not space.m_is_good:
         along = [replace(dipole, space=axis) for axis in np.eye(3)]
         for low, up in combinations_with_replacement(range(len(blocks)), 2):
-            axes = [blocks[up].between(operator, blocks[low]) for operator in along]
+            axes = [space.between(blocks[up], operator, blocks[low]) for operator in along]
             if any(elements.any() for elements in axes):
                 between = [_between(solved[up], solved[low], elements) for elements in axes]
-                yield BlockPair(up, low, 0, 1), light.strength(between, unit)
+                yield (up, low), light.strength(between, unit)
         return
-    for pair in pairs_of_blocks(blocks):
-        factor = light.factors[pair.q] * pair.copies
+    for up, low, q, copies in pairs_of_blocks(blocks):
+        factor = light.factors[q] * copies
         if factor > 1e-30:  # the cosine of 90 degrees is not quite 0
-            elements = blocks[pair.up].between(dipole, blocks[pair.low])
+            elements = space.between(blocks[up], dipole, blocks[low])
             if elements.any():
-                yield pair, factor * np.abs(_between(solved[pair.up], solved[pair.low], elements)) ** 2
+                yield (up, low), factor * np.abs(_between(solved[up], solved[low], elements)) ** 2
 
 
 def _between(up: BlockStates, low: BlockStates, elements: NDArray[Any]) -> NDArray[Any]:
@@ -280,18 +281,18 @@ class _Part(NamedTuple):
 
 
 def _pair_lines(
-    solved: list[BlockStates], pair: BlockPair, strength: Floats, populations: Populations, j_highest: int
+    solved: list[BlockStates], pair: tuple[int, int], strength: Floats, populations: Populations, j_highest: int
 ) -> _Part:
     """Lines between the states of two blocks; strength: (fields, up, low)."""
-    up, low = solved[pair.up], solved[pair.low]
+    up, low = (solved[place] for place in pair)
     ours = [side.j <= j_highest for side in (up, low)]
-    first, second = np.nonzero(np.multiply.outer(*ours) & (_above(len(ours[0])) if pair.up == pair.low else True))
+    first, second = np.nonzero(np.multiply.outer(*ours) & (_above(len(ours[0])) if pair[0] == pair[1] else True))
     frequency = up.energies[:, first] - low.energies[:, second]
     turned = frequency[-1] < 0
     levels = up.block.levels
     free = levels.energy_mhz[up.rows[first]] - levels.energy_mhz[low.rows[second]]
     sign = np.where(turned, -1.0, 1.0)
-    difference = populations.by_block[pair.low][:, second] - populations.by_block[pair.up][:, first]
+    difference = populations.by_block[pair[1]][:, second] - populations.by_block[pair[0]][:, first]
     intensity = INTENSITY_NM2_MHZ * frequency * strength[:, first, second] * difference
     return _Part(
         sign * frequency,
@@ -322,11 +323,11 @@ def _names(
 
 
 def _numbers(
-    solved: list[BlockStates], pair: BlockPair, states: tuple[Ints, Ints], turned: NDArray[np.bool_]
+    solved: list[BlockStates], pair: tuple[int, int], states: tuple[Ints, Ints], turned: NDArray[np.bool_]
 ) -> tuple[Ints, Ints]:
     """Numbers of the upper and lower state of each line, counted through the blocks."""
     first = np.cumsum([0, *(len(block.rows) for block in solved)])
-    up, low = first[pair.up] + states[0], first[pair.low] + states[1]
+    up, low = (first[place] + rows for place, rows in zip(pair, states, strict=True))
     return np.where(turned, low, up), np.where(turned, up, low)
 
 
