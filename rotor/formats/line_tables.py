@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor.formats.atomic_write import atomic_path
 from rotor.formats.provenance import provenance_record, write_beside
-from rotor.formats.spcat.text.cat import format_lines, load_compiled, write_cat
+from rotor.formats.spcat.text.cat import format_lines, write_cat
 from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.spectra.lines import Lines
@@ -104,7 +104,6 @@ def _write_in_pieces(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
     from concurrent.futures import ThreadPoolExecutor
 
     _ = lines.partition, lines.spread  # made once, before the pieces ask for them
-    load_compiled(len(lines))
 
     def text(start: int) -> bytes:
         return format_lines(catalogue(lines.where(slice(start, start + PIECE)), tag))

@@ -23,8 +23,7 @@ from rotor.formats.spcat.hamiltonian.file_effect import (
     ignored_states,
     real_lines,
 )
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, l_doubled_pairs
-from rotor.formats.spcat.hamiltonian.l_spins import named_by_l
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, l_doubled_pairs, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import named_by
 from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
 from rotor.formats.spcat.hamiltonian.phases import Phases, read_phases, turned_axis, turned_odd_axes, with_dipoles

@@ -18,8 +18,8 @@ from rotor.formats.spcat.file_model import Group, connected_groups, line_names
 from rotor.formats.spcat.file_quanta import Format, listed_quanta, quanta_format
 from rotor.formats.spcat.fits.at_zero import left_at_zero
 from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
-from rotor.formats.spcat.hamiltonian.l_spins import functions_by_l, named_by_l
-from rotor.formats.spcat.hamiltonian.labels import has_other_names, named_by, naming_by, spin_naming_by
+from rotor.formats.spcat.hamiltonian.l_doubled import functions_by_l, named_by_l
+from rotor.formats.spcat.hamiltonian.labels import has_other_names, named_by, naming_by, over_basis, spin_naming_by
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
@@ -29,7 +29,8 @@ from rotor.quantum.estimates.labelled_spins import assigned_with_spins
 from rotor.quantum.label_tracking import AssignedLevels, LabelledBlocks, without_level
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError
 from rotor.quantum.labelled_states import labelled_states
-from rotor.quantum.levels import Levels
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation
 
@@ -250,8 +251,13 @@ def _assign_functions(
 
 
 def _label_functions(group: Group, levels: Levels) -> Functions:
-    """The functions that label levels of l-doubled states."""
-    return partial(functions_by_l, pairs=group.effect.pairs, representation=str(levels.representation))
+    """The functions, over the basis, that label levels of l-doubled states, and their labels."""
+
+    def functions_of(block: SolvedBlock | SpinBlock) -> tuple[Floats, Ints]:
+        functions = functions_by_l(over_basis(block), group.effect.pairs, str(levels.representation))
+        return functions.amplitudes, functions.names
+
+    return functions_of
 
 
 def _group_places(group: Group, form: Format, labels: Ints) -> Ints:

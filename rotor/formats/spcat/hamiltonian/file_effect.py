@@ -14,8 +14,7 @@ import numpy as np
 
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Symmetry, split_code
 from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, basis_axes
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs
-from rotor.formats.spcat.hamiltonian.l_spins import spin_terms_with_pairs
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs, spin_terms_with_pairs
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, k_energy
 from rotor.formats.spcat.hamiltonian.phases import half_turned
 from rotor.formats.spcat.hamiltonian.series import (

@@ -13,26 +13,30 @@ Operators O refer to |k⟩|l⟩ (H. M. Pickett, documentation of SPFIT and SPCAT
 | another state and the first | Δl = ±L, likewise | O/√2, ±(i/√2)(O↑ - O↓) |
 | two first states | O, both l alike | O, O |
 
-O↑ and O↓ are the parts that raise and lower k. Parameters of the second state twice are ignored, as in SPFIT. The parity of a split pair,
+O↑ and O↓ are the parts that raise and lower k. The table also holds for the operators of N in spin terms: for a tensor with components
+q = ±1 or ±2 only, i(O↑ - O↓) is the tensor turned about z by 90° or 45°, xz becomes yz, and xx - yy becomes xy + yx.
+Parameters of the second state twice are ignored, as in SPFIT. The parity of a split pair,
 which depends on the phase between x and y, is not verified against the program.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.formats.spcat.hamiltonian.labels import Functions, places, renamed, wang_functions
 from rotor.formats.spcat.hamiltonian.states import StateOptions
-from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.spins.operators import AxialState
-from rotor.quantum.spins.parts import assigned
+from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.spins.blocks import SpinBlock
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor
+from rotor.quantum.spins.scheme import SpinTerm
 from rotor.quantum.states import Coupling, OperatorOfJ
-from rotor.quantum.wang.basis import Part, names_of
-from rotor.quantum.wang.j_operators import JOperator, between_blocks, j_z
+from rotor.quantum.wang.j_operators import JOperator
 
 
 class Pair(NamedTuple):
@@ -154,71 +158,95 @@ def couplings_with_pairs(
     ]
 
 
-# Names of levels
+def spin_terms_with_pairs(
+    term: SpinTerm, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair], axes: str
+) -> list[SpinTerm]:
+    """A spin term of a file over real states, if at least one of its states is l-doubled (table of this module).
 
-
-def l_functions(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Floats, Ints]:
-    """The functions (n, n), in rows, that label the states of a block, and their labels v, Ka, Kc (n, 3).
-
-    States that are not l-doubled have basis functions, a pair has |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0. A half turn across the
-    axis changes the sign of y; of the two functions with K = 0, the one of y therefore has the other species, Ka + Kc = N + 1.
+    term: the term for states that are not l-doubled. states: numbers, the lower one first. reversed_: whether V2 > V1 in the code, Δk Δl
+    < 0. pairs: the l-doubled states of the file. axes: the axes x, y, z: bca or bac.
+    Returns: terms over x and y.
+    Raises ValueError for terms that are not supported between such states.
     """
-    if any(isinstance(part.basis, AxialState) for part in block.parts):
-        raise ValueError(_UNCOUPLED)
-    size = len(block.vectors)
-    functions, names = list[Floats](), list[tuple[int, int, int]]()
-    second = {pair.first: pair.second for pair in pairs}
-    members = {v for pair in pairs for v in pair}
-    for part in block.parts:
-        for place, (k, ka, kc) in enumerate(zip(part.basis.k.tolist(), *_by_k(part, representation), strict=True)):
-            unit_vector = np.zeros(size)
-            unit_vector[part.place.start + place] = 1.0
-            if part.v not in members:
-                functions.append(unit_vector)
-                names.append((part.v, ka, kc))
-            elif part.v in second:
-                for v, function in _functions_with_l(unit_vector, k, part, block.parts, second[part.v], representation):
-                    functions.append(function)
-                    names.append((v, ka, kc))
-            elif k == 0:
-                functions.append(unit_vector)
-                names.append((part.v, ka + 1, kc) if representation == "IIIl" else (part.v, ka, kc + 1))
-    if len(functions) < size:
-        raise ValueError(_UNCOUPLED)
-    return np.array(functions), np.array(names)
+    odd = term.rotor.odd
+    if odd and states[0] == states[1] and axes[2] == "c":
+        # the sign of what is odd is another between states than within a pair there
+        term = replace(term, factor=-term.factor)
+    turned = turned_rotor(term.rotor, axes)
+    return [
+        replace(term, bra=part.bra, ket=part.ket, factor=term.factor * part.factor, rotor=rotor)
+        for part in over_real_states(states, odd, reversed_, pairs, "spin operator")
+        if (rotor := turned if part.turned else term.rotor) is not None
+    ]
 
+
+def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
+    """i(O↑ - O↓) of a tensor; None if it is zero.
+
+    >>> turned_rotor(Cosines(((0, 0, 0), (0, 1.0, 0), (0, 0, -1.0))), "bca").components  # bb - cc becomes bc + cb
+    ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
+    """
+    if not isinstance(rotor, Cosines | CosinesWithN) or (rotor.rank == 1 and isinstance(rotor, Cosines)):
+        return None
+    x, y, z = ("abc".index(axis) for axis in axes)
+    c, turned = np.array(rotor.components, dtype=float), np.zeros((3, 3))
+    stretched = (c[x, x] - c[y, y]) / 2
+    turned[x, y] = turned[y, x] = stretched
+    turned[x, x], turned[y, y] = -(c[x, y] + c[y, x]) / 2, (c[x, y] + c[y, x]) / 2
+    turned[y, z], turned[z, y], turned[x, z], turned[z, x] = c[x, z], c[z, x], -c[y, z], -c[z, y]
+    if not turned.any():
+        return None
+    turned += 0.0  # no minus zeros
+    components: Matrix = tuple(tuple(float(value) for value in row) for row in turned)  # type: ignore[assignment]
+    return type(rotor)(components)
+
+
+# Labels of levels
 
 _UNCOUPLED = "l-doubled states without a coupling of their components; give -2Aζ (TYP 20) for them"
 
 
-def block_names(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> tuple[Ints, Floats]:
-    """Labels and weights of the states of a block."""
-    functions, names = l_functions(block, pairs, representation)
-    shares = (functions @ block.vectors) ** 2
-    function_of_state = assigned(shares, np.ones(len(functions), dtype=np.int64))
-    return names[function_of_state], shares[function_of_state, np.arange(len(function_of_state))]
+def functions_by_l(block: SolvedBlock | SpinBlock, pairs: Sequence[Pair], representation: str) -> Functions:
+    """The functions that label the states of a block: |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0 of a pair, else Wang functions.
+
+    (x ± y)/√2 of one K has K l > 0 if ⟨x|Nz l|y⟩ is positive, which it is for x with Ka + Kc - N + K even. A half turn across the axis
+    changes the sign of y; of the two functions with K = 0, the one of y therefore has the other species, Ka + Kc = N + 1.
+    """
+    if block.axial_k is not None:
+        raise ValueError(_UNCOUPLED)
+    plain, second_of = wang_functions(block, representation), {pair.first: pair.second for pair in pairs}
+    members = {v for pair in pairs for v in pair}
+    keys = np.column_stack([plain.names[:, 0], plain.n, plain.k, plain.above, plain.names[:, 3:]]).tolist()
+    row_of = {tuple(key): row for row, key in enumerate(keys)}
+    names, amplitudes = list[Ints](), list[Floats]()
+    for name, amplitude, (v, n, k, above, *pattern) in zip(plain.names, plain.amplitudes, keys, strict=True):
+        if v in second_of and k:
+            partner = row_of.get((second_of[v], n, k, 1 - above, *pattern))
+            if partner is None:
+                raise ValueError(_UNCOUPLED)
+            other = (-1) ** (k + above) * plain.amplitudes[partner]
+            names += [name, np.concatenate([[second_of[v]], name[1:]])]
+            amplitudes += [(amplitude + other) / sqrt(2.0), (amplitude - other) / sqrt(2.0)]
+        elif v in second_of:
+            names.append(np.concatenate([[second_of[v]], name[1:]]))
+            amplitudes.append(amplitude)
+        elif v not in members or k == 0:
+            names.append(
+                name + (v in members) * np.eye(len(name), dtype=np.int64)[1 if representation == "IIIl" else 2]
+            )
+            amplitudes.append(amplitude)
+    if len(names) < len(keys):
+        raise ValueError(_UNCOUPLED)
+    alone = np.arange(len(names))
+    return Functions(np.array(names), plain.k, alone, alone, np.array(amplitudes), plain.n)
 
 
-def _by_k(part: Part, representation: str) -> tuple[list[int], list[int]]:
-    """Ka and Kc of the functions, whose K rises."""
-    ka, kc = names_of(part.basis, representation)
-    along = kc if representation == "IIIl" else ka
-    order = np.argsort(along, kind="stable")  # stable: both components of one K keep their order
-    return ka[order].tolist(), kc[order].tolist()
-
-
-def _functions_with_l(
-    unit_vector: Floats, k: int, part: Part, parts: Sequence[Part], second: int, representation: str
-) -> list[tuple[int, Floats]]:
-    """(x ± y)/√2 with K l > 0 and with K l < 0, by the sign of ⟨Nz l⟩; x only at K = 0."""
-    if k == 0:
-        return [(second, unit_vector)]
-    operator = -1j * j_z(part.basis.j)  # ⟨x|Nz l|y⟩
-    for partner in parts:
-        if partner.v == second and partner.basis.sign == -part.basis.sign and k in partner.basis.k.tolist():
-            at = partner.basis.k.tolist().index(k)
-            element = between_blocks(part.basis, partner.basis, operator).real[part.basis.k.tolist().index(k), at]
-            other = np.zeros_like(unit_vector)
-            other[partner.place.start + at] = np.sign(element)
-            return [(part.v, (unit_vector + other) / sqrt(2.0)), (second, (unit_vector - other) / sqrt(2.0))]
-    raise ValueError(_UNCOUPLED)
+def named_by_l(levels: Levels, pairs: Sequence[Pair], representation: str) -> Levels:
+    """Levels with v of a pair by the sign of K l, and the labels of the function of `functions_by_l` with the largest weight."""
+    tables, shares = list[Ints](), list[Floats]()
+    for block in levels.blocks:
+        functions = functions_by_l(block, pairs, representation)
+        at = places(functions, block.energies_mhz, 1)
+        tables.append(functions.names[at])
+        shares.append(functions.amplitudes[at, np.arange(len(at))] ** 2)
+    return renamed(levels, tables, shares)

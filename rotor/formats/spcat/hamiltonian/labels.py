@@ -117,13 +117,9 @@ def spin_naming_by(
     diag: int, oblate: bool, diagonal: Diagonal, block: SpinBlock, representation: str
 ) -> NamedFunctions:
     """Rule that labels the states of a block with spins while constants change, over its basis functions."""
-    size = block.parts[-1].place.stop
-    over_basis = [
-        part._replace(rotor=replace(part.rotor, vectors=np.eye(len(part.rotor.energies_mhz)))) for part in block.parts
-    ]
-    functions = _functions_with_spins(replace(block, parts=tuple(over_basis), vectors=np.eye(size)), representation)
+    functions = wang_functions(over_basis(block), representation)
     turn, row_of_function = functions.amplitudes, functions.amplitudes.argmax(axis=1)
-    groups = np.empty(size, dtype=np.int64)
+    groups = np.empty(len(turn), dtype=np.int64)
     groups[row_of_function] = _groups(functions, diag)
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
@@ -262,6 +258,16 @@ def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, en
         here = by_k2[run]
         functions_of_states[here[np.argsort(energies[states[here]], kind="stable")]] = by_tau[run]
     return functions_of_states
+
+
+def over_basis(block: SolvedBlock | SpinBlock) -> SolvedBlock | SpinBlock:
+    """The block with its basis functions in place of its states."""
+    if not isinstance(block, SpinBlock):
+        return replace(block, vectors=np.eye(len(block.vectors)))
+    parts = [
+        part._replace(rotor=replace(part.rotor, vectors=np.eye(len(part.rotor.energies_mhz)))) for part in block.parts
+    ]
+    return replace(block, parts=tuple(parts), vectors=np.eye(block.parts[-1].place.stop))
 
 
 def wang_functions(block: SolvedBlock | SpinBlock, representation: str) -> Functions:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import gzip
-import importlib
 import os
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -32,9 +30,6 @@ from rotor.formats.spcat.text.rows import (
     take_rows,
 )
 
-COMPILED_FROM = 2_000_000  # lines; the compiler takes 0.3 s to load and saves 0.15 µs a line
-_FEW = 20_000  # lines that take a few hundredths of a second
-_COMPILED = "rotor.formats.spcat.text._kernels"
 _CHUNK = 1 << 14  # lines handled at once: about 1 MB of text, which fits a processor's cache
 _BOM = b"\xef\xbb\xbf"
 _BLANKS = b" \t\r\n\x1a"  # a line of these alone is blank; ^Z ended files under DOS
@@ -50,25 +45,12 @@ def _length(layout: Layout, width: int) -> int:
     return 80 if width == 6 else QUANTA + 4 * width
 
 
-def load_compiled(lines: int) -> None:
-    """Load the compiled form of rows for a list so long that this pays, or where the compiler is loaded already."""
-    if lines >= COMPILED_FROM or (lines >= _FEW and "numba" in sys.modules):
-        importlib.import_module(_COMPILED)
-
-
-def _row_form() -> Callable[[Text, Columns, tuple[int, int, int, int]], Mask]:
-    """The function that fills rows of text: the compiled one where it is loaded."""
-    fill: Callable[[Text, Columns, tuple[int, int, int, int]], Mask]
-    fill = sys.modules[_COMPILED].put_rows if _COMPILED in sys.modules else put_rows
-    return fill
-
-
-def _plain_rows(text: Text, columns: Columns, layout: Layout, fill: Callable[..., Mask]) -> Mask:
+def _plain_rows(text: Text, columns: Columns, layout: Layout) -> Mask:
     """Fill rows (n, full length and line end); true where a row is the line, nothing but blanks cut off its end."""
     width = columns.quanta_upper.shape[1]
     length = _length(layout, width)
     full = max(length, QUANTA + 4 * width)
-    plain = fill(text[:, :full], _capped(columns, layout.decimals), layout.decimals)
+    plain = put_rows(text[:, :full], _capped(columns, layout.decimals), layout.decimals)
     plain &= (columns.qnfmt >= 0) & (np.maximum(columns.qnfmt % 10, 6) == width)
     if layout.decimals[0] == 4:
         plain &= columns.frequency_mhz < 99999999.0
@@ -78,7 +60,7 @@ def _plain_rows(text: Text, columns: Columns, layout: Layout, fill: Callable[...
     return plain
 
 
-def _wide_rows(rows: Text, columns: Columns, layout: Layout, fill: Callable[..., Mask], plain: Mask) -> None:
+def _wide_rows(rows: Text, columns: Columns, layout: Layout, plain: Mask) -> None:
     """Fill the rows of numbers that need a decimal less, and mark them plain: long lists have many such lines.
 
     The program prints FREQ, ERR and LGINT with three decimals where FREQ is wide; LGINT below -99.9999 has three.
@@ -92,7 +74,7 @@ def _wide_rows(rows: Text, columns: Columns, layout: Layout, fill: Callable[...,
             text = np.empty((len(index), rows.shape[1]), dtype=np.uint8)
             chosen_columns: list[Any] = [column[index] for column in columns]
             part = _capped(Columns(*chosen_columns), layout.decimals)
-            plain[index] = _plain_rows(text, part, replace(layout, decimals=decimals), fill)
+            plain[index] = _plain_rows(text, part, replace(layout, decimals=decimals))
             rows[index] = text
 
 
@@ -131,8 +113,6 @@ def _within_format(record: Record, index: int) -> Record:
 def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
     """The text of a catalogue in pieces of some thousand lines, for lists larger than memory should hold twice."""
     layout, width = catalogue.layout, catalogue.quanta_upper.shape[1]
-    load_compiled(len(catalogue))
-    fill = _row_form()
     space = max(_length(layout, width), QUANTA + 4 * width) + len(layout.newline)
     end = _length(layout, width) + len(layout.newline)
     buffer = np.empty((min(_CHUNK, len(catalogue)), space), dtype=np.uint8)
@@ -142,8 +122,8 @@ def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
         stop = min(start + _CHUNK, len(catalogue))
         rows = buffer[: stop - start]
         columns = catalogue.rows(start, stop)
-        plain = _plain_rows(rows, columns, layout, fill)
-        _wide_rows(rows, columns, layout, fill, plain)
+        plain = _plain_rows(rows, columns, layout)
+        _wide_rows(rows, columns, layout, plain)
         plain[spelled[(spelled >= start) & (spelled < stop)] - start] = False
         yield from _with_odd_lines(catalogue, start, rows[:, :end], plain)
     yield layout.ending
@@ -242,7 +222,7 @@ def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Ma
         padded = np.full((len(rows), max(lines.length, QUANTA + 4 * width) + 2), ord(" "), dtype=np.uint8)
         padded[:, : layout.line_length] = rows[:, : layout.line_length]
         columns = take_rows(padded, width, layout.decimals)
-        plain = _plain_rows(padded, columns, layout, put_rows)
+        plain = _plain_rows(padded, columns, layout)
         plain &= (padded[:, : lines.length] == rows).all(axis=1) & _quanta_present(columns)
         is_plain[chunk] = regular & plain
         parts.append(columns)

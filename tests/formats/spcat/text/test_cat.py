@@ -9,7 +9,7 @@ import pytest
 from places import ORACLES, PROJECT, SHARED
 
 from rotor.formats.atomic_write import atomic_path, open_atomic
-from rotor.formats.spcat.text import _kernels, cat, rows
+from rotor.formats.spcat.text import cat, rows
 from rotor.formats.spcat.text.cat import format_lines, read_cat, write_cat
 from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue, Layout
 from rotor.formats.spcat.text.fields import (
@@ -118,10 +118,6 @@ def test_rounding_is_that_of_printf(decimals):
     out = np.empty((len(values), 13), dtype=np.uint8)
     assert rows._put_decimal(out, values, decimals).all()
     assert out.tobytes() == expected
-    compiled = np.empty_like(out)
-    for i, value in enumerate(values):
-        assert _kernels._put_decimal(compiled[i], 0, 13, value, decimals, 10.0**decimals)
-    assert compiled.tobytes() == expected
 
 
 def random_catalogue(n: int, rng: np.random.Generator) -> Catalogue:
@@ -140,18 +136,6 @@ def random_catalogue(n: int, rng: np.random.Generator) -> Catalogue:
         quanta_upper=quanta[0],
         quanta_lower=quanta[1],
     )
-
-
-def test_compiled_rows_are_the_plain_rows():
-    catalogue = random_catalogue(5000, np.random.default_rng(7))
-    columns = catalogue.rows(0, 5000)
-    plain, compiled = (np.zeros((5000, 81), dtype=np.uint8) for _ in range(2))
-    fits, fits_compiled = (
-        form.put_rows(out, columns, (4, 4, 4, 4)) for form, out in ((rows, plain), (_kernels, compiled))
-    )
-    assert np.array_equal(fits, fits_compiled)
-    assert 500 < fits.sum() < 4900  # both kinds are there
-    assert np.array_equal(plain[fits], compiled[fits])
 
 
 def test_rows_are_the_lines_spelled_one_by_one():
@@ -396,20 +380,6 @@ def test_short_lists_do_not_load_the_compiler():
         f"format_lines(read_cat({LINE!r} * 100)); sys.exit('numba' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], cwd=PROJECT).returncode == 0
-
-
-def test_without_a_writable_cache_folder_code_is_compiled_all_the_same(monkeypatch):
-    import numba
-
-    njit = numba.njit
-
-    def refusing(*args, **options):
-        if options.get("cache"):
-            raise RuntimeError("cannot cache function: no locator available")
-        return njit(*args, **options)
-
-    monkeypatch.setattr(numba, "njit", refusing)
-    assert _kernels.compiled(lambda x: x + 1)(1) == 2
 
 
 def test_layout_of_new_lists_is_that_of_the_program():
