@@ -2,8 +2,9 @@
 
 H(x) = H0 + F + x V over each exact block of states; x is the varied field, F a constant one (such as laser light). Only the lowest states
 of each block are solved, at all fields, in the smallest basis of free states whose truncation error is within the tolerance
-(`rotor.quantum.fields.truncation`): J max is chosen first, then the states up to it. The map lists the bound and the population of the
-highest J for each state and field.
+(`rotor.quantum.fields.truncation`): J max is chosen first, then the states up to it. Higher levels that lie among those of the map are not
+needed where the bound shows that the field does not connect them. The map lists the bound and the population of the highest J of each state
+at each field.
 
 Labels: inside an exact symmetry block levels do not cross, so the state of rank r at any field is labelled by the free level of rank r in
 that block. These adiabatic labels do not depend on the grid of fields, unlike labels by overlap. Diabatic labels are exchanged where two
@@ -35,6 +36,8 @@ Of = TypeVar("Of")
 EDGE = 2  # the highest values of J whose population is leakage
 HIGHEST_J = 300
 STEP_J = 6
+# a bound below this shows that levels outside the basis cross those of the map as if they were not coupled: labels need none of them
+NARROW_MHZ = 1e-3
 ROUND_OFF = 2 * float(np.finfo(np.float64).eps)  # of eigenvalues, relative to the norm of the matrix
 
 
@@ -42,7 +45,7 @@ ROUND_OFF = 2 * float(np.finfo(np.float64).eps)  # of eigenvalues, relative to t
 class FieldMap(Table):
     """States in a field as columns (n,): all fields of one state, then those of the next.
 
-    field: in the unit of `request.kind`. m: M. rank: order in energy inside the exact block. block: label of the block.
+    field: in the unit of `request.kind`. m: M. rank: order in energy among the states of the basis in the exact block. block: its label.
     energy_mhz: E/h. label: the free level of this rank. slope: -dE/dfield, named by `slope_name`. cosines: expectation values by name.
     edge_population: of the two highest J. copies: number of coinciding states (M and -M). diabatic_label: or None. free_row, free_mhz,
     weight: row, energy and spin weight (of one state) of the free level. jmax: of the basis. truncation_mhz: bound of the truncation error
@@ -186,7 +189,7 @@ def _check_highest(jmax: int) -> None:
 
 def smallest_jmax(request: MapRequest, executor: Executor | None = None) -> int:
     """The lowest J max, at most 300, for which the bounds of all energies at the strongest field are within the tolerance."""
-    lowest = _lowest_jmax(request)
+    lowest = request.j_highest + EDGE if request.tolerance_mhz <= NARROW_MHZ else _lowest_jmax(request)
     costly = request.top.internal_rotation is not None or any(effect.spins(request.top) for effect in request.effects)
     highest = lowest if costly else lowest + STEP_J  # free states with spins or a torsion take longer than a field
     while True:
@@ -268,10 +271,9 @@ def _lowest_jmax(request: MapRequest) -> int:
 
 
 def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
-    """Whether all blocks are chains small enough for one sweep, which takes milliseconds and gains nothing from other processes."""
+    """Whether chains are small enough for one sweep, which takes milliseconds and gains nothing from other processes."""
     states = sum(count_of(request, block, block.free_order) for block in blocks)
-    chains = all(isinstance(block.space, AxialSpace) for block in blocks)
-    return chains and max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
+    return max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
 
 
 def _round_off(terms: Terms, fields: Floats) -> float:
@@ -284,11 +286,14 @@ def _round_off(terms: Terms, fields: Floats) -> float:
 def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> FieldMap:
     """The map with J max of the basis, by block and rank."""
     blocks = blocks_of_map(request, jmax)
-    if executor is None or _is_small(request, blocks):
-        parts = _columns(request, jmax, blocks)
-    else:
-        apart = executor.map(partial(_columns, request, jmax), [[block] for block in blocks])
-        parts = [columns for columns_of_block in apart for columns in columns_of_block]
+    columns = partial(_columns, request, jmax)
+    if all(isinstance(block.space, AxialSpace) for block in blocks) and (
+        executor is None or _is_small(request, blocks)
+    ):
+        parts = columns(blocks)
+    else:  # the vectors of one block at a time are in memory
+        apart = (map if executor is None else executor.map)(columns, [[block] for block in blocks])
+        parts = [columns_of_block for columns_of_blocks in apart for columns_of_block in columns_of_blocks]
     whole: dict[str, Any] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     cosines = {name: whole.pop(name) for name in request.observables}
     numbers = np.repeat(np.arange(len(parts)), [len(part["field"]) for part in parts])

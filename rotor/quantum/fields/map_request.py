@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 # largest population of a state in the two highest J of the basis; the error of cosines is about as large
 MOST_AT_EDGE = 1e-6
+MOST_ENERGIES = 600_000  # of a map: about 15 s for an asymmetric top
 
 
 class FieldKind(NamedTuple):
@@ -83,6 +84,19 @@ class MapRequest:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.tolerance_mhz) and self.tolerance_mhz > 0):
             raise ValueError(f"tolerance {self.tolerance_mhz} MHz: a finite number above 0 is expected")
+        if (energies := self.states * len(self.fields)) > MOST_ENERGIES:
+            raise ValueError(
+                f"{self.states:,} states of J up to {self.j_highest} at {len(self.fields)} fields are {energies:,} energies, more than "
+                f"{MOST_ENERGIES:,}: follow states of lower J, or ask for fewer fields"
+            )
+
+    @property
+    def states(self) -> int:
+        """Number of states to follow; with spins about so many."""
+        spins = self.top.spin_constants if any(effect.spins(self.top) for effect in self.effects) else None
+        of_spins = math.prod(twice + 1 for twice in spins.twice.values()) if spins else 1
+        levels = [1 if self.top.kind == "linear" else 2 * j + 1 for j in range(self.j_highest + 1)]
+        return of_spins * sum(count * sum(abs(m) <= j for m in self.m_values) for j, count in enumerate(levels))
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the spaces, which another process makes anew."""

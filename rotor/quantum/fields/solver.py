@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.fields.chains import chain_states, is_chain
+from rotor.quantum.fields.interpolation import FAILURES, FEWEST_FIELDS, Interpolation, chebyshev_places, improved
 
 Matrix = NDArray[Any]
 Terms = tuple[Matrix, ...]  # H_n (n, n)
@@ -25,6 +26,9 @@ FIRST_ANCHORS = 5  # fields that are solved in full first
 SPANNED = 101  # fields at which a basis for diabatic labels is tested
 BUFFER = 4  # further states in a reduced basis
 PART_OF_TOLERANCE = 0.1  # share of the tolerance for the error of a reduced basis
+SUBSET = (
+    1 / 8
+)  # shares of the states above which all of them take less time than the lowest alone (LAPACK's evd and evr)
 DEPENDENT = 1e-7  # directions of a basis with smaller singular values, relative to the largest, are left out
 
 
@@ -45,6 +49,8 @@ def at_fields(terms: Terms, fields: Floats) -> Matrix:
 def expectation(matrix: Matrix, vectors: Matrix) -> Floats:
     """⟨v|O|v⟩ (fields, states) of vectors (fields, n, states)."""
     fields, size, states = vectors.shape
+    if size > DENSE:
+        return np.asarray(np.einsum("fnk,fnk->fk", vectors.conj(), matrix @ vectors).real)
     # one matrix product instead of one for each field
     columns = vectors.transpose(1, 0, 2).reshape(size, fields * states)
     means = np.einsum("nk,nk->k", columns.conj(), matrix @ columns).real
@@ -70,6 +76,8 @@ def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float 
         if spanned is None or spanned[1][2].max() > tolerance_mhz:  # dependent directions were left out
             return _each(terms, fields, count)
         return spanned[1]
+    if len(fields) >= FEWEST_FIELDS and tolerance_mhz > 0 and count > SUBSET * size:
+        return _between_few(terms, fields, count, PART_OF_TOLERANCE * tolerance_mhz)
     return _each(terms, fields, count)
 
 
@@ -95,8 +103,37 @@ def _each(terms: Terms, fields: Floats, count: int) -> tuple[Floats, Matrix, Flo
     return _exact(np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved]))
 
 
+def _between_few(terms: Terms, fields: Floats, count: int, largest_mhz: float) -> tuple[Floats, Matrix, Floats]:
+    """Solutions of rising fields, in full at a few and interpolated between them where residuals are small enough."""
+    anchors = chebyshev_places(fields)
+    full = dict(zip(anchors.tolist(), (np.linalg.eigh(_at(terms, fields, place)) for place in anchors), strict=True))
+    between = Interpolation(fields, anchors, np.array([states.eigenvectors for states in full.values()]))
+    shape = len(fields), len(terms[0]), count
+    energies, vectors = np.empty((len(fields), count)), np.empty(shape, dtype=between.vectors.dtype)
+    errors, failures = np.zeros(energies.shape), 0
+    for place in range(len(fields)):
+        states: Any = full.get(place)
+        if states is None:
+            matrix = _at(terms, fields, place)
+            states = improved(matrix, between.at(place), largest_mhz) if failures < FAILURES else None
+            failures += states is None
+            states = states or np.linalg.eigh(matrix)
+        energies[place], vectors[place] = states[0][:count], states[1][:, :count]
+        if len(states) > 2:
+            errors[place] = states[2][:count]
+    return energies, vectors, errors
+
+
+def _at(terms: Terms, fields: Floats, place: int) -> Matrix:
+    """H at one of the fields."""
+    return np.asarray(at_fields(terms, fields[place : place + 1])[0])
+
+
 def _lowest(matrix: Matrix, count: int) -> tuple[Floats, Matrix]:
     """The lowest eigenvalues and eigenvectors of a matrix."""
+    if count > SUBSET * len(matrix):
+        energies, vectors = np.linalg.eigh(matrix)
+        return energies[:count], vectors[:, :count]
     from scipy.linalg import eigh
 
     chosen = (0, min(count, len(matrix)) - 1)

@@ -8,7 +8,8 @@ lowers an eigenvalue E of H below that of H11 by
 since H22 - diag(H_kk - Σ_l |H_kl|) is diagonally dominant with a positive diagonal, hence not negative (Gershgorin). Where d_k is small,
 |r|²/(d/2 + √(d²/4 + |r|²)) replaces |r|²/d; it never exceeds |r| (C.-K. Li and R.-C. Li, A note on eigenvalues of perturbed Hermitian
 matrices, doi 10.1016/j.laa.2004.08.026, abstract). The lowering is a positive operator; it mixes two states i, j of the basis by at most
-√(δ_i δ_j), which adds min(δ_i δ_j/|E_i - E_j|, √(δ_i δ_j)).
+√(δ_i δ_j), which adds min(δ_i δ_j/|E_i - E_j|, √(δ_i δ_j)). Where a level of the rest is not above a state, the bound is |r|: without r the
+state would be an eigenstate, and no eigenvalue shifts by more than the norm of what is added (Weyl).
 
 The block reaches twice as far in J beyond the basis as H connects, so that Σ_l is complete for each r_k that is not zero.
 """
@@ -20,7 +21,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.solver import Matrix, Terms
 
-HELD = 1 << 22  # most numbers in a temporary array
+HELD = 1 << 17  # most numbers in a temporary array: more leave the cache
 
 
 def left_out_mhz(terms: Terms, places: Ints, energies: Floats, vectors: Matrix, fields: Floats) -> Floats:
@@ -59,7 +60,9 @@ def _lowering(
     """`left_out_mhz` at a few fields; couplings (t, n), diagonals (t,) and radii (t,) for each power of the field."""
     powers = [fields**n for n in range(len(couplings))]
     lowest = np.transpose(powers) @ np.array(diagonals) - np.abs(np.transpose(powers)) @ np.array(radii)  # (f, t)
-    distance = np.maximum(lowest[:, :, None] - energies[:, None, :], 0.0)  # (f, t, s)
+    distance = lowest[:, :, None] - energies[:, None, :]  # (f, t, s)
+    above = (distance > 0).all(axis=1, keepdims=True)
+    distance = np.where(above, distance, 0.0)
     coupled = np.array([x[:, None, None] * (coupling @ vectors) for x, coupling in zip(powers, couplings, strict=True)])
     residual = np.abs(coupled.sum(axis=0)) ** 2
     total = residual.sum(axis=1, keepdims=True)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.effects.stark import HIGHEST_KV_PER_CM
-from rotor.quantum.fields.block_states import count_of
+from rotor.quantum.fields.block_states import basis_order, count_of
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.field_map import FieldMap, blocks_of_map
 from rotor.quantum.fields.field_series import FieldSeries, field_series
@@ -89,7 +89,8 @@ def level_coefficients(states: FieldMap) -> StarkCoefficients:
     >>> coefficients.coefficients[0, 1].round(8).item()  # -μ²/6B
     -3.44937264
     """
-    series = [_block_series(states.request, block) for block in blocks_of_map(states.request, states.jmax)]
+    request, jmax = states.request, states.jmax
+    series = [_block_series(request, block, jmax) for block in blocks_of_map(request, jmax)]
     first = [rows.start for rows in states.curves()]
     of_curve = list(zip(states.block_number[first].tolist(), states.rank[first].tolist(), strict=True))
     values, errors = (
@@ -101,25 +102,28 @@ def level_coefficients(states: FieldMap) -> StarkCoefficients:
 def line_coefficients(lines: FieldLines) -> StarkCoefficients:
     """Stark coefficients of lines: those of the upper state minus those of the lower state."""
     first = [rows.start for rows in lines.pairs()]
-    values, errors = _field_series(lines.request, lines.blocks)
+    values, errors = _field_series(lines.request, lines.blocks, lines.jmax)
     upper, lower = lines.upper_state[first], lines.lower_state[first]
     names = {name: getattr(lines, name)[first] for name in ("upper", "upper_m", "lower", "lower_m")}
     return _coefficients(names, values[upper] - values[lower], errors[upper] + errors[lower])
 
 
-def _field_series(request: MapRequest, blocks: Sequence[FieldBlock]) -> FieldSeries:
-    series = [_block_series(request, block) for block in blocks]
+def _field_series(request: MapRequest, blocks: Sequence[FieldBlock], jmax: int) -> FieldSeries:
+    series = [_block_series(request, block, jmax) for block in blocks]
     coefficients, errors = (np.concatenate(parts) for parts in zip(*series, strict=True))
     return FieldSeries(coefficients, errors)
 
 
-def _block_series(request: MapRequest, block: FieldBlock) -> FieldSeries:
-    """Coefficients c1 ... c6 of the states of a block, in their order at the fields of the map."""
+def _block_series(request: MapRequest, block: FieldBlock, jmax: int) -> FieldSeries:
+    """Coefficients c1 ... c6 of the states of a block that a map solves, in their order at its fields; levels beyond its J max act too."""
     # only negative fields: odd powers change sign
     sign = -1 if request.fields.max() <= 0 > request.fields.min() else 1
     turned = tuple(sign**n * term for n, term in enumerate(request.matrices(block)))
-    series = field_series(turned, count_of(request, block, block.free_order), _SUMMED, block.even_in_field)
-    return FieldSeries(series.coefficients * np.power(sign, np.arange(1, _SUMMED + 1)), series.errors)
+    order, inside = block.free_order, basis_order(block, jmax)
+    ranks = np.flatnonzero(block.j[order] <= jmax)[: count_of(request, block, inside)]
+    series = field_series(turned, int(ranks[-1]) + 1, _SUMMED, block.even_in_field)
+    powers = np.power(sign, np.arange(1, _SUMMED + 1))
+    return FieldSeries(series.coefficients[ranks] * powers, series.errors[ranks])
 
 
 def _coefficients(names: dict[str, NDArray[Any]], values: Floats, errors: Floats) -> StarkCoefficients:

@@ -6,7 +6,8 @@ import pytest
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.zeeman import zeeman_map
 from rotor.quantum.fields import block_states
-from rotor.quantum.fields.solver import solve_fields, spanned_states
+from rotor.quantum.fields.interpolation import improved
+from rotor.quantum.fields.solver import at_fields, solve_fields, spanned_states
 from rotor.quantum.fields.truncation import left_out_mhz
 from rotor.tops.top import Top
 
@@ -130,6 +131,15 @@ def test_the_bound_in_small_cases(matrix):
     assert bound.max() < 2 * lowering.max()
 
 
+def test_a_level_of_the_rest_at_the_same_energy_counts_beside_one_above():
+    """The state mixes with the level at its energy by 1e-3; |r|²/d of the one above, and a share of |r|, would be 2e-4."""
+    matrix = np.array([[-3, 0, 0, 0], [0, 0, 0.01, 1e-3], [0, 0.01, 1, 0], [0, 1e-3, 0, -1e-9]])
+    problem = (matrix, np.zeros_like(matrix))
+    bound = left_out_mhz(problem, np.arange(2), np.array([[-3.0, 0.0]]), np.eye(2)[None], np.zeros(1))[0]
+    assert np.abs(np.linalg.eigvalsh(matrix)).min() > 9e-4
+    assert np.abs(np.linalg.eigvalsh(matrix)).min() <= bound[1] < 0.02
+
+
 # The basis of eigenvectors at a few fields
 
 
@@ -163,6 +173,75 @@ def test_the_basis_grows_until_its_error_is_within_the_tolerance():
     first, _ = spanned_states(terms, fields, 4, 1e9)
     rough = [np.linalg.eigvalsh(first.T @ (fixed + x * terms[1]) @ first)[:4] for x in fields]
     assert np.abs(np.subtract(rough, whole)).max() > 1e-3
+
+
+# Many states of one matrix at many fields, interpolated between a few
+
+
+def weak_terms(size: int = 60, crossing: bool = False) -> tuple[np.ndarray, ...]:
+    """Levels that a field mixes little; with `crossing` two of them would cross at 0.5, 0.01 MHz apart there."""
+    rng = np.random.default_rng(8)
+    slope, curvature = (part + part.T for part in rng.normal(size=(2, size, size)))
+    energies = np.linspace(0, 1e5, size) + rng.uniform(0, 500, size)
+    if crossing:
+        energies[:2] = -1e5, -1e5 + 1.0
+        slope[:2], slope[:, :2], curvature[:2], curvature[:, :2] = 0, 0, 0, 0
+        slope[1, 1], slope[0, 1], slope[1, 0] = -2.0, 0.01, 0.01
+    return np.diag(energies), slope, curvature
+
+
+def counted_solutions(monkeypatch) -> list[int]:
+    """Sizes of the matrices that are solved in full from now on."""
+    sizes, whole = [], np.linalg.eigh
+    monkeypatch.setattr(np.linalg, "eigh", lambda matrix: sizes.append(len(matrix)) or whole(matrix))
+    return sizes
+
+
+@pytest.mark.parametrize("complex_phases", [False, True])
+def test_states_between_a_few_fields_are_those_of_full_solutions(monkeypatch, complex_phases):
+    terms, fields = weak_terms(), np.linspace(0, 1, 41)
+    if complex_phases:
+        phases = np.exp(1j * np.arange(60))
+        terms = tuple(phases[:, None] * term * phases.conj() for term in terms)
+    whole = [np.linalg.eigh(at_fields(terms, fields[place : place + 1])[0]) for place in range(41)]
+    sizes = counted_solutions(monkeypatch)
+    energies, vectors, error = solve_fields(terms, fields, 50, 1e-6)
+    assert len(sizes) == 9
+    exact = np.array([states.eigenvalues[:50] for states in whole])
+    assert (np.abs(energies - exact) <= error + 1e-9).all()
+    for states, near in zip(whole, vectors, strict=True):
+        overlaps = np.abs(np.einsum("nk,nk->k", states.eigenvectors[:, :50].conj(), near))
+        assert overlaps.min() > 1 - 1e-12
+
+
+def test_fields_near_an_avoided_crossing_are_solved_in_full(monkeypatch):
+    terms, fields = weak_terms(crossing=True), np.linspace(0, 1, 41)
+    exact = np.array([np.linalg.eigvalsh(at_fields(terms, fields[place : place + 1])[0])[:50] for place in range(41)])
+    sizes = counted_solutions(monkeypatch)
+    energies, _, error = solve_fields(terms, fields, 50, 1e-6)
+    assert len(sizes) > 20
+    assert (np.abs(energies - exact) <= error + 1e-9).all()
+
+
+def test_vectors_of_one_energy_are_told_apart():
+    """Two states of one energy at all fields: interpolated vectors may coincide, which no residual shows."""
+    matrix = np.diag([0.0, 0.0, 1.0])
+    vectors = np.array([[1.0, 1.0, 0.0], [0.0, 1e-3, 0.0], [0.0, 0.0, 1.0]])
+    vectors /= np.linalg.norm(vectors, axis=0)
+    assert improved(matrix, vectors, 1e-6) is None
+    assert improved(matrix, np.eye(3), 1e-6) is not None
+
+
+def test_levels_beyond_the_basis_may_lie_among_those_of_a_map():
+    """Levels of J = 13 to 18 lie below the highest of J = 12; the tolerance shows that the field does not connect them."""
+    top = Top.from_constants("A=10 B=6 C=4 GHz")
+    tensors = {"g": [0.6, -0.2, 0.3], "magnetisability": [-3.0, 0.0, -7.0], "j_highest": 12}
+    states = zeeman_map(top, [0.0, 11.0], **tensors)
+    finer = zeeman_map(top, [0.0, 11.0], **tensors, jmax=20)
+    assert states.jmax < 18  # 18 0 18 lies below 12 12 0
+    assert states.label.tolist() == finer.label.tolist()
+    actual = np.abs(states.energy_mhz - finer.energy_mhz)
+    assert (actual <= states.truncation_mhz + states.round_off_mhz + finer.truncation_mhz + finer.round_off_mhz).all()
 
 
 def test_enough_free_states_are_taken_at_the_strongest_field():

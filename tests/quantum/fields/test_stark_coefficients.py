@@ -241,3 +241,13 @@ def test_fields_below_zero_name_their_states():
     assert (below.coefficients * [-1, 1, -1, 1]).sum(axis=1) == pytest.approx(shift, abs=0.05)  # E⁵ at 1 kV/cm
     assert below.names["label"].tolist() == above.names["label"].tolist()
     assert np.abs(below.coefficients[:, 0] - above.coefficients[:, 0]).max() > 100
+
+
+def test_coefficients_do_not_depend_on_levels_between_those_of_a_map():
+    """Levels beyond the basis lie among those of the map: each state has its coefficients, by label."""
+    top = Top.from_constants("A=10 B=6 C=4 GHz", dipole_abc_debye=(0.1, 0, 0))
+    near, far = (stark_map(top, [0.0, 0.1], j_highest=6, m_values=(2,), jmax=jmax) for jmax in (None, 14))
+    assert near.jmax < 9  # 9 0 9 lies below 6 6 0
+    few, many = level_coefficients(near), level_coefficients(far)
+    assert few.names["label"].tolist() == many.names["label"].tolist()
+    np.testing.assert_allclose(few.coefficients[:, 1], many.coefficients[:, 1], rtol=1e-9)

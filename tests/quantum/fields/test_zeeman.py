@@ -98,3 +98,14 @@ def test_what_of_the_field_is_left_out_is_said():
     proton = 2.7928473 * NUCLEAR_MAGNETON_MHZ_PER_T * 0.5
     assert results[False] == {"magnetic moments of nuclei": pytest.approx(proton, rel=1e-4), "magnetisability": None}
     assert results[True] == {}
+
+
+def test_a_map_of_too_many_energies_is_refused():
+    """(2J+1)² states of each J, at all fields: 14,190 of J ≤ 21 at 33 fields are 468,270 and answered, at 50 fields they are not."""
+    top = Top.from_constants("A=10 B=6 C=4 GHz", magnetic=MagneticTensors(tensor_for("asymmetric", [0.6, -0.2, 0.3])))
+    assert ZeemanRequest(top, tuple(range(33)), j_highest=21).map.states == 14_190
+    message = (
+        "14,190 states of J up to 21 at 50 fields are 709,500 energies, more than 600,000: follow states of lower J"
+    )
+    with pytest.raises(ValueError, match=message):
+        answer_zeeman(ZeemanRequest(top, tuple(range(50)), j_highest=21))
