@@ -239,7 +239,7 @@ def contracted_levels(
     rotations = rotation_blocks(terms, len(names), list(rotors.values()), shared.representation)
     linear = linear_blocks_of_spins(top, effects, names, [block for block, _ in chosen])
     blocks = tuple(
-        LabelledBlock(b.parts, matrices, targets) for (b, targets), matrices in zip(chosen, linear, strict=True)
+        LabelledBlock(tuple(b.parts), matrices, targets) for (b, targets), matrices in zip(chosen, linear, strict=True)
     )
     contracted = ContractedLevels(len(rows), rotors, dict(zip(rotors, rotations, strict=True)), blocks, 0.0)
     window = _window(contracted, values_mhz)

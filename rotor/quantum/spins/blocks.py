@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -25,8 +24,8 @@ from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import Block, SolvedBlock, Used
 from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, stacks_of, within_blocks
 from rotor.quantum.spins.families import families_of, links_of_stacks
-from rotor.quantum.spins.many_f import Frame, Group, frame_of, groups_of
-from rotor.quantum.spins.parts import SpinPart, named_states
+from rotor.quantum.spins.many_f import Group, frame_of, groups_by_number, groups_of
+from rotor.quantum.spins.parts import PartColumns, SpinPart, named_states
 from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import (
     ALONE,
@@ -76,20 +75,21 @@ class SpinBlock(Block):
 
     patterns: all coupling patterns of the F, doubled. labels: (n, columns) v, Ka (K if axial), Kc and the doubled pattern N, J ... F.
     mixing: (n,) weight of the sub-block that labels each state. start: row of the first state. allowed: functions that exchange allows.
-    group: blocks of other F solved in the same array.
+    group: blocks of other F solved in the same array. twice_row: its row in tables, doubled (`many_f.Frame`).
     """
 
     with_spins: ClassVar[bool] = True
 
     twice_f: int
     patterns: Ints
-    parts: tuple[SpinPart, ...]
+    parts: Sequence[SpinPart]
     energies_mhz: Floats
     vectors: Floats
     labels: Ints
     mixing: Floats
     shared: Shared
     group: Group = field(repr=False, compare=False)
+    twice_row: int
     start: int = 0
     allowed: Allowed | None = None
 
@@ -108,23 +108,40 @@ class SpinBlock(Block):
         """Treatment of the spins, the same for all blocks of a calculation."""
         return self.shared.used
 
-    def twice_row(self, frame: Frame) -> int:
-        """The doubled row of the block in tables of a frame."""
-        return frame.twice_row(self.twice_f, self.parts[0].number)
 
+@dataclass(frozen=True, eq=False)
+class Members:
+    """Blocks before they are solved.
 
-class Member(NamedTuple):
-    """A block before it is solved.
-
-    names: v, Ka, Kc and pattern of the levels, sub-block after sub-block. sizes: number of levels of each sub-block. allowed: functions
-    that exchange of equivalent nuclei allows.
+    names: v, Ka, Kc and pattern of the levels of all blocks, sub-block after sub-block. sizes: number of levels of each sub-block.
+    levels, sub_blocks: numbers of both in each block. allowed: functions that exchange of equivalent nuclei allows in each block; empty
+    without.
     """
 
-    twice_f: int
-    parts: tuple[SpinPart, ...]
+    twice_f: Ints
+    parts: PartColumns
     names: Ints
     sizes: Ints
-    allowed: Allowed | None = None
+    levels: Ints
+    sub_blocks: Ints
+    allowed: Sequence[Allowed] = ()
+
+    def alike(self, numbers: Sequence[int]) -> tuple[Ints, Ints]:
+        """Names (blocks, levels, columns) and sizes (blocks, sub-blocks) of blocks that have as many of both."""
+        blocks: Ints = np.array(numbers, dtype=np.int64)
+        tables = ((self.names, self.levels), (self.sizes, self.sub_blocks))
+        names, sizes = (
+            table[(np.cumsum(counts) - counts)[blocks, None] + np.arange(counts[blocks[0]])] for table, counts in tables
+        )
+        return names, sizes
+
+    def existing(self, exist: Exist) -> Members:
+        """The blocks in which a level exists."""
+        exists = np.logical_or.reduceat(exist(self.names), np.cumsum(self.levels) - self.levels)
+        names, sizes = (np.repeat(exists, counts) for counts in (self.levels, self.sub_blocks))
+        columns = self.levels[exists], self.sub_blocks[exists], self.allowed
+        parts = self.parts.chosen(np.flatnonzero(exists))
+        return Members(self.twice_f[exists], parts, self.names[names], self.sizes[sizes], *columns)
 
 
 class States(NamedTuple):
@@ -234,7 +251,7 @@ def _alike(channels: Channels) -> dict[Channel, Channel]:
     return firsts
 
 
-def blocks_of_f(plan: Plan, patterns: Mapping[int, Ints]) -> list[tuple[int, tuple[SpinPart, ...]]]:
+def blocks_of_f(plan: Plan, patterns: Mapping[int, Ints]) -> tuple[Ints, PartColumns]:
     """Doubled F and parts of each block, by F, then by family; an F whose patterns no rotational block has is left out."""
     runs, placed = _runs_of_patterns(plan, patterns), plan.placed
     low, high = (np.searchsorted(placed.keys, runs.keys, side) for side in ("left", "right"))
@@ -242,18 +259,15 @@ def blocks_of_f(plan: Plan, patterns: Mapping[int, Ints]) -> list[tuple[int, tup
     family, place = placed.families[member], placed.places[member]
     order = np.lexsort((runs.first[run], place, family, runs.f[run]))
     run, family, numbers = run[order], family[order], placed.numbers[member[order]]
-    if not len(run):
-        return []
     first, last, f = runs.first[run], runs.last[run], runs.f[run]
-    begins = np.flatnonzero(np.append(True, (f[1:] != f[:-1]) | (family[1:] != family[:-1])))
-    sizes = (last - first) * np.array(plan.sizes)[numbers]
-    stop = np.cumsum(sizes)
-    stop -= np.repeat((stop - sizes)[begins], np.diff(np.append(begins, len(run))))
-    slices = (map(slice, a.tolist(), b.tolist()) for a, b in ((first, last), (stop - sizes, stop)))
-    rotors = map(plan.blocks.__getitem__, numbers.tolist())
-    parts = list(map(SpinPart, numbers.tolist(), rotors, *slices))
-    bounds = pairwise([*begins.tolist(), len(parts)])
-    return [(twice_f, tuple(parts[a:b])) for twice_f, (a, b) in zip(f[begins].tolist(), bounds, strict=True)]
+    starts_block = np.ones(len(run), dtype=bool)
+    starts_block[1:] = (f[1:] != f[:-1]) | (family[1:] != family[:-1])
+    begins = np.flatnonzero(starts_block)
+    counts = np.diff(np.append(begins, len(run)))
+    sizes = (last - first) * np.array(plan.sizes, dtype=np.int64)[numbers]
+    stops = np.cumsum(sizes)
+    stops -= np.repeat((stops - sizes)[begins], counts)
+    return f[begins], PartColumns(plan.blocks, counts, numbers, first, last, stops)
 
 
 class _Runs(NamedTuple):
@@ -286,15 +300,15 @@ def functions_of_blocks(plan: Plan, all_f: Sequence[int]) -> list[SpinBlock]:
     """Basis functions of the blocks of all F, without vectors: labels and energies are those of the rotational states."""
     table = pattern_table(plan.shared.scheme, all_f[0], all_f[-1])
     frame = plan.shared.cache["frame"] = frame_of(plan.shared.stacks, table)
-    members = blocks_of_f(plan, {f: table.patterns[f] for f in all_f if f in table.patterns})
-    groups = {number: group for group, numbers in groups_of(members, frame) for number in numbers}
+    all_twice_f, columns = blocks_of_f(plan, {f: table.patterns[f] for f in all_f if f in table.patterns})
+    groups = groups_by_number(groups_of(all_twice_f, columns, frame))
     out = []
-    for number, (twice_f, parts) in enumerate(members):
-        patterns = table.patterns[twice_f]
+    for number, twice_f in enumerate(all_twice_f.tolist()):
+        patterns, parts = table.patterns[twice_f], columns.of_block(number)
         energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
         labels = np.concatenate([_labels_of_functions(part, patterns[part.patterns]) for part in parts])
         results = energies, np.zeros((0, 0)), labels, np.ones(len(energies))
-        out.append(SpinBlock(twice_f, patterns, parts, *results, plan.shared, groups[number]))
+        out.append(SpinBlock(twice_f, patterns, parts, *results, plan.shared, *groups[number]))
     return out
 
 

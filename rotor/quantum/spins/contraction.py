@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, runs_of_similar_size
+from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.spins.operators import AxialState, Basis, Rotor
+from rotor.quantum.spins.operators import AxialState, Rotor
 from rotor.quantum.spins.rotor import Piece, acts
 from rotor.quantum.spins.stack_elements import Pairs, Section, rotor_elements, tensor_elements_of_pairs
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
@@ -28,13 +28,15 @@ _LIKE, _SMALL = 1.5, 16  # largest ratio of sizes of blocks that share a stack, 
 class Stack(NamedTuple):
     """Solved blocks of rising N with the same states and kinds of Wang functions.
 
-    kind: number of this combination. numbers, n, sizes: number, N and states of each block. vectors: (blocks, rows, states), zero beyond a
-    block; None where functions take the place of eigenstates. single: blocks that are contracted one by one.
+    kind: number of this combination. numbers, n, sizes: number, N and states of each block. k: K of functions |N K⟩, None for Wang
+    functions. vectors: (blocks, rows, states), zero beyond a block; None where functions take the place of eigenstates. single: blocks
+    that are contracted one by one.
     """
 
     kind: int
     numbers: Ints
     n: Ints
+    k: Ints | None
     sections: tuple[Section, ...]
     vectors: Floats | None
     sizes: list[int]
@@ -44,7 +46,12 @@ class Stack(NamedTuple):
     @property
     def axial(self) -> bool:
         """Whether the functions are |N K⟩ instead of Wang functions."""
-        return isinstance(self.sections[0].basis, AxialState)
+        return self.k is not None
+
+    @property
+    def places(self) -> tuple[Ints, Ints]:
+        """Block and place in it of each state."""
+        return numbers_in_runs(np.array(self.sizes))
 
 
 Element = tuple[Section, Section, Floats]
@@ -69,46 +76,56 @@ def stacks_of(blocks: Sequence[SolvedBlock], contract: bool = True) -> list[Stac
 
     contract: False for stacks of functions, one for each kind.
     """
-    alike: dict[tuple[tuple[int, ...], ...], list[int]] = {}
-    for number, block in enumerate(blocks):
-        alike.setdefault(tuple([(part.v, *_kind(part.basis)) for part in block.parts]), []).append(number)
-    stacks = list[Stack]()
-    for kind, members in enumerate(alike.values()):
-        rising = sorted(members, key=lambda number: blocks[number].j)
-        sizes = [len(blocks[number].energies_mhz) for number in rising]
+    alike: dict[Any, list[int]] = {}
+    for number, kind in enumerate(_kinds(blocks)):
+        alike.setdefault(kind, []).append(number)
+    stacks, all_n = list[Stack](), np.array([block.j for block in blocks])
+    for place, members in enumerate(alike.values()):
+        rising: Ints = np.array(members)
+        rising = rising[np.argsort(all_n[rising], kind="stable")]
+        sizes = [len(blocks[number].energies_mhz) for number in rising.tolist()]
         runs = runs_of_similar_size(sizes, _LIKE, _SMALL) if contract else [slice(None)]
-        stacks += [_stack(blocks, kind, rising[run], contract) for run in runs]
+        make = _axial_stack if isinstance(blocks[members[0]].parts[0].basis, AxialState) else _stack
+        stacks += [make(blocks, place, rising[run], all_n[rising[run]], sizes[run], contract) for run in runs]
     return stacks
 
 
-def _kind(basis: Basis) -> tuple[int, ...]:
-    """First K and sign of Wang functions."""
-    return (basis.first_k, basis.sign) if isinstance(basis, WangBlock) else ()
+def _kinds(blocks: Sequence[SolvedBlock]) -> Iterator[Any]:
+    """The state v of each block of |N K⟩; states v, first K and sign of the Wang functions of each other block."""
+    for block in blocks:
+        basis = block.parts[0].basis
+        if isinstance(basis, WangBlock):
+            yield tuple([(part.v, part.basis.first_k, part.basis.sign) for part in block.parts])
+        else:
+            yield block.parts[0].v
 
 
-def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: list[int], contract: bool) -> Stack:
-    """The stack of these blocks."""
-    members = [blocks[number] for number in numbers]
+def _axial_stack(
+    blocks: Sequence[SolvedBlock], kind: int, numbers: Ints, n: Ints, sizes: list[int], contract: bool
+) -> Stack:
+    """The stack of these blocks of |N K⟩."""
+    members = [blocks[number] for number in numbers.tolist()]
+    parts = tuple([block.parts[0] for block in members])
+    k = np.array([part.basis.axial_k for part in parts])
+    section = Section(parts[0].v, parts[0].basis, slice(0, 1), parts)
+    vectors = np.ones((len(members), 1, 1)) if contract else None
+    return Stack(kind, numbers, n, k, (section,), vectors, sizes, members, [False] * len(members))
+
+
+def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: Ints, n: Ints, sizes: list[int], contract: bool) -> Stack:
+    """The stack of these blocks of Wang functions."""
+    members = [blocks[number] for number in numbers.tolist()]
     sections, start = [], 0
     for parts in zip(*(block.parts for block in members), strict=True):
         largest = max((part.basis for part in parts), key=lambda basis: basis.size)
         sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), parts))
         start += largest.size
-    sizes = [len(block.energies_mhz) for block in members]
-    return Stack(
-        kind,
-        np.array(numbers),
-        np.array([block.j for block in members]),
-        tuple(sections),
-        _padded_vectors(members, sections, sizes) if contract else None,
-        sizes,
-        members,
-        [
-            isinstance(sections[0].basis, WangBlock)
-            and (size == 1 or any(part.basis.size == 1 for part in block.parts))
-            for size, block in zip(sizes, members, strict=True)
-        ],
-    )
+    single = [
+        size == 1 or any(part.basis.size == 1 for part in block.parts)
+        for size, block in zip(sizes, members, strict=True)
+    ]
+    vectors = _padded_vectors(members, sections, sizes) if contract else None
+    return Stack(kind, numbers, n, None, tuple(sections), vectors, sizes, members, single)
 
 
 def _padded_vectors(members: Sequence[SolvedBlock], sections: Sequence[Section], sizes: Sequence[int]) -> Floats:
@@ -210,17 +227,17 @@ def _near(
 
 def _pairs(up: Stack, low: Stack, rise: int, rise_of_k: int) -> Pairs:
     """The blocks with N' - N = rise; for equal N, those whose first number is not below the second."""
-    if up.axial:
-        k_up, k = (np.array([part.basis.axial_k for part in stack.sections[0].parts]) for stack in (up, low))
-        width = 1 + max(int(k_up.max()), int(k.max())) + abs(rise_of_k)
-        rows_up, rows = up.n * width + k_up, (low.n + rise) * width + k + rise_of_k
+    if up.k is not None and low.k is not None:
+        width = 1 + max(int(up.k.max()), int(low.k.max())) + abs(rise_of_k)
+        rows_up, rows = up.n * width + up.k, (low.n + rise) * width + low.k + rise_of_k
         _, a, b = np.intersect1d(rows_up, rows, assume_unique=True, return_indices=True)
     else:
         a, b = _alike(up.n, low.n + rise)
     if not rise and up is not low:
         ordered = up.numbers[a] > low.numbers[b]
         a, b = a[ordered], b[ordered]
-    return Pairs(a, b, up.n[a][:, None], low.n[b][:, None], (k_up[a], k[b]) if up.axial else None)
+    k = None if up.k is None or low.k is None else (up.k[a], low.k[b])
+    return Pairs(a, b, up.n[a][:, None], low.n[b][:, None], k)
 
 
 def _alike(left: Ints, right: Ints) -> tuple[Ints, Ints]:

@@ -36,7 +36,7 @@ def _matrices_of_group(
     group: Group, kinds: Sequence[tuple[int, ...]], acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats,
     space: Workspace,
 ) -> Iterator[tuple[list[int], Floats]]:  # fmt: skip
-    """Places of blocks of one kind in a group, and their matrices."""
+    """Places of blocks of one kind and shape in a group, and their matrices."""
     for run in group.runs():
         places, height = np.arange(run.start, run.stop), int(group.heights[run].max())
         shape = len(places), group.columns, height, group.columns, height
@@ -52,11 +52,8 @@ def _matrices_of_group(
         for rotation in group.rotations:
             of_kind = frame.energies_mhz[rotation.kind][frame.rows_of(group.twice_rows[run], rotation), :height]
             energies[:, rotation.columns, : of_kind.shape[1]] = (of_kind - zeros[run, None])[:, None]
-        for kind in dict.fromkeys(kinds[run]):
-            of_kind_at = [place for place in places.tolist() if kinds[place] == kind]
-            at = np.array(of_kind_at)[:, None] - run.start
-            columns, states = (np.array(pair) for pair in zip(*(group.functions[i] for i in of_kind_at), strict=True))
-            matrices = whole[at[:, :, None], columns[:, :, None], states[:, :, None], columns[:, None], states[:, None]]
-            diagonal = np.arange(kind[0])
-            matrices[:, diagonal, diagonal] += energies[at, columns, states]
-            yield of_kind_at, matrices
+        for at, (columns, states) in group.by_shape(places, kinds[run]):
+            matrices = whole[at[:, None, None], columns[:, None], states[:, None], columns, states]
+            diagonal = np.arange(len(columns))
+            matrices[:, diagonal, diagonal] += energies[at[:, None], columns, states]
+            yield places[at].tolist(), matrices

@@ -107,15 +107,21 @@ class FunctionTables:
 def function_tables(top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], shared: Shared) -> FunctionTables:
     """Elements of parameters over the functions of all rotational blocks of a calculation."""
     frame: Frame = shared.cache["frame"]
-    rotors = {
-        i: block for stack in shared.stacks for i, block in zip(stack.numbers.tolist(), stack.blocks, strict=True)
-    }
-    blocks = [rotors[i] for i in range(len(rotors))]
-    stacks = stacks_of(blocks, contract=False)
-    functions = _functions(stacks, len(blocks))
     first, last = frame.twice_f[0], frame.twice_f[-1]
     terms = StateTerms.from_effects(top, effects, names, shared.representation)
-    rotation = _rotation_elements(terms, len(names), blocks, functions, shared)
+    if shared.axial:
+        stacks = [stack._replace(vectors=None) for stack in shared.stacks]
+        functions = [np.zeros(1, dtype=np.int64)] * len(frame.kinds)
+        vectors = {kind: np.ones((len(energies), 1, 1)) for kind, energies in frame.energies_mhz.items()}
+        rotation = _axial_elements(terms, len(names), stacks, frame)
+    else:
+        numbered = (zip(stack.numbers.tolist(), stack.blocks, strict=True) for stack in shared.stacks)
+        rotors = {number: block for pairs in numbered for number, block in pairs}
+        blocks = [rotors[number] for number in range(len(rotors))]
+        stacks = stacks_of(blocks, contract=False)
+        functions = _functions(stacks, len(blocks))
+        vectors = _vectors(blocks, stacks, functions, frame)
+        rotation = _rotation_elements(terms, len(names), blocks, functions, shared)
     channels = [(couplings_by_f(shared.scheme, ALONE, first, last), rotation)]
     by_parameter = parameter_channels(top, effects, names, shared.scheme)
     channels_of_spins = dict.fromkeys(channel for by_channel in by_parameter for channel in by_channel)
@@ -132,7 +138,7 @@ def function_tables(top: Top, effects: Sequence[QuantumEffect], names: Sequence[
         for channel, of_channel in pieces.items():
             elements = _spin_elements(of_channel, by_unit, frame)
             channels.append((couplings_by_f(shared.scheme, channel, first, last), elements))
-    return FunctionTables(frame, functions, _vectors(blocks, stacks, functions, frame), channels)
+    return FunctionTables(frame, functions, vectors, channels)
 
 
 def _functions(stacks: Sequence[Stack], count: int) -> list[Ints]:
@@ -150,8 +156,6 @@ def _vectors(
 ) -> dict[int, Floats]:
     """Eigenvectors of the rotational blocks by kind, (table rows, functions, states)."""
     out = {}
-    if isinstance(blocks[0].parts[0].basis, AxialState):
-        return {kind: np.ones((len(energies), 1, 1)) for kind, energies in frame.energies_mhz.items()}
     for stack in stacks:
         count, states = frame.energies_mhz[stack.kind].shape
         out[stack.kind] = np.zeros((count, stack.sections[-1].rows.stop, states))
@@ -168,33 +172,37 @@ def rotation_blocks(
     if not isinstance(blocks[0].parts[0].basis, AxialState):
         return blocks_of_terms(terms, count, representation, blocks)
     first, parameters = np.zeros(1, dtype=np.int64), np.arange(count)
-    rows = _powers_of_axial(terms, count, blocks)
+    parts = [block.parts[0] for block in blocks]
+    v, n, k = np.array([(part.v, part.basis.j, part.basis.axial_k) for part in parts]).T
+    rows = _powers_of_axial(terms, count, v, n, k)
     return [LinearBlock(1, first, first, np.ones((1, 1)), row[None], parameters) for row in rows]
 
 
-def _powers_of_axial(terms: StateTerms, count: int, blocks: Sequence[SolvedBlock]) -> Floats:
-    """Diagonal elements [N(N+1)]^p K^2q by function and parameter, (blocks, count); operators that change K do not contribute."""
-    parts = [block.parts[0] for block in blocks]
-    v, n, k = np.array([(part.v, part.basis.j, part.basis.axial_k) for part in parts]).T
-    x, out = n * (n + 1.0), np.zeros((len(parts), count))
+def _powers_of_axial(terms: StateTerms, count: int, v: Ints | int, n: Ints, k: Ints) -> Floats:
+    """Diagonal elements [N(N+1)]^p K^2q by function and parameter, (functions, count); operators that change K do not contribute."""
+    x, out = n * (n + 1.0), np.zeros((len(n), count))
     for state, (p, q, order), column, factor in terms.by_power():
         if not order:
             out[:, column] += np.where(v == state, factor * x**p * k ** (2.0 * q), 0.0)
     return out
 
 
+def _axial_elements(terms: StateTerms, count: int, stacks: Sequence[Stack], frame: Frame) -> dict[Kinds, UnitElements]:
+    """Elements of the rotation alone within functions |N K⟩."""
+    out, first, parameters = dict[Kinds, UnitElements](), np.zeros(1, dtype=np.int64), np.arange(count)
+    for stack in stacks:
+        assert stack.k is not None
+        values = np.zeros((len(frame.n_of_rows), 1, count))
+        values[frame.rows[stack.numbers], 0] = _powers_of_axial(terms, count, stack.sections[0].v, stack.n, stack.k)
+        out[stack.kind, stack.kind, 0] = UnitElements(first, first, values, parameters)
+    return out
+
+
 def _rotation_elements(
     terms: StateTerms, count: int, blocks: Sequence[SolvedBlock], functions: Sequence[Ints], shared: Shared
 ) -> dict[Kinds, UnitElements]:
-    """Elements of the rotation alone, with both triangles."""
+    """Elements of the rotation alone between Wang functions, with both triangles."""
     frame: Frame = shared.cache["frame"]
-    if shared.axial:
-        whole = {kind: np.zeros((len(frame.n_of_rows), 1, count)) for kind in frame.energies_mhz}
-        powers, kinds = _powers_of_axial(terms, count, blocks), np.array(frame.kinds)
-        for kind, values in whole.items():
-            values[frame.rows[kinds == kind], 0] = powers[kinds == kind]
-        first, parameters = np.zeros(1, dtype=np.int64), np.arange(count)
-        return {(kind, kind, 0): UnitElements(first, first, values, parameters) for kind, values in whole.items()}
     of_kind: dict[int, list[tuple[int, Ints, Ints, LinearBlock]]] = {}
     for number, linear in enumerate(rotation_blocks(terms, count, blocks, shared.representation)):
         places = functions[number][linear.rows], functions[number][linear.columns]
@@ -293,10 +301,10 @@ def linear_blocks_of_spins(
 def _elements(block: SpinBlock, tables: FunctionTables) -> Iterator[WeightedElements]:
     """Elements of the lower triangle of a block."""
     group, size = block.group, block.parts[-1].place.stop
-    at = group.places[block.twice_row(tables.frame)]
+    at = group.places[block.twice_row]
     functions = np.concatenate([np.tile(tables.functions[part.number], part.repeats) for part in block.parts])
     place = np.full((group.columns, 1 + int(functions.max())), -1)
-    place[group.functions[at][0], functions] = np.arange(size)
+    place[group.functions[int(group.shapes[at])][0], functions] = np.arange(size)
     for acting in tables.acting(group, np.array([at])):
         up, low = np.nonzero(acting.coefficients[0])
         last = np.maximum(acting.unit.rows, acting.unit.columns)

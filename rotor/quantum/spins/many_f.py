@@ -8,16 +8,15 @@ rotation are tables with a row for each N (and K), coupling coefficients are tab
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, runs_of_similar_size
+from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
 from rotor.frozen import dataclass
 from rotor.quantum.spins.contraction import Contracted, Stack
-from rotor.quantum.spins.operators import AxialState
-from rotor.quantum.spins.parts import SpinPart
+from rotor.quantum.spins.parts import PartColumns, SpinPart
 from rotor.quantum.spins.pattern_tables import PatternTable
 
 Tables = dict[tuple[int, int, int], Floats]
@@ -49,23 +48,32 @@ class RotationColumns(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Blocks of rising row (`Frame.twice_row`) that share arrays.
+    """Blocks of rising doubled row (`Frame`) that share arrays.
 
-    heights: the largest number of states of a rotational block, for each block. functions: columns and states of the functions of each
-    block, in the order of its parts. places: index of the block by its doubled row.
+    heights: the largest number of states of a rotational block, for each block. shapes: number of its shape; blocks of one shape have the
+    same functions. functions: columns and states of the functions of a shape, in the order of the parts. places: index of the block by its
+    doubled row.
     """
 
     rotations: tuple[RotationColumns, ...]
     twice_f: Ints
     twice_rows: Ints
     heights: Ints
-    functions: list[tuple[Ints, Ints]]
+    shapes: Ints
+    functions: dict[int, tuple[Ints, Ints]]
     places: dict[int, int]
 
     @property
     def columns(self) -> int:
         """Number of columns."""
         return int(self.rotations[-1].columns.stop)
+
+    def by_shape(self, places: Ints, kinds: Iterable[Hashable]) -> list[tuple[Ints, tuple[Ints, Ints]]]:
+        """Indices of `places`, blocks that agree in `kinds` and in their functions together, with these functions."""
+        alike: dict[tuple[int, Hashable], list[int]] = {}
+        for index, key in enumerate(zip(self.shapes[places].tolist(), kinds, strict=True)):
+            alike.setdefault(key, []).append(index)
+        return [(np.array(indices), self.functions[shape]) for (shape, _), indices in alike.items()]
 
     def runs(self) -> Iterator[slice]:
         """Runs of blocks of similar size, whose matrices share an array."""
@@ -75,6 +83,9 @@ class Group:
 @dataclass(frozen=True, eq=False)
 class Frame:
     """Data of all groups of a calculation.
+
+    The doubled row of a block is 2F plus twice the rows of lower K: half the sum of this and 2(N - F), from the lowest N on, is the row of
+    a rotational block.
 
     twice_f: doubled F. lowest: lowest N. count: rows of each K, one for each N and some to spare. kinds, rows, k, sizes: of rotational
     blocks by number: their kinds, rows in tables, K of axial functions and numbers of states. energies_mhz: (rows, states) by kind.
@@ -91,10 +102,6 @@ class Frame:
     sizes: list[int]
     patterns: dict[int, list[int]]
     n_patterns: list[NPattern]
-
-    def twice_row(self, twice_f: int, number: int) -> int:
-        """2F plus the rows of lower K: half the sum of this and 2(N - F), from the lowest N on, is the row of a rotational block."""
-        return twice_f + 2 * self.count * self.k[number]
 
     @property
     def n_of_rows(self) -> Ints:
@@ -122,21 +129,23 @@ def frame_of(stacks: Sequence[Stack], table: PatternTable) -> Frame:
     lowest, highest = min(int(stack.n.min()) for stack in stacks), max(int(stack.n.max()) for stack in stacks)
     total, twice_f = sum(len(stack.numbers) for stack in stacks), list(table.places)
     count = max(highest - lowest, (twice_f[-1] - twice_f[0]) // 2) + _SPARE
-    kinds, k, sizes = [0] * total, [0] * total, [0] * total
-    rows, most = np.zeros(total, dtype=np.int64), dict[int, int]()
+    kinds, k, sizes, rows = np.zeros((4, total), dtype=np.int64)
+    most = dict[int, int]()
     for stack in stacks:
         most[stack.kind] = max(most.get(stack.kind, 0), *stack.sizes)
-        for number, block, size in zip(stack.numbers.tolist(), stack.blocks, stack.sizes, strict=True):
-            basis = block.parts[0].basis
-            k[number] = basis.axial_k if isinstance(basis, AxialState) else 0
-            kinds[number], sizes[number], rows[number] = stack.kind, size, block.j - lowest + count * k[number]
-    energies = {kind: np.zeros((count * (max(k) + 1), states)) for kind, states in most.items()}
+        kinds[stack.numbers], sizes[stack.numbers] = stack.kind, stack.sizes
+        k[stack.numbers] = 0 if stack.k is None else stack.k
+        rows[stack.numbers] = stack.n - lowest + count * k[stack.numbers]
+    energies = {kind: np.zeros((count * (int(k.max()) + 1), states)) for kind, states in most.items()}
     for stack in stacks:
-        for number, block, size in zip(stack.numbers.tolist(), stack.blocks, stack.sizes, strict=True):
-            energies[stack.kind][rows[number], :size] = block.energies_mhz
+        place, state = stack.places
+        of_states = np.concatenate([block.energies_mhz for block in stack.blocks])
+        energies[stack.kind][rows[stack.numbers][place], state] = of_states
     patterns = {f: numbers.tolist() for f, numbers in table.places.items()}
     n_patterns = [(rise, symmetry_class) for rise, symmetry_class in table.distances[:, [0, -1]].tolist()]
-    return Frame(twice_f, lowest, count, kinds, rows, k, energies, sizes, patterns, n_patterns)
+    return Frame(
+        twice_f, lowest, count, kinds.tolist(), rows, k.tolist(), energies, sizes.tolist(), patterns, n_patterns
+    )
 
 
 def tables_of(contracted: Sequence[Contracted], frame: Frame) -> Tables:
@@ -152,60 +161,92 @@ def tables_of(contracted: Sequence[Contracted], frame: Frame) -> Tables:
     return out
 
 
-def groups_of(members: Sequence[tuple[int, Sequence[SpinPart]]], frame: Frame) -> list[tuple[Group, list[int]]]:
+class _Shape(NamedTuple):
+    """What blocks have in common that differ only in F and K: their layout, and the patterns and number of states of each part."""
+
+    layout: Layout
+    patterns: tuple[tuple[int, ...], ...]
+    sizes: tuple[int, ...]
+
+
+def groups_of(twice_f: Ints, parts: PartColumns, frame: Frame) -> list[tuple[Group, list[int]]]:
     """Group blocks (doubled F and parts); each group comes with the numbers of its blocks."""
-    layouts = [_layout(frame.patterns[f], parts, frame) for f, parts in members]
-    rows = [frame.twice_row(f, parts[0].number) for f, parts in members]
-    columns = {layout: frozenset(layout) for layout in set(layouts)}
-    layouts_and_members: list[tuple[Layout, dict[int, int]]] = []
-    for number in sorted(range(len(members)), key=lambda number: -members[number][0]):
+    shapes, shape_of = _shapes(twice_f, parts, frame)
+    twice_rows = twice_f + 2 * frame.count * np.array(frame.k, dtype=np.int64)[parts.lowest]
+    layouts = [shapes[shape].layout for shape in shape_of.tolist()]
+    columns = {layout: frozenset(layout) for layout in dict.fromkeys(layouts)}
+    grouped: list[tuple[Layout, dict[int, int]]] = []
+    falling, rows = np.argsort(-twice_f, kind="stable"), twice_rows.tolist()
+    for number in falling.tolist():
         row, layout = rows[number], layouts[number]
-        for group_layout, by_row in layouts_and_members:
-            if row not in by_row and columns[layout] <= columns[group_layout]:
+        for group_layout, by_row in grouped:
+            if row not in by_row and (layout is group_layout or columns[layout] <= columns[group_layout]):
                 by_row[row] = number
                 break
         else:
-            layouts_and_members.append((layout, {row: number}))
-    grouped = [(layout, [by_row[row] for row in sorted(by_row)]) for layout, by_row in layouts_and_members]
-    return [
-        (_group(layout, [(*members[i], rows[i], layouts[i]) for i in numbers], frame), numbers)
-        for layout, numbers in grouped
-    ]
+            grouped.append((layout, {row: number}))
+    out = list[tuple[Group, list[int]]]()
+    for layout, by_row in grouped:
+        numbers = [by_row[row] for row in sorted(by_row)]
+        out.append((_group(layout, twice_f[numbers], twice_rows[numbers], shapes, shape_of[numbers], frame), numbers))
+    return out
 
 
-def _group(layout: Layout, members: Sequence[tuple[int, Sequence[SpinPart], int, Layout]], frame: Frame) -> Group:
-    """The group with a layout; members: doubled F, parts, doubled row (rising) and layout of each block."""
+def groups_by_number(grouped: Sequence[tuple[Group, list[int]]]) -> dict[int, tuple[Group, int]]:
+    """The group of each block, and its doubled row."""
+    pairs = ((group, zip(numbers, group.twice_rows.tolist(), strict=True)) for group, numbers in grouped)
+    return {number: (group, row) for group, numbers_and_rows in pairs for number, row in numbers_and_rows}
+
+
+def _shapes(twice_f: Ints, parts: PartColumns, frame: Frame) -> tuple[list[_Shape], Ints]:
+    """The distinct shapes of blocks, and the number of the shape of each block."""
+    sets: dict[tuple[int, ...], int] = {}
+    set_of_f = {f: sets.setdefault(tuple(numbers), len(sets)) for f, numbers in frame.patterns.items()}
+    kinds, sizes = np.array(frame.kinds), np.array(frame.sizes)
+    codes = kinds[parts.numbers] * (1 + sizes.max()) + sizes[parts.numbers]
+    for rows in (parts.first, parts.last):
+        codes = codes * (1 + len(frame.n_patterns)) + rows
+    code_of_part, begins = codes.tolist(), parts.begins.tolist()
+    known, shapes, out = dict[tuple[int, ...], int](), list[_Shape](), []
+    for number, (f, begin, count) in enumerate(zip(twice_f.tolist(), begins, parts.counts.tolist(), strict=True)):
+        key = (set_of_f[f], *code_of_part[begin : begin + count])
+        if key not in known:
+            known[key] = len(shapes)
+            shapes.append(_shape(frame.patterns[f], parts.of_block(number), frame))
+        out.append(known[key])
+    return shapes, np.array(out, dtype=np.int64)
+
+
+def _shape(numbers: Sequence[int], parts: Sequence[SpinPart], frame: Frame) -> _Shape:
+    """The shape of a block from the numbers of the patterns of its F."""
+    patterns = tuple(tuple(numbers[part.patterns]) for part in parts)
+    n_patterns = [frame.n_patterns[of_part[0]] for of_part in patterns]
+    kinds_and_sizes = [(frame.kinds[part.number], frame.sizes[part.number]) for part in parts]
+    layout = [(n_pattern, kind) for n_pattern, (kind, _) in zip(n_patterns, kinds_and_sizes, strict=True)]
+    return _Shape(tuple(layout), patterns, tuple(size for _, size in kinds_and_sizes))
+
+
+def _group(
+    layout: Layout, twice_f: Ints, twice_rows: Ints, shapes: Sequence[_Shape], shape_of: Ints, frame: Frame
+) -> Group:
+    """The group with a layout; doubled F, doubled row (rising) and number of the shape of each block."""
     rotations, start = list[RotationColumns](), 0
     for n_pattern, kind in layout:
         first, count = frame.n_patterns.index(n_pattern), frame.n_patterns.count(n_pattern)
         rotations.append(RotationColumns(n_pattern[0], kind, slice(first, first + count), slice(start, start + count)))
         start += count
     place_of = {n_pattern_and_kind: place for place, n_pattern_and_kind in enumerate(layout)}
-    functions, heights = list[tuple[Ints, Ints]](), list[int]()
-    known: dict[tuple[object, ...], tuple[Ints, Ints]] = {}  # of blocks with the same columns and sizes
-    for f, parts, _, block_layout in members:
-        numbers, sizes = frame.patterns[f], tuple(frame.sizes[part.number] for part in parts)
-        order = list[int]()
-        for part, n_pattern_and_kind in zip(parts, block_layout, strict=True):
+    functions, heights = dict[int, tuple[Ints, Ints]](), np.zeros(len(shapes), dtype=np.int64)
+    for number in dict.fromkeys(shape_of.tolist()):
+        shape, columns = shapes[number], list[int]()
+        for part_patterns, n_pattern_and_kind in zip(shape.patterns, shape.layout, strict=True):
             rotation = rotations[place_of[n_pattern_and_kind]]
-            shift = rotation.columns.start - rotation.patterns.start
-            order += [pattern + shift for pattern in numbers[part.patterns]]
-        key = (sizes, *order)
-        if key not in known:
-            states = np.repeat(sizes, [part.repeats for part in parts])
-            ends = np.cumsum(states)
-            known[key] = np.repeat(order, states), np.arange(ends[-1]) - np.repeat(ends - states, states)
-        functions.append(known[key])
-        heights.append(max(sizes))
-    twice_rows = [row for _, _, row, _ in members]
-    places = {row: place for place, row in enumerate(twice_rows)}
-    twice_f = np.array([f for f, *_ in members])
-    return Group(tuple(rotations), twice_f, np.array(twice_rows), np.array(heights), functions, places)
-
-
-def _layout(numbers: Sequence[int], parts: Sequence[SpinPart], frame: Frame) -> Layout:
-    """The layout of a block from the numbers of its patterns."""
-    return tuple((frame.n_patterns[numbers[part.patterns.start]], frame.kinds[part.number]) for part in parts)
+            columns += [pattern + rotation.columns.start - rotation.patterns.start for pattern in part_patterns]
+        sizes = np.repeat(shape.sizes, [len(part_patterns) for part_patterns in shape.patterns])
+        run, states = numbers_in_runs(sizes)
+        functions[number], heights[number] = (np.array(columns)[run], states), max(shape.sizes)
+    places = {row: place for place, row in enumerate(twice_rows.tolist())}
+    return Group(tuple(rotations), twice_f, twice_rows, heights[shape_of], shape_of, functions, places)
 
 
 def are_connected(up: Group, low: Group, step: int, tables: Tables) -> bool:

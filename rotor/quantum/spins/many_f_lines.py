@@ -91,11 +91,12 @@ class GroupStates:
 
     def _scattered(self, places: Ints) -> Floats:
         """Vectors of some blocks over the functions of the group."""
-        height, count = self.group.heights[self.in_group[places]].max(), self.sizes[places].max()
-        vectors = np.zeros((len(places), self.group.columns, height, count))
-        for row, place in enumerate(places.tolist()):
-            block = self.blocks[place]
-            vectors[row, *self.group.functions[self.in_group[place]], : len(block.energies_mhz)] = block.vectors
+        in_group, sizes = self.in_group[places], self.sizes[places]
+        vectors = np.zeros((len(places), self.group.columns, self.group.heights[in_group].max(), sizes.max()))
+        for at, (columns, states) in self.group.by_shape(in_group, sizes.tolist()):
+            of_shape = np.concatenate([self.blocks[place].vectors for place in places[at].tolist()])
+            count = of_shape.shape[1]
+            vectors[at[:, None], columns, states, :count] = of_shape.reshape(len(at), len(columns), count)
         return vectors
 
 
@@ -140,20 +141,22 @@ def connections_of(blocks: Sequence[Any], moments: Moments) -> Connections:
 
 def groups_of_blocks(blocks: Sequence[SpinBlock], levels: int) -> list[GroupStates]:
     """The groups in which blocks were solved with these blocks; levels: the row of padding."""
-    members: dict[int, list[SpinBlock]] = {}
-    frame: Frame = blocks[0].shared.cache["frame"]
-    for block in sorted(blocks, key=lambda block: block.twice_row(frame)):
-        members.setdefault(id(block.group), []).append(block)
-    return [_states_of_group(alike, frame, levels) for alike in members.values()]
+    members: dict[int, tuple[list[SpinBlock], list[int]]] = {}
+    rows = np.array([block.twice_row for block in blocks])
+    for number, row in zip((order := np.argsort(rows, kind="stable")).tolist(), rows[order].tolist(), strict=True):
+        blocks_and_rows = members.setdefault(id(blocks[number].group), ([], []))
+        blocks_and_rows[0].append(blocks[number])
+        blocks_and_rows[1].append(row)
+    return [_states_of_group(*alike, levels) for alike in members.values()]
 
 
-def _states_of_group(blocks: list[SpinBlock], frame: Frame, levels: int) -> GroupStates:
+def _states_of_group(blocks: list[SpinBlock], twice_rows: list[int], levels: int) -> GroupStates:
     """Blocks of one group by rising row."""
     sizes = np.array([len(block.energies_mhz) for block in blocks])
     starts, numbers = np.array([block.start for block in blocks], dtype=np.int32), np.arange(max(sizes), dtype=np.int32)
     rows = np.where(numbers < sizes[:, None], starts[:, None] + numbers, np.int32(levels))
     group = blocks[0].group
-    return GroupStates(group, blocks, {block.twice_row(frame): place for place, block in enumerate(blocks)}, rows)
+    return GroupStates(group, blocks, {row: place for place, row in enumerate(twice_rows)}, rows)
 
 
 def _between(

@@ -7,11 +7,13 @@ each sub-block has as many levels as functions. Among the levels of one sub-bloc
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import cached_property
+from typing import NamedTuple, overload
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, numbers_in_runs
+from rotor.frozen import dataclass
 from rotor.quantum.levels import SolvedBlock
 
 _AT_A_TIME = 1000  # entries of a table of weights that are examined together
@@ -32,6 +34,81 @@ class SpinPart(NamedTuple):
     def repeats(self) -> int:
         """Number of patterns."""
         return int(self.patterns.stop - self.patterns.start)
+
+
+@dataclass(frozen=True, eq=False)
+class PartColumns:
+    """Parts of many blocks in columns, block after block.
+
+    rotors: all rotational blocks. counts: number of parts of each block. numbers: rotational block of each part. first, last: rows of its
+    patterns among those of the F. stops: last row of the part in the block.
+    """
+
+    rotors: Sequence[SolvedBlock]
+    counts: Ints
+    numbers: Ints
+    first: Ints
+    last: Ints
+    stops: Ints
+
+    @classmethod
+    def from_parts(cls, rotors: Sequence[SolvedBlock], blocks: Sequence[Sequence[SpinPart]]) -> PartColumns:
+        """The parts of these blocks."""
+        rows = [(p.number, p.patterns.start, p.patterns.stop, p.place.stop) for parts in blocks for p in parts]
+        counts: Ints = np.array([len(parts) for parts in blocks], dtype=np.int64)
+        return cls(rotors, counts, *np.array(rows, dtype=np.int64).reshape(-1, 4).T)
+
+    @cached_property
+    def begins(self) -> Ints:
+        """The first part of each block."""
+        return _starts(self.counts)
+
+    @property
+    def lowest(self) -> Ints:
+        """The first rotational block of each block."""
+        return np.asarray(self.numbers[self.begins])
+
+    @cached_property
+    def of_one_state(self) -> bool:
+        """Whether each rotational block is a single Wang block, or one function |N K⟩."""
+        return all(len(rotor.parts) == 1 for rotor in self.rotors)
+
+    def chosen(self, blocks: Ints) -> PartColumns:
+        """The parts of some blocks."""
+        _, parts = numbers_in_runs(self.counts[blocks], self.begins[blocks])
+        columns = (column[parts] for column in (self.numbers, self.first, self.last, self.stops))
+        return PartColumns(self.rotors, self.counts[blocks], *columns)
+
+    def of_block(self, block: int) -> tuple[SpinPart, ...]:
+        """The parts of a block."""
+        parts, start = list[SpinPart](), 0
+        here = slice(int(self.begins[block]), int(self.begins[block] + self.counts[block]))
+        columns = (column[here].tolist() for column in (self.numbers, self.first, self.last, self.stops))
+        for number, first, last, stop in zip(*columns, strict=True):
+            parts.append(SpinPart(number, self.rotors[number], slice(first, last), slice(start, stop)))
+            start = stop
+        return tuple(parts)
+
+
+class PartsOfBlock(Sequence[SpinPart]):
+    """The parts of one block of many, made when they are read first."""
+
+    def __init__(self, columns: PartColumns, block: int) -> None:
+        self._columns, self._block = columns, block
+
+    @cached_property
+    def _parts(self) -> tuple[SpinPart, ...]:
+        return self._columns.of_block(self._block)
+
+    @overload
+    def __getitem__(self, place: int) -> SpinPart: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[SpinPart, ...]: ...
+    def __getitem__(self, place: int | slice) -> SpinPart | tuple[SpinPart, ...]:
+        return self._parts[place]
+
+    def __len__(self) -> int:
+        return len(self._parts)
 
 
 def named_states(rotor: SolvedBlock, vectors: Floats) -> Ints:
@@ -59,15 +136,15 @@ def labels_by_shares(names: Ints, sizes: Ints, vectors: Floats) -> tuple[Ints, F
     return labels, np.asarray(shares[block, sub_block_of_state, np.arange(n)])
 
 
-def over_functions(parts_of_blocks: Sequence[tuple[SpinPart, ...]], vectors: Floats) -> Floats:
+def over_functions(columns: PartColumns, blocks: Sequence[int], vectors: Floats) -> Floats:
     """Vectors (blocks, n, n) over rotational functions instead of states; unchanged if each state belongs to one Wang block anyway."""
-    if all(len(part.rotor.parts) == 1 for parts in parts_of_blocks for part in parts):
+    if columns.of_one_state:
         return vectors
-    pairs = zip(parts_of_blocks, vectors, strict=True)
+    pairs = zip(blocks, vectors, strict=True)
     return np.stack(
         [
-            np.concatenate([_over_functions(part, vectors_of_block) for part in parts])
-            for parts, vectors_of_block in pairs
+            np.concatenate([_over_functions(part, vectors_of_block) for part in columns.of_block(block)])
+            for block, vectors_of_block in pairs
         ]
     )
 
@@ -102,14 +179,18 @@ class Names(NamedTuple):
     sub_blocks: Ints
 
 
-def names_of_parts(parts: Sequence[SpinPart], patterns: Ints, first_rows: Ints | int = 0) -> Names:
+def names_of_block(parts: Sequence[SpinPart], patterns: Ints) -> Names:
+    """Labels of the levels of a block with these patterns."""
+    distinct = {part.number: (place, part.rotor) for place, part in enumerate(parts)}
+    rotors, places = [rotor for _, rotor in distinct.values()], dict(zip(distinct, range(len(distinct)), strict=True))
+    numbered = [part._replace(number=places[part.number]) for part in parts]
+    return names_of_parts(PartColumns.from_parts(rotors, [numbered]), patterns)
+
+
+def names_of_parts(columns: PartColumns, patterns: Ints, first_rows: Ints | int = 0) -> Names:
     """Labels of the levels of parts, whose patterns count from the first row of their F in a table of patterns."""
-    rotors = {part.number: part.rotor for part in parts}
-    places = dict(zip(rotors, range(len(rotors)), strict=True))
-    wang_names = [[wang_part.names for wang_part in rotor.parts] for rotor in rotors.values()]
-    rotor = np.array([places[part.number] for part in parts])
-    repeats: Ints = np.array([part.patterns.stop - part.patterns.start for part in parts])
-    rows = np.asarray([part.patterns.start for part in parts], dtype=np.int64) + first_rows
+    wang_names = [[wang_part.names for wang_part in rotor.parts] for rotor in columns.rotors]
+    rotor, repeats, rows = columns.numbers, columns.last - columns.first, columns.first + first_rows
 
     counts: Ints = np.array([len(names) for names in wang_names])  # Wang blocks of each rotational block
     part, wang_part = numbers_in_runs(counts[rotor], _starts(counts)[rotor])

@@ -6,16 +6,16 @@ Matrices are computed for all blocks of a group at once (`many_f`), or over the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import accumulate
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints, end_to_end
-from rotor.quantum.spins.blocks import Member, Plan, SpinBlock, States, blocks_of_f, diagonalised
+from rotor.quantum.spins.blocks import Members, Plan, SpinBlock, States, blocks_of_f, diagonalised
 from rotor.quantum.spins.hamiltonians import hamiltonians
-from rotor.quantum.spins.many_f import Group, frame_of, groups_of
-from rotor.quantum.spins.parts import labels_by_shares, names_of_parts, over_functions
+from rotor.quantum.spins.many_f import Group, frame_of, groups_by_number, groups_of
+from rotor.quantum.spins.parts import PartsOfBlock, labels_by_shares, names_of_parts, over_functions
 from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import Exist
 
@@ -26,67 +26,66 @@ def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) 
     table = pattern_table(shared.scheme, all_f[0], all_f[-1])
     patterns = {f: table.patterns[f] for f in all_f if f in table.patterns}
     frame = shared.cache["frame"] = frame_of(shared.stacks, table)
+    solutions: Iterable[States]
     if shared.scheme.equivalent == 3:
         from rotor.quantum.spins.three_equivalent import allowed_states
 
         members, solutions = allowed_states(plan, patterns, exist)
-        grouped = groups_of([member[:2] for member in members], frame)
+        grouped = groups_of(members.twice_f, members.parts, frame)
     else:
-        members = _existing_members(plan, patterns, exist)
-        grouped = groups_of([member[:2] for member in members], frame)
+        members = _members(plan, patterns)
+        members = members if exist is None or not len(members.twice_f) else members.existing(exist)
+        grouped = groups_of(members.twice_f, members.parts, frame)
         solutions = _states(plan, members, grouped)
-    groups = {number: group for group, numbers in grouped for number in numbers}
-    starts = list(accumulate((len(member.names) for member in members), initial=0))
-    out: list[SpinBlock] = [None] * len(members)  # type: ignore[list-item]
+    groups = groups_by_number(grouped)
+    twice_f, starts = members.twice_f.tolist(), (np.cumsum(members.levels) - members.levels).tolist()
+    out: list[SpinBlock] = [None] * len(twice_f)  # type: ignore[list-item]
     for states in solutions:
-        for i, energies, vectors, labels, mixing in _named(states, [members[i] for i in states.numbers]):
-            f, parts, _, _, allowed = members[i]
+        for i, energies, vectors, labels, mixing in _named(states, members):
+            f, parts, allowed = (
+                twice_f[i],
+                PartsOfBlock(members.parts, i),
+                members.allowed[i] if members.allowed else None,
+            )
             results = energies, vectors, labels, mixing
-            out[i] = SpinBlock(f, patterns[f], parts, *results, shared, groups[i], starts[i], allowed)
+            out[i] = SpinBlock(f, patterns[f], parts, *results, shared, *groups[i], starts[i], allowed)
     return out
 
 
-def _named(states: States, members: Sequence[Member]) -> Iterator[tuple[int, Floats, Floats, Ints, Floats]]:
+def _named(states: States, members: Members) -> Iterator[tuple[int, Floats, Floats, Ints, Floats]]:
     """Number, energies, vectors over parts, labels and mixing of each solved block of one size."""
-    names = np.concatenate([member.names for member in members]).reshape(len(members), *members[0].names.shape)
-    sizes = np.concatenate([member.sizes for member in members]).reshape(len(members), -1)
+    names, sizes = members.alike(states.numbers)
     vectors: Sequence[Floats] | Floats = states.vectors
-    if members[0].allowed is None:
-        labels, mixing = labels_by_shares(names, sizes, over_functions([m.parts for m in members], states.vectors))
+    if not members.allowed:
+        over = over_functions(members.parts, states.numbers, states.vectors)
+        labels, mixing = labels_by_shares(names, sizes, over)
     else:
         labels, mixing = labels_by_shares(names, sizes, states.vectors)
-        vectors = [
-            m.allowed.products @ mixtures for m, mixtures in zip(members, states.vectors, strict=True) if m.allowed
-        ]
+        products = (members.allowed[number].products for number in states.numbers)
+        vectors = [of_block @ mixtures for of_block, mixtures in zip(products, states.vectors, strict=True)]
     yield from zip(states.numbers, states.energies_mhz, vectors, labels, mixing, strict=True)
 
 
-def _existing_members(plan: Plan, patterns: dict[int, Ints], exist: Exist | None) -> list[Member]:
-    """The blocks in which a level exists."""
-    candidates = blocks_of_f(plan, patterns)
-    if not candidates:  # N of the first K (KNMIN) is above every N of these F
-        return []
-    table = end_to_end(list(patterns.values()))
+def _members(plan: Plan, patterns: dict[int, Ints]) -> Members:
+    """The blocks of all F; none where N of the first K (KNMIN) is above every N of these F."""
+    twice_f, parts = blocks_of_f(plan, patterns)
     first_rows = dict(zip(patterns, accumulate(map(len, patterns.values()), initial=0), strict=False))
-    parts = [part for _, parts_of_block in candidates for part in parts_of_block]
-    counts: Ints = np.array([len(parts_of_block) for _, parts_of_block in candidates])
-    names, sizes, sub_blocks = names_of_parts(parts, table, np.repeat([first_rows[f] for f, _ in candidates], counts))
-    stops = np.cumsum([0, *(parts_of_block[-1].place.stop for _, parts_of_block in candidates)])
-    lasts = np.append(0, np.cumsum(np.add.reduceat(sub_blocks, np.asarray(np.cumsum(counts) - counts))))
-    exists = np.ones(len(candidates), dtype=bool)
-    if exist is not None:
-        exists = np.logical_or.reduceat(exist(names), stops[:-1])
-    name_bounds, size_bounds = stops.tolist(), lasts.tolist()
-    return [
-        Member(*candidates[i], names[name_bounds[i] : name_bounds[i + 1]], sizes[size_bounds[i] : size_bounds[i + 1]])
-        for i in np.flatnonzero(exists).tolist()
-    ]
+    of_block = np.array([first_rows[f] for f in twice_f.tolist()], dtype=np.int64)
+    table = end_to_end(list(patterns.values()))
+    names, sizes, sub_blocks = names_of_parts(parts, table, np.repeat(of_block, parts.counts))
+    levels, subs = (
+        np.add.reduceat(counts, parts.begins) if len(twice_f) else np.zeros(0, dtype=np.int64)
+        for counts in ((parts.last - parts.first) * np.array(plan.sizes)[parts.numbers], sub_blocks)
+    )
+    return Members(twice_f, parts, names, sizes, levels, subs)
 
 
-def _states(plan: Plan, members: Sequence[Member], grouped: Sequence[tuple[Group, list[int]]]) -> Iterator[States]:
+def _states(plan: Plan, members: Members, grouped: Sequence[tuple[Group, list[int]]]) -> Iterator[States]:
     """The states of blocks, those of one size together."""
-    zeros = np.array([member.parts[0].rotor.energies_mhz[0] for member in members])  # energy zero of each block
-    kinds = [_kind(plan, member) for member in members]
+    zeros = np.array([block.energies_mhz[0] for block in plan.blocks])[
+        members.parts.lowest
+    ]  # energy zero of each block
+    kinds = _kinds(plan, members)
     alike: dict[tuple[int, ...], list[tuple[list[int], Floats]]] = {}
     for numbers, matrices in hamiltonians(plan, grouped, kinds, zeros):
         alike.setdefault(kinds[numbers[0]], []).append((numbers, matrices))
@@ -99,10 +98,12 @@ def _states(plan: Plan, members: Sequence[Member], grouped: Sequence[tuple[Group
             yield diagonalised(numbers, matrices, zeros[numbers])
 
 
-def _kind(plan: Plan, member: Member) -> tuple[int, int, int]:
-    """Functions and sub-blocks of a block, and the number of patterns where each rotational state is solved by itself, else 1."""
-    by_state = plan.shared.state_by_state and len(member.parts) == 1
-    return len(member.names), len(member.sizes), member.parts[0].repeats if by_state else 1
+def _kinds(plan: Plan, members: Members) -> list[tuple[int, int, int]]:
+    """Functions and sub-blocks of each block, and the number of patterns where each rotational state is solved by itself, else 1."""
+    parts, repeats = members.parts, np.ones(len(members.levels), dtype=np.int64)
+    if plan.shared.state_by_state:
+        repeats = np.where(parts.counts == 1, (parts.last - parts.first)[parts.begins], 1)
+    return list(zip(members.levels.tolist(), members.sub_blocks.tolist(), repeats.tolist(), strict=True))
 
 
 def _state_by_state(matrices: Floats, repeats: int, zeros_mhz: Floats) -> tuple[Floats, Floats]:

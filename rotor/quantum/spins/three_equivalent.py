@@ -20,10 +20,10 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, symmetric_from_lower
 from rotor.quantum.connected import part_numbers
-from rotor.quantum.spins.blocks import Member, Plan, States, diagonalised
+from rotor.quantum.spins.blocks import Members, Plan, States, diagonalised
 from rotor.quantum.spins.hamiltonians import hamiltonians
 from rotor.quantum.spins.many_f import groups_of
-from rotor.quantum.spins.parts import SpinPart
+from rotor.quantum.spins.parts import PartColumns, SpinPart
 from rotor.quantum.spins.rotor import Exist
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.spins.threefold_rotor import wang_functions
@@ -34,30 +34,42 @@ from rotor.tops.operators import axis_order
 _ZERO = 1e-12  # smaller elements, relative to the largest, are round-off of sums that cancel
 
 
-def allowed_states(
-    plan: Plan, patterns: Mapping[int, Ints], exist: Exist | None
-) -> tuple[list[Member], Iterator[States]]:
+def allowed_states(plan: Plan, patterns: Mapping[int, Ints], exist: Exist | None) -> tuple[Members, Iterator[States]]:
     """The blocks of all F over allowed functions in which a level exists, and their states."""
     wholes = [(f, parts) for f, patterns_of_f in patterns.items() if (parts := _parts(plan, patterns_of_f))]
     allowed = [_allowed(plan, patterns[f], parts) for f, parts in wholes]
     found = dict[int, Floats]()
-    grouped, sizes = groups_of(wholes, plan.shared.cache["frame"]), [(len(each.products),) for each in allowed]
+    columns = PartColumns.from_parts(plan.blocks, [parts for _, parts in wholes])
+    grouped = groups_of(np.array([f for f, _ in wholes], dtype=np.int64), columns, plan.shared.cache["frame"])
+    sizes = [(len(each.products),) for each in allowed]
     for numbers, matrices in hamiltonians(plan, grouped, sizes, np.zeros(len(wholes))):
         for number, matrix in zip(numbers, symmetric_from_lower(np.tril(matrices)), strict=True):
             found[number] = allowed[number].products.T @ matrix @ allowed[number].products
-    members, solved = list[Member](), list[Floats]()
+    members, solved = list[tuple[int, tuple[SpinPart, ...], Allowed]](), list[Floats]()
     for number in sorted(found):
         functions, matrix = allowed[number], found[number]
         for chosen in _connected(matrix, functions.sub_block) if len(matrix) else ():
             parts, block = _part_of(wholes[number][1], functions, chosen)
             if exist is None or exist(block.names).any():
-                members.append(Member(wholes[number][0], parts, block.names, block.sizes, block))
+                members.append((wholes[number][0], parts, block))
                 solved.append(matrix[np.ix_(chosen, chosen)])
     solutions = (
         diagonalised([number], (matrix - matrix[0, 0] * np.eye(len(matrix)))[None], matrix[:1, 0])
         for number, matrix in enumerate(solved)
     )
-    return members, solutions
+    return _columns(plan, members), solutions
+
+
+def _columns(plan: Plan, members: Sequence[tuple[int, tuple[SpinPart, ...], Allowed]]) -> Members:
+    """Blocks, by their doubled F, parts and functions, as columns."""
+    allowed = [functions for _, _, functions in members]
+    counts = np.array([(len(each.names), len(each.sizes)) for each in allowed], dtype=np.int64).reshape(-1, 2).T
+    tables = ([each.names for each in allowed], [each.sizes for each in allowed])
+    names, sizes = (np.concatenate(table) if table else np.zeros((0, 4), dtype=np.int64) for table in tables)
+    parts = PartColumns.from_parts(plan.blocks, [parts for _, parts, _ in members])
+    return Members(
+        np.array([f for f, *_ in members], dtype=np.int64), parts, names, sizes, counts[0], counts[1], allowed
+    )
 
 
 def _parts(plan: Plan, patterns: Ints) -> tuple[SpinPart, ...]:

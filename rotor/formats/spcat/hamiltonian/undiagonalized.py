@@ -13,7 +13,7 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.labels import renamed, wang_functions
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
-from rotor.quantum.spins.parts import names_of_parts
+from rotor.quantum.spins.parts import names_of_block
 
 UNDIAGONALIZED_NOTE = (
     "DIAG is below 0: the energies are diagonal elements of the Hamiltonian over the functions of the file, as in SPCAT, and each "
@@ -57,7 +57,7 @@ def _functions_as_states(block: SolvedBlock | SpinBlock, representation: str) ->
         names, amplitudes = functions.names, functions.amplitudes
     else:  # |N K⟩ with each pattern: the rows of the vectors
         assert isinstance(block, SpinBlock)
-        names, amplitudes = names_of_parts(block.parts, block.patterns).labels, block.vectors
+        names, amplitudes = names_of_block(block.parts, block.patterns).labels, block.vectors
     diagonal: Floats = amplitudes**2 @ block.energies_mhz
     order = np.argsort(diagonal, kind="stable")  # stable: equal diagonal elements keep the order of functions
     vectors = (block.vectors @ amplitudes.T)[:, order]
