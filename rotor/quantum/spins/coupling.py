@@ -169,16 +169,21 @@ def moment_coefficients(spins: tuple[int, ...], rank: int, acting: int | None, b
     dipole, it is the product over the chain of A. R. Edmonds (1957), eq. (7.1.7).
     """
     left, right = np.broadcast_arrays(bra[..., :, None, :], ket[..., None, :, :])
-    near = np.ones(left.shape[:-1], dtype=bool)
-    # an operator of rank K changes no intermediate angular momentum by more than K
-    for column in range(left.shape[-1]):
-        near &= np.abs(left[..., column] - right[..., column]) <= 2 * max(rank, 1)
+    near = within_reach(rank, bra, ket)
     out = np.zeros(near.shape)
-    out[near] = _moment_products(spins, rank, acting, left[near], right[near])
+    out[near] = moment_products(spins, rank, acting, left[near], right[near])
     return out
 
 
-def _moment_products(spins: tuple[int, ...], rank: int, acting: int | None, left: Ints, right: Ints) -> Floats:
+def within_reach(rank: int, bra: Ints, ket: Ints) -> NDArray[np.bool_]:
+    """Pairs of patterns (..., bra, ket) between which a moment acts: rank K changes no intermediate angular momentum by more than K."""
+    near = np.ones((*bra.shape[:-1], ket.shape[-2]), dtype=bool)
+    for column in range(bra.shape[-1]):
+        near &= np.abs(bra[..., :, None, column] - ket[..., None, :, column]) <= 2 * max(rank, 1)
+    return near
+
+
+def moment_products(spins: tuple[int, ...], rank: int, acting: int | None, left: Ints, right: Ints) -> Floats:
     """The coefficients of pairs of patterns (pairs, columns)."""
     total = np.ones(len(left))
     if acting is not None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Workspace
 from rotor.quantum.spins.blocks import Plan
-from rotor.quantum.spins.many_f import Frame, Group, Tables, between, tables_of
+from rotor.quantum.spins.many_f import Coefficients, Frame, Group, Tables, between, of_all_f, tables_of
 from rotor.quantum.spins.pattern_tables import couplings_by_f
 
 
@@ -24,7 +24,8 @@ def hamiltonians(
     for contracted, channels in plan.contracted:
         if contracted:
             each = [couplings_by_f(scheme, channel, frame.twice_f[0], frame.twice_f[-1]) for channel in channels]
-            acting.append((tables_of(contracted, frame), each[0] if len(each) == 1 else np.add.reduce(each)))
+            whole = each[0] if len(each) == 1 else np.add.reduce(each)
+            acting.append((tables_of(contracted, frame), of_all_f(whole, frame)))
     space = Workspace()
     for group, numbers in grouped:
         kinds_of_group = [kinds[number] for number in numbers]
@@ -33,7 +34,7 @@ def hamiltonians(
 
 
 def _matrices_of_group(
-    group: Group, kinds: Sequence[tuple[int, ...]], acting: Sequence[tuple[Tables, Floats]], frame: Frame, zeros: Floats,
+    group: Group, kinds: Sequence[tuple[int, ...]], acting: Sequence[tuple[Tables, Coefficients]], frame: Frame, zeros: Floats,
     space: Workspace,
 ) -> Iterator[tuple[list[int], Floats]]:  # fmt: skip
     """Places of blocks of one kind and shape in a group, and their matrices."""

@@ -8,7 +8,7 @@ rotation are tables with a row for each N (and K), coupling coefficients are tab
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +21,9 @@ from rotor.quantum.spins.pattern_tables import PatternTable
 
 Tables = dict[tuple[int, int, int], Floats]
 """Elements (rows, states', states) by the kinds of both blocks and the distance of their rows; a row is that of the second block."""
+
+Coefficients = Callable[[Ints], Callable[[slice, slice], Floats]]
+"""Coefficients (F, patterns', patterns) of doubled F, then of some patterns."""
 
 NPattern = tuple[int, int]
 """2(N - F) and the class of coupling patterns."""
@@ -254,17 +257,27 @@ def are_connected(up: Group, low: Group, step: int, tables: Tables) -> bool:
     return any((a.kind, b.kind, (step + a.rise - b.rise) // 2) in tables for a in up.rotations for b in low.rotations)
 
 
+def of_all_f(coefficients: Floats, frame: Frame) -> Coefficients:
+    """Coefficients from an array (F, patterns', patterns) for all F of the frame."""
+
+    def of_some(twice_f: Ints) -> Callable[[slice, slice], Floats]:
+        chosen = coefficients[frame.rows_of_f(twice_f)]
+        return lambda left, right: chosen[:, left, right]
+
+    return of_some
+
+
 def between(
-    up: Group, low: Group, chosen: Ints, step: int, tables: Tables, coefficients: Floats, frame: Frame,
+    up: Group, low: Group, chosen: Ints, step: int, tables: Tables, coefficients: Coefficients, frame: Frame,
     out: Floats,
 ) -> Floats:  # fmt: skip
     """c(F) ⟨r'‖X‖r⟩ between blocks `chosen` of a group and those of another with doubled row + step, written to `out`.
 
-    tables: elements of the rotation. coefficients: (F, patterns', patterns) for all F of the frame. out: (blocks, columns', states',
-    columns, states).
+    tables: elements of the rotation. coefficients: between patterns (`of_all_f`). out: (blocks, columns', states', columns,
+    states).
     """
     out.fill(0.0)
-    coefficients_of_f = coefficients[frame.rows_of_f(low.twice_f[chosen])]
+    coefficients_of_f = coefficients(low.twice_f[chosen])
     twice_rows = low.twice_rows[chosen]
     for right in low.rotations:
         places = frame.rows_of(twice_rows, right)
@@ -275,7 +288,7 @@ def between(
                 _, rows, columns = element.shape
                 np.multiply(
                     element[:, None, :, None, :],
-                    coefficients_of_f[:, left.patterns, None, right.patterns, None],
+                    coefficients_of_f(left.patterns, right.patterns)[:, :, None, :, None],
                     out=out[:, left.columns, :rows, right.columns, :columns],
                 )
     return out

@@ -10,7 +10,7 @@ see `coupling.moment_coefficients`, which has the coefficients of magnetic momen
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -21,8 +21,19 @@ from rotor.frozen import dataclass
 from rotor.quantum.levels import Connections
 from rotor.quantum.spins.blocks import Shared, SpinBlock
 from rotor.quantum.spins.contraction import tensors_of_stacks
-from rotor.quantum.spins.many_f import Frame, Group, Tables, are_connected, between, consecutive, tables_of
-from rotor.quantum.spins.pattern_tables import tensors_by_f
+from rotor.quantum.spins.many_f import (
+    Coefficients,
+    Frame,
+    Group,
+    Tables,
+    are_connected,
+    between,
+    consecutive,
+    of_all_f,
+    tables_of,
+)
+from rotor.quantum.spins.pattern_tables import tensors_by_f, tensors_of_columns
+from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import Tensors, rank_of
 
 # ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
@@ -165,12 +176,11 @@ def _between(
 ) -> Iterator[Rows]:  # fmt: skip
     """Elements between two groups, whose doubled F differ by `rise` and doubled rows by `step`."""
     frame: Frame = shared.cache["frame"]
-    first, last = frame.twice_f[0], frame.twice_f[-1]
     chosen = [row for row in low.places if row + step in up.places]
     chosen = [row for row in chosen if 2 * low.blocks[low.places[row]].twice_f + rise >= 2 * moments.rank]
     sums = [
         [
-            (acting.tables, tensors_by_f(shared.scheme, acting.rank, rise, first, last, acting.spin))
+            (acting.tables, _coefficients(shared.scheme, frame, acting, rise))
             for acting in interfering
             if are_connected(up.group, low.group, step, acting.tables)
         ]
@@ -190,8 +200,16 @@ def _between(
         yield Rows(up_rows, low_rows, amplitudes, up is low and not step)
 
 
+def _coefficients(scheme: Scheme, frame: Frame, acting: Acting, rise: int) -> Coefficients:
+    """Coefficients of a moment from each doubled F to F + rise: of all patterns, or of each pair of groups where these are many."""
+    arguments = scheme, acting.rank, rise, frame.twice_f[0], frame.twice_f[-1], acting.spin
+    if scheme.equivalent or len(frame.twice_f) * len(frame.n_patterns) ** 2 <= _IN_MEMORY:
+        return of_all_f(tensors_by_f(*arguments), frame)
+    return lambda twice_f: partial(tensors_of_columns, *arguments, twice_f)
+
+
 def _elements(
-    up: Group, low: Group, chosen: Ints, step: int, terms: Sequence[tuple[Tables, Floats]], frame: Frame,
+    up: Group, low: Group, chosen: Ints, step: int, terms: Sequence[tuple[Tables, Coefficients]], frame: Frame,
     bra: Floats, ket: Floats, space: Workspace,
 ) -> Floats:  # fmt: skip
     """Σ V' c ⟨r'‖X‖r⟩ V of operators between blocks of two groups, (blocks, n_up, n_low)."""

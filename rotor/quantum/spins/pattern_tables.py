@@ -12,7 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.coupling import coefficients, for_all_f, moment_coefficients, powers_between
+from rotor.quantum.spins.coupling import (
+    coefficients,
+    for_all_f,
+    moment_coefficients,
+    moment_products,
+    powers_between,
+    within_reach,
+)
 from rotor.quantum.spins.rotor import Channel
 from rotor.quantum.spins.scheme import Scheme
 
@@ -72,6 +79,27 @@ def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int, ac
     """
     table = pattern_table(scheme, first, last)
     return _by_f(table, _coefficients_of_step(scheme, table.patterns, rank, step, acting), step)
+
+
+def tensors_of_columns(
+    scheme: Scheme, rank: int, step: int, first: int, last: int, acting: int | None, twice_f: Ints, left: slice,
+    right: slice,
+) -> Floats:  # fmt: skip
+    """Some columns of `tensors_by_f` (twice_f, left, right), without the others: they have distances between patterns in common for all F.
+
+    Spins are not equivalent.
+    """
+    table = pattern_table(scheme, first, last)
+    bra, ket = table.distances[left, :-1] + step, table.distances[right, :-1]
+    up, low = np.nonzero(within_reach(rank, bra, ket))
+    present = {f: np.isin(np.arange(len(table.distances)), places) for f, places in table.places.items()}
+    nowhere = np.zeros(len(table.distances), dtype=bool)
+    both = [present.get(f + step, nowhere)[left][up] & present.get(f, nowhere)[right][low] for f in twice_f.tolist()]
+    at, pair = np.nonzero(both)
+    up, low, f = up[pair], low[pair], twice_f[at, None]
+    out = np.zeros((len(twice_f), len(bra), len(ket)))
+    out[at, up, low] = moment_products(scheme.twice, rank, acting, bra[up] + f, ket[low] + f)
+    return out
 
 
 def _by_f(table: PatternTable, coefficients: Mapping[int, Floats], step: int) -> Floats:
