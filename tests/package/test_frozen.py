@@ -80,6 +80,8 @@ def test_fields_are_set_and_read(point):
     assert asdict(one)["values"] == (1.0,)
     assert replace(one, x=3.0).x == 3.0
     assert copy.copy(one) == one
+    if sys.version_info >= (3, 13):
+        assert copy.replace(one, x=3.0) == replace(one, x=3.0)
     assert point.__match_args__ == ("x", "values", "made", "hidden")
     assert list(inspect.signature(point).parameters) == ["x", "values", "made", "hidden", "named"]
 
@@ -150,6 +152,17 @@ def test_ours_extends_ours_and_one_of_the_standard_library():
         frozen.dataclass(frozen=True)(
             type("Strict", (dataclasses.dataclass(type("Loose", (), {"__annotations__": {"a": "int"}})),), {})
         )
+
+
+def test_annotations_may_be_types_and_names_that_follow_later():
+    """Without `from __future__ import annotations`; Python 3.14 evaluates annotations only when they are read."""
+    later = "Later" if sys.version_info >= (3, 14) else "'Later'"
+    source = f"@dataclass(frozen=True)\nclass Early:\n    a: int\n    b: {later} = 2\n"
+    names = {"dataclass": frozen.dataclass, "__name__": __name__}
+    exec(compile(source, "early", "exec", dont_inherit=True), names)
+    early = names["Early"](1)
+    assert (early, fields(early)[0].type) == (names["Early"](1, b=2), int)
+    assert repr(early) == "Early(a=1, b=2)"
 
 
 def test_a_class_takes_less_time_than_one_of_the_standard_library():
