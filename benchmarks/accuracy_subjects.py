@@ -25,24 +25,12 @@ from rotor.scenes.scene import (
     ThermoScene,
 )
 from rotor.scenes.scene_file import read_scene
-from rotor.scenes.sections import (
-    FluidConditions,
-    FluidNumerics,
-    GasNumerics,
-    GasObservables,
-    LevelsObservables,
-    MoleculeSection,
-    SpectrumConditions,
-    SpectrumObservables,
-    StarkConditions,
-    ThermoConditions,
-)
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 SCENES = Path(__file__).resolve().parents[1] / "examples" / "scenes"
 LIMIT_SECONDS = 60.0  # of one knob
-INDOLE = MoleculeSection(constants="A=3877.826 B=1636.047 C=1150.8997 MHz", dipole_abc=[1.376, 1.40, 0.0])
+INDOLE = {"constants": "A=3877.826 B=1636.047 C=1150.8997 MHz", "dipole_abc": [1.376, 1.40, 0.0]}
 
 
 @dataclass(frozen=True)
@@ -73,13 +61,11 @@ def curves(scene: Scene, knob: str) -> list[tuple[str, str, list[Point]]]:
 
 def spectra() -> dict[str, SpectrumScene]:
     """Lists of lines: a light linear molecule, a heavy asymmetric one, a cold one."""
-    complete = SpectrumObservables(min_lgint=-12.0)
+    complete = {"min_lgint": -12.0}
     return {
         "CO, 300 K": SpectrumScene(molecule="CO", observables=complete),
-        "SO₂, 300 K": SpectrumScene(molecule="SO2", observables=SpectrumObservables(min_lgint=-8.0)),
-        "CH₂OHCHO, 10 K": SpectrumScene(
-            molecule="CH2OHCHO", conditions=SpectrumConditions(temperature="10 K"), observables=complete
-        ),
+        "SO₂, 300 K": SpectrumScene(molecule="SO2", observables={"min_lgint": -8.0}),
+        "CH₂OHCHO, 10 K": SpectrumScene(molecule="CH2OHCHO", conditions={"temperature": "10 K"}, observables=complete),
     }
 
 
@@ -146,7 +132,7 @@ def evened(points: list[Point]) -> list[Point]:
 def partition(_: Path | None) -> list[Panel]:
     results = {}
     for name in ("CO", "water", "CH2OHCHO"):
-        scene = ThermoScene(molecule=name, conditions=ThermoConditions(temperature=[10.0, 100.0, 300.0]))
+        scene = ThermoScene(molecule=name, conditions={"temperature": [10.0, 100.0, 300.0]})
         results[name] = curve(scene, "numerics.relative_error", "Q")
     return [Panel("relative error asked for, at 10, 100 and 300 K", "Q (%)", results)]
 
@@ -159,7 +145,7 @@ def hyperfine(_: Path | None) -> list[Panel]:
         for name, solver in methods(3).items()
     }
     formamide = read_scene(SCENES / "formamide_hyperfine.toml")
-    scene = LevelsScene(molecule=formamide.molecule, effects=formamide.effects, observables=LevelsObservables(jmax=20))
+    scene = LevelsScene(molecule=formamide.molecule, effects=formamide.effects, observables={"jmax": 20})
     computed["formamide, N ≤ 20"] = curve(scene, "effects.hyperfine_method")
     return [Panel("method of hyperfine structure", "energy of a level (MHz)", computed, joined=False)]
 
@@ -167,7 +153,7 @@ def hyperfine(_: Path | None) -> list[Panel]:
 def stark(_: Path | None) -> list[Panel]:
     results = {}
     for name, molecule in (("OCS", "OCS"), ("indole", INDOLE)):
-        scene = StarkScene(molecule=molecule, conditions=StarkConditions(field="0:200kV/cm:21"))
+        scene = StarkScene(molecule=molecule, conditions={"field": "0:200kV/cm:21"})
         results[f"{name}, 200 kV/cm"] = curve(scene, "numerics.jmax")
     return [Panel("highest J of the basis, states of J ≤ 2", "energy (MHz)", results)]
 
@@ -223,18 +209,17 @@ def driven(_: Path | None) -> list[Panel]:
 
 def replace_times(scene: Scene, points: int) -> Scene:
     """The same motion looked at a few times only: a table with many rows makes the steps short by itself."""
-    import msgspec
 
-    first, last, _ = scene.conditions.times.split(":")
-    when = msgspec.structs.replace(scene.conditions, times=f"{first}:{last}:{points}")
-    return msgspec.structs.replace(scene, conditions=when)
+    first, last, _ = scene.content["conditions"]["times"].split(":")
+    when = {**scene.content["conditions"], "times": f"{first}:{last}:{points}"}
+    return scene.replaced(conditions=when)
 
 
 def liquid(electrostatics: str) -> FluidScene:
     """A small box of water."""
     return FluidScene(
-        conditions=FluidConditions(model="spce", molecules=216, steps=100),
-        numerics=FluidNumerics(electrostatics=electrostatics),
+        conditions={"model": "spce", "molecules": 216, "steps": 100},
+        numerics={"electrostatics": electrostatics},
     )
 
 
@@ -258,8 +243,8 @@ def ewald(_: Path | None) -> list[Panel]:
 
 
 def samples(_: Path | None) -> list[Panel]:
-    times = GasObservables(times="0:0.5:51")
-    scene = GasScene(molecule="water", observables=times, numerics=GasNumerics(molecules=10_000))
+    times = {"times": "0:0.5:51"}
+    scene = GasScene(molecule="water", observables=times, numerics={"molecules": 10_000})
     knobs = [knob for knob in knobs_of(scene).knobs if knob.name == "numerics.molecules"]
     panels = []
     for knob in knobs:

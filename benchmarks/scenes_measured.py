@@ -21,8 +21,6 @@ import tracemalloc
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-import msgspec
-
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, work_precision
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import Scene
@@ -94,11 +92,11 @@ def asking() -> list[str]:
 
 def one_point(name: str) -> Scene:
     """A scene without its sweep, whose other values are those of the file."""
-    return msgspec.structs.replace(read_scene(SCENES / f"{name}.toml"), sweep={})
+    return read_scene(SCENES / f"{name}.toml").replaced(sweep=None)
 
 
 def without_files(scene: Scene) -> Scene:
-    return msgspec.structs.replace(scene, outputs=type(scene.outputs)())
+    return scene.replaced(outputs={})
 
 
 def measure(name: str) -> Measured:

@@ -43,11 +43,10 @@ class New:
 
 def answer(request: NewRequest, work: Work) -> New:
     """The scene, or the schema."""
-    from rotor.scenes.scene import KINDS
     from rotor.scenes.template import template
 
     if (request.kind is None) != request.schema:
-        raise ValueError(f"expected either a kind of scene, one of {', '.join(KINDS)}, or --schema")
+        raise ValueError(f"expected either a kind of scene, one of {', '.join(SCENE_VERBS)}, or --schema")
     return New(_schema() if request.kind is None else template(request.kind), "out" in work.files)
 
 
@@ -61,7 +60,7 @@ def check(_: NewRequest, outputs: Mapping[str, Any], __: Any) -> None:
 def _schema() -> str:
     import json
 
-    from rotor.scenes.scene_file import json_schema
+    from rotor.scenes.schema import json_schema
 
     return json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
 

@@ -20,31 +20,32 @@ in the plan. An accuracy beyond double precision is refused.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Annotated, Any
-
-import msgspec
+from typing import Any
 
 from rotor.frozen import dataclass
 from rotor.requests.budget import ErrorBudget, ErrorTerm
-from rotor.requests.field import Field
+from rotor.requests.field import REQUIRED, Field, declared
 from rotor.requests.fill import Entries
 from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Sought, knobs_of_fields
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.readers import Quantity
+from rotor.requests.readers import Custom, Quantity
 
 CONVERTED = ("MHz", "K", "Å")  # units of an accuracy for which others may stand
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 
-class TotalAccuracy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+@dataclass(frozen=True)
+class TotalAccuracy:
     """An accuracy of the whole error budget, not of its numerical part alone."""
 
-    total: Annotated[str | float, msgspec.Meta(description="of all sources of error together")]
+    total: str | float = declared(
+        REQUIRED, Custom(str, scene_type=str | float), "of all sources of error together", "total"
+    )
 
 
-Stated = str | float | TotalAccuracy | None
+Stated = str | float | Mapping[str, str | float] | None  # a table has the key of `TotalAccuracy`
 
 
 @dataclass(frozen=True)
@@ -145,8 +146,8 @@ def read_accuracy(stated: Stated, numerics: Numerics, entries: Entries = Entries
     """
     if stated is None:
         return None
-    total = isinstance(stated, TotalAccuracy)
-    plain = stated.total if isinstance(stated, TotalAccuracy) else stated
+    total = isinstance(stated, Mapping)
+    plain = stated["total"] if isinstance(stated, Mapping) else stated
     goals, text = numerics.goals, str(plain).strip()
     unit, percent = _unit_of(text, numerics, entries), text.endswith("%")
     if unit not in goals:

@@ -20,10 +20,9 @@ def suffixes_of(kind: str) -> dict[str, tuple[str, ...]]:
 
 def names_of(scene: Scene) -> dict[str, list[str]]:
     """The names of files in a scene, by output."""
-    named = {name: getattr(scene.outputs, name, None) for name in suffixes_of(scene.kind)}  # type: ignore[attr-defined]
-    return {
-        name: value if isinstance(value, list) else [value] for name, value in named.items() if value not in (None, [])
-    }
+    outputs = scene.content.get("outputs", {})
+    named = {name: outputs[name] for name in suffixes_of(scene.kind) if name in outputs}
+    return {name: value if isinstance(value, list) else [value] for name, value in named.items()}
 
 
 def paths_of(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
@@ -59,8 +58,7 @@ def refuse_outside(scene: Scene, out: Where) -> None:
     """Refuse outputs outside the folder `out`, so that a scene from elsewhere cannot replace other files.
 
     >>> from rotor.scenes.scene import LevelsScene
-    >>> from rotor.scenes.sections import LevelsOutputs
-    >>> refuse_outside(LevelsScene(molecule="CO", outputs=LevelsOutputs(csv="../a.csv")), "results")
+    >>> refuse_outside(LevelsScene(molecule="CO", outputs={"csv": "../a.csv"}), "results")
     Traceback (most recent call last):
         ...
     ValueError: outputs.csv: ../a.csv: lies outside the folder results; name a file inside it, or give another folder as --out

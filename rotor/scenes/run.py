@@ -5,16 +5,14 @@ from __future__ import annotations
 from concurrent.futures import Executor
 from contextlib import ExitStack
 
-import msgspec
-
 from rotor.formats.atomic_write import resolved
 from rotor.requests.fill import Entries, flattened
+from rotor.scenes.keys import keyed
 from rotor.scenes.outputs import Where, checked_paths, paths_of
 from rotor.scenes.scene import Scene, SceneResult
 from rotor.scenes.scene_file import scene_text
 from rotor.temporary import locked_file
 from rotor.verbs.calculation import Calculation, Outcome
-from rotor.verbs.scene_tables import keyed
 from rotor.verbs.verb import Work, verb_of
 
 
@@ -67,12 +65,11 @@ def run_scene(
 def scene_calculation(scene: Scene, folder: Where = ".", out: Where = ".") -> Calculation:
     """The calculation of a scene. folder: of the files that it reads. out: of those that it writes."""
     verb = verb_of(scene.kind)  # no other verb is imported
-    tables = verb.subject.tables(msgspec.to_builtins(scene))
-    entries = Entries(flattened(tables, [*keyed(verb), *verb.subject.tables_read]), "key")
+    entries = Entries(flattened(verb.subject.tables(scene.content), keyed(verb)), "key")
     files = paths_of(scene, out)
     provenance = {"scene": scene_text(scene)} if files else {}
     work = Work(shown=verb.read_shown(entries), files=files, provenance=provenance, from_scene=True)
-    return Calculation(verb, entries, work, folder, getattr(scene, "accuracy", None))
+    return Calculation(verb, entries, work, folder, scene.accuracy)
 
 
 def _write(outcome: Outcome) -> None:

@@ -1,28 +1,25 @@
-"""A scene: a simulation as one object, with the content of a scene file (`rotor.scenes.scene_file`).
+"""A scene: a simulation as data, with the content of a scene file (`rotor.scenes.scene_file`).
 
-No physics is imported here: a scene is data, checked for names and types; requests check the values. What computes a scene is
-imported by name when it runs.
+No physics is imported here: names and types of a scene are checked by the declaration of its verb, values by the request. What
+computes a scene is imported by name when it runs.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from concurrent.futures import Executor
-from functools import cache
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import msgspec
-from msgspec import Struct, field
+from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
 from rotor.requests.accuracy import Stated
+from rotor.requests.choices import nearest
+from rotor.scenes.keys import inner_tables, keys_of, tables_of
+from rotor.scenes.values import UnknownKeyError, checked_table
 from rotor.verbs.calculation import Outcome
-from rotor.verbs.scene_tables import entries_before, tables_of
-from rotor.verbs.tables import described
-from rotor.verbs.verb import SCENE_VERBS, verb_of
+from rotor.verbs.verb import SCENE_VERBS, Verb, verb_of
 
 if TYPE_CHECKING:
     from rotor.requests.plan import Plan
@@ -30,27 +27,38 @@ if TYPE_CHECKING:
 SCHEMA = 1
 
 
-class Scene(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True, tag_field="kind"):
-    """Fields of all kinds of scene. schema: version of the format."""
+@dataclass(frozen=True)
+class Scene:
+    """A scene, made by `scene_of`. kind: name of the verb. content: keys and tables as in the file, without schema, kind and defaults."""
 
-    schema: Annotated[int, described("version of this format")] = SCHEMA
-    title: Annotated[str, described("a line for reports", "Water in the microwave region")] = ""
-    sweep: Annotated[
-        dict[str, list[Any]],
-        described(
-            "values by dotted name; every combination is run", {"conditions.temperature": ["10 K", "100 K", "300 K"]}
-        ),
-    ] = field(default_factory=dict)
+    kind: str
+    content: Mapping[str, Any]
 
     @property
-    def kind(self) -> str:
-        """Name of the kind, such as spectrum or stark; `rotor.verbs.names.SCENE_VERBS` lists all."""
-        return str(self.__struct_config__.tag)
+    def title(self) -> str:
+        """The line for reports."""
+        return str(self.content.get("title", ""))
+
+    @property
+    def sweep(self) -> Mapping[str, list[Any]]:
+        """Swept values by dotted name."""
+        swept: Mapping[str, list[Any]] = self.content.get("sweep", {})
+        return swept
+
+    @property
+    def accuracy(self) -> Stated:
+        """The requested accuracy; None without one."""
+        stated: Stated = self.content.get("accuracy")
+        return stated
 
     @property
     def heading(self) -> str:
         """The title, or the kind in words."""
         return self.title or f"a scene of the kind {self.kind}"
+
+    def replaced(self, **content: Any) -> Scene:
+        """The scene with other keys or whole tables."""
+        return scene_of({"schema": SCHEMA, "kind": self.kind, **self.content, **content})
 
     def run(
         self,
@@ -85,48 +93,58 @@ class SceneResult(Outcome):
         return self.table._repr_html_() + errors_html(self.answer)
 
 
-@cache
-def _scene_class(kind: str) -> Any:
-    """The structure of a kind of scene, made from the declaration of its verb."""
-    verb = verb_of(kind)
-    entries = entries_before(verb)
-    if verb.accuracy:
-        meta = described(verb.accuracy, verb.accuracy_example)
-        entries.append(("accuracy", Annotated[Stated, meta], None))
-    entries += [(table, structure, structure()) for table, structure in tables_of(verb).items()]
-    scene = msgspec.defstruct(
-        f"{kind.capitalize()}Scene", entries, bases=(Scene,), frozen=True, kw_only=True, tag=kind, tag_field="kind",
-        forbid_unknown_fields=True, omit_defaults=True, module=__name__,
-    )  # fmt: skip
-    scene.__doc__ = verb.about
-    return scene
+def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
+    """The scene of nested tables, as parsed from TOML.
+
+    Raises ValueError for an unknown version or kind, unknown keys and wrong types.
+    """
+    verb = _verb_of(content.get("schema"), content.get("kind"), where)
+    tables = tables_of(verb)
+    values = {key: value for key, value in content.items() if key not in ("schema", "kind")}
+    try:
+        for key, value in values.items():
+            if key not in tables and key not in tables[""]:
+                raise UnknownKeyError(key, value, "", {**tables[""], **tables})  # type: ignore[dict-item]
+        inner = {name: checked_table(keys, values.get(name) or {}, name) for name, keys in tables.items() if name}
+        head = checked_table(tables[""], {key: value for key, value in values.items() if key not in inner}, "")
+    except UnknownKeyError as error:
+        raise ValueError(f"{where}: {error.text(_other_place(error.key, verb))}") from None
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from None
+    return Scene(verb.name, head | {name: table for name, table in inner.items() if table})
 
 
-class Kinds(Mapping[str, type[Scene]]):
-    """The structures of all kinds of scene, each made on first use."""
-
-    def __getitem__(self, kind: str) -> type[Scene]:
-        if kind not in SCENE_VERBS:
-            raise KeyError(kind)
-        structure: type[Scene] = _scene_class(kind)
-        return structure
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(SCENE_VERBS)
-
-    def __len__(self) -> int:
-        return len(SCENE_VERBS)
+def _verb_of(schema: Any, kind: Any, where: str) -> Verb:
+    if schema != SCHEMA:
+        problem = "it has none" if schema is None else f"this one has {schema!r}"
+        raise ValueError(f"{where}: expected schema = {SCHEMA}, the version of the format, and {problem}")
+    if not isinstance(kind, str) or kind not in SCENE_VERBS:
+        problem = "it has none" if kind is None else f"{kind!r} is none; {nearest(str(kind), SCENE_VERBS)}"
+        raise ValueError(f"{where}: expected kind, one of {', '.join(SCENE_VERBS)}; {problem}")
+    return verb_of(kind)
 
 
-KINDS = Kinds()
+def _other_place(key: str, verb: Verb) -> str:
+    """Where a scene has a key of this name, outside lists of tables; empty if nowhere."""
+    tables = dict(tables_of(verb))
+    first = tables.pop("")
+    if key in first or key in tables:
+        return "; it stands before the first table"
+    tables |= {name: keys_of(part) for name, field in first.items() for part in inner_tables(field).values()}
+    places = [name for name, keys in tables.items() if key in keys]
+    return f"; it is a key of {' and '.join(f'[{name}]' for name in places)}" if places else ""
 
 
 def __getattr__(name: str) -> Any:
-    """Structures by name, such as `RamanScene`."""
+    """Functions that make a scene of a kind from its keys and tables, such as `RamanScene(molecule="N2")`."""
     kind = name.removesuffix("Scene").lower()
-    if name.endswith("Scene") and kind in SCENE_VERBS and name == f"{kind.capitalize()}Scene":
-        return KINDS[kind]
-    raise AttributeError(f"module 'rotor.scenes.scene' has no attribute {name!r}")
+    if kind not in SCENE_VERBS or name != f"{kind.capitalize()}Scene":
+        raise AttributeError(f"module 'rotor.scenes.scene' has no attribute {name!r}")
+
+    def make(**content: Any) -> Scene:
+        return scene_of({"schema": SCHEMA, "kind": kind, **content})
+
+    return make
 
 
 def within(folder: str | os.PathLike[str], name: str) -> str:

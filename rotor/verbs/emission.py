@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-from msgspec import NODEFAULT
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.frozen import dataclass
 from rotor.reports.line_tables import first_rows_title
@@ -15,10 +12,10 @@ from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.sources import short_source
 from rotor.reports.spins import hyperfine_lines
 from rotor.reports.top_facts import error_facts, left_out_facts, with_command
-from rotor.requests.field import OUTPUT, Field, all_fields, declared
+from rotor.requests.field import OUTPUT, REQUIRED, Field, all_fields, declared
 from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT
-from rotor.requests.readers import Quantity, Text, Whole
+from rotor.requests.readers import Custom, Quantity, Text, Whole
 from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
 from rotor.tops.top import Top
 from rotor.verbs.emission_observed import OBSERVED
@@ -35,7 +32,6 @@ from rotor.verbs.molecule import (
 from rotor.verbs.observed_file import SeveralInput, is_catalogue
 from rotor.verbs.outputs import Output, Report, picture, tables
 from rotor.verbs.subjects import beside, saved_molecule
-from rotor.verbs.tables import defined, described, entries_of
 from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb
 
 if TYPE_CHECKING:
@@ -81,11 +77,18 @@ class EmitterInput:
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class EmittingMolecule(EmitterInput, MoleculeInput):
+    """A molecule of the source."""
+
+
 class SeveralMolecules(SubjectKind):
     """Several molecules, or one with further inputs; .cat files with Q(T) may be among them."""
 
     fields = {**all_fields(SeveralInput), **{FIELDS[name].identity: FIELDS[name] for name in _SINGLE_ONLY}}  # noqa: RUF012
-    tables_read = ("molecules",)
+    scene_fields: ClassVar[tuple[Field, ...]] = (
+        Field(Custom(list, scene_type=list[EmittingMolecule]), "one or more", "molecules", default=REQUIRED),
+    )
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read all molecules and their inputs."""
@@ -124,11 +127,6 @@ class SeveralMolecules(SubjectKind):
             for source in several.names
         ]
 
-    def scene_fields(self) -> list[tuple[str, Any, Any]]:
-        """The list of molecules."""
-        structure: Any = emitting_molecule()
-        return [("molecules", Annotated[list[structure], described("one or more")], NODEFAULT)]
-
     def saved(self, request: EmissionRequest, subject: Subject, folder: Path) -> dict[str, Any]:
         """The tables of the molecules."""
         first = request.sources[0]
@@ -153,13 +151,6 @@ class SeveralMolecules(SubjectKind):
             )
             tables.append({**content, **written_fields(emitter)})
         return {"molecules": tables}
-
-
-@cache
-def emitting_molecule() -> Any:
-    """Structure of a molecule in the scene's list; made once, since msgspec identifies structures by class."""
-    fields: tuple[Field, ...] = (*FIELDS.values(), *all_fields(EmitterInput).values())
-    return defined("EmittingMolecule", entries_of(fields), "A molecule of the source.")
 
 
 def _read_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, Mapping[str, Any]]:

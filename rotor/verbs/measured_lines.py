@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
@@ -14,7 +14,7 @@ from rotor.requests.fill import Entries, NamedError, read_instance, renaming, wr
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
-from rotor.verbs.subjects import optional_molecule, saved_inputs, saved_molecule
+from rotor.verbs.subjects import MOLECULE, saved_inputs, saved_molecule
 from rotor.verbs.verb import Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
@@ -135,15 +135,15 @@ class MeasuredLines(SubjectKind):
         **all_fields(LinesInput), **{field.identity: field for field in FIELDS.values()}, START.identity: START,
     }  # fmt: skip
 
+    scene_fields: ClassVar[tuple[Field, ...]] = (
+        replace(MOLECULE, help="start of the fit; not needed with a .par file", default=None, example="water"),
+    )
+
     @property
     def options(self) -> Mapping[str, Field]:
         """Inputs of the lines and of the start."""
         start = {FIELDS[name].identity: FIELDS[name] for name in _START}
         return {**all_fields(LinesInput), START.identity: START, **start}
-
-    def scene_fields(self) -> list[tuple[str, Any, Any]]:
-        """The key `molecule`, which a .par file makes superfluous."""
-        return [optional_molecule("start of the fit; not needed with a .par file")]
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """The files of the lines, and the starting top."""

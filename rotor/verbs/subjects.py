@@ -6,11 +6,12 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.frozen import dataclass
-from rotor.requests.field import Field, all_fields
+from rotor.requests.field import REQUIRED, Field, all_fields
 from rotor.requests.fill import Entries, read_instance, written_fields
+from rotor.requests.readers import Custom
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
 from rotor.verbs.verb import Note, Place, Subject, SubjectKind
 
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from rotor.verbs.verb import Verb
 
 FILES = ("source", "hessian")  # inputs of a molecule that may name a file
+MOLECULE = Field(
+    Custom(str, scene_type=str | MoleculeInput), "a name, a file, SMILES:..., or a table", "molecule", default=REQUIRED,
+)  # fmt: skip
 
 
 def unprepared(top: Top, reading: Reading, entries: Entries) -> Top:
@@ -37,6 +41,7 @@ class OneMolecule(SubjectKind):
     without: tuple[str, ...] = ()
     prepare: Callable[[Top, Reading, Entries], Top] = unprepared
     further: type | None = None
+    scene_fields: ClassVar[tuple[Field, ...]] = (MOLECULE,)
 
     @cached_property
     def fields(self) -> Mapping[str, Field]:  # type: ignore[override]
@@ -62,12 +67,6 @@ class OneMolecule(SubjectKind):
         further = None if self.further is None else read_instance(self.further, entries)
         return Subject({"top": top}, (molecule,), text, place.note, further=further)
 
-    def scene_fields(self) -> list[tuple[str, Any, Any]]:
-        """The key `molecule`: a name, a file, SMILES:... or a table."""
-        from msgspec import NODEFAULT
-
-        return [("molecule", _molecule_type(), NODEFAULT)]
-
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs as entered, with files relative to the folder of the scene."""
         further = {} if subject.further is None else written_fields(subject.further)
@@ -90,26 +89,6 @@ def top_of_word(
     values = {"molecule.source": source, "molecule.isotopes": tuple(isotopes) or None}
     reading = Reading(read_molecule(Entries(values, "option")), "option", ".", note)
     return prepare(top_of(reading), reading)
-
-
-def _molecule_type() -> Any:
-    from rotor.verbs.tables import described
-
-    return Annotated[str | molecule_section(), described("a name, a file, SMILES:..., or a table")]
-
-
-def optional_molecule(about: str) -> tuple[str, Any, Any]:
-    """Name, type and default of the key `molecule` in scenes that need none."""
-    from rotor.verbs.tables import described
-
-    return "molecule", Annotated[str | molecule_section() | None, described(about, "water")], None
-
-
-def molecule_section() -> Any:
-    """The structure of the table [molecule]."""
-    from rotor.verbs.tables import section_class
-
-    return section_class("molecule", tuple(FIELDS.values()))
 
 
 def saved_molecule(molecule: MoleculeInput, folder: Path) -> dict[str, Any]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.frozen import dataclass
+from rotor.requests.field import Field
 from rotor.requests.fill import Entries, NamedError, read_instance, renaming, written_fields
 from rotor.requests.readers import Custom, Grid, Quantity
 from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL
 from rotor.verbs.body_inputs import BODY, MOTION, BodyInput, MotionInput, in_si, three
-from rotor.verbs.subjects import OneMolecule, optional_molecule, saved_molecule
+from rotor.verbs.subjects import MOLECULE, OneMolecule, saved_molecule
 from rotor.verbs.verb import Place, Subject
 
 if TYPE_CHECKING:
@@ -51,10 +52,9 @@ class TurningBody(OneMolecule):
     """A molecule, an everyday body or bare moments."""
 
     further: type = BodyInput
-
-    def scene_fields(self) -> list[tuple[str, Any, Any]]:
-        """The key `molecule`; a body may replace it."""
-        return [optional_molecule("a name, a file, SMILES:..., or a table")]
+    scene_fields: ClassVar[tuple[Field, ...]] = (
+        replace(MOLECULE, default=None, example="water"),
+    )  # a body may replace it
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read the molecule or the body."""

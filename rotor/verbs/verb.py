@@ -122,9 +122,13 @@ class Extra:
 
 
 class SubjectKind:
-    """Kind of subject that a verb computes; this base class stands for none."""
+    """Kind of subject that a verb computes; this base class stands for none.
+
+    fields: its inputs. scene_fields: keys that a scene alone has, before its first table.
+    """
 
     fields: Mapping[str, Field] = {}
+    scene_fields: ClassVar[tuple[Field, ...]] = ()
 
     @property
     def options(self) -> Mapping[str, Field]:
@@ -139,16 +143,10 @@ class SubjectKind:
         """The subject as a scene in the folder holds it, by dotted key."""
         return {}
 
-    def scene_fields(self) -> list[tuple[str, Any, Any]]:
-        """Name, type and default of the subject's keys outside plain tables."""
-        return []
-
-    tables_read: tuple[str, ...] = ()  # keys read as a whole
-
-    def tables(self, content: dict[str, Any]) -> dict[str, Any]:
+    def tables(self, content: Mapping[str, Any]) -> Mapping[str, Any]:
         """The tables of a scene; a plain name of a molecule becomes the source of its table."""
         molecule = content.get("molecule")
-        return content | {"molecule": {"source": molecule}} if isinstance(molecule, str) else content
+        return {**content, "molecule": {"source": molecule}} if isinstance(molecule, str) else content
 
 
 NOTHING = SubjectKind()

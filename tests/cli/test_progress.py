@@ -15,7 +15,6 @@ from rotor.reports import progress
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.scenes.scene import LevelsScene
 from rotor.scenes.scene_file import write_scene
-from rotor.scenes.sections import LevelsObservables
 
 
 class Terminal(io.StringIO):
@@ -73,7 +72,7 @@ def test_a_sweep_shows_points_and_the_time_left_on_a_terminal(folder):
     import pty
 
     write_scene(
-        LevelsScene(molecule="CO", observables=LevelsObservables(jmax=2), sweep={"observables.jmax": [*range(60)]}),
+        LevelsScene(molecule="CO", observables={"jmax": 2}, sweep={"observables.jmax": [*range(60)]}),
         "s.toml",
     )
     reading, writing = pty.openpty()

@@ -118,7 +118,7 @@ def test_an_atom_is_refused_as_an_atom_and_not_as_a_drawing():
 
 @pytest.mark.parametrize(
     "module",
-    ["rotor", "rotor.api", "rotor.formats", "rotor.scenes.scene", "rotor.scenes.sections", "rotor.thermodynamics"],
+    ["rotor", "rotor.api", "rotor.formats", "rotor.scenes.scene", "rotor.thermodynamics"],
 )
 def test_modules_that_load_names_late_refuse_names_that_do_not_exist(module):
     """Without an error hasattr is true of anything, and a misspelt function is None."""

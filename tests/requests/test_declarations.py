@@ -43,10 +43,12 @@ def ring(monkeypatch):
     """The toy verb, entered as a module of the package: what a new file would be."""
     import rotor.cli
     import rotor.scenes.scene
+    import rotor.scenes.schema
+    import rotor.scenes.template
     import rotor.verbs.verb
 
     monkeypatch.setitem(sys.modules, "rotor.verbs.ring", toy_verb)
-    for module in (rotor.verbs.verb, rotor.scenes.scene):
+    for module in (rotor.verbs.verb, rotor.scenes.scene, rotor.scenes.schema, rotor.scenes.template):
         monkeypatch.setattr(module, "SCENE_VERBS", (*SCENE_VERBS, "ring"))
     monkeypatch.setitem(rotor.cli.VERBS, "ring", "A particle on a ring.")
 

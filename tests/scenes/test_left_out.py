@@ -28,13 +28,6 @@ from rotor.scenes.plan import plan_of
 from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import FluidScene, LevelsScene, SpectrumScene
 from rotor.scenes.scene_file import read_scene
-from rotor.scenes.sections import (
-    FluidConditions,
-    FluidNumerics,
-    LevelsObservables,
-    SpectrumConditions,
-    SpectrumObservables,
-)
 from rotor.spectra.widths import pressure_width
 
 SCENES = PROJECT / "examples" / "scenes"
@@ -60,7 +53,7 @@ def test_widths_are_those_of_the_conditions_of_the_scene():
     alone = pressure_width(rotor.read("OCS"), 2.0, None)
     assert alone.size is None
     assert f"{pressure_width(rotor.read('OCS'), 2.0, 1e-3).size:.2g} MHz for each mbar" in alone.basis
-    scene = SpectrumScene(molecule="H2CO", conditions=SpectrumConditions(temperature="30 K", range="100:105GHz"))
+    scene = SpectrumScene(molecule="H2CO", conditions={"temperature": "30 K", "range": "100:105GHz"})
     widths = {neglected.name: neglected for neglected in plan_of(scene).left_out}
     assert "at 105000 MHz" in widths["Doppler width"].basis
     assert widths["pressure width"].size is None
@@ -68,8 +61,8 @@ def test_widths_are_those_of_the_conditions_of_the_scene():
 
 def test_a_spectrum_without_widths_says_both_and_one_of_them_with_doppler():
     def names(**observables) -> set[str]:
-        gas = SpectrumConditions(range="115.2:115.4GHz")
-        scene = SpectrumScene(molecule="CO", conditions=gas, observables=SpectrumObservables(**observables))
+        gas = {"range": "115.2:115.4GHz"}
+        scene = SpectrumScene(molecule="CO", conditions=gas, observables=dict(**observables))
         return {neglected.name for neglected in plan_of(scene).left_out}
 
     assert {"Doppler width", "pressure width"} <= names()
@@ -78,11 +71,11 @@ def test_a_spectrum_without_widths_says_both_and_one_of_them_with_doppler():
 
 
 def test_a_plan_says_where_the_distortion_series_ends():
-    plan, top = plan_of(LevelsScene(molecule="HCONH2", observables=LevelsObservables(jmax=80))), rotor.read("HCONH2")
+    plan, top = plan_of(LevelsScene(molecule="HCONH2", observables={"jmax": 80})), rotor.read("HCONH2")
     assert "converges to J = 68;" in dict(plan.parts)["warning"]
     said = warnings_of(top, solve_levels(top, 80, jmin=80, vectors=False))
     assert "energies above J = 68 at the highest K" in said[0]  # what the run itself says
-    short = plan_of(LevelsScene(molecule="HCONH2", observables=LevelsObservables(jmax=68)))
+    short = plan_of(LevelsScene(molecule="HCONH2", observables={"jmax": 68}))
     assert "warning" not in dict(short.parts)
 
 
@@ -156,8 +149,8 @@ def test_the_box_slows_diffusion_as_yeh_and_hummer_have_it(count):
 @pytest.mark.slow
 def test_a_plan_of_atoms_on_a_perfect_lattice():
     """64 atoms of argon: forces are round-off at the start, which is no net force; atoms have no step error of rotation."""
-    box = FluidConditions(model="argon", molecules=64, density=1.0, steps=10, every=5)
-    plan = plan_of(FluidScene(conditions=box, numerics=FluidNumerics(cutoff="7 Å")))
+    box = {"model": "argon", "molecules": 64, "density": 1.0, "steps": 10, "every": 5}
+    plan = plan_of(FluidScene(conditions=box, numerics={"cutoff": "7 Å"}))
     sizes = {neglected.name: neglected.size for neglected in plan.left_out}
     assert sizes["finite box"] == pytest.approx(25.0)  # 64^(-1/3)
     assert "finite step" not in sizes
@@ -171,8 +164,8 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
     from rotor.fluids.request import make_box
     from rotor.scenes.run import scene_calculation
 
-    box = FluidConditions(molecules=64, ensemble="langevin", friction=5.0, steps=100)
-    scene = FluidScene(conditions=box, numerics=FluidNumerics(cutoff="6 Å"))
+    box = {"molecules": 64, "ensemble": "langevin", "friction": 5.0, "steps": 100}
+    scene = FluidScene(conditions=box, numerics={"cutoff": "6 Å"})
     planned = {neglected.name: neglected.size for neglected in plan_of(scene).left_out}
     request = scene_calculation(scene).request
     atoms, kelvin, step_fs = make_box(request), 298.15, 2.0
@@ -189,9 +182,8 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
 
 
 def driven(name: str, **changes) -> DrivenRequest:
-    scene = read_scene(SCENES / f"{name}.toml")
-    fields = {name: getattr(scene, name) for name in scene.__struct_fields__}
-    return replace(scene_calculation(type(scene)(**{**fields, "accuracy": None}), SCENES).request, **changes)
+    scene = read_scene(SCENES / f"{name}.toml").replaced(accuracy=None)
+    return replace(scene_calculation(scene, SCENES).request, **changes)
 
 
 @pytest.mark.parametrize(

@@ -15,21 +15,13 @@ from rotor.geometry.rotations import distance
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene, scene_calculation
 from rotor.scenes.scene import TumbleScene
-from rotor.scenes.sections import (
-    ConstantTorqueSection,
-    LinearDragSection,
-    PeriodicDriveSection,
-    SpinningRotorSection,
-    TumbleBody,
-    TumbleConditions,
-)
 
-BODY = TumbleBody(moments=[1.0, 2.0, 3.0], angular_velocity=[0.2, 1.0, 0.1])
+BODY = {"moments": [1.0, 2.0, 3.0], "angular_velocity": [0.2, 1.0, 0.1]}
 DRIVEN = [
-    PeriodicDriveSection(amplitude=[0.1, 0.0, 0.2], angular_frequency=1.3),
-    LinearDragSection(coefficients=[0.1, 0.1, 0.1]),
+    {"effect": "periodic drive", "amplitude": [0.1, 0.0, 0.2], "angular_frequency": 1.3},
+    {"effect": "linear drag", "coefficients": [0.1, 0.1, 0.1]},
 ]
-REGULAR = TumbleScene(body=BODY, effects=DRIVEN, conditions=TumbleConditions(times="0:60:13"), accuracy="1e-7 rad")
+REGULAR = TumbleScene(body=BODY, effects=DRIVEN, conditions={"times": "0:60:13"}, accuracy="1e-7 rad")
 
 
 def found_error(result) -> float:
@@ -61,10 +53,10 @@ def test_a_first_part_that_says_too_little_is_corrected_by_the_run(monkeypatch):
 
 def test_a_wobble_below_the_tolerance_is_in_the_error_that_is_stated():
     """All tolerances from 1e-5 to 1e-8 do not see it and agree among themselves; their error is its size, 1e-5 rad."""
-    body = TumbleBody(moments=[1.0, 1.2, 1.5], angular_velocity=[1e-5, 0.0, 0.3])
-    when = TumbleConditions(times="0:40000:101")
+    body = {"moments": [1.0, 1.2, 1.5], "angular_velocity": [1e-5, 0.0, 0.3]}
+    when = {"times": "0:40000:101"}
     scene = TumbleScene(
-        body=body, effects=[SpinningRotorSection(momentum=[0, 0, 0.7])], conditions=when, accuracy="1e-5 rad"
+        body=body, effects=[{"effect": "spinning rotor", "momentum": [0, 0, 0.7]}], conditions=when, accuracy="1e-5 rad"
     )
     result = run_scene(scene)
     assert found_error(result) <= result.reached.error <= 1e-5
@@ -72,9 +64,9 @@ def test_a_wobble_below_the_tolerance_is_in_the_error_that_is_stated():
 
 def test_steps_of_a_body_that_is_spun_up_are_expected_to_grow(monkeypatch):
     """Its rate grows with the time, so that the first twentieth of the time has a four hundredth of the steps."""
-    body = TumbleBody(moments=[100.0, 100.0, 180.0], angular_velocity=[0.0, 0.0, 0.0])
-    when = TumbleConditions(times="0:3000:3")
-    scene = TumbleScene(body=body, effects=[ConstantTorqueSection(vector=[0.05, 0.0, 2.0])], conditions=when)
+    body = {"moments": [100.0, 100.0, 180.0], "angular_velocity": [0.0, 0.0, 0.0]}
+    when = {"times": "0:3000:3"}
+    scene = TumbleScene(body=body, effects=[{"effect": "constant torque", "vector": [0.05, 0.0, 2.0]}], conditions=when)
     request = scene_calculation(scene).request
     monkeypatch.setattr(motion_steps, "MORE_COMPILED", 0)
     monkeypatch.setattr(motion_steps, "ENOUGH_STEPS", 10)

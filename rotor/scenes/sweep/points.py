@@ -17,12 +17,9 @@ from dataclasses import field
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
 from rotor.frozen import dataclass
 from rotor.scenes.outputs import check_path, checked_paths, suffixes_of
-from rotor.scenes.scene import Scene
-from rotor.scenes.scene_file import scene_of
+from rotor.scenes.scene import SCHEMA, Scene, scene_of
 from rotor.scenes.sweep.molecule_list import is_list, list_entries
 
 _NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
@@ -121,8 +118,8 @@ def is_sweep(scene: Scene, folder: str | os.PathLike[str] = ".") -> bool:
 
 def _listed(scene: Scene, folder: str | os.PathLike[str]) -> str | None:
     """The list of molecules that a scene names as its molecule; None for a single molecule."""
-    molecule = getattr(scene, "molecule", None)
-    source = molecule if isinstance(molecule, str) else getattr(molecule, "source", None)
+    molecule = scene.content.get("molecule", {})
+    source = molecule if isinstance(molecule, str) else molecule.get("source")
     return source if source is not None and is_list(source, folder) else None
 
 
@@ -136,11 +133,10 @@ def points(scene: Scene, folder: str | os.PathLike[str] = ".") -> Points:
     same file.
 
     >>> from rotor.scenes.scene import LevelsScene
-    >>> [p.scene.molecule for p in points(LevelsScene(molecule="CO", sweep={"molecule": ["CO", "HCl"]}))]
+    >>> [p.scene.content["molecule"] for p in points(LevelsScene(molecule="CO", sweep={"molecule": ["CO", "HCl"]}))]
     ['CO', 'HCl']
     """
-    content: dict[str, Any] = msgspec.to_builtins(scene)
-    content |= {"schema": scene.schema}
+    content: dict[str, Any] = {"schema": SCHEMA, "kind": scene.kind, **deepcopy(dict(scene.content))}
     content.pop("sweep", None)
     swept = dict(scene.sweep)
     whole = _listed(scene, folder)

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from rotor.scenes.scene import KINDS
 from rotor.scenes.scene_file import parse_scene
 from rotor.scenes.sweep import run_sweep
+from rotor.verbs.names import SCENE_VERBS
 
 MEASURED = "j_upper,j_lower,frequency_mhz,error_mhz\n1,0,20000.0,0.01\n2,1,40000.0,0.01\n3,2,60000.0,0.01\n"
 FAMILY = """name = "carbon monoxide"
@@ -68,7 +68,7 @@ SMALL = {
 
 
 def test_every_kind_is_here():
-    assert SMALL.keys() == KINDS.keys()
+    assert SMALL.keys() == set(SCENE_VERBS)
 
 
 @pytest.mark.parametrize("kind", SMALL)
