@@ -28,7 +28,6 @@ from rotor.quantum.fields.field_map import smallest_jmax
 from rotor.quantum.fields.map_request import MapRequest
 from rotor.quantum.fields.solved_space import SolvedSpace
 from rotor.quantum.labelled import AT_ZERO_MHZ, LevelModel, MissingLevelsError
-from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, label_value
 from rotor.quantum.solve import solve_levels
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM
@@ -148,8 +147,7 @@ class StarkLevels(LevelModel):
         linear = linear_blocks_of(top, elements.levels, names, blocks)
         places = pairwise(space.starts(block).tolist())
         for solved, derivatives, (start, stop) in zip(blocks, linear, places, strict=True):
-            part = vectors[:, start:stop]
-            total[:, derivatives.parameters] += _expectation(derivatives, part @ solved.vectors.T)
+            total[:, derivatives.parameters] += derivatives.slopes(solved.vectors @ vectors[:, start:stop].T)
         return total
 
 
@@ -157,14 +155,6 @@ def _request(constants: TopConstants, labels: Ints) -> MapRequest:
     """A Stark map at the fields of the labels."""
     fields = np.unique(labels[:, -1]) * FIELD_STEP_KV_PER_CM
     return map_request(constants.top, fields, j_highest=int(labels[:, 0].max()), tolerance_mhz=TOLERANCE_MHZ)
-
-
-def _expectation(block: LinearBlock, states: Floats) -> Floats:
-    """Expectation values Σ O_i(r, c) v_r* v_c (states, parameters) of a block's operators in states (states, functions)."""
-    density = (states[:, block.rows].conj() * states[:, block.columns]).real
-    # only one triangle is stored: elements off the diagonal count twice
-    density = np.where(block.rows != block.columns, 2.0, 1.0) * density
-    return np.asarray(density @ block.factors @ block.mix)
 
 
 def stark_levels(constants: TopConstants, labels: Ints) -> StarkLevels:

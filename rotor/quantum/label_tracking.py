@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints, Workspace
 from rotor.frozen import dataclass
 from rotor.quantum.labelled import ClosedForm, LevelModel
-from rotor.quantum.linear_stacks import LinearBlock, LinearStack, SolvedStack, stack_numbers
+from rotor.quantum.linear_stacks import LinearBlock, LinearStack, stack_numbers
 from rotor.quantum.wang.basis import WangBlock
 
 if TYPE_CHECKING:
@@ -30,7 +30,9 @@ _FIRST = 0.5  # share above which a state has its sub-block before all others
 _ALIKE = 1e-13  # of the width of a block: energies that differ less are one, such as doublets of high K
 
 
-Namer = Callable[[Floats, Floats, Floats], Ints]  # matrix, energies, vectors -> names (n, columns) of the states
+Namer = Callable[
+    [Floats, Floats, Floats], Ints
+]  # lower triangle of the matrix, energies, vectors -> names (n, columns) of the states
 
 
 class Follows(Enum):
@@ -98,19 +100,20 @@ def tracked_blocks(
     for numbers in stack_numbers([block for block, _ in blocks]):
         stack = LinearStack.from_blocks([blocks[i][0] for i in numbers.tolist()])
         members = _members([blocks[i][1].sub_blocks for i in numbers.tolist()], stack.size)
-        solved = stack.solved(values_mhz, space)
-        state_names = [blocks[i][1].namer(*stack.states(solved, place)) for place, i in enumerate(numbers.tolist())]
+        energies, vectors, matrices = stack.solved(values_mhz, space)
+        state_names = [
+            _names(blocks[i][1], stack.matrix(matrices, k), energies[k], vectors[k])
+            for k, i in enumerate(numbers.tolist())
+        ]
         tracked_rows = [find(i, names) for i, names in zip(numbers.tolist(), state_names, strict=True)]
-        slopes = stack.slopes(solved.vectors, _padded([states for _, states in tracked_rows], 0), space)
-        leading, shares = _leading(members, solved)
+        slopes = stack.slopes(vectors, _padded([states for _, states in tracked_rows], 0), space)
+        leading, shares = _leading(members, energies, vectors)
         for place, (rows, states) in enumerate(tracked_rows):
             if len(rows):
                 block, named = blocks[numbers[place]]
                 block_rows = slopes[place, : len(rows), : len(block.parameters)]
                 leading_of_states = leading[place, : block.size], shares[place, : block.size]
-                start = AtStart(
-                    values_mhz[block.parameters], solved.energies[place, states], block_rows, *leading_of_states
-                )
+                start = AtStart(values_mhz[block.parameters], energies[place, states], block_rows, *leading_of_states)
                 tracked.append(Tracked(block, named, rows, state_names[place][states], states, start))
     return LabelledBlocks(tuple(names), count, tuple(tracked))
 
@@ -123,15 +126,21 @@ def _members(sub_blocks: Sequence[Ints], size: int) -> Floats:
     return members
 
 
-def _leading(members: Floats, solved: SolvedStack) -> tuple[Ints, Floats]:
+def _names(named: NamedFunctions, matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
+    """Names of the states of a block from its row of a stack, where these are padded."""
+    size = len(matrix)
+    return named.namer(matrix, energies[:size], vectors[:size, :size])
+
+
+def _leading(members: Floats, energies: Floats, vectors: Floats) -> tuple[Ints, Floats]:
     """The sub-block with the largest share of each state, (blocks, size), and that share; of two states that round-off alone tells
     apart the lower number first, whichever way round they come."""
     if members.shape[1] == 1 or members.shape[2] == 1:
-        return np.zeros(solved.energies.shape, dtype=np.int64), np.ones(solved.energies.shape)
-    shares = members @ solved.vectors**2
+        return np.zeros(energies.shape, dtype=np.int64), np.ones(energies.shape)
+    shares = members @ vectors**2
     largest_state, largest = np.asarray(shares.argmax(axis=1)), np.asarray(shares.max(axis=1))
-    whole = np.nanmax(solved.energies, axis=1, keepdims=True) - solved.energies[:, :1]
-    turned = (np.diff(solved.energies, axis=1) <= _ALIKE * whole) & (largest_state[:, :-1] > largest_state[:, 1:])
+    whole = np.nanmax(energies, axis=1, keepdims=True) - energies[:, :1]
+    turned = (np.diff(energies, axis=1) <= _ALIKE * whole) & (largest_state[:, :-1] > largest_state[:, 1:])
     turned[:, 1:] &= ~turned[:, :-1]
     block, place = np.nonzero(turned)
     largest_state[block, place], largest_state[block, place + 1] = (
@@ -180,14 +189,14 @@ class _Labelled:
 
     def levels(self, values_mhz: Floats, space: Workspace) -> tuple[Floats, Floats]:
         """Energies (blocks, labels) and derivatives (blocks, labels, parameters of the blocks)."""
-        solved = self.stack.solved(values_mhz, space)
-        states = self._states(solved)
-        return np.take_along_axis(solved.energies, states, axis=1), self.stack.slopes(solved.vectors, states, space)
+        energies, vectors, matrices = self.stack.solved(values_mhz, space)
+        states = self._states(energies, vectors, matrices)
+        return np.take_along_axis(energies, states, axis=1), self.stack.slopes(vectors, states, space)
 
-    def _states(self, solved: SolvedStack) -> Ints:
+    def _states(self, energies: Floats, vectors: Floats, matrices: Floats) -> Ints:
         """The states that have the labels now; names are made anew where a state is mostly in another sub-block, and where sub-blocks
         share one now or did so at the start: names are those of these constants, whatever the way to them was."""
-        leading, shares = _leading(self.members, solved)
+        leading, shares = _leading(self.members, energies, vectors)
         moved = self._unclear_at_start | self._unclear(leading, shares)
         if (self._below & (leading != self.leading)).any():
             moved |= ((self._ranks(leading) != self._at_start) & (self.rows >= 0)).any(axis=1)
@@ -196,7 +205,7 @@ class _Labelled:
         states = self.states.copy()
         for b in np.flatnonzero(moved).tolist():
             block = self.tracked[b]
-            state_names = block.named.namer(*self.stack.states(solved, b))
+            state_names = _names(block.named, self.stack.matrix(matrices, b), energies[b], vectors[b])
             states[b, : len(block.rows)] = _states_of(state_names, block.names)
         return states
 

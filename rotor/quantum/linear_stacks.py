@@ -48,15 +48,15 @@ class LinearBlock(NamedTuple):
         """The elements of H, lower triangle, at values (parameters,)."""
         return np.asarray(self.factors @ (self.mix @ values_mhz[self.parameters]))
 
-    def matrix(self, values_mhz: Floats) -> Floats:
-        """H, whole, at values (parameters,)."""
+    def lower(self, values_mhz: Floats) -> Floats:
+        """The lower triangle of H at values (parameters,)."""
         lower = np.zeros((self.size, self.size))
         lower[self.rows, self.columns] = self.elements(values_mhz)
-        return symmetric_from_lower(lower)
+        return lower
 
     def slopes(self, vectors: Floats) -> Floats:
         """⟨n|O_i|n⟩ (n, parameters of the block) of vectors (size, n)."""
-        weights = vectors[self.rows] * vectors[self.columns]
+        weights = (vectors[self.rows].conj() * vectors[self.columns]).real
         weights *= np.where(self.rows == self.columns, 1.0, 2.0)[:, None]
         return np.asarray(weights.T @ self.factors @ self.mix)
 
@@ -68,15 +68,6 @@ class LinearBlock(NamedTuple):
             places = np.flatnonzero(matrix)
             elements.append(WeightedElements(places, matrix.ravel()[places, None], np.array([parameter])))
         return linear_block(len(functions), elements)
-
-
-class SolvedStack(NamedTuple):
-    """Blocks side by side: all matrices (lower triangles, less `zero` on the diagonal) one behind the other, energies (blocks, size), NaN
-    beyond a block, vectors (blocks, size, size), 0 beyond a block."""
-
-    matrices: Floats
-    energies: Floats
-    vectors: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,8 +134,12 @@ class LinearStack:
         starts = zip(self.offsets, self.sizes, strict=False)
         return np.concatenate([start + np.arange(n) * (n + 1) for start, n in starts])
 
-    def solved(self, values_mhz: Floats, space: Workspace) -> SolvedStack:
-        """A number is taken off each diagonal for the sake of digits, and added to the energies."""
+    def solved(self, values_mhz: Floats, space: Workspace) -> tuple[Floats, Floats, Floats]:
+        """Energies (blocks, size), NaN beyond a block, vectors (blocks, size, size), 0 beyond a block, and matrices.
+
+        Matrices are lower triangles one behind the other, see `matrix`. A number is taken off each diagonal for the sake of digits, and
+        added to the energies.
+        """
         count, size = self.rows.shape[0], self.size
         values = np.append(values_mhz, 0.0)[self.parameters]
         elements = (self.factors @ (self.mix @ values[:, :, None]))[:, :, 0]
@@ -163,13 +158,12 @@ class LinearStack:
             matrices = whole[self.offsets[first] : self.offsets[stop]].reshape(stop - first, n, n)
             energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(matrices)
         energies += zero[:, None]
-        return SolvedStack(whole, energies, vectors)
+        return energies, vectors, whole
 
-    def states(self, solved: SolvedStack, place: int) -> tuple[Floats, Floats, Floats]:
-        """Matrix, energies and vectors of one block."""
+    def matrix(self, matrices: Floats, place: int) -> Floats:
+        """The lower triangle of one block, of all of them one behind the other."""
         n = int(self.sizes[place])
-        matrix = solved.matrices[self.offsets[place] : self.offsets[place + 1]].reshape(n, n)
-        return matrix, solved.energies[place, :n], solved.vectors[place, :n, :n]
+        return matrices[self.offsets[place] : self.offsets[place + 1]].reshape(n, n)
 
     def slopes(self, vectors: Floats, states: Ints, space: Workspace) -> Floats:
         """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""

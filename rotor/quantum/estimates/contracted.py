@@ -119,7 +119,7 @@ class ContractedLevels:
 
     def rotation(self, values_mhz: Floats) -> _Rotation:
         """The rotation solved at values (parameters,) in MHz."""
-        solved = {number: _eigen(linear.matrix(values_mhz)) for number, linear in self.rotations.items()}
+        solved = {number: _eigen(linear.lower(values_mhz)) for number, linear in self.rotations.items()}
         return _Rotation(*({number: pair[i] for number, pair in solved.items()} for i in range(2)))
 
     def functions(self, block: LabelledBlock, rotation: _Rotation) -> Ints:
@@ -134,10 +134,10 @@ class ContractedLevels:
         return np.array(functions, dtype=np.int64)
 
 
-def _eigen(matrix: Floats) -> tuple[Floats, Floats]:
-    """Energies and vectors; a constant is subtracted from the diagonal to reduce round-off."""
-    zero = float(matrix[0, 0])
-    energies, vectors = np.linalg.eigh(matrix - zero * np.eye(len(matrix)))
+def _eigen(lower: Floats) -> tuple[Floats, Floats]:
+    """Energies and vectors of a lower triangle; a constant is subtracted from the diagonal to reduce round-off."""
+    zero = float(lower[0, 0])
+    energies, vectors = np.linalg.eigh(lower - zero * np.eye(len(lower)))
     return energies + zero, vectors
 
 

@@ -21,7 +21,6 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
 from rotor.quantum.label_blocks import expectations, unit_diagonals
 from rotor.quantum.levels import Levels, MomentBlock
-from rotor.quantum.linear_stacks import LinearStack, stack_numbers
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
 from rotor.tops.operators import Operators, Powers
@@ -107,20 +106,10 @@ def _derivatives_of_coupled(top: Top, levels: Levels, names: Sequence[str], rows
     """Derivatives of levels in coupled blocks, from their linear blocks."""
     starts = np.array([block.start for block in levels.blocks])
     blocks = [levels.blocks[i] for i in distinct(np.searchsorted(starts, rows, side="right") - 1).tolist()]
-    linear = linear_blocks_of(top, levels, names, blocks)
-    out = np.zeros((len(levels) + 1, len(names) + 1))  # the last row and column take the padding
-    space = Workspace()
-    for numbers in stack_numbers(linear):
-        stack = LinearStack.from_blocks([linear[i] for i in numbers.tolist()])
-        vectors = np.zeros((len(numbers), stack.size, stack.size))
-        rows_of_states = np.full((len(numbers), stack.size), len(levels))
-        for place, block in enumerate(blocks[i] for i in numbers.tolist()):
-            size = len(block.energies_mhz)
-            vectors[place, :size, :size] = block.vectors
-            rows_of_states[place, :size] = block.start + np.arange(size)
-        states = np.tile(np.arange(stack.size), (len(numbers), 1))
-        out[rows_of_states[:, :, None], stack.parameters[:, None, :]] = stack.slopes(vectors, states, space)
-    return out[rows, :-1]
+    out = np.zeros((len(levels), len(names)))
+    for block, linear in zip(blocks, linear_blocks_of(top, levels, names, blocks), strict=True):
+        out[block.start : block.start + len(block.energies_mhz), linear.parameters] = linear.slopes(block.vectors)
+    return out[rows]
 
 
 def _derivatives_of_spherical(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
