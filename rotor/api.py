@@ -163,14 +163,14 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.quantum.effects.hyperfine import quadrupole_of_tensor as quadrupole_of_tensor
     from rotor.quantum.effects.of_top import effects_of as effects_of
     from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2 as MHZ_ANGSTROM3_W_PER_CM2
+    from rotor.quantum.effects.stark import StarkRequest as StarkRequest
+    from rotor.quantum.effects.stark import answer_stark as answer_stark
     from rotor.quantum.effects.stark import stark_map as stark_map
     from rotor.quantum.effects.watson import SEMI_RIGID as SEMI_RIGID
+    from rotor.quantum.effects.zeeman import ZeemanRequest as ZeemanRequest
+    from rotor.quantum.effects.zeeman import answer_zeeman as answer_zeeman
     from rotor.quantum.effects.zeeman import zeeman_map as zeeman_map
     from rotor.quantum.fields.deflection import deflection_table as deflection_table
-    from rotor.quantum.fields.stark_request import StarkRequest as StarkRequest
-    from rotor.quantum.fields.stark_request import answer_stark as answer_stark
-    from rotor.quantum.fields.zeeman_request import ZeemanRequest as ZeemanRequest
-    from rotor.quantum.fields.zeeman_request import answer_zeeman as answer_zeeman
     from rotor.quantum.hyperfine_method import used_method as used_method
     from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation as with_internal_rotation
     from rotor.quantum.internal_rotation.levels import turning_tops as turning_tops

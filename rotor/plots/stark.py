@@ -10,9 +10,9 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.plots.picture import GREY, PALETTE, WIDTH_INCHES, Picture, new_figure, styled, top_title
 from rotor.plots.view import WHOLE, View, show_part
+from rotor.quantum.effects.stark import StarkAnswer
 from rotor.quantum.fields.blocks import BEFORE_J
 from rotor.quantum.fields.field_map import FieldMap
-from rotor.quantum.fields.stark_request import StarkAnswer
 from rotor.quantum.quanta import as_mathtext
 from rotor.spectra.fields.lines import FieldLines
 from rotor.units import MHZ_PER_CM, MHZ_PER_DEBYE_KV_PER_CM

@@ -8,8 +8,8 @@ import numpy as np
 
 from rotor.plots.picture import Picture, new_figure, styled, top_title
 from rotor.plots.view import WHOLE, View, show_part
+from rotor.quantum.effects.zeeman import ZeemanAnswer
 from rotor.quantum.fields.field_map import FieldMap
-from rotor.quantum.fields.zeeman_request import ZeemanAnswer
 
 PANELS = 9  # at most; further levels are left out
 PANEL_INCHES = (2.6, 2.3)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
-from rotor.quantum.fields.stark_request import StarkAnswer, StarkRequest, answer_stark
+from rotor.quantum.effects.stark import StarkAnswer, StarkRequest, answer_stark
 from rotor.reports import top_facts
 from rotor.reports.field_maps import SHOWN, accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
 from rotor.reports.screen import Part, Table, record_table

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
-from rotor.quantum.fields.zeeman_request import ZeemanAnswer, ZeemanRequest, answer_zeeman
+from rotor.quantum.effects.zeeman import ZeemanAnswer, ZeemanRequest, answer_zeeman
 from rotor.reports import top_facts
 from rotor.reports.field_maps import accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
 from rotor.reports.screen import Part

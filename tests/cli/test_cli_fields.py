@@ -12,8 +12,8 @@ from rotor.alignment.pulse import GaussianPulse
 from rotor.alignment.request import AlignRequest, answer_align
 from rotor.cli.shared.workers import Counted, working
 from rotor.formats import read
-from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
-from rotor.quantum.fields.zeeman_request import ZeemanRequest, answer_zeeman
+from rotor.quantum.effects.stark import StarkRequest, answer_stark
+from rotor.quantum.effects.zeeman import ZeemanRequest, answer_zeeman
 from rotor.reports.screen import plain
 from rotor.spectra.fields.lines import field_lines
 from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T

@@ -211,7 +211,7 @@ MUTATIONS = (
         "tests/quantum/fields/test_field_bounds.py::test_the_basis_grows_until_its_error_is_within_the_tolerance",
     ),
     Mutation(
-        23, "rotor/quantum/fields/truncation.py",
+        23, "rotor/quantum/fields/block_states.py",
         "lowering + mixed.sum(axis=2)", "lowering",
         "tests/quantum/fields/test_field_bounds.py::test_the_bound_in_small_cases",
     ),
@@ -262,7 +262,7 @@ MUTATIONS = (
         "tests/thermodynamics/test_thermo.py::test_error_is_below_what_was_asked",
     ),
     Mutation(
-        23, "rotor/quantum/fields/truncation.py",
+        23, "rotor/quantum/fields/block_states.py",
         " - np.abs(np.transpose(powers)) @ np.array(radii)", "",
         "tests/quantum/fields/test_field_bounds.py::test_the_bound_in_small_cases",
     ),

@@ -110,7 +110,7 @@ DIPOLE = (2.0, 1.0, 0.0)
 
 def stark_energies(seed: int) -> list[float]:
     """Of the state that an estimated dipole moves most, in 10 kV/cm."""
-    from rotor.quantum.fields.answer import ESTIMATED_DIPOLE_D
+    from rotor.quantum.effects.stark import ESTIMATED_DIPOLE_D
 
     answer = stark_answer(1.0)
     place = np.nanargmax(np.abs(answer.states.field * answer.states.slope))
@@ -122,7 +122,7 @@ def stark_energies(seed: int) -> list[float]:
 
 @cache
 def stark_answer(scale: float):
-    from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
+    from rotor.quantum.effects.stark import StarkRequest, answer_stark
 
     constants = Constants(**ROD.values, uncertainties=dict.fromkeys(ROD.values, 1e-9))
     dipole = tuple(scale * item for item in DIPOLE)

@@ -161,8 +161,7 @@ def test_report_table_and_json_have_the_same_numbers(call, verb):
 
 def test_a_static_field_polarizes_as_light_of_its_intensity_does():
     """½ α F² is the energy in light of the intensity c ε0 F², whose field is F in the root mean square."""
-    from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2
-    from rotor.quantum.fields.answer import MHZ_PER_ANGSTROM3
+    from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, MHZ_PER_ANGSTROM3
 
     w_per_cm2 = units.SPEED_OF_LIGHT_M_PER_S * units.VACUUM_PERMITTIVITY_F_PER_M * 1e10 * 1e-4
     assert math.isclose(MHZ_PER_ANGSTROM3, MHZ_ANGSTROM3_W_PER_CM2 * w_per_cm2, rel_tol=1e-9)  # digits of ε0
@@ -170,8 +169,7 @@ def test_a_static_field_polarizes_as_light_of_its_intensity_does():
 
 def test_the_error_of_an_estimated_dipole_is_that_of_the_energies():
     """Against energies with a dipole that is larger by a thousandth."""
-    from rotor.quantum.fields.answer import ESTIMATED_DIPOLE_D
-    from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
+    from rotor.quantum.effects.stark import ESTIMATED_DIPOLE_D, StarkRequest, answer_stark
 
     def energies(scale):
         dipole = tuple(scale * x for x in (1.0, 0.5, 0.0))
@@ -186,7 +184,7 @@ def test_the_error_of_an_estimated_dipole_is_that_of_the_energies():
 
 
 def test_maps_state_their_bounds_and_the_unknown_moments():
-    from rotor.quantum.fields.stark_request import StarkRequest, answer_stark
+    from rotor.quantum.effects.stark import StarkRequest, answer_stark
 
     answer = answer_stark(StarkRequest(rotor.read("OCS"), (0.0, 50.0)))
     assert answer.errors.numerical == pytest.approx(answer.states.accuracy_mhz, rel=0.5)

@@ -7,6 +7,10 @@ The dipole points from minus to plus, so that a positive field lowers the state 
 To second order a linear top has W = (μ²E²/2hB) [J(J+1) - 3M²]/[J(J+1)(2J-1)(2J+3)], and -μ²E²/6hB for J = 0; a symmetric one has
 -μE KM/[J(J+1)] to first order (C. H. Townes and A. L. Schawlow, Microwave Spectroscopy, 1955, chapter 10). These formulas serve as checks;
 the module solves the matrices.
+
+H = H0 - s E·μ is linear in a scale s of the dipole, so that ∂E/∂ln s = F ∂E/∂F at a field of strength F (theorem of Hellmann and Feynman).
+A relative error of the dipole therefore shifts an energy by this error times F ∂E/∂F. Maps neglect the polarization of the molecule by a
+static field, -½ α F² by definition of the polarizability, with α/4πε0 a volume.
 """
 
 from __future__ import annotations
@@ -14,17 +18,26 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
+from rotor.checks import require_positive
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
 from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.estimates.beyond import Limit
+from rotor.quantum.fields.answer import MapAnswer
 from rotor.quantum.fields.field_map import FieldMap, field_map
+from rotor.quantum.fields.inputs import basis_field, read_direction, read_m, states_field, tolerance_field
 from rotor.quantum.fields.map_request import MOST_AT_EDGE, FieldKind, FieldTerm, MapRequest
 from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.hamiltonian_input import spins_field
+from rotor.requests.budget import ErrorTerm
+from rotor.requests.field import check_fields, declared
+from rotor.requests.readers import Custom, Grid, Quantity
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -38,6 +51,11 @@ ELECTRIC = FieldKind(
 Z = (0.0, 0.0, 1.0)
 # 2π I/(c h) in MHz for 1 Å³ and 1 W/cm²
 MHZ_ANGSTROM3_W_PER_CM2 = 2 * math.pi * 1e-30 * 1e4 / (units.SPEED_OF_LIGHT_M_PER_S * units.PLANCK_J_S) * 1e-6
+# ½ α F² in MHz of 1 Å³ in 1 kV/cm
+MHZ_PER_ANGSTROM3 = 2 * math.pi * units.VACUUM_PERMITTIVITY_F_PER_M * 1e-30 * 1e10 / units.PLANCK_J_S * 1e-6
+# standard deviation of a normal distribution with half of its values beyond ±0.2 D, as for the estimates
+ESTIMATED_DIPOLE_D = 0.2 / 0.6745
+POINTS = 201  # number of fields of a range without a count
 
 
 def stark_map(
@@ -264,3 +282,144 @@ def _alignment(top: Top) -> Contraction:
     """cos²θ of the figure axis and Z."""
     axis = np.eye(3)[figure_axis(top)]
     return Contraction(np.outer(axis, axis), np.outer(Z, Z))
+
+
+@dataclass(frozen=True)
+class StarkRequest:
+    """A map of levels in an electric field; all values are checked when the request is made.
+
+    top: with its dipole. fields_kv_per_cm: in any order. j_highest: highest J of the free levels in the map. m_values: |M|; None for all.
+    intensity_w_per_cm2: of a laser along Z. direction: of the field. jmax: highest J of the basis; None for what tolerance_mhz needs.
+    diabatic_gap_mhz: None for no diabatic labels. hyperfine: include the spins of the top's constants; m_values are then |M_F|.
+    most_at_edge: largest population of a state in the two highest J of the basis; the error of cosines is about as large.
+    """
+
+    top: Top
+    fields_kv_per_cm: tuple[float, ...] = declared(
+        tuple(np.linspace(0.0, 100.0, POINTS).tolist()), Grid("kV/cm", points=POINTS),
+        "Fields: start:stop[:count], of 201 by default, or a comma list (kV/cm)", "conditions.field", common=True,
+        typed="0:100kV/cm:201",
+    )  # fmt: skip
+    j_highest: int = states_field()
+    m_values: tuple[float, ...] | None = declared(
+        None, Custom(read_m, list, "LIST", list[float]), "|M| of the states: 0,1; by default all. With spins |M_F|: 0.5,1.5",
+        "observables.m", common=True, example=[0, 1],
+    )  # fmt: skip
+    intensity_w_per_cm2: float = declared(
+        0.0, Quantity("W/cm2", metavar="I"), "Of a laser along Z, far from resonance (W/cm2)", "conditions.intensity"
+    )
+    direction: tuple[float, float, float] = declared(
+        Z, Custom(read_direction, list, "ANGLE", list[float]), "Angle of the field with the light of the laser (degrees); M is mixed then",
+        "conditions.direction", option="--tilt", example=[0.0, 0.0, 1.0],
+    )  # fmt: skip
+    jmax: int | None = basis_field(30)
+    tolerance_mhz: float = tolerance_field(1e-4, "1e-4 MHz")
+    diabatic_gap_mhz: float | None = declared(
+        None, Quantity("MHz", above=0, metavar="GAP"),
+        "Follow states diabatically through avoided crossings narrower than this (MHz)", "observables.diabatic_gap", example="10 MHz",
+    )  # fmt: skip
+    hyperfine: bool = spins_field()
+    most_at_edge: float = MOST_AT_EDGE
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        checked_j(self.j_highest)
+        projections(self.top, self.effects, self.m_values, self.j_highest)
+        require_positive("most_at_edge", self.most_at_edge)
+        checked_direction(self.direction)
+        if self.tilted and self.m_values is not None:
+            raise ValueError("m_values: a field at an angle with the light mixes M; leave them out")
+        acting(self.top, self.intensity_w_per_cm2)
+
+    @property
+    def effects(self) -> tuple[QuantumEffect, ...]:
+        """Effects with spins if these are requested; empty for the default Hamiltonian."""
+        return effects_of(self.top, True) if self.hyperfine else ()
+
+    @property
+    def tilted(self) -> bool:
+        """Whether the field is at an angle with Z."""
+        return bool(self.direction[0] or self.direction[1])
+
+    @property
+    def map(self) -> MapRequest:
+        """Hamiltonian, fields and states of the map."""
+        return map_request(
+            self.top,
+            self.fields_kv_per_cm,
+            j_highest=self.j_highest,
+            m_values=self.m_values,
+            intensity_w_per_cm2=self.intensity_w_per_cm2,
+            direction=self.direction,
+            effects=self.effects,
+            tolerance_mhz=self.tolerance_mhz,
+            diabatic_gap_mhz=self.diabatic_gap_mhz,
+            most_at_edge=self.most_at_edge,
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class StarkAnswer(MapAnswer):
+    """The map of a request."""
+
+    request: StarkRequest
+
+    def conditions(self) -> dict[str, Any]:
+        """The laser, the direction of the field, and the gap of diabatic labels."""
+        return {
+            "intensity_w_per_cm2": self.request.intensity_w_per_cm2,
+            "field_direction": list(self.request.direction),
+            "diabatic_gap_mhz": self.request.diabatic_gap_mhz,
+        }
+
+    def field_limits(self) -> list[Limit]:
+        """The polarization by the static field."""
+        return static_polarization(self.request.top, float(np.abs(self.states.fields).max()))
+
+    def moment_terms(self) -> list[ErrorTerm]:
+        """Errors of the dipole, and of the polarizability in light."""
+        terms = [dipole_term(self.request.top, self.states)]
+        if self.request.intensity_w_per_cm2:
+            terms.append(ErrorTerm(None, "the polarizability has no stated uncertainty"))
+        return terms
+
+
+def answer_stark(request: StarkRequest, executor: Executor | None = None) -> StarkAnswer:
+    """The map of a request. executor: solves blocks of states in parallel.
+
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", dipole_abc_debye=(0.7, 0, 0))
+    >>> answer_stark(StarkRequest(rod, (0.0, 1.0), j_highest=0)).states.energy_mhz.round(3).tolist()  # -μ²E²/6B
+    [0.0, -3.449]
+    """
+    return StarkAnswer(request, field_map(request.map, request.jmax, executor))
+
+
+def static_polarization(top: Top, strongest_kv_per_cm: float) -> list[Limit]:
+    """The polarization of a top by a static field; nothing without a field.
+
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", polarizability_abc_angstrom3=((8, 0, 0), (0, 4, 0), (0, 0, 4)))
+    >>> round(static_polarization(rod, 100.0)[0].size_mhz, 3)
+    67.168
+    """
+    if not strongest_kv_per_cm:
+        return []
+    text = f"all levels are lower by about so much in {strongest_kv_per_cm:g} kV/cm, lines shift only by what differs between them"
+    name, tensor = "polarization by the static field", top.polarizability_abc_angstrom3
+    if tensor is None:
+        return [Limit(name, None, "the polarizability is not known")]
+    largest = float(np.abs(np.linalg.eigvalsh(np.array(tensor))).max())
+    return [Limit(name, MHZ_PER_ANGSTROM3 * largest * strongest_kv_per_cm**2, text)]
+
+
+def dipole_term(top: Top, states: FieldMap) -> ErrorTerm:
+    """One standard deviation of the energies from the error of an estimated dipole; other dipoles have no stated uncertainty."""
+    dipole = float(np.linalg.norm(top.dipole_abc_debye or (0.0,)))
+    moved = np.abs(states.field * states.slope) * units.MHZ_PER_DEBYE_KV_PER_CM
+    if not moved.any():
+        return ErrorTerm(0.0, "the dipole moves no energy")
+    if not top.dipole_source.startswith("estimate"):
+        return ErrorTerm(None, "the dipole has no stated uncertainty")
+    largest = float(np.nanmax(moved)) * ESTIMATED_DIPOLE_D / dipole
+    return ErrorTerm(largest, f"dipole estimated within {ESTIMATED_DIPOLE_D:.1g} D", "a measured dipole")

@@ -13,31 +13,42 @@ about 0.1 MHz/T² for an anisotropy of ten of these units. With spins, -μ_N B �
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
+from rotor.molecules.nuclei import isotope
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.stark import projections
+from rotor.quantum.effects.of_top import effects_of
+from rotor.quantum.effects.stark import DEFAULT_TOLERANCE_MHZ, Z, checked_j, projections
+from rotor.quantum.estimates.beyond import Limit
+from rotor.quantum.fields.answer import MapAnswer
 from rotor.quantum.fields.field_map import FieldMap, field_map
+from rotor.quantum.fields.inputs import basis_field, states_field, tolerance_field
 from rotor.quantum.fields.map_request import FieldKind, FieldTerm, MapRequest
 from rotor.quantum.fields.operators import Contraction, Magnet
+from rotor.quantum.hamiltonian_input import spins_field
+from rotor.requests.budget import ErrorTerm
+from rotor.requests.field import SPINS, check_fields, declared
+from rotor.requests.readers import Grid, Pairs
+from rotor.tops.magnetic import MagneticTensors
 from rotor.units import AVOGADRO_PER_MOL, NUCLEAR_MAGNETON_MHZ_PER_T, PLANCK_J_S
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 HIGHEST_TESLA = 1000.0
-DEFAULT_TOLERANCE_MHZ = 1e-6
 MAGNETIC = FieldKind(
     "T", "fields_tesla", "field_tesla", "moment_nuclear_magnetons", NUCLEAR_MAGNETON_MHZ_PER_T, HIGHEST_TESLA
 )
 MHZ_PER_T2 = 1e-11 / (AVOGADRO_PER_MOL * PLANCK_J_S)  # value of 1e-6 erg/(G² mol), which is 1e-5 J/(T² mol)
-Z = (0.0, 0.0, 1.0)
+POINTS = 51  # number of fields of a range without a count
 
 
 def zeeman_map(
@@ -163,3 +174,157 @@ def _axial_tensor(top: Top, values: ArrayLike, name: str) -> Floats:
                 f"the {name} tensor of a {top.kind} top is symmetric about {'abc'[axis]}; got {tensor.tolist()}"
             )
     return np.array(tensor)
+
+
+@dataclass(frozen=True)
+class ZeemanRequest:
+    """A map of levels in a magnetic field; all values are checked when the request is made.
+
+    top: with its g tensor in `magnetic`. fields_tesla: in any order. j_highest: highest J of the free levels in the map. jmax: highest J of
+    the basis; None for what tolerance_mhz needs. hyperfine: include the spins of the top's constants. nuclear_g: g = μ/(μ_N I) by the names
+    of spins; by default that of the isotope. An electron spin needs a value.
+    """
+
+    top: Top
+    fields_tesla: tuple[float, ...] = declared(
+        tuple(np.linspace(0.0, 5.0, POINTS).tolist()), Grid("T", points=POINTS),
+        "Fields: start:stop[:count], of 51 by default, or a comma list (T, mT or G)", "conditions.field", common=True, typed="0:5T:51",
+    )  # fmt: skip
+    j_highest: int = states_field()
+    jmax: int | None = basis_field(12)
+    tolerance_mhz: float = tolerance_field(DEFAULT_TOLERANCE_MHZ, "1e-6 MHz")
+    hyperfine: bool = spins_field()
+    nuclear_g: Mapping[str, float] | None = declared(
+        None, Pairs(float, "spin", "14N=0.4038"),
+        "g = moment/(nuclear magneton x spin) of spins, 14N=0.4038,...; by default of the isotope", "magnetic.nuclear_g",
+        example={"14N": 0.4038}, panel=SPINS,
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        checked_j(self.j_highest)
+        MAGNETIC.checked(self.fields_tesla)
+        checked_g(self.top, self.magnetic.g)
+        if self.nuclear_g and not self.hyperfine:
+            raise ValueError("nuclear_g: belongs to spins; ask for the hyperfine structure too")
+        _ = self.effects, self.spin_g
+
+    @property
+    def magnetic(self) -> MagneticTensors:
+        """The tensors of the top; ValueError if they are not known."""
+        if self.top.magnetic is None:
+            raise ValueError(
+                f"the rotational g tensor of {self.top.name or 'this top'} is not known: give one, in principal axes"
+            )
+        return self.top.magnetic
+
+    @property
+    def effects(self) -> tuple[QuantumEffect, ...]:
+        """Effects with spins if these are requested; empty for the default Hamiltonian."""
+        return effects_of(self.top, True) if self.hyperfine else ()
+
+    @property
+    def map(self) -> MapRequest:
+        """Hamiltonian, fields and states of the map."""
+        return magnetic_map_request(
+            self.top,
+            self.fields_tesla,
+            self.magnetic.g,
+            magnetisability=self.magnetic.magnetisability,
+            effects=self.effects,
+            nuclear_g=self.spin_g,
+            j_highest=self.j_highest,
+            tolerance_mhz=self.tolerance_mhz,
+        )
+
+    @property
+    def spin_g(self) -> dict[str, float]:
+        """g of each spin, from the request or the isotope; ValueError if it is not known."""
+        constants = self.top.spin_constants
+        if not self.hyperfine or constants is None:
+            return {}
+        requested = dict(self.nuclear_g or {})
+        if unknown := sorted(requested.keys() - constants.twice.keys()):
+            raise ValueError(f"nuclear_g: {', '.join(unknown)}: the spins of this top are {', '.join(constants.twice)}")
+        return {name: _finite(name, requested[name]) if name in requested else _g_of(name) for name in constants.twice}
+
+
+def _finite(name: str, value: float) -> float:
+    """The value; ValueError unless it is finite."""
+    if not math.isfinite(value):
+        raise ValueError(f"nuclear_g: {name} = {value}: a finite number is expected")
+    return float(value)
+
+
+def _g_of(name: str) -> float:
+    """g of the isotope after which a spin is named, such as 35Cl_1."""
+    label = name.partition("_")[0]
+    try:
+        g = isotope(label).g_factor
+    except ValueError:
+        g = None
+    if g is None:
+        raise ValueError(f"nuclear_g: the g of {name} is not known; give it")
+    return g
+
+
+@dataclass(frozen=True, repr=False)
+class ZeemanAnswer(MapAnswer):
+    """The map of a request."""
+
+    request: ZeemanRequest
+
+    def conditions(self) -> dict[str, Any]:
+        """The tensors of the top and g of its nuclei."""
+        magnetic = self.request.magnetic
+        return {
+            "g_abc": magnetic.g,
+            "magnetisability_abc": magnetic.magnetisability,
+            "magnetic_source": magnetic.source or None,
+            "nuclear_g": self.request.spin_g,
+        }
+
+    def field_limits(self) -> list[Limit]:
+        """See `magnetic_limits`."""
+        return magnetic_limits(self.request)
+
+    def moment_terms(self) -> list[ErrorTerm]:
+        """The error of the g tensor."""
+        if self.states.fields.any():
+            return [ErrorTerm(None, "the g tensor has no stated uncertainty")]
+        return [ErrorTerm(0.0, "no field acts")]
+
+
+def magnetic_limits(request: ZeemanRequest) -> list[Limit]:
+    """Neglected effects of the field: moments of nuclei without hyperfine structure, and an unknown magnetisability.
+
+    >>> from rotor.tops.magnetic import MagneticTensors, tensor_for
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", magnetic=MagneticTensors(tensor_for("linear", [-0.03])))
+    >>> [limit.name for limit in magnetic_limits(ZeemanRequest(rod, (0.0, 1.0)))]
+    ['magnetisability']
+    """
+    limits, strongest = [], max(abs(field) for field in request.fields_tesla)
+    nuclei = () if request.top.molecule is None else request.top.molecule.nuclei
+    moments = {nucleus.label: abs(nucleus.g_factor or 0.0) * nucleus.spin for nucleus in nuclei if nucleus.spin > 0}
+    if moments and not request.hyperfine:
+        size = max(moments.values()) * NUCLEAR_MAGNETON_MHZ_PER_T * strongest
+        text = f"{', '.join(sorted(moments))}: energies in {strongest:g} T, not lines between states of one orientation"
+        limits.append(Limit("magnetic moments of nuclei", size, text))
+    if request.magnetic.magnetisability is None:
+        text = f"levels shift with the square of the field, up to {strongest:g} T"
+        limits.append(Limit("magnetisability", None, text))
+    return limits
+
+
+def answer_zeeman(request: ZeemanRequest, executor: Executor | None = None) -> ZeemanAnswer:
+    """The map of a request. executor: solves blocks of states in parallel.
+
+    >>> from rotor.tops.magnetic import MagneticTensors, tensor_for
+    >>> from rotor.tops.top import Top
+    >>> rod = Top.from_constants("B=6000 MHz", magnetic=MagneticTensors(tensor_for("linear", [-0.03])))
+    >>> states = answer_zeeman(ZeemanRequest(rod, (0.0, 1.0), j_highest=1)).states
+    >>> (states.energy_mhz[states.curve("1", 1)] - 12000).round(4).tolist()  # 0.03 μ_N B
+    [0.0, 0.2287]
+    """
+    return ZeemanAnswer(request, field_map(request.map, request.jmax, executor))

@@ -1,9 +1,4 @@
-"""Answers of maps of levels in a field, and their error budgets (`rotor.requests.budget`).
-
-H = H0 - s E·μ is linear in a scale s of the dipole, so that ∂E/∂ln s = F ∂E/∂F at a field of strength F (theorem of Hellmann and Feynman).
-A relative error of the dipole therefore shifts an energy by this error times F ∂E/∂F. Maps neglect the polarization of the molecule by a
-static field, -½ α F² by definition of the polarizability, with α/4πε0 a volume.
-"""
+"""Answers of maps of levels in a field, and their error budgets (`rotor.requests.budget`)."""
 
 from __future__ import annotations
 
@@ -16,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor import units
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, data_term, model_term, parameter_names
@@ -31,11 +25,6 @@ from rotor.tops.facts import top_facts
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
-
-# ½ α F² in MHz of 1 Å³ in 1 kV/cm
-MHZ_PER_ANGSTROM3 = 2 * math.pi * units.VACUUM_PERMITTIVITY_F_PER_M * 1e-30 * 1e10 / units.PLANCK_J_S * 1e-6
-# standard deviation of a normal distribution with half of its values beyond ±0.2 D, as for the estimates
-ESTIMATED_DIPOLE_D = 0.2 / 0.6745
 
 
 @dataclass(frozen=True, repr=False)
@@ -90,24 +79,6 @@ class MapAnswer(TextOf):
         }
 
 
-def static_polarization(top: Top, strongest_kv_per_cm: float) -> list[Limit]:
-    """The polarization of a top by a static field; nothing without a field.
-
-    >>> from rotor.tops.top import Top
-    >>> rod = Top.from_constants("B=6000 MHz", polarizability_abc_angstrom3=((8, 0, 0), (0, 4, 0), (0, 0, 4)))
-    >>> round(static_polarization(rod, 100.0)[0].size_mhz, 3)
-    67.168
-    """
-    if not strongest_kv_per_cm:
-        return []
-    text = f"all levels are lower by about so much in {strongest_kv_per_cm:g} kV/cm, lines shift only by what differs between them"
-    name, tensor = "polarization by the static field", top.polarizability_abc_angstrom3
-    if tensor is None:
-        return [Limit(name, None, "the polarizability is not known")]
-    largest = float(np.abs(np.linalg.eigvalsh(np.array(tensor))).max())
-    return [Limit(name, MHZ_PER_ANGSTROM3 * largest * strongest_kv_per_cm**2, text)]
-
-
 def constants_term(top: Top, effects: Sequence[QuantumEffect], j: int) -> ErrorTerm:
     """One standard deviation of the free levels up to J = `j` from the uncertainties of the constants."""
     levels = solve_levels(top, j, effects=effects) if effects else solve_levels(top, j)
@@ -117,18 +88,6 @@ def constants_term(top: Top, effects: Sequence[QuantumEffect], j: int) -> ErrorT
     if covariance is None:
         return data_term(None, source)
     return data_term(level_errors(top, levels, covariance), f"{source}; levels without the field")
-
-
-def dipole_term(top: Top, states: FieldMap) -> ErrorTerm:
-    """One standard deviation of the energies from the error of an estimated dipole; other dipoles have no stated uncertainty."""
-    dipole = float(np.linalg.norm(top.dipole_abc_debye or (0.0,)))
-    moved = np.abs(states.field * states.slope) * units.MHZ_PER_DEBYE_KV_PER_CM
-    if not moved.any():
-        return ErrorTerm(0.0, "the dipole moves no energy")
-    if not top.dipole_source.startswith("estimate"):
-        return ErrorTerm(None, "the dipole has no stated uncertainty")
-    largest = float(np.nanmax(moved)) * ESTIMATED_DIPOLE_D / dipole
-    return ErrorTerm(largest, f"dipole estimated within {ESTIMATED_DIPOLE_D:.1g} D", "a measured dipole")
 
 
 def joined_data(*terms: ErrorTerm) -> ErrorTerm:

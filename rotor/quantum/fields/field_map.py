@@ -2,7 +2,7 @@
 
 H(x) = H0 + F + x V over each exact block of states; x is the varied field, F a constant one (such as laser light). Only the lowest states
 of each block are solved, at all fields, in the smallest basis of free states whose truncation error is within the tolerance
-(`rotor.quantum.fields.truncation`): J max is chosen first, then the states up to it. Higher levels that lie among those of the map are not
+(`rotor.quantum.fields.block_states`): J max is chosen first, then the states up to it. Higher levels among those of the map are not
 needed where the bound shows that the field does not connect them. The map lists the bound and the population of the highest J of each state
 at each field.
 

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from rotor.quantum.effects.stark import answer_stark
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.effects.zeeman import answer_zeeman
 from rotor.quantum.estimates.plans import plan_fields
 from rotor.quantum.fields.block_states import solve_block
 from rotor.quantum.fields.field_map import each_block
 from rotor.quantum.fields.inputs import ENERGY, largest_difference
-from rotor.quantum.fields.stark_request import answer_stark
-from rotor.quantum.fields.zeeman_request import answer_zeeman
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut, largest_first

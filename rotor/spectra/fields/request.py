@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.checks import require_choice
-from rotor.quantum.fields.stark_request import StarkRequest
+from rotor.quantum.effects.stark import StarkRequest
 from rotor.requests.field import CONDITIONS, OBSERVABLES, check_fields, declared
 from rotor.requests.readers import Custom, Quantity, Range, Text
 from rotor.spectra.fields.light import LightText, light_components

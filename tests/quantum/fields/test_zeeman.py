@@ -9,10 +9,9 @@ import pytest
 from field_matrices import contracted_vectors, rigid, states
 
 import rotor
-from rotor.quantum.effects.zeeman import zeeman_map
+from rotor.quantum.effects.zeeman import ZeemanRequest, answer_zeeman, magnetic_limits, zeeman_map
 from rotor.quantum.fields.operators import Magnet
 from rotor.quantum.fields.space import field_space
-from rotor.quantum.fields.zeeman_request import ZeemanRequest, answer_zeeman, magnetic_limits
 from rotor.tops.magnetic import MagneticTensors, tensor_for
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
