@@ -17,7 +17,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
-from rotor.quantum.basis.state_elements import StateElements, StateTerms
+from rotor.quantum.basis.state_elements import StateElements, StateTerms, Summed
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.levels import Levels, SolvedBlock, levels_of_blocks, placed
@@ -116,7 +116,8 @@ def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
     vertices = {
         j: [(v, b) for v in sorted(model.states) for b in blocks_within(j, frame, limits.get(v))] for j in all_j
     }
-    terms = StateTerms.with_values(model.states, _links(model), model.representation)
+    operators = [(v, 0, operators) for v, operators in model.states.items()]
+    terms = StateTerms.from_operators(model.states, operators, _links(model))
     elements = StateElements(terms, 1, model.representation, vertices)
     by_j: dict[int, list[SolvedBlock]] = {}
     for j in sorted(all_j, reverse=True):
@@ -138,8 +139,8 @@ def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
     return [block for j in all_j for block in by_j[j]]
 
 
-def _links(model: Model) -> list[tuple[int, int, OperatorOfJ, list[tuple[str, OperatorOfJ]]]]:
-    """The couplings of two states added up, with each by its name."""
+def _links(model: Model) -> list[tuple[int, Summed]]:
+    """The couplings of two states added up, with each by its name, of the parameter 0, H itself."""
 
     def summed(couplings: list[tuple[float, Coupling]]) -> OperatorOfJ:
         def operator(j: int, representation: str) -> JOperator:
@@ -151,7 +152,7 @@ def _links(model: Model) -> list[tuple[int, int, OperatorOfJ, list[tuple[str, Op
         return operator
 
     return [
-        (*v, summed(pairs), [(coupling.name, coupling.operator) for _, coupling in pairs])
+        (0, (*v, summed(pairs), [(coupling.name, coupling.operator) for _, coupling in pairs]))
         for v, pairs in model.couplings.items()
     ]
 

@@ -8,7 +8,7 @@ X^p and the factors of its parameters. Couplings of states, and operators of J t
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -75,42 +75,31 @@ class StateTerms(NamedTuple):
         """The terms of named parameters of effects."""
         place = {name: i for i, name in enumerate(names)}
         states = [state for effect in effects for state in (State(0, effect.operators(top)), *effect.states(top))]
-        occurring = {(q, n) for state in states for operators in state.terms.values() for _, q, n in operators}
-        powers = ((0, 0), *sorted(occurring - {(0, 0)}))
-        first = {v: i * len(powers) for i, v in enumerate(dict.fromkeys(state.v for state in states))}
-        terms = [
-            (first[state.v] + powers.index((q, n)), place[name], p, factor)
-            for state in states
-            for name, operators in state.terms.items()
-            if name in place
-            for (p, q, n), factor in operators.items()
+        operators = [
+            (state.v, place[name], terms) for state in states for name, terms in state.terms.items() if name in place
         ]
-        links = list[_Link]()
-        for coupling in couplings_of(top, effects, representation):
-            if coupling.name in place:
-                unit = len(first) * len(powers) + len(links)
-                named = [(coupling.name, coupling.operator)]
-                links.append(_Link(unit, coupling.bra, coupling.ket, coupling.operator, named))
-                terms.append((unit, place[coupling.name], 0, 1.0))
-        rows, columns, p = np.array([term[:3] for term in terms], dtype=np.int64).reshape(-1, 3).T
-        factors = np.array([term[3] for term in terms], dtype=float)
-        return cls(powers, first, rows, columns, p, factors, tuple(links))
+        couplings = [c for c in couplings_of(top, effects, representation) if c.name in place]
+        links = [(place[c.name], (c.bra, c.ket, c.operator, [(c.name, c.operator)])) for c in couplings]
+        return cls.from_operators([state.v for state in states], operators, links)
 
     @classmethod
-    def with_values(cls, states: Mapping[int, Operators], links: Sequence[Summed], representation: str) -> StateTerms:
-        """Of one parameter, H itself: operators of every state by v with their values, and sums of couplings."""
-        powers = ((0, 0), *sorted({(q, n) for operators in states.values() for _, q, n in operators} - {(0, 0)}))
-        first = {v: i * len(powers) for i, v in enumerate(states)}
-        terms = [
-            (first[v] + powers.index((q, n)), p, c)
-            for v, operators in states.items()
-            for (p, q, n), c in operators.items()
+    def from_operators(
+        cls, states: Iterable[int], operators: Sequence[tuple[int, int, Operators]], links: Sequence[tuple[int, Summed]]
+    ) -> StateTerms:
+        """The terms of operators, each with its state and parameter, and of links, each with its parameter."""
+        powers = ((0, 0), *sorted({(q, n) for _, _, terms in operators for _, q, n in terms} - {(0, 0)}))
+        first = {v: i * len(powers) for i, v in enumerate(dict.fromkeys(states))}
+        rows = [
+            (first[v] + powers.index((q, n)), parameter, p, factor)
+            for v, parameter, terms in operators
+            for (p, q, n), factor in terms.items()
         ]
         units = range(len(first) * len(powers), len(first) * len(powers) + len(links))
-        terms += [(unit, 0, 1.0) for unit in units]
-        rows, p, factors = (np.array(column) for column in zip(*terms, strict=True))
-        numbered_links = tuple(_Link(unit, *link) for unit, link in zip(units, links, strict=True))
-        return cls(powers, first, rows, np.zeros_like(rows), p, factors, numbered_links)
+        rows += [(number, parameter, 0, 1.0) for number, (parameter, _) in zip(units, links, strict=True)]
+        unit, column, p = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
+        factors = np.array([row[3] for row in rows], dtype=float)
+        numbered_links = tuple(_Link(number, *link) for number, (_, link) in zip(units, links, strict=True))
+        return cls(powers, first, unit, column, p, factors, numbered_links)
 
     @property
     def linked(self) -> list[int]:
