@@ -56,48 +56,44 @@ class _Rotation(NamedTuple):
     vectors: dict[int, Floats]
 
 
-@dataclass(frozen=True)
-class LabelledBlock:
-    """One block of an F: its parts, the matrices over basis functions that parameters multiply, and the labels in it."""
+class _Coupled(NamedTuple):
+    """A block at given constants: its parts, the rotation, E_r and the diagonal of H of each function, H over basis functions."""
 
     parts: tuple[SpinPart, ...]
-    linear: LinearBlock
-    targets: tuple[_Target, ...]
-
-    def over_functions(self, vectors: Floats, rotation: _Rotation) -> Floats:
-        """Columns over rotational states times patterns as columns over basis functions."""
-        return self._turned(vectors, rotation.vectors)
-
-    def over_states(self, vectors: Floats, rotation: _Rotation) -> Floats:
-        """Columns over basis functions as columns over rotational states times patterns."""
-        return self._turned(vectors, {part.number: rotation.vectors[part.number].T for part in self.parts})
-
-    def _turned(self, vectors: Floats, matrices: Mapping[int, Floats]) -> Floats:
-        """Columns, each part of which is multiplied by the matrix of its rotational block."""
-        out = np.empty_like(vectors)
-        for part in self.parts:
-            rows = vectors[part.place].reshape(part.repeats, -1, vectors.shape[1])
-            out[part.place] = np.matmul(matrices[part.number], rows).reshape(-1, vectors.shape[1])
-        return out
-
-
-class _Coupled(NamedTuple):
-    """A block at given constants: E_r and the diagonal of H of each function, and H over basis functions as a sparse matrix."""
-
     rotation: _Rotation
     energies: Floats
     diagonal: Floats
     matrix: Any
 
+    def over_functions(self, columns: Floats) -> Floats:
+        """Columns over rotational states times patterns as columns over basis functions."""
+        return self._turned(columns, self.rotation.vectors)
+
+    def over_states(self, columns: Floats) -> Floats:
+        """Columns over basis functions as columns over rotational states times patterns."""
+        return self._turned(columns, {part.number: self.rotation.vectors[part.number].T for part in self.parts})
+
+    def _turned(self, columns: Floats, matrices: Mapping[int, Floats]) -> Floats:
+        """Columns, each part of which is multiplied by the matrix of its rotational block."""
+        out = np.empty_like(columns)
+        for part in self.parts:
+            rows = columns[part.place].reshape(part.repeats, -1, columns.shape[1])
+            out[part.place] = np.matmul(matrices[part.number], rows).reshape(-1, columns.shape[1])
+        return out
+
 
 @dataclass(frozen=True)
 class ContractedLevels:
-    """Labelled levels as functions of the parameters; rotations: linear blocks of rotational blocks by their numbers."""
+    """Labelled levels as functions of the parameters.
+
+    rotors, rotations: rotational blocks and their linear blocks, by their numbers. blocks: of each block of an F its parts, the matrices
+    over basis functions that parameters multiply, and the labels in it.
+    """
 
     count: int
     rotors: dict[int, SolvedBlock]
     rotations: dict[int, LinearBlock]
-    blocks: tuple[LabelledBlock, ...]
+    blocks: tuple[tuple[tuple[SpinPart, ...], LinearBlock, tuple[_Target, ...]], ...]
     window_mhz: float
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
@@ -106,15 +102,11 @@ class ContractedLevels:
             raise ValueError("a block of the Hamiltonian is not finite with these constants")
         rotation = self.rotation(values_mhz)
         energies, slopes = np.empty(self.count), np.zeros((self.count, len(values_mhz)))
-        for block in self.blocks:
-            rows = np.array([target.row for target in block.targets])
-            functions = self.functions(block, rotation)
-            energies[rows], vectors = _levels_of(
-                block, functions, _coupled(block, rotation, values_mhz), self.window_mhz
-            )
-            slopes[rows[:, None], block.linear.parameters] = block.linear.slopes(
-                block.over_functions(vectors, rotation)
-            )
+        for parts, linear, targets in self.blocks:
+            rows = np.array([target.row for target in targets])
+            coupled = _coupled(parts, linear, rotation, values_mhz)
+            energies[rows], vectors = _levels_of(coupled, self.functions(parts, targets, rotation), self.window_mhz)
+            slopes[rows[:, None], linear.parameters] = linear.slopes(coupled.over_functions(vectors))
         return energies, slopes
 
     def rotation(self, values_mhz: Floats) -> _Rotation:
@@ -122,13 +114,13 @@ class ContractedLevels:
         solved = {number: _eigen(linear.lower(values_mhz)) for number, linear in self.rotations.items()}
         return _Rotation(*({number: pair[i] for number, pair in solved.items()} for i in range(2)))
 
-    def functions(self, block: LabelledBlock, rotation: _Rotation) -> Ints:
+    def functions(self, parts: Sequence[SpinPart], targets: Sequence[_Target], rotation: _Rotation) -> Ints:
         """Places of the functions that the labels of a block name."""
-        numbers = {block.parts[target.part].number for target in block.targets}
+        numbers = {parts[target.part].number for target in targets}
         names = {number: _states_by_name(self.rotors[number], rotation.vectors[number]) for number in numbers}
         functions = []
-        for target in block.targets:
-            part = block.parts[target.part]
+        for target in targets:
+            part = parts[target.part]
             state = names[part.number][target.name]
             functions.append(part.place.start + target.pattern * len(part.rotor.energies_mhz) + state)
         return np.array(functions, dtype=np.int64)
@@ -146,26 +138,25 @@ def _states_by_name(rotor: SolvedBlock, vectors: Floats) -> dict[tuple[int, ...]
     return {tuple(name): state for state, name in enumerate(named_states(rotor, vectors).tolist())}
 
 
-def _coupled(block: LabelledBlock, rotation: _Rotation, values_mhz: Floats) -> _Coupled:
+def _coupled(parts: tuple[SpinPart, ...], linear: LinearBlock, rotation: _Rotation, values_mhz: Floats) -> _Coupled:
     """A block at values (parameters,) in MHz."""
     from scipy.sparse import coo_array  # loaded in fits of large blocks only
 
-    linear = block.linear
     rows, columns, elements = linear.rows, linear.columns, linear.elements(values_mhz)
     off = rows != columns
     places = np.append(rows, columns[off]), np.append(columns, rows[off])
     matrix = coo_array((np.append(elements, elements[off]), places), shape=(linear.size, linear.size)).tocsr()
     energies, diagonal = [], []
-    for part in block.parts:
+    for part in parts:
         vectors = rotation.vectors[part.number]
         energies.append(np.tile(rotation.energies[part.number], part.repeats))
         for start in range(part.place.start, part.place.stop, len(vectors)):
             inside = matrix[start : start + len(vectors), start : start + len(vectors)]
             diagonal.append(np.einsum("ij,ij->j", vectors, inside @ vectors))
-    return _Coupled(rotation, np.concatenate(energies), np.concatenate(diagonal), matrix)
+    return _Coupled(parts, rotation, np.concatenate(energies), np.concatenate(diagonal), matrix)
 
 
-def _levels_of(block: LabelledBlock, functions: Ints, coupled: _Coupled, window_mhz: float) -> tuple[Floats, Floats]:
+def _levels_of(coupled: _Coupled, functions: Ints, window_mhz: float) -> tuple[Floats, Floats]:
     """Energies (targets,) and vectors (functions, targets) of the levels dominated by these functions."""
     diagonal = coupled.diagonal
     energies, vectors = np.empty(len(functions)), np.empty((len(diagonal), len(functions)))
@@ -173,7 +164,7 @@ def _levels_of(block: LabelledBlock, functions: Ints, coupled: _Coupled, window_
     centres = [float(diagonal[functions[group]].mean()) for group in groups]
     near = [np.flatnonzero(np.abs(diagonal - centre) < window_mhz) for centre in centres]
     chosen = np.unique(np.concatenate(near))
-    columns = coupling_columns(block, chosen, coupled)
+    columns = coupling_columns(coupled, chosen)
     for group, centre, inside in zip(groups, centres, near, strict=True):
         inside_columns = columns[:, np.searchsorted(chosen, inside)]
         eliminated, states = _eliminated(coupled.energies, diagonal, inside_columns, inside, centre)
@@ -194,12 +185,12 @@ def _groups(energies: Floats, spread_mhz: float) -> Iterator[Ints]:
             start = stop
 
 
-def coupling_columns(block: LabelledBlock, chosen: Ints, coupled: _Coupled) -> Floats:
+def coupling_columns(coupled: _Coupled, chosen: Ints) -> Floats:
     """Columns of V (functions, chosen)."""
     places = np.arange(len(chosen))
     units = np.zeros((len(coupled.energies), len(chosen)))
     units[chosen, places] = 1.0
-    columns = block.over_states(coupled.matrix @ block.over_functions(units, coupled.rotation), coupled.rotation)
+    columns = coupled.over_states(coupled.matrix @ coupled.over_functions(units))
     columns[chosen, places] -= coupled.energies[chosen]
     return columns
 
@@ -239,7 +230,7 @@ def contracted_levels(
     rotations = rotation_blocks(terms, len(names), list(rotors.values()), shared.representation)
     linear = linear_blocks_of_spins(top, effects, names, [block for block, _ in chosen])
     blocks = tuple(
-        LabelledBlock(tuple(b.parts), matrices, targets) for (b, targets), matrices in zip(chosen, linear, strict=True)
+        (tuple(block.parts), matrices, targets) for (block, targets), matrices in zip(chosen, linear, strict=True)
     )
     contracted = ContractedLevels(len(rows), rotors, dict(zip(rotors, rotations, strict=True)), blocks, 0.0)
     window = _window(contracted, values_mhz)
@@ -271,8 +262,8 @@ def _blocks_with(levels: Levels, rows: Ints) -> list[tuple[SpinBlock, tuple[_Tar
 def _window(levels: ContractedLevels, values_mhz: Floats) -> float:
     """W from the largest norm of a column of V of a labelled function."""
     rotation, longest = levels.rotation(values_mhz), 0.0
-    for block in levels.blocks:
-        functions = np.unique(levels.functions(block, rotation))
-        columns = coupling_columns(block, functions, _coupled(block, rotation, values_mhz))
+    for parts, linear, targets in levels.blocks:
+        functions = np.unique(levels.functions(parts, targets, rotation))
+        columns = coupling_columns(_coupled(parts, linear, rotation, values_mhz), functions)
         longest = max(longest, float(np.sqrt(np.einsum("ij,ij->j", columns, columns)).max()))
     return max(_LEAST_RATIO * longest, float(np.sqrt(longest**3 / TOLERANCE_MHZ)))
