@@ -1,11 +1,11 @@
 """Two source trees of rotor on the same work, in turns: what a change costs or gains, as ratios after/before.
 
-    python benchmarks/before_after.py BEFORE AFTER [--rounds 5] [--only TEXT] [--json benchmarks/results/before_after.json]
+    python benchmarks/before_after.py BEFORE AFTER [--rounds 5] [--only TEXT] [--processor] [--json FILE]
 
 BEFORE and AFTER are folders with rotor/ and benchmarks/ in them, such as two git worktrees. Each piece of work is
 that of the tree's own bench_lines.py, bench_tops.py and bench_fluid.py, then whole processes. One process a tree and
 piece, which wait for each other; a ratio is that of the fastest rounds, since whatever else the machine does only adds.
-Memory is the peak of each process.
+Memory is the peak of each process. With --processor seconds are those of the processor, for a machine that does other work too.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -67,19 +68,23 @@ def _fluid(ewald: bool, folder: Path) -> Callable[[], float]:
     return lambda: float(next(pieces))
 
 
-def serve(name: str, folder: Path) -> None:
+def serve(name: str, folder: Path, processor: bool) -> None:
     """The process of one tree: a line in, the seconds of one round out; at the end the peak of memory."""
-    import resource
-
     run = work_of(name, folder)
     for line in sys.stdin:
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024
-        print(memory if line.startswith("memory") else run(), flush=True)
+        if line.startswith("memory"):
+            print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, flush=True)
+            continue
+        before = time.process_time()
+        seconds = run()
+        print(time.process_time() - before if processor else seconds, flush=True)
 
 
-def in_turns(name: str, trees: list[Path], rounds: int, folder: Path) -> Iterator[tuple[list[float], float]]:
+def in_turns(
+    name: str, trees: list[Path], rounds: int, folder: Path, processor: bool
+) -> Iterator[tuple[list[float], float]]:
     """For each tree the seconds of its rounds and its peak of memory in MB."""
-    processes = [_process(name, tree, folder) for tree in trees]
+    processes = [_process(name, tree, folder, processor) for tree in trees]
     seconds: list[list[float]] = [[] for _ in trees]
     for k in range(rounds + 1):
         for taken, process in zip(seconds, processes, strict=True):
@@ -92,9 +97,10 @@ def in_turns(name: str, trees: list[Path], rounds: int, folder: Path) -> Iterato
         process.wait()
 
 
-def _process(name: str, tree: Path, folder: Path) -> subprocess.Popen[str]:
+def _process(name: str, tree: Path, folder: Path, processor: bool) -> subprocess.Popen[str]:
     path = os.pathsep.join([str(tree), str(tree / "benchmarks")])
     command = [sys.executable, "-P", __file__, "--serve", name, "--folder", str(folder)]
+    command += ["--processor"] if processor else []
     return subprocess.Popen(
         command, env=os.environ | {"PYTHONPATH": path}, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
@@ -106,12 +112,19 @@ def _ask(process: subprocess.Popen[str], word: str) -> float:
     return float(process.stdout.readline())
 
 
-def commands(words: list[str], trees: list[Path], rounds: int, folder: Path) -> list[list[float]]:
+def _children() -> float:
+    """Processor time of the processes that have ended, in seconds."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def commands(words: list[str], trees: list[Path], rounds: int, folder: Path, processor: bool) -> list[list[float]]:
     """Seconds of whole processes, the trees taking turns."""
     seconds: list[list[float]] = [[] for _ in trees]
     for k in range(rounds + 1):
         for taken, tree in zip(seconds, trees, strict=True):
-            started = time.perf_counter()
+            clock = _children if processor else time.perf_counter
+            started = clock()
             subprocess.run(
                 [sys.executable, "-m", "rotor", *words],
                 env=os.environ | {"PYTHONPATH": str(tree)},
@@ -121,7 +134,7 @@ def commands(words: list[str], trees: list[Path], rounds: int, folder: Path) -> 
                 stderr=subprocess.DEVNULL,
             )
             if k:
-                taken.append(time.perf_counter() - started)
+                taken.append(clock() - started)
     return seconds
 
 
@@ -132,21 +145,22 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--only", default="", help="only the work whose name holds this text")
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--processor", action="store_true", help="processor time")
     parser.add_argument("--serve")
     parser.add_argument("--folder", type=Path)
     arguments = parser.parse_args()
     if arguments.serve:
-        return serve(arguments.serve, arguments.folder)
+        return serve(arguments.serve, arguments.folder, arguments.processor)
     trees = [tree.resolve() for tree in arguments.trees]
     table = {}
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for work in (work for work in WORK if arguments.only in work):
-            (before, old), (after, new) = in_turns(work, trees, arguments.rounds, folder)
+            (before, old), (after, new) = in_turns(work, trees, arguments.rounds, folder, arguments.processor)
             table[work] = _row(work, before, after) | {"memory_mb_before": old, "memory_mb_after": new}
             print(f"    peak memory {old:.0f} MB before, {new:.0f} MB after", flush=True)
         for work, words in ((work, words) for work, words in COMMANDS.items() if arguments.only in work):
-            before, after = commands(words, trees, 2 * arguments.rounds, folder)
+            before, after = commands(words, trees, 2 * arguments.rounds, folder, arguments.processor)
             table[work] = _row(work, before, after)
     if arguments.json:
         arguments.json.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
