@@ -1,15 +1,17 @@
 """All states of a Hamiltonian Σ x^n H_n at many fields x, where the field changes them little: eigenvectors interpolated in the field.
 
-The matrix is solved in full at fields near the nodes of Chebyshev. Their eigenvectors of equal rank, turned to a real positive overlap with
-those of the field before, are interpolated by the polynomial of Lagrange. With E_i = ⟨i|H|i⟩ of the interpolated vectors and the residual
-r_i = H|i⟩ - E_i|i⟩, an eigenvalue lies within |r_i| of E_i. It lies within |r_i|²/gap, too: if no eigenvalue is between λ and μ, then
-0 ≤ ⟨(H - λ)(H - μ)⟩ = |r|² + (E - λ)(E - μ). Since (E_k - E_i)⟨i|k⟩ = ⟨i|r_k⟩ - ⟨r_i|k⟩, vectors of small residual are orthogonal unless
-their energies nearly coincide; these overlaps are computed. As many orthogonal vectors as functions are all states, so that their order in
-energy is known. A field at which a residual or an overlap is too large, such as near an avoided crossing, is solved in full.
+The matrix is solved in full at fields near the nodes of Chebyshev. Their eigenvectors, in the order of those of the field before by overlap
+and turned to a real positive one, are interpolated by the polynomial of Lagrange. With E_i = ⟨i|H|i⟩ of the interpolated vectors and the
+residual r_i = H|i⟩ - E_i|i⟩, an eigenvalue lies within |r_i| of E_i. It lies within |r_i|²/gap, too: if no eigenvalue is between λ and μ,
+then 0 ≤ ⟨(H - λ)(H - μ)⟩ = |r|² + (E - λ)(E - μ). Since (E_k - E_i)⟨i|k⟩ = ⟨i|r_k⟩ - ⟨r_i|k⟩, vectors of small residual are orthogonal
+unless their energies nearly coincide; these overlaps are computed. As many orthogonal vectors as functions are all states, so that their
+order in energy is known. A field at which a residual or an overlap is too large, such as near an avoided crossing, is solved in full; after
+a few of them the fields that remain are divided into halves.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -20,23 +22,73 @@ from rotor.arrays import Floats, Ints
 
 NODES = 9
 FEWEST_FIELDS = 2 * NODES
-PART_OF_TOLERANCE = 0.1  # largest residual as a share of the tolerance of energies
 OVERLAP = 1e-7  # largest overlap of two vectors
-FAILURES = 3  # after so many fields at which interpolation fails all others are solved in full
+FAILURES = 3  # fields of a range at which interpolation may fail
 TINY = 1e-300  # instead of 0 in a denominator
 
 Vectors = NDArray[Any]
 
 
+def interpolated_states(
+    matrix_at: Callable[[int], Vectors], fields: Floats, count: int, largest_mhz: float
+) -> tuple[Floats, Vectors, Floats]:
+    """Energies (f, count), vectors (f, n, count) and errors (f, count) of the lowest states of a matrix at rising fields.
+
+    matrix_at: H (n, n) at the field of a place. largest_mhz: residual of interpolated vectors.
+    """
+    first = matrix_at(0)
+    energies, errors = np.empty((len(fields), count)), np.zeros((len(fields), count))
+    vectors = np.empty((len(fields), len(first), count), dtype=first.dtype)
+    full: dict[int, Vectors] = {}
+
+    def keep(place: int, states: Sequence[Any]) -> None:
+        energies[place], vectors[place] = states[0][:count], states[1][:, :count]
+        if len(states) > 2:
+            errors[place] = states[2][:count]
+
+    def solve(place: int) -> Vectors:
+        if place not in full:
+            keep(place, states := np.linalg.eigh(matrix_at(place)))
+            full[place] = states[1]
+        return full[place]
+
+    ranges = [(0, len(fields))]
+    while ranges:
+        start, stop = ranges.pop()
+        if stop - start < FEWEST_FIELDS:
+            for place in range(start, stop):
+                solve(place)
+            continue
+        anchors = start + chebyshev_places(fields[start:stop])
+        between = Interpolation(fields, anchors, np.array([solve(place) for place in anchors.tolist()]))
+        failures = 0
+        for place in range(start, stop):
+            if place not in full and (states := improved(matrix_at(place), between.at(place), largest_mhz)) is not None:
+                keep(place, states)
+            elif place not in full:
+                solve(place)
+                failures += 1
+            if failures > FAILURES:
+                middle = (place + 1 + stop) // 2
+                ranges += [(middle, stop), (place + 1, middle)]
+                break
+    return energies, vectors, errors
+
+
 class Interpolation:
     """Interpolated states between full solutions at a few of the rising fields.
 
-    anchors: places of the fields solved in full. vectors (anchors, n, n): their eigenvectors by rank, which are turned in place.
+    anchors: places of the fields solved in full. vectors (anchors, n, n): their eigenvectors, which are ordered and turned in place.
     """
 
     def __init__(self, fields: Floats, anchors: Ints, vectors: Vectors) -> None:
         for before, here in pairwise(vectors):
-            overlap = np.einsum("nk,nk->k", before.conj(), here)
+            overlaps = before.conj().T @ here
+            alike = np.abs(overlaps).argmax(axis=1)
+            if len(np.unique(alike)) == len(alike):
+                here[:] = here[:, alike]
+                overlaps = overlaps[:, alike]
+            overlap = np.diagonal(overlaps)
             here *= (overlap / np.maximum(np.abs(overlap), TINY)).conj()
         self.vectors, self.factors = vectors, _lagrange(fields, fields[anchors])
 

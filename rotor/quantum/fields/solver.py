@@ -7,6 +7,7 @@ requested, span a small space for the fields between, and an error estimate show
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.fields.chains import chain_states, is_chain
-from rotor.quantum.fields.interpolation import FAILURES, FEWEST_FIELDS, Interpolation, chebyshev_places, improved
+from rotor.quantum.fields.interpolation import FEWEST_FIELDS, interpolated_states
 
 Matrix = NDArray[Any]
 Terms = tuple[Matrix, ...]  # H_n (n, n)
@@ -77,7 +78,7 @@ def solve_fields(terms: Terms, fields: Floats, count: int, tolerance_mhz: float 
             return _each(terms, fields, count)
         return spanned[1]
     if len(fields) >= FEWEST_FIELDS and tolerance_mhz > 0 and count > SUBSET * size:
-        return _between_few(terms, fields, count, PART_OF_TOLERANCE * tolerance_mhz)
+        return interpolated_states(partial(_at, terms, fields), fields, count, PART_OF_TOLERANCE * tolerance_mhz)
     return _each(terms, fields, count)
 
 
@@ -101,27 +102,6 @@ def _each(terms: Terms, fields: Floats, count: int) -> tuple[Floats, Matrix, Flo
     """Full solutions field by field."""
     solved = [_lowest(at_fields(terms, fields[place : place + 1])[0], count) for place in range(len(fields))]
     return _exact(np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved]))
-
-
-def _between_few(terms: Terms, fields: Floats, count: int, largest_mhz: float) -> tuple[Floats, Matrix, Floats]:
-    """Solutions of rising fields, in full at a few and interpolated between them where residuals are small enough."""
-    anchors = chebyshev_places(fields)
-    full = dict(zip(anchors.tolist(), (np.linalg.eigh(_at(terms, fields, place)) for place in anchors), strict=True))
-    between = Interpolation(fields, anchors, np.array([states.eigenvectors for states in full.values()]))
-    shape = len(fields), len(terms[0]), count
-    energies, vectors = np.empty((len(fields), count)), np.empty(shape, dtype=between.vectors.dtype)
-    errors, failures = np.zeros(energies.shape), 0
-    for place in range(len(fields)):
-        states: Any = full.get(place)
-        if states is None:
-            matrix = _at(terms, fields, place)
-            states = improved(matrix, between.at(place), largest_mhz) if failures < FAILURES else None
-            failures += states is None
-            states = states or np.linalg.eigh(matrix)
-        energies[place], vectors[place] = states[0][:count], states[1][:, :count]
-        if len(states) > 2:
-            errors[place] = states[2][:count]
-    return energies, vectors, errors
 
 
 def _at(terms: Terms, fields: Floats, place: int) -> Matrix:

@@ -223,6 +223,25 @@ def test_fields_near_an_avoided_crossing_are_solved_in_full(monkeypatch):
     assert (np.abs(energies - exact) <= error + 1e-9).all()
 
 
+def test_states_that_cross_nearly_without_coupling_are_interpolated(monkeypatch):
+    """Two states cross between the fields that are solved in full: vectors are followed by overlap, energies are sorted."""
+    terms, fields = weak_terms(crossing=True), np.linspace(0, 1.01, 41)  # none at the crossing
+    terms[1][0, 1] = terms[1][1, 0] = 1e-9
+    exact = np.array([np.linalg.eigvalsh(at_fields(terms, fields[place : place + 1])[0])[:50] for place in range(41)])
+    sizes = counted_solutions(monkeypatch)
+    energies, _, error = solve_fields(terms, fields, 50, 1e-6)
+    assert len(sizes) == 9
+    assert (np.abs(energies - exact) <= error + 1e-9).all()
+
+
+def test_a_narrow_part_is_divided_until_it_is_interpolated(monkeypatch):
+    """Near an avoided crossing ranges are halved; far from it, a few fields stand for all."""
+    terms, fields = weak_terms(crossing=True), np.linspace(0, 2, 401)
+    sizes = counted_solutions(monkeypatch)
+    solve_fields(terms, fields, 50, 1e-6)
+    assert 9 < len(sizes) < 200
+
+
 def test_vectors_of_one_energy_are_told_apart():
     """Two states of one energy at all fields: interpolated vectors may coincide, which no residual shows."""
     matrix = np.diag([0.0, 0.0, 1.0])
