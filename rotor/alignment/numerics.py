@@ -14,7 +14,7 @@ from rotor.quantum.estimates.plans import plan_fields
 from rotor.quantum.fields.inputs import largest_difference
 from rotor.requests.knob import Choice, Knob, Measure, Sought, with_whole
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, peak_mb, timed
+from rotor.requests.plan import Cost, whole_cost
 
 MORE_J = 6  # in the reference
 SHARES_OF_J = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -104,10 +104,9 @@ CLASSICAL = Knob(
 def align_cost(request: Any) -> Cost:
     """The cost with a coarse tolerance, scaled: the number of steps grows with its fourth root; and the coarse answer."""
     coarse = _coarse(request)
-    answer = answer_align(coarse)
-    # steps of a method of order 4 grow with tolerance^(-1/4)
-    seconds = timed(lambda: answer_align(coarse)) * (coarse.tolerance / request.tolerance) ** 0.25
-    return Cost(seconds, peak_mb(lambda: answer_align(replace(coarse, points=request.points))), answer)
+    growth = (coarse.tolerance / request.tolerance) ** 0.25  # steps of a method of order 4
+    all_times = replace(coarse, points=request.points)
+    return whole_cost(lambda: answer_align(coarse), growth, lambda: answer_align(all_times))
 
 
 def _coarse(request: Any) -> Any:

@@ -20,7 +20,7 @@ from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.requests.budget import ROUNDING
 from rotor.requests.knob import NOTHING_CHEAPER, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, LeftOut, peak_mb, timed
+from rotor.requests.plan import Cost, LeftOut, timed, traced, whole_cost
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
@@ -127,7 +127,7 @@ def step_error(request: Any, steps: int) -> LeftOut:
 def motion_cost(request: Any) -> Cost:
     """The cost of a free or driven motion; of a driven one with its number of steps."""
     if isinstance(request, TumbleRequest):
-        return Cost(timed(lambda: answer_tumble(request)), peak_mb(lambda: answer_tumble(request).table.columns))
+        return whole_cost(lambda: answer_tumble(request), largest=lambda: answer_tumble(request).table.columns)
     steps = expected_steps(request)
     return Cost(_step_seconds(request, steps), _memory_mb(request), steps)
 
@@ -172,7 +172,7 @@ def _step_seconds(request: DrivenRequest, steps: int) -> float:
 
 def _memory_mb(request: DrivenRequest) -> float:
     first = beginning(request, first_share(request))
-    return peak_mb(lambda: answer_driven(first).table.columns) * len(request.times) / len(first.times)
+    return traced(lambda: answer_driven(first).table.columns)[1] * len(request.times) / len(first.times)
 
 
 TUMBLE = Numerics(

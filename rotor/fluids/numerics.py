@@ -38,7 +38,7 @@ from rotor.fluids.request import NewBox, answer_fluid, make_box
 from rotor.fluids.settings import ELECTROSTATICS
 from rotor.requests.knob import Choice, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, Growth, LeftOut, largest_first, peak_mb
+from rotor.requests.plan import Cost, Growth, LeftOut, largest_first, traced
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
@@ -298,9 +298,9 @@ def fluid_cost(request: Any) -> Cost:
             replace(ready, box=ready.box.copy(), settings=replace(settings, steps=steps)), progress=lambda *_: None
         )
 
-    settled = min(SETTLING_STEPS, settings.steps)
     seconds = Growth(short, before + settings.steps, SHORT_STEPS).seconds
-    return Cost(seconds, peak_mb(lambda: short(settled)), short(settled))
+    settled, memory_mb = traced(lambda: short(min(SETTLING_STEPS, settings.steps)))
+    return Cost(seconds, memory_mb, settled)
 
 
 def _steps_before(picoseconds: float, settings: Any) -> int:

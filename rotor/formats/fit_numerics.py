@@ -13,7 +13,7 @@ from rotor.quantum.estimates.left_out import neglected_in_levels
 from rotor.quantum.estimates.plans import effect_texts
 from rotor.requests.knob import DECADES, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, LeftOut, peak_mb, timed
+from rotor.requests.plan import Cost, LeftOut, timed, traced
 
 if TYPE_CHECKING:
     from rotor.formats.fit_request import FitRequest
@@ -84,7 +84,7 @@ def fit_cost(request: Any) -> Cost:
     least = timed(lambda: limited(SHORT_ITERATIONS))
     step = max(timed(lambda: limited(SHORT_ITERATIONS + 2)) - least, 0.0) / 2
     seconds = least + step * (USUAL_ITERATIONS - SHORT_ITERATIONS)
-    return Cost(seconds, peak_mb(lambda: limited(SHORT_ITERATIONS)))
+    return Cost(seconds, traced(lambda: limited(SHORT_ITERATIONS))[1])
 
 
 def describe_fit(request: Any, _: Any) -> dict[str, Any]:

@@ -87,11 +87,11 @@ class Cost:
     answer: Any = None
 
 
-def whole_cost(call: Callable[[], Any]) -> Cost:
-    """The cost of a complete run of a call."""
+def whole_cost(call: Callable[[], Any], times: float = 1.0, largest: Callable[[], Any] | None = None) -> Cost:
+    """The cost of a call, and its answer. times: of its seconds. largest: the call that takes the memory, if it is another."""
     answers: list[Any] = []
     seconds = timed(lambda: answers.append(call()))
-    return Cost(seconds, peak_mb(call), answers[-1])
+    return Cost(times * seconds, traced(largest or call)[1], answers[-1])
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class Growth:
     @property
     def memory_mb(self) -> float:
         """Peak memory."""
-        return self.extrapolated(peak_mb, self.memory)
+        return self.extrapolated(lambda call: traced(call)[1], self.memory)
 
     @property
     def cost(self) -> Cost:
@@ -153,8 +153,8 @@ def timed(call: Callable[[], Any], long: float = 3.0) -> float:
     return time.process_time() - start
 
 
-def peak_mb(call: Callable[[], Any]) -> float:
-    """Peak memory (MB) that Python and NumPy allocate during a call, above the level before it; call it once before, for imports."""
+def traced(call: Callable[[], T]) -> tuple[T, float]:
+    """The answer of a call, and the memory (MB) that it allocates at its peak; call it once before, for imports."""
     import tracemalloc
 
     started_here = not tracemalloc.is_tracing()
@@ -163,8 +163,8 @@ def peak_mb(call: Callable[[], Any]) -> float:
     try:
         before = tracemalloc.get_traced_memory()[0]
         tracemalloc.reset_peak()
-        call()
-        return (tracemalloc.get_traced_memory()[1] - before) / 1e6
+        answer = call()
+        return answer, (tracemalloc.get_traced_memory()[1] - before) / 1e6
     finally:
         if started_here:
             tracemalloc.stop()

@@ -8,7 +8,7 @@ from typing import Any
 from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.estimates.plans import plan_fields
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, LeftOut, peak_mb, whole_cost
+from rotor.requests.plan import Cost, LeftOut, whole_cost
 
 
 def thermo_cost(request: Any) -> Cost:
@@ -16,7 +16,7 @@ def thermo_cost(request: Any) -> Cost:
     from rotor.thermodynamics.request import answer_thermo
 
     hottest = replace(request, temperatures_k=(max(request.temperatures_k),))
-    return replace(whole_cost(lambda: answer_thermo(hottest)), memory_mb=peak_mb(lambda: answer_thermo(request)))
+    return whole_cost(lambda: answer_thermo(hottest), largest=lambda: answer_thermo(request))
 
 
 def describe_thermo(request: Any, hot: Any) -> dict[str, Any]:
