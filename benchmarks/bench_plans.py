@@ -20,7 +20,7 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rotor.requests.plan import peak_mb
+from rotor.requests.plan import traced
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import (
@@ -114,7 +114,7 @@ def measure(case: str) -> Planned:
         taken = [_seconds(run)]
         if taken[0] < LONG_SECONDS:
             taken = [_seconds(run) for _ in range(REPEATS)]
-        memory = peak_mb(run)
+        memory = traced(run)[1]
     return Planned(case, plan.seconds, statistics.median(taken), plan.memory_mb, memory)
 
 
