@@ -236,7 +236,8 @@ def test_memory_of_a_plan_is_the_peak_of_a_run(kind, tmp_path):
     """Within a factor of 2 of what a second run allocates, which is counted here."""
     import tracemalloc
 
-    (tmp_path / "ocs.lin").write_text("".join(f"{j + 1:3d}{j:3d}                              {12162.979 * (j + 1):.4f} 0.1\n" for j in range(20)))
+    lines = [f"{j + 1:3d}{j:3d}{12162.979 * (j + 1):45.4f} 0.1\n" for j in range(20)]
+    (tmp_path / "ocs.lin").write_text("".join(lines))
     scene = parse_scene(f'schema = 1\nkind = "{kind}"\n{MEMORY[kind]}')
     planned = plan_of(scene, tmp_path).memory_mb
     run_scene(scene, folder=tmp_path)
