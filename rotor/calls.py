@@ -115,7 +115,7 @@ class Result(Outcome):
 
     def scene(self, folder: str | os.PathLike[str] = ".") -> Any:
         """The scene that repeats the calculation; `rotor.write_scene` writes it. folder: of the scene, for names of files."""
-        from rotor.scenes.saved import saved_scene
+        from rotor.scenes.run import saved_scene
 
         return saved_scene(self, Path(folder), {})
 

@@ -16,13 +16,12 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
 from rotor.checks import NoAnswerError, RunStopped
 from rotor.cli.shared import process
-from rotor.cli.shared.options import PlainGroup, folded
 from rotor.cli.shared.output import release_files
 from rotor.verbs.names import declared_verbs, has_small_blocks
 
@@ -93,8 +92,11 @@ Examples:
 
 def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer.Typer:
     """The command with these verbs. listed: only their names and help lines; their modules are not loaded."""
+    group: Any = None
+    if not listed:
+        from rotor.cli.shared.command import PlainGroup as group
     app = typer.Typer(
-        cls=PlainGroup,
+        cls=group,
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
@@ -114,14 +116,42 @@ def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer
         if listed and VERBS[verb]:
             app.command(verb, short_help=VERBS[verb])(_listed)
             continue
-        from rotor.cli.shared.command import PanelCommand, command_of
+        from rotor.cli.shared.command import VerbCommand, command_of
         from rotor.cli.shared.runner import run_verb
 
         declared = declaration(verb)
-        app.command(verb, cls=PanelCommand, short_help=VERBS[verb] or declared.about, epilog=folded(declared.examples))(
+        app.command(verb, cls=VerbCommand, short_help=VERBS[verb] or declared.about, epilog=folded(declared.examples))(
             command_of(declared, run_verb)
         )
     return app
+
+
+def folded(examples: str, width: int = 76) -> str:
+    """Examples in which long commands continue on the next line, as a shell reads them.
+
+    >>> print(folded("  rotor levels water --jmax 4 --plot terms.png", width=30))
+      rotor levels water \\
+          --jmax 4 \\
+          --plot terms.png
+    """
+    return "\n".join(_folded_line(line, width) for line in examples.split("\n"))
+
+
+def _folded_line(line: str, width: int) -> str:
+    if len(line) <= width:
+        return line
+    words = shlex.split(line, posix=False)
+    indent = line[: len(line) - len(line.lstrip())]
+    rows, row = [], indent + words[0]
+    for number, word in enumerate(words[1:], 1):
+        with_value = word.startswith("-") and number + 1 < len(words)  # an option stays beside its value
+        needed = len(word) + (1 + len(words[number + 1]) if with_value and not words[number + 1].startswith("-") else 0)
+        if len(row) + 1 + needed > width - 2:
+            rows.append(row + " \\")
+            row = indent + "    " + word
+        else:
+            row += " " + word
+    return "\n".join([*rows, row])
 
 
 def _listed() -> None:

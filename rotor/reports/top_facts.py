@@ -199,6 +199,16 @@ def weights_facts(top: Top, mapping: Mapping[str, int]) -> list[tuple[str, str]]
     return [("" if i else "spin weights", text) for i, text in enumerate(texts)]
 
 
+def hyperfine_lines(used: dict[str, Any] | None) -> list[tuple[str, str]]:
+    """The method that split the levels, and the estimated difference from the exact one."""
+    if used is None:
+        return []
+    if used["method"] == "exact":
+        return [("hyperfine", "exact: all N that a tensor connects")]
+    estimate = f"{1000 * used['estimate_mhz']:.2g} kHz"
+    return [("hyperfine", f"{used['method']}: differs from exact by less than {estimate}, estimated")]
+
+
 def weights_text(mapping: Mapping[str, int]) -> str:
     """Spin weights as `ee 1, eo 3, oe 3, oo 1`."""
     return ", ".join(f"{name} {weight}" for name, weight in mapping.items()) or "not given: 1 for every level"

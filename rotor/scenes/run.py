@@ -1,15 +1,18 @@
-"""Run a scene: make its request, answer it, and write the files that the scene names."""
+"""Run a scene: make its request, answer it, and write the files that the scene names; and back, the scene of an answer."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
 
 from rotor.formats.atomic_write import resolved
-from rotor.requests.fill import Entries, flattened
+from rotor.requests.fill import Entries, flattened, nested
 from rotor.scenes.keys import keyed
 from rotor.scenes.outputs import Where, checked_paths, paths_of
-from rotor.scenes.scene import Scene, SceneResult
+from rotor.scenes.scene import SCHEMA, Scene, SceneResult, scene_of
 from rotor.scenes.scene_file import scene_text
 from rotor.temporary import locked_file
 from rotor.verbs.calculation import Calculation, Outcome
@@ -65,11 +68,26 @@ def run_scene(
 def scene_calculation(scene: Scene, folder: Where = ".", out: Where = ".") -> Calculation:
     """The calculation of a scene. folder: of the files that it reads. out: of those that it writes."""
     verb = verb_of(scene.kind)  # no other verb is imported
-    entries = Entries(flattened(verb.subject.tables(scene.content), keyed(verb)), "key")
+    molecule = scene.content.get("molecule")
+    named = {"molecule": {"source": molecule}} if isinstance(molecule, str) else {}
+    entries = Entries(flattened({**scene.content, **named}, keyed(verb)), "key")
     files = paths_of(scene, out)
     provenance = {"scene": scene_text(scene)} if files else {}
     work = Work(shown=verb.read_shown(entries), files=files, provenance=provenance, from_scene=True)
     return Calculation(verb, entries, work, folder, scene.accuracy)
+
+
+def saved_scene(outcome: Outcome, folder: Path, outputs: Mapping[str, Any]) -> Scene:
+    """The scene of an answered request, in a folder. outputs: files by name; their settings are among the inputs."""
+    verb, entries = outcome.verb, outcome.calculation.entries
+    flat = {
+        **verb.saved(outcome.request, outcome.subject, folder),
+        **{f"outputs.{name}": value for name, value in outputs.items()},
+    }
+    for key, field in keyed(verb).items():
+        if field.table == "outputs" and entries.has(field):
+            flat[key] = field.write(field.read(entries.of(field), entries.style))
+    return scene_of({"schema": SCHEMA, "kind": verb.name, **nested(flat)})
 
 
 def _write(outcome: Outcome) -> None:

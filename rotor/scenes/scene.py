@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.frozen import dataclass
 from rotor.requests.accuracy import Stated
 from rotor.requests.choices import nearest
-from rotor.scenes.keys import inner_tables, keys_of, tables_of
-from rotor.scenes.values import UnknownKeyError, checked_table
+from rotor.scenes.keys import UnknownKeyError, checked_table, inner_tables, keys_of, tables_of
 from rotor.verbs.calculation import Outcome
 from rotor.verbs.verb import SCENE_VERBS, Verb, verb_of
 

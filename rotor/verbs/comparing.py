@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from rotor.formats.spcat.compare import Comparison
     from rotor.formats.spcat.text.catalogue import Catalogue
-    from rotor.verbs.cat_request import CatRequest
+    from rotor.verbs.cat import CatRequest
 
 FORMAT_K = 300.0  # intensities of the 80-column format are those at 300 K
 DIFFERENCES = ("frequency_mhz", "lgint", "energy_lower_cm")

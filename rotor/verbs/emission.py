@@ -10,8 +10,7 @@ from rotor.frozen import dataclass
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.sources import short_source
-from rotor.reports.spins import hyperfine_lines
-from rotor.reports.top_facts import error_facts, left_out_facts, with_command
+from rotor.reports.top_facts import error_facts, hyperfine_lines, left_out_facts, with_command
 from rotor.requests.field import OUTPUT, REQUIRED, Field, all_fields, declared
 from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT

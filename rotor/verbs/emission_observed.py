@@ -2,26 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
+from rotor.requests.field import changed_fields, declared_fields
 from rotor.verbs import emission_cube
-from rotor.verbs.emission_cell import cell_fit, refuse_telescope
 from rotor.verbs.emission_cube import Mapped
 from rotor.verbs.observed_file import json_of, spectrum_facts
-from rotor.verbs.observed_request import ObservedRequest, components_of, fit_choices, sight_of, species_in
+from rotor.verbs.observed_request import (
+    FIT_OPTIONS,
+    ObservedRequest,
+    components_of,
+    each_species,
+    fit_choices,
+    sight_of,
+    species_in,
+)
 from rotor.verbs.outputs import PICTURES, Output, Report
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Work
+from rotor.verbs.verb import Note, Work
 
 if TYPE_CHECKING:
     from rotor.observed.fit import Contribution, SourceFit
+    from rotor.observed.gas_cell import CellFit
     from rotor.observed.model import Component, Sight
     from rotor.observed.spectrum import ObservedSpectrum
     from rotor.table import Table as Columns
+
+# options and files that a gas cell has no place for
+_TELESCOPE_INPUTS = ("background_k", "redshift", *FIT_OPTIONS)
+_BEAM_INPUTS = ("beam_arcsec", "size_arcsec")
+_TELESCOPE_FILES = ("diagram", "corner")
 
 
 @dataclass(frozen=True)
@@ -94,6 +109,37 @@ def answer(request: ObservedRequest, work: Work) -> Observed | Mapped:
         chain = sample_source(fit, request.sample)
     diagrams = _diagrams(spectrum, fit, work) if "diagram" in work.files else None
     return Observed(request, spectrum, sight, list(fit.components), fit, contributions(fit), chain, diagrams)
+
+
+def refuse_telescope(request: ObservedRequest, files: Collection[str]) -> None:
+    """ValueError for options that a gas cell has no place for."""
+    fields = changed_fields(request, _TELESCOPE_INPUTS) + changed_fields(request.spectrum, _BEAM_INPUTS)
+    flags = [field.flag for field in fields] + [f"--{name}" for name in _TELESCOPE_FILES if name in files]
+    flags += ["--velocity"] if any(request.velocity_km_s or ()) else []
+    if flags:
+        raise ValueError(f"{flags[0]}: belongs to brightness in K; expected without a spectrum in absorbance")
+
+
+def cell_fit(spectrum: ObservedSpectrum, request: ObservedRequest, note: Note) -> CellFit:
+    """The fit of a gas cell, from numbers that were typed and from the spectrum."""
+    from rotor.observed.gas_cell import fit_cell, start_cell
+
+    kelvin, width = _single(request, "excitation_k"), _single(request, "fwhm_km_s")
+    species = species_in(spectrum, request, note)
+    columns = each_species("column_per_cm2", request, len(species))
+    start = start_cell(spectrum, species, kelvin, width)
+    if columns is not None:
+        start = [replace(part, column_per_cm2=column) for part, column in zip(start, columns, strict=True)]
+    return fit_cell(spectrum, start)
+
+
+def _single(request: ObservedRequest, name: str) -> float | None:
+    """A number that all the gas has in common."""
+    values = getattr(request, name)
+    if values is not None and len(values) > 1:
+        flag = declared_fields(ObservedRequest)[name].flag
+        raise ValueError(f"{flag}: {len(values)} numbers; the gas of a cell has one temperature and one width")
+    return values[0] if values else None
 
 
 def _diagrams(spectrum: ObservedSpectrum, fit: SourceFit, work: Work) -> Any:

@@ -11,7 +11,6 @@ from rotor.quantum.request import LevelsAnswer, LevelsRequest, answer_levels
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, table_records
-from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Text, Whole, whole_range
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY
@@ -90,7 +89,7 @@ def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, 
         *top_facts.states_facts(top)[:1],
         ("levels", f"{len(answer.table)}: {limits}"),
         ("lowest", f"{ground}: energies count from this level, the lowest that exists"),
-        *hyperfine_lines(content["hyperfine"]),
+        *top_facts.hyperfine_lines(content["hyperfine"]),
     ]
 
 

@@ -9,7 +9,6 @@ from rotor.frozen import dataclass
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title, labelled_rows, states_text
 from rotor.reports.screen import Part, Table, record_table
-from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OUTPUT, declared
 from rotor.requests.readers import Whole
 from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
@@ -65,7 +64,7 @@ def _facts(lines: RamanLines, record: Mapping[str, Any]) -> list[tuple[str, str]
         ("Q", top_facts.q_text(record["q"])),
         ("J max", f"{lines.jmax}: {record['jmax_source']}"),
         ("cut", "none: every allowed line" if least is None else f"{least:g} of the strongest"),
-        *hyperfine_lines(record["hyperfine"]),
+        *top_facts.hyperfine_lines(record["hyperfine"]),
         ("lines", count),
     ]
 

@@ -12,7 +12,6 @@ from rotor.frozen import dataclass
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part
-from rotor.reports.spins import hyperfine_lines
 from rotor.requests.field import OBSERVABLES, OUTPUT, changed_fields, declared
 from rotor.requests.fill import Entries, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Text, Whole
@@ -224,7 +223,7 @@ def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str,
         ("Q", top_facts.q_text(record["q"], classical=named)),
         ("J max", f"{record['jmax']}: {record['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
-        *hyperfine_lines(record["hyperfine"]),
+        *top_facts.hyperfine_lines(record["hyperfine"]),
         ("lines", _count_text(answer, record["line_count"])),
         *_error_column(answer),
         *_layer_facts(record),

@@ -143,11 +143,6 @@ class SubjectKind:
         """The subject as a scene in the folder holds it, by dotted key."""
         return {}
 
-    def tables(self, content: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The tables of a scene; a plain name of a molecule becomes the source of its table."""
-        molecule = content.get("molecule")
-        return {**content, "molecule": {"source": molecule}} if isinstance(molecule, str) else content
-
 
 NOTHING = SubjectKind()
 

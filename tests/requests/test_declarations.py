@@ -308,7 +308,7 @@ def test_an_error_names_fields_in_the_style_of_the_user(style, text):
 
 def test_changed_fields_are_those_that_differ_from_their_defaults():
     from rotor.requests.field import changed_fields
-    from rotor.verbs.cat_request import CatRequest
+    from rotor.verbs.cat import CatRequest
 
     request = CatRequest("a.cat", compare="b.int", as_spcat=True, top_lines=20)
     assert [field.flag for field in changed_fields(request)] == ["FILE", "--compare", "--as-spcat"]

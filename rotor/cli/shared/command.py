@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 import typer
+import typer.core
 
-from rotor.cli.shared.options import PlainCommand
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_fields
 from rotor.frozen import dataclass
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, Field
@@ -168,8 +168,30 @@ def molecules_and_files(incomplete: str) -> list[str]:
     return sorted(text for name, text in known.items() if name.startswith(incomplete.casefold())) + sorted(files)
 
 
-class PanelCommand(PlainCommand):
-    """A command whose help has panels: the options that most people use first, all of them by --help-all."""
+class VerbCommand(typer.core.TyperCommand):
+    """A command whose help has panels: the options that most people use first, all of them by --help-all.
+
+    Texts are left unconverted; readers of declared fields make numbers of them. Typer's own conversion loads pydantic, which takes as
+    long as numpy.
+    """
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The parameters, --help among them."""
+        return [_unconverted(parameter) for parameter in super().get_params(ctx)]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The arguments; ValueError for an option with a single value that is given twice."""
+        single = {
+            text
+            for parameter in self.params
+            if not parameter.multiple
+            for text in (*parameter.opts, *parameter.secondary_opts)
+        }
+        names = [word.partition("=")[0] for word in args if word.startswith("--")]
+        twice = next((word for word in names if word in single and names.count(word) > 1), None)
+        if twice is not None:
+            raise ValueError(f"{twice}: given more than once; it has one value")
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Arguments and options, panel by panel."""
@@ -186,6 +208,23 @@ class PanelCommand(PlainCommand):
             if panel in panels:
                 with formatter.section(panel):
                     formatter.write_dl(panels[panel])
+
+
+class PlainGroup(typer.core.TyperGroup):
+    """A group of commands that leaves texts unconverted."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The parameters, --help among them."""
+        return [_unconverted(parameter) for parameter in super().get_params(ctx)]
+
+
+def _unconverted(parameter: Any) -> Any:
+    def process_value(context: Any, value: Any) -> Any:
+        """The value after the callback of its parameter."""
+        return parameter.callback(context, parameter, value) if parameter.callback else value
+
+    parameter.process_value = process_value
+    return parameter
 
 
 def _show_all(context: typer.Context, value: bool) -> None:

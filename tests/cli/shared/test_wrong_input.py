@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from places import ORACLES
 
-from rotor.cli.shared.options import folded
+from rotor.cli import folded
 from rotor.cli.shared.output import Files
 from rotor.cli.shared.runner import refuse_overwriting
 
