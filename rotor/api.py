@@ -183,7 +183,7 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.quantum.request import answer_levels as answer_levels
     from rotor.quantum.solve import solve_levels as solve_levels
     from rotor.quantum.spins import Spin as Spin
-    from rotor.scenes.scene import SpectrumScene as SpectrumScene
+    from rotor.scenes.scene import make_scene as make_scene
     from rotor.spectra.classical_band import classical_band as classical_band
     from rotor.spectra.classical_band import compare_bands as compare_bands
     from rotor.spectra.classical_band import dipole_band_area as dipole_band_area

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
+from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, record_table, show_parts
 from rotor.requests.field import REQUIRED, declared
 from rotor.requests.readers import Quantity, Text
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from rotor.scenes.accuracy_sweep import WorkPrecision
     from rotor.scenes.scene import Scene
 
+WIDTH = 70  # of the line that shows the setting
 EXAMPLES = """\b
 Examples:
   rotor accuracy s.toml
@@ -61,10 +61,11 @@ def answer(request: AccuracyRequest, work: Work) -> AccuracyAnswer:
     scene, folder = read_scene(request.scene), Path(request.scene).parent
     so_far: list[WorkPrecision] = []
     try:
-        with _progress() as shown:
+        with rewritten_line(WIDTH) as write:
             table = work_precision(
-                scene, folder=folder, limit_seconds=request.seconds, progress=shown, on_knob=so_far.append
-            )
+                scene, folder=folder, limit_seconds=request.seconds, on_knob=so_far.append,
+                progress=lambda knob, setting: write(f"{knob}: {setting}"),
+            )  # fmt: skip
     except KeyboardInterrupt:
         work.note("interrupted: the knobs swept so far follow, no file is written")
         if so_far:
@@ -73,18 +74,6 @@ def answer(request: AccuracyRequest, work: Work) -> AccuracyAnswer:
     if "plot" in work.files and not table.rows:
         raise ValueError(f"--plot: there is nothing to draw: {'; '.join(table.remarks)}")
     return AccuracyAnswer(request.scene, scene, table)
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, str], object]]:
-    """A status line on a terminal, rewritten before each calculation."""
-    if not sys.stderr.isatty():
-        yield lambda knob, setting: None
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status("") as status:
-        yield lambda knob, setting: status.update(f"{knob}: {setting}")
 
 
 def draw(answer: AccuracyAnswer, path: Path, report: Report) -> None:

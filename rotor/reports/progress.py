@@ -71,28 +71,28 @@ def sum_progress() -> Callable[[int, int], None] | None:
 
 
 @contextmanager
-def rewritten_line(width: int) -> Iterator[Callable[[str], None] | None]:
-    """Function that rewrites a line on standard error with a text; None where that is no terminal. The line is cleared at the end."""
+def rewritten_line(width: int) -> Iterator[Callable[[str], None]]:
+    """Function that rewrites a line on standard error, which is cleared at the end; without a terminal, it does nothing."""
     if not sys.stderr.isatty():
-        yield None
+        yield lambda text: None
         return
     yield lambda text: print(f"\r{text[-width:]:{width}s}", end="", file=sys.stderr)
     print("\r" + " " * width + "\r", end="", file=sys.stderr)
 
 
 @contextmanager
-def counting(total: int, what: str) -> Iterator[Callable[[int], object] | None]:
-    """Function that advances a bar by a count; None where standard error is no terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+def counting(total: int, what: str) -> Iterator[Callable[[int], object]]:
+    """Function that advances a bar by a count."""
+    done = 0
+    with progress_bar(what) as show:
 
-    columns = (BarColumn(), MofNCompleteColumn(), TextColumn(what), TimeRemainingColumn())
-    with _open_bar(), Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda done: bar.advance(task, done)
+        def advance(count: int) -> None:
+            """Show the count so far."""
+            nonlocal done
+            done += count
+            show(done, total)
+
+        yield advance
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,6 +93,33 @@ class SceneResult(Outcome):
         return self.table._repr_html_() + errors_html(self.answer)
 
 
+def make_scene(kind: str, **content: Any) -> Scene:
+    """A scene from its keys and tables.
+
+    Parameters
+    ----------
+    kind : str
+        Name of a verb with scenes: "spectrum", "levels", ...
+    **content
+        Keys of the scene, and its tables as mappings, as in a scene file.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    ValueError
+        For an unknown kind or key, and for a value of a wrong type.
+
+    Examples
+    --------
+    >>> make_scene("levels", molecule="CO", observables={"jmax": 3}).run().table.energy_cm.round(3).tolist()
+    [0.0, 3.845, 11.535, 23.069]
+    """
+    return scene_of({"schema": SCHEMA, "kind": kind, **content})
+
+
 def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
     """The scene of nested tables, as parsed from TOML.
 
@@ -140,10 +168,7 @@ def __getattr__(name: str) -> Any:
     if kind not in SCENE_VERBS or name != f"{kind.capitalize()}Scene":
         raise AttributeError(f"module 'rotor.scenes.scene' has no attribute {name!r}")
 
-    def make(**content: Any) -> Scene:
-        return scene_of({"schema": SCHEMA, "kind": kind, **content})
-
-    return make
+    return partial(make_scene, kind)
 
 
 def within(folder: str | os.PathLike[str], name: str) -> str:

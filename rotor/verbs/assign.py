@@ -91,9 +91,7 @@ class SpectrumFile(SubjectKind):
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs, with files relative to the folder of the scene."""
-        if not isinstance(subject.molecules[0].source, str):
-            raise ValueError("a scene cannot hold the numbers of a spectrum; give a file")
-        return saved_inputs(subject.molecules[0], folder)
+        return saved_inputs(subject.molecules[0], folder, "the numbers of a spectrum")
 
 
 def write_lines(answer: AssignAnswer, path: Path, report: Report) -> None:

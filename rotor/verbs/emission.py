@@ -11,7 +11,7 @@ from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.sources import short_source
 from rotor.reports.top_facts import error_facts, hyperfine_lines, left_out_facts, with_command
-from rotor.requests.field import OUTPUT, REQUIRED, Field, all_fields, declared
+from rotor.requests.field import OUTPUT, REQUIRED, Field, all_fields, declared, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT
 from rotor.requests.readers import Custom, Quantity, Text, Whole
@@ -153,13 +153,11 @@ class SeveralMolecules(SubjectKind):
 
 
 def _read_table(table: Mapping[str, Any]) -> tuple[MoleculeInput, Mapping[str, Any]]:
-    names = {field.key for field in all_fields(EmitterInput).values()}
-    values = {f"molecule.{name}": value for name, value in table.items() if name not in names}
-    emitter: EmitterInput = read_instance(
-        EmitterInput, Entries({name: table[name] for name in names & table.keys()}, "key")
-    )
-    departures = {name: value for name, value in vars(emitter).items() if value is not None}
-    return read_molecule(Entries(values, "key")), departures
+    fields = all_fields(EmittingMolecule).values()
+    entered = {field.identity: table[field.last] for field in fields if field.last in table}
+    molecule: EmittingMolecule = read_instance(EmittingMolecule, Entries(entered, "key"))
+    values = {name: getattr(molecule, name) for name in declared_fields(EmitterInput)}
+    return molecule, {name: value for name, value in values.items() if value is not None}
 
 
 def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:

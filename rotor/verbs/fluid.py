@@ -92,18 +92,26 @@ class Box(SubjectKind):
         inputs: BoxInput = read_instance(BoxInput, entries)
         settings = Settings(**read_fields(Settings, entries))
         self._refuse_unused(inputs, settings, entries)
-        if entries.style == "key":
-            return self._scene_box(inputs, place, _equilibration(inputs, entries))
-        if inputs.source is None:
+        in_scene = entries.style == "key"
+        file = inputs.box if in_scene else inputs.source
+        if in_scene and (inputs.molecules is None) == (file is None):
+            raise ValueError("conditions: give either molecules, to make a box of, or a box")
+        if not in_scene and file is None:
             raise ValueError("SOURCE is missing; --help shows what the command takes")
         if inputs.molecules is not None:
-            return Subject({"box": _new_box(inputs, settings), "box_source": "given"}, (), inputs.source, place.note)
-        if not Path(inputs.source).is_file():
-            raise ValueError(
-                f"{inputs.source}: no such file; with --molecules N a box is made of 'water' or of a model"
-            )
-        values = {"box": _read(inputs.source), "box_source": inputs.source, **_equilibration(inputs, entries)}
-        return Subject(values, (), inputs.source, place.note)
+            if not in_scene:
+                _refuse_other_model(str(inputs.source), settings)
+            density = WATER_G_CM3 if inputs.density is None else inputs.density
+            box = NewBox(inputs.molecules, density, inputs.equilibration)
+            return Subject({"box": box, "box_source": "given"}, (), inputs.source or "", place.note)
+        path = str(Path(place.folder) / str(file))
+        if not Path(path).is_file() and not in_scene:
+            raise ValueError(f"{file}: no such file; with --molecules N a box is made of 'water' or of a model")
+        try:
+            values = {"box": _read(path), "box_source": file, **_equilibration(inputs, entries)}
+        except ValueError as error:
+            raise ValueError(f"conditions.box: {error}" if in_scene else str(error)) from None
+        return Subject(values, (), path if in_scene else str(file), place.note)
 
     def _refuse_unused(self, inputs: BoxInput, settings: Settings, entries: Entries) -> None:
         """Refuse inputs without effect: of another ensemble, other electrostatics, or a new box."""
@@ -118,21 +126,6 @@ class Box(SubjectKind):
                 raise NamedError(f"{{{name}}}: expected with {{{choice}}} {needed}; {chosen} does not use it")
         if inputs.molecules is None and inputs.density is not None:
             raise NamedError("{density}: expected with {molecules}; the box of a file has the density of its cell")
-
-    def _scene_box(self, inputs: BoxInput, place: Place, equilibration: dict[str, Any]) -> Subject:
-        if (inputs.molecules is None) == (inputs.box is None):
-            raise ValueError("conditions: give either molecules, to make a box of, or a box")
-        if inputs.molecules is not None:
-            density = WATER_G_CM3 if inputs.density is None else inputs.density
-            box = NewBox(inputs.molecules, density, inputs.equilibration)
-            return Subject({"box": box, "box_source": "given"}, (), "", place.note)
-        path = str(Path(place.folder) / str(inputs.box))
-        if not Path(path).is_file():
-            raise ValueError(f"conditions.box: {path}: no such file")
-        try:
-            return Subject({"box": _read(path), "box_source": str(inputs.box), **equilibration}, (), path, place.note)
-        except ValueError as error:
-            raise ValueError(f"conditions.box: {error}") from None
 
     def saved(self, request: FluidRequest, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs of a new box, or its file."""
@@ -154,13 +147,15 @@ def _equilibration(inputs: BoxInput, entries: Entries) -> dict[str, Any]:
 def _read(path: str) -> Atoms:
     from rotor.formats.boxes import read_box
 
+    if not Path(path).is_file():
+        raise ValueError(f"{path}: no such file")
     return read_box(path)
 
 
-def _new_box(inputs: BoxInput, settings: Settings) -> NewBox:
+def _refuse_other_model(source: str, settings: Settings) -> None:
+    """Refuse a new box of another molecule than that of the model."""
     from rotor.fluids.forces.models import MODELS, find_model
 
-    source = str(inputs.source)
     if source != settings.model and source in MODELS:
         raise ValueError(f"{source!r}: the model is {settings.model}; write --model {source} too")
     if "," in settings.model or source not in ("water", settings.model):
@@ -171,8 +166,6 @@ def _new_box(inputs: BoxInput, settings: Settings) -> NewBox:
     model = find_model(settings.model)
     if source == "water" and model.symbols != ("O", "H", "H"):
         raise ValueError(f"{source!r}: --model {model.name} is not a model of water; write {model.name!r}")
-    density = WATER_G_CM3 if inputs.density is None else inputs.density
-    return NewBox(inputs.molecules or 0, density, inputs.equilibration)
 
 
 @dataclass(frozen=True)

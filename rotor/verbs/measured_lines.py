@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -14,7 +13,7 @@ from rotor.requests.fill import Entries, NamedError, read_instance, renaming, wr
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
-from rotor.verbs.subjects import MOLECULE, saved_inputs, saved_molecule
+from rotor.verbs.subjects import MOLECULE, file_name, saved_inputs, saved_molecule
 from rotor.verbs.verb import Place, Subject, SubjectKind
 
 if TYPE_CHECKING:
@@ -54,17 +53,12 @@ class Priors(Reader):
         return {name: f"{number!r} MHz" for name, number in value.items()}
 
 
-def _lines(raw: Any) -> Any:
-    """A file name, or lines or rows of numbers unchanged."""
-    return os.fspath(raw) if isinstance(raw, os.PathLike) else raw
-
-
 @dataclass(frozen=True)
 class LinesInput:
     """The measured lines."""
 
     source: Any = declared(
-        None, Custom(_lines), "Lines: .lin, .csv, .cat; or case.par (with case.lin)", "lines.source", option="SOURCE", panel=CONDITIONS,
+        None, Custom(file_name), "Lines: .lin, .csv, .cat; or case.par (with case.lin)", "lines.source", option="SOURCE", panel=CONDITIONS,
         example="lines.csv",
     )  # fmt: skip
     lin: str | None = declared(
@@ -175,10 +169,8 @@ class MeasuredLines(SubjectKind):
     def saved(self, request: FitRequest, subject: Subject, folder: Path) -> dict[str, Any]:
         """Lines, start and parameters, with files relative to the folder of the scene."""
         lines, molecule = subject.molecules
-        if not isinstance(lines.source, str):
-            raise ValueError("a scene cannot hold lines; give a file")
         start = {} if molecule is None else saved_molecule(molecule, folder)
-        return {**saved_inputs(lines, folder), **start, **written_fields(subject.values["inputs"])}
+        return {**saved_inputs(lines, folder, "lines"), **start, **written_fields(subject.values["inputs"])}
 
 
 def _path(name: Any, called: str, place: Place) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ from rotor.requests.readers import Custom
 from rotor.structures.family import Family
 from rotor.table import counted
 from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
-from rotor.verbs.subjects import saved_inputs
+from rotor.verbs.subjects import file_name, saved_inputs
 from rotor.verbs.verb import ErrorsShown, Place, Subject, SubjectKind, Verb
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ class FamilyInput:
 
     source: Any = declared(
         None,
-        Custom(lambda raw: raw),
+        Custom(file_name),
         "Family of isotopologues (.toml)",
         "family.file",
         option="FAMILY",
@@ -63,7 +62,7 @@ class Isotopologues(SubjectKind):
             raise ValueError("FAMILY is missing; expected a family of isotopologues (.toml)")
         if isinstance(inputs.source, Family):
             return Subject({"file": FamilyFile(inputs.source, (), (), {})}, (inputs,), inputs.source.name, place.note)
-        if not os.fspath(inputs.source).lower().endswith(".toml"):
+        if not str(inputs.source).lower().endswith(".toml"):
             raise ValueError(
                 f"{inputs.source}: a family of isotopologues is a .toml file; docs/structure.md describes it"
             )
@@ -73,9 +72,7 @@ class Isotopologues(SubjectKind):
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The file, relative to the folder of the scene."""
-        if isinstance(subject.molecules[0].source, Family):
-            raise ValueError("a scene cannot hold a family; give a file")
-        return saved_inputs(subject.molecules[0], folder)
+        return saved_inputs(subject.molecules[0], folder, "a family")
 
 
 def _geometry(answer: StructureAnswer, option: str) -> Any:

@@ -73,8 +73,15 @@ class OneMolecule(SubjectKind):
         return {**saved_molecule(subject.molecules[0], folder), **further}
 
 
-def saved_inputs(inputs: Any, folder: Path) -> dict[str, Any]:
-    """Inputs by key, with files relative to the folder of the scene."""
+def file_name(raw: Any) -> Any:
+    """A file name as text; other values, such as lines or a family, unchanged."""
+    return os.fspath(raw) if isinstance(raw, os.PathLike) else raw
+
+
+def saved_inputs(inputs: Any, folder: Path, what: str) -> dict[str, Any]:
+    """Inputs by key, with files relative to the folder of the scene; ValueError if their source is no file but `what`."""
+    if not isinstance(inputs.source, str):
+        raise ValueError(f"a scene cannot hold {what}; give a file")
     content = written_fields(inputs)
     return {key: beside(value, folder) if isinstance(value, str) else value for key, value in content.items()}
 
