@@ -7,7 +7,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -171,31 +171,24 @@ def answer(options: Options, _: Work) -> SceneRun | SweepRun:
         return _sweep(scene, options, pool) if swept else _single(scene, options, pool)
 
 
-@contextmanager
-def _workers(options: Options) -> Iterator[Executor | None]:
-    """A pool of processes or of cluster workers; None for a single process."""
-    number = options.workers
-    if options.dask is not None:
-        if number is not None:
-            raise ValueError("--workers and --dask: give one of them; the cluster has its own workers")
-        with _dask_pool(options.dask, options.dask_tls) as cluster:
-            yield cluster
-        return
-    if options.dask_tls is not None:
+def _workers(options: Options) -> AbstractContextManager[Executor | None]:
+    """Context with a pool of processes or of cluster workers; None for a single process."""
+    if options.dask is None and options.dask_tls is not None:
         raise ValueError("--dask-tls: goes with --dask, the address of a scheduler")
-    if number is None or number == 1:
-        yield None
-        return
+    if options.dask is not None:
+        if options.workers is not None:
+            raise ValueError("--workers and --dask: give one of them; the cluster has its own workers")
+        return _dask_pool(options.dask, options.dask_tls)
+    if options.workers in (None, 1):
+        return nullcontext()
     from rotor.scenes.worker_processes import worker_processes
 
-    with worker_processes(number) as pool:
-        yield pool
+    return worker_processes(options.workers)
 
 
 @contextmanager
 def _dask_pool(address: str, certificates: str | None) -> Iterator[Executor]:
-    from contextlib import ExitStack
-
+    """The workers of a Dask cluster; errors of the connection name the option."""
     from rotor.scenes.cluster import dask_executor, tls_security
 
     files = [] if certificates is None else certificates.split(",")
