@@ -89,7 +89,8 @@ def _frozen_attributes(cls: Any, names: frozenset[str]) -> dict[str, Any]:
 
 def _comparison(names: tuple[str, ...]) -> dict[str, Any]:
     """Equality of objects of one class by these fields, and their hash."""
-    values: Any = attrgetter(*names) if len(names) > 1 else lambda self: tuple(getattr(self, name) for name in names)
+    read: Any = attrgetter(*names) if names else lambda _: None
+    values = read if len(names) > 1 else lambda self: (read(self),)
 
     def __eq__(self: Any, other: object) -> Any:
         if other.__class__ is not self.__class__:

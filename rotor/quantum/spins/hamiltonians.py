@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 import numpy as np
 
 from rotor.arrays import Floats, Workspace
 from rotor.quantum.spins.blocks import Plan
-from rotor.quantum.spins.many_f import Coefficients, Frame, Group, Tables, between, of_all_f, tables_of
+from rotor.quantum.spins.many_f import Coefficients, Frame, Group, Tables, between, of_all_f, tables_of, write_between
 from rotor.quantum.spins.pattern_tables import couplings_by_f
 
 
@@ -37,24 +38,24 @@ def _matrices_of_group(
     group: Group, kinds: Sequence[tuple[int, ...]], acting: Sequence[tuple[Tables, Coefficients]], frame: Frame, zeros: Floats,
     space: Workspace,
 ) -> Iterator[tuple[list[int], Floats]]:  # fmt: skip
-    """Places of blocks of one kind and shape in a group, and their matrices."""
+    """Places of blocks of one kind in a group, and their matrices."""
     for run in group.runs():
         places, height = np.arange(run.start, run.stop), int(group.heights[run].max())
         shape = len(places), group.columns, height, group.columns, height
         whole = space.array("whole", *shape)
-        if not acting:
-            whole.fill(0.0)
-        for number, (tables, coefficients) in enumerate(acting):
-            out = space.array("elements", *shape) if number else whole
-            between(group, group, places, 0, tables, coefficients, frame, out)
-            if number:
-                whole += out
+        each = (between(group, group, places, 0, *operator, frame, (height, height)) for operator in acting)
+        write_between(chain.from_iterable(each), whole)
         energies = np.zeros(shape[:3])
         for rotation in group.rotations:
             of_kind = frame.energies_mhz[rotation.kind][frame.rows_of(group.twice_rows[run], rotation), :height]
             energies[:, rotation.columns, : of_kind.shape[1]] = (of_kind - zeros[run, None])[:, None]
-        for at, (columns, states) in group.by_shape(places, kinds[run]):
-            matrices = whole[at[:, None, None], columns[:, None], states[:, None], columns, states]
-            diagonal = np.arange(len(columns))
+        by_function = whole.reshape(len(places), group.columns * height, -1)
+        for at, columns, states in group.alike(places, kinds[run]):
+            functions = columns * height + states
+            if len(functions) == 1 and functions.shape[1] == by_function.shape[1] and (np.diff(functions) == 1).all():
+                matrices = by_function[at]
+            else:
+                matrices = by_function[at[:, None, None], functions[:, :, None], functions[:, None]]
+            diagonal = np.arange(functions.shape[1])
             matrices[:, diagonal, diagonal] += energies[at[:, None], columns, states]
             yield places[at].tolist(), matrices

@@ -16,7 +16,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
 from rotor.frozen import dataclass
 from rotor.quantum.spins.contraction import Contracted, Stack
-from rotor.quantum.spins.parts import PartColumns, SpinPart
+from rotor.quantum.spins.parts import PartColumns
 from rotor.quantum.spins.pattern_tables import PatternTable
 
 Tables = dict[tuple[int, int, int], Floats]
@@ -71,12 +71,18 @@ class Group:
         """Number of columns."""
         return int(self.rotations[-1].columns.stop)
 
-    def by_shape(self, places: Ints, kinds: Iterable[Hashable]) -> list[tuple[Ints, tuple[Ints, Ints]]]:
-        """Indices of `places`, blocks that agree in `kinds` and in their functions together, with these functions."""
-        alike: dict[tuple[int, Hashable], list[int]] = {}
-        for index, key in enumerate(zip(self.shapes[places].tolist(), kinds, strict=True)):
-            alike.setdefault(key, []).append(index)
-        return [(np.array(indices), self.functions[shape]) for (shape, _), indices in alike.items()]
+    def alike(self, places: Ints, kinds: Iterable[Hashable]) -> list[tuple[Ints, Ints, Ints]]:
+        """Indices of `places`, blocks of one kind together, with columns and states of their functions, (1 or blocks, functions)."""
+        by_kind: dict[Hashable, list[int]] = {}
+        for index, kind in enumerate(kinds):
+            by_kind.setdefault(kind, []).append(index)
+        out, shapes = [], self.shapes[places].tolist()
+        for indices in by_kind.values():
+            of_blocks = [shapes[index] for index in indices]
+            chosen = of_blocks[:1] if len(set(of_blocks)) == 1 else of_blocks
+            columns, states = (np.array(pair) for pair in zip(*(self.functions[i] for i in chosen), strict=True))
+            out.append((np.array(indices), columns, states))
+        return out
 
     def runs(self) -> Iterator[slice]:
         """Runs of blocks of similar size, whose matrices share an array."""
@@ -118,7 +124,11 @@ class Frame:
     def rows_of(self, twice_rows: Ints, rotation: RotationColumns) -> Places:
         """Rows of tables that columns have in blocks of these doubled rows; arbitrary where N is beyond the table."""
         last = len(self.energies_mhz[rotation.kind]) - 1
-        return consecutive(np.clip((twice_rows + rotation.rise) // 2 - self.lowest, 0, last))
+        least = (int(twice_rows[0]) + rotation.rise) // 2 - self.lowest
+        most = (int(twice_rows[-1]) + rotation.rise) // 2 - self.lowest
+        if most - least == len(twice_rows) - 1 and least >= 0 and most <= last:  # they rise
+            return slice(least, most + 1)
+        return np.clip((twice_rows + rotation.rise) // 2 - self.lowest, 0, last)
 
 
 def consecutive(places: Ints) -> Places:
@@ -210,23 +220,25 @@ def _shapes(twice_f: Ints, parts: PartColumns, frame: Frame) -> tuple[list[_Shap
     for rows in (parts.first, parts.last):
         codes = codes * (1 + len(frame.n_patterns)) + rows
     code_of_part, begins = codes.tolist(), parts.begins.tolist()
+    columns = [column.tolist() for column in (parts.numbers, parts.first, parts.last)]
     known, shapes, out = dict[tuple[int, ...], int](), list[_Shape](), []
-    for number, (f, begin, count) in enumerate(zip(twice_f.tolist(), begins, parts.counts.tolist(), strict=True)):
-        key = (set_of_f[f], *code_of_part[begin : begin + count])
+    for f, begin, count in zip(twice_f.tolist(), begins, parts.counts.tolist(), strict=True):
+        here = slice(begin, begin + count)
+        key = (set_of_f[f], *code_of_part[here])
         if key not in known:
             known[key] = len(shapes)
-            shapes.append(_shape(frame.patterns[f], parts.of_block(number), frame))
+            shapes.append(
+                _shape(frame.patterns[f], list(zip(*(column[here] for column in columns), strict=True)), frame)
+            )
         out.append(known[key])
     return shapes, np.array(out, dtype=np.int64)
 
 
-def _shape(numbers: Sequence[int], parts: Sequence[SpinPart], frame: Frame) -> _Shape:
-    """The shape of a block from the numbers of the patterns of its F."""
-    patterns = tuple(tuple(numbers[part.patterns]) for part in parts)
-    n_patterns = [frame.n_patterns[of_part[0]] for of_part in patterns]
-    kinds_and_sizes = [(frame.kinds[part.number], frame.sizes[part.number]) for part in parts]
-    layout = [(n_pattern, kind) for n_pattern, (kind, _) in zip(n_patterns, kinds_and_sizes, strict=True)]
-    return _Shape(tuple(layout), patterns, tuple(size for _, size in kinds_and_sizes))
+def _shape(numbers: Sequence[int], parts: Sequence[tuple[int, int, int]], frame: Frame) -> _Shape:
+    """The shape of a block from the numbers of the patterns of its F, and rotational block, first and last pattern of each part."""
+    patterns = tuple(tuple(numbers[first:last]) for _, first, last in parts)
+    layout = tuple((frame.n_patterns[numbers[first]], frame.kinds[number]) for number, first, _ in parts)
+    return _Shape(layout, patterns, tuple(frame.sizes[number] for number, _, _ in parts))
 
 
 def _group(
@@ -267,28 +279,50 @@ def of_all_f(coefficients: Floats, frame: Frame) -> Coefficients:
     return of_some
 
 
+class Between(NamedTuple):
+    """Elements between two kinds of columns: of the rotation (blocks, states', states), and coefficients (blocks, columns', columns)."""
+
+    left: RotationColumns
+    right: RotationColumns
+    elements: Floats
+    coefficients: Floats
+
+    def product(self) -> Floats:
+        """c(F) ⟨r'‖X‖r⟩ (blocks, columns' · states', columns · states)."""
+        (count, rows, columns), (_, up, low) = self.elements.shape, self.coefficients.shape
+        out = self.elements[:, None, :, None, :] * self.coefficients[:, :, None, :, None]
+        return out.reshape(count, up * rows, low * columns)
+
+
 def between(
     up: Group, low: Group, chosen: Ints, step: int, tables: Tables, coefficients: Coefficients, frame: Frame,
-    out: Floats,
-) -> Floats:  # fmt: skip
-    """c(F) ⟨r'‖X‖r⟩ between blocks `chosen` of a group and those of another with doubled row + step, written to `out`.
+    states: tuple[int, int],
+) -> Iterator[Between]:  # fmt: skip
+    """Elements c(F) ⟨r'‖X‖r⟩ between blocks `chosen` of a group and those of another with doubled row + step.
 
-    tables: elements of the rotation. coefficients: between patterns (`of_all_f`). out: (blocks, columns', states', columns,
-    states).
+    tables: elements of the rotation. coefficients: between patterns (`of_all_f`). states: most states' and states.
     """
-    out.fill(0.0)
     coefficients_of_f = coefficients(low.twice_f[chosen])
     twice_rows = low.twice_rows[chosen]
     for right in low.rotations:
-        places = frame.rows_of(twice_rows, right)
-        for left in up.rotations:
-            table = tables.get((left.kind, right.kind, (step + left.rise - right.rise) // 2))
-            if table is not None:
-                element = table[places, : out.shape[2], : out.shape[4]]
-                _, rows, columns = element.shape
-                np.multiply(
-                    element[:, None, :, None, :],
-                    coefficients_of_f(left.patterns, right.patterns)[:, :, None, :, None],
-                    out=out[:, left.columns, :rows, right.columns, :columns],
-                )
-    return out
+        keys = ((left, (left.kind, right.kind, (step + left.rise - right.rise) // 2)) for left in up.rotations)
+        acting = [(left, tables[key]) for left, key in keys if key in tables]
+        places = frame.rows_of(twice_rows, right) if acting else slice(0)
+        for left, table in acting:
+            of_columns = coefficients_of_f(left.patterns, right.patterns)
+            yield Between(left, right, table[places, : states[0], : states[1]], of_columns)
+
+
+def write_between(all_elements: Iterable[Between], out: Floats) -> None:
+    """Write sums of elements to an array (blocks, columns', states', columns, states)."""
+    out.fill(0.0)
+    written = set[tuple[int, int]]()
+    for left, right, elements, coefficients in all_elements:
+        _, rows, columns = elements.shape
+        target = out[:, left.columns, :rows, right.columns, :columns]
+        factors = elements[:, None, :, None, :], coefficients[:, :, None, :, None]
+        if (place := (left.columns.start, right.columns.start)) in written:
+            target += np.multiply(*factors)
+        else:
+            np.multiply(*factors, out=target)
+            written.add(place)

@@ -28,9 +28,9 @@ from rotor.quantum.spins.many_f import (
     Tables,
     are_connected,
     between,
-    consecutive,
     of_all_f,
     tables_of,
+    write_between,
 )
 from rotor.quantum.spins.pattern_tables import tensors_by_f, tensors_of_columns
 from rotor.quantum.spins.scheme import Scheme
@@ -38,6 +38,7 @@ from rotor.quantum.tensors import Tensors, rank_of
 
 # ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
 _LIKE, _SMALL, _MOST = 1.5, 24, 1 << 20
+_LARGE = 20_000  # elements of a block whose columns are multiplied one kind after another
 _IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that lie side by side: 32 MB
 
 
@@ -92,7 +93,9 @@ class GroupStates:
         if self._whole is None:
             return self._scattered(places)
         height = self.group.heights[self.in_group[places]].max()
-        return self._whole[consecutive(places), :, :height, : self.sizes[places].max()]
+        first, last = int(places[0]), int(places[-1])  # they rise
+        chosen = slice(first, last + 1) if last - first == len(places) - 1 else places
+        return self._whole[chosen, :, :height, : self.sizes[places].max()]
 
     @cached_property
     def _whole(self) -> Floats | None:
@@ -104,10 +107,11 @@ class GroupStates:
         """Vectors of some blocks over the functions of the group."""
         in_group, sizes = self.in_group[places], self.sizes[places]
         vectors = np.zeros((len(places), self.group.columns, self.group.heights[in_group].max(), sizes.max()))
-        for at, (columns, states) in self.group.by_shape(in_group, sizes.tolist()):
-            of_shape = np.concatenate([self.blocks[place].vectors for place in places[at].tolist()])
-            count = of_shape.shape[1]
-            vectors[at[:, None], columns, states, :count] = of_shape.reshape(len(at), len(columns), count)
+        kinds = [self.blocks[place].vectors.shape for place in places.tolist()]
+        for at, columns, states in self.group.alike(in_group, kinds):
+            of_kind = np.concatenate([self.blocks[place].vectors for place in places[at].tolist()])
+            count = of_kind.shape[1]
+            vectors[at[:, None], columns, states, :count] = of_kind.reshape(len(at), -1, count)
         return vectors
 
 
@@ -213,11 +217,20 @@ def _elements(
     bra: Floats, ket: Floats, space: Workspace,
 ) -> Floats:  # fmt: skip
     """Σ V' c ⟨r'‖X‖r⟩ V of operators between blocks of two groups, (blocks, n_up, n_low)."""
-    shape = len(bra), *bra.shape[1:3], *ket.shape[1:3]
-    whole = space.array("whole", *shape)
-    between(up, low, chosen, step, *terms[0], frame, whole)
-    for term in terms[1:]:
-        whole += between(up, low, chosen, step, *term, frame, space.array("elements", *shape))
-    functions_up, functions_low = bra.shape[1] * bra.shape[2], ket.shape[1] * ket.shape[2]
-    moved = np.matmul(whole.reshape(-1, functions_up, functions_low), ket.reshape(len(ket), functions_low, -1))
+    states = bra.shape[2], ket.shape[2]
+    acting = [each for term in terms for each in between(up, low, chosen, step, *term, frame, states)]
+    functions_up, functions_low = bra.shape[1] * states[0], ket.shape[1] * states[1]
+    if functions_up * functions_low < _LARGE:
+        whole = space.array("whole", len(bra), *bra.shape[1:3], *ket.shape[1:3])
+        write_between(acting, whole)
+        moved = np.matmul(whole.reshape(-1, functions_up, functions_low), ket.reshape(len(ket), functions_low, -1))
+    else:  # most columns are not connected
+        moved = space.array("moved", *bra.shape[:3], ket.shape[3])
+        moved.fill(0.0)
+        for each in acting:
+            (_, rows, columns), (left, right) = each.elements.shape, (each.left.columns, each.right.columns)
+            of_right = ket[:, right, :columns].reshape(len(ket), -1, ket.shape[3])
+            added = np.matmul(each.product(), of_right)
+            moved[:, left, :rows] += added.reshape(len(ket), -1, rows, ket.shape[3])
+        moved = moved.reshape(len(ket), functions_up, -1)
     return np.asarray(np.matmul(bra.reshape(len(bra), functions_up, -1).transpose(0, 2, 1), moved))

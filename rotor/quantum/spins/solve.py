@@ -91,7 +91,7 @@ def _states(plan: Plan, members: Members, grouped: Sequence[tuple[Group, list[in
         alike.setdefault(kinds[numbers[0]], []).append((numbers, matrices))
     for (_, _, repeats), pieces in alike.items():
         numbers = [number for piece, _ in pieces for number in piece]
-        matrices = np.concatenate([matrices for _, matrices in pieces])
+        matrices = end_to_end([matrices for _, matrices in pieces])
         if repeats > 1:
             yield States(numbers, *_state_by_state(matrices, repeats, zeros[numbers]))
         else:

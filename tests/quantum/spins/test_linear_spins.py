@@ -33,7 +33,7 @@ def _check(top, levels):
     assert np.abs(level_derivatives(top, levels, names) @ values - levels.energy_mhz).max() < 1e-11 * highest
     linear = linear_blocks_of_spins(top, levels.effects, names, levels.blocks)
     for matrices, block in zip(linear, levels.blocks, strict=True):
-        energies = np.linalg.eigvalsh(matrices.matrix(values))
+        energies = np.linalg.eigvalsh(matrices.lower(values))
         assert np.abs(energies - block.energies_mhz).max() < 1e-11 * highest
 
 
