@@ -88,6 +88,11 @@ def kinds_in(hint: Any) -> tuple[Any, ...]:
     return get_args(hint) if isinstance(hint, UnionType) else (hint,)
 
 
+def kinds_of(field: Field) -> tuple[Any, ...]:
+    """The types that a value of a field may have, that of its word for None among them."""
+    return (*kinds_in(field.reader.scene_type), *([str] if field.none else []))
+
+
 def about(field: Field) -> str:
     """The help of a field as a description: it begins with a small letter, unless it begins with a symbol or an acronym."""
     return field.help[:1].lower() + field.help[1:] if field.help[1:2].islower() else field.help
@@ -144,7 +149,7 @@ def checked_table(keys: Keys, values: Any, place: str) -> dict[str, Any]:
 def checked_value(field: Field, value: Any, place: str) -> Any:
     """The value of a key; ValueError, with its place, for a value of a wrong type."""
     if not isinstance(field.reader, Choices):
-        return _typed(value, (*kinds_in(field.reader.scene_type), *([str] if field.none else [])), place)
+        return _typed(value, kinds_of(field), place)
     if not isinstance(value, list | tuple):
         raise _wrong_type(place, value, (list,))
     return [_chosen(field.reader, item, f"{place}[{number}]") for number, item in enumerate(value)]

@@ -8,7 +8,7 @@ from typing import Any, get_args, get_origin
 
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, Field
-from rotor.scenes.keys import Keys, about, keys_of, kinds_in, shown_default, tables_of
+from rotor.scenes.keys import Keys, about, keys_of, kinds_in, kinds_of, shown_default, tables_of
 from rotor.scenes.scene import SCHEMA
 from rotor.verbs.verb import SCENE_VERBS, verb_of
 
@@ -44,13 +44,13 @@ def _scene_schema(kind: str) -> dict[str, Any]:
     """Schema of a kind of scene."""
     verb = verb_of(kind)
     tables = {name: keys for name, keys in tables_of(verb).items() if name}
-    schema = _table_schema(tables_of(verb)[""], verb.about, ("kind", kind))
+    schema = table_schema(tables_of(verb)[""], verb.about, ("kind", kind))
     schema["properties"]["schema"] = {"description": "version of this format", "const": SCHEMA}
-    schema["properties"] |= {name: _table_schema(keys, TITLES.get(name, "Settings.")) for name, keys in tables.items()}
+    schema["properties"] |= {name: table_schema(keys, TITLES.get(name, "Settings.")) for name, keys in tables.items()}
     return schema
 
 
-def _table_schema(keys: Keys, description: str, tag: tuple[str, str] | None = None) -> dict[str, Any]:
+def table_schema(keys: Keys, description: str, tag: tuple[str, str] | None = None) -> dict[str, Any]:
     """Schema of a table. tag: key and value that tell it from others."""
     tagged = {} if tag is None else {tag[0]: {"enum": [tag[1]]}}
     required = [*tagged, *(key for key, field in keys.items() if field.default is REQUIRED)]
@@ -72,10 +72,10 @@ def _field_schema(field: Field) -> dict[str, Any]:
     if field.example is not None:
         described["examples"] = [field.example]
     if not isinstance(field.reader, Choices):
-        return _type_schema((*kinds_in(field.reader.scene_type), *([str] if field.none else []))) | described
+        return _type_schema(kinds_of(field)) | described
     word = field.reader.word
     kinds = {
-        name: _table_schema(keys_of(kind), (kind.__doc__ or "").splitlines()[0], (word, name))
+        name: table_schema(keys_of(kind), (kind.__doc__ or "").splitlines()[0], (word, name))
         for name, kind in field.reader.load().items()
     }
     return {"type": "array", "items": {"anyOf": list(kinds.values())}} | described
@@ -89,7 +89,7 @@ def _type_schema(kinds: tuple[Any, ...]) -> dict[str, Any]:
         if base is Any:
             schemas.append({})
         elif is_dataclass(base):
-            schemas.append(_table_schema(keys_of(base), (base.__doc__ or "").splitlines()[0]))
+            schemas.append(table_schema(keys_of(base), (base.__doc__ or "").splitlines()[0]))
         elif base is list:
             schemas.append({"type": "array", "items": _type_schema(kinds_in(inner[0]))})
         elif base is dict:

@@ -6,15 +6,18 @@ import json
 import re
 import subprocess
 import sys
+import tomllib
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rotor.scenes.keys import tables_of
+from rotor.requests.field import Field
+from rotor.requests.readers import Whole
+from rotor.scenes.keys import checked_table, tables_of
 from rotor.scenes.scene import AlignScene, LevelsScene, SpectrumScene, StarkScene
 from rotor.scenes.scene_file import parse_scene, read_scene, scene_text, write_scene
-from rotor.scenes.schema import json_schema
+from rotor.scenes.schema import json_schema, table_schema
 from rotor.scenes.sweep.points import points
 from rotor.scenes.template import template
 from rotor.verbs.verb import SCENE_VERBS, verb_of
@@ -135,6 +138,35 @@ def test_the_json_schema_knows_every_key():
             for name in (table or kind, *keys):
                 assert f'"{name}"' in schema
     assert '"description"' in schema
+
+
+def test_tables_that_are_examples_are_comments():
+    lines = template("tumble").splitlines()
+    assert {"# [body]", "# [[effects]]"} <= set(lines)
+    assert {"[molecule]", "[conditions]", "[outputs]"} <= set(lines)
+
+
+@pytest.mark.parametrize("kind", SCENE_VERBS)
+def test_the_json_schema_takes_templates_and_refuses_what_a_scene_refuses(kind):
+    """Another program reads the schema: jsonschema, with all keys of the template switched on."""
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json_schema()["$defs"][kind]
+    jsonschema.Draft202012Validator.check_schema(schema)
+    lines = (re.sub(r"^# (?=[\w.]+ = |\[)", "", line) for line in template(kind).splitlines())
+    content = tomllib.loads("\n".join(lines))
+    jsonschema.validate(content, schema)
+    for wrong in ({"title": 3}, {"unknown": 1}, {"outputs": {"csv": 1.5}}, {"kind": "none"}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(content | wrong, schema)
+
+
+def test_the_word_for_none_is_a_value_of_any_type():
+    """A whole number may have such a word too, in a scene and in the schema."""
+    count = {"count": Field(Whole(), "Number of lines", "numerics.count", none="all")}
+    assert checked_table(count, {"count": "all"}, "numerics") == {"count": "all"}
+    assert table_schema(count, "Settings.")["properties"]["count"]["anyOf"] == [{"type": "integer"}, {"type": "string"}]
+    with pytest.raises(ValueError, match="numerics.count: expected a whole number or a text, found a list"):
+        checked_table(count, {"count": [1]}, "numerics")
 
 
 def test_nothing_heavy_is_loaded_by_a_scene_alone():
