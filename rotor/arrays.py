@@ -94,6 +94,11 @@ def runs_of_similar_size(
     >>> [(run.start, run.stop) for run in runs_of_similar_size([1, 3, 4, 9, 10, 11], 1.5, small=4, most=200)]
     [(0, 3), (3, 5), (5, 6)]
     """
+    if len(sizes) and not costs:
+        largest = max(sizes)
+        if largest <= max(ratio * min(sizes), small) and len(sizes) * largest * largest <= most:
+            yield slice(0, len(sizes))
+            return
     start, place, least, largest, cost = 0, 0, math.inf, 0, 0
     for (size, matrix_cost), alike in groupby(zip(sizes, costs or (size * size for size in sizes), strict=True)):
         stop = place + sum(1 for _ in alike)

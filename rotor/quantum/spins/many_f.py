@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
+from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.frozen import dataclass
 from rotor.quantum.spins.contraction import Contracted, Stack
 from rotor.quantum.spins.parts import PartColumns
@@ -133,8 +133,9 @@ class Frame:
 
 def consecutive(places: Ints) -> Places:
     """The places as a slice if they are consecutive."""
-    alike = len(places) == 1 or (places[-1] - places[0] == len(places) - 1 and (np.diff(places) == 1).all())
-    return slice(int(places[0]), int(places[-1]) + 1) if alike else places
+    first, count = int(places[0]), len(places)
+    alike = places[-1] - first == count - 1 and places.tolist() == list(range(first, first + count))
+    return slice(first, first + count) if alike else places
 
 
 def frame_of(stacks: Sequence[Stack], table: PatternTable) -> Frame:
@@ -253,13 +254,14 @@ def _group(
     place_of = {n_pattern_and_kind: place for place, n_pattern_and_kind in enumerate(layout)}
     functions, heights = dict[int, tuple[Ints, Ints]](), np.zeros(len(shapes), dtype=np.int64)
     for number in dict.fromkeys(shape_of.tolist()):
-        shape, columns = shapes[number], list[int]()
-        for part_patterns, n_pattern_and_kind in zip(shape.patterns, shape.layout, strict=True):
+        shape, columns, states = shapes[number], list[int](), list[int]()
+        for part_patterns, n_pattern_and_kind, size in zip(shape.patterns, shape.layout, shape.sizes, strict=True):
             rotation = rotations[place_of[n_pattern_and_kind]]
-            columns += [pattern + rotation.columns.start - rotation.patterns.start for pattern in part_patterns]
-        sizes = np.repeat(shape.sizes, [len(part_patterns) for part_patterns in shape.patterns])
-        run, states = numbers_in_runs(sizes)
-        functions[number], heights[number] = (np.array(columns)[run], states), max(shape.sizes)
+            shift = rotation.columns.start - rotation.patterns.start
+            for pattern in part_patterns:
+                columns += [pattern + shift] * size
+                states += range(size)
+        functions[number], heights[number] = (np.array(columns), np.array(states)), max(shape.sizes)
     places = {row: place for place, row in enumerate(twice_rows.tolist())}
     return Group(tuple(rotations), twice_f, twice_rows, heights[shape_of], shape_of, functions, places)
 

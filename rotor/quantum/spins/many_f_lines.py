@@ -88,25 +88,29 @@ class GroupStates:
         """Number of each block in the group."""
         return np.array([self.group.places[row] for row in self.places])
 
+    @cached_property
+    def heights(self) -> Ints:
+        """The largest number of states of a rotational block, for each block."""
+        return self.group.heights[self.in_group]
+
     def vectors(self, places: Ints) -> Floats:
         """Vectors (blocks, columns, rotational states, states) of some blocks."""
         if self._whole is None:
             return self._scattered(places)
-        height = self.group.heights[self.in_group[places]].max()
         first, last = int(places[0]), int(places[-1])  # they rise
         chosen = slice(first, last + 1) if last - first == len(places) - 1 else places
-        return self._whole[chosen, :, :height, : self.sizes[places].max()]
+        return self._whole[chosen, :, : self.heights[chosen].max(), : self.sizes[chosen].max()]
 
     @cached_property
     def _whole(self) -> Floats | None:
         """Vectors of all blocks; None where they are large."""
-        numbers = len(self.blocks) * self.group.columns * self.group.heights[self.in_group].max() * self.sizes.max()
+        numbers = len(self.blocks) * self.group.columns * self.heights.max() * self.sizes.max()
         return self._scattered(np.arange(len(self.blocks))) if numbers <= _IN_MEMORY else None
 
     def _scattered(self, places: Ints) -> Floats:
         """Vectors of some blocks over the functions of the group."""
         in_group, sizes = self.in_group[places], self.sizes[places]
-        vectors = np.zeros((len(places), self.group.columns, self.group.heights[in_group].max(), sizes.max()))
+        vectors = np.zeros((len(places), self.group.columns, self.heights[places].max(), sizes.max()))
         kinds = [self.blocks[place].vectors.shape for place in places.tolist()]
         for at, columns, states in self.group.alike(in_group, kinds):
             of_kind = np.concatenate([self.blocks[place].vectors for place in places[at].tolist()])
