@@ -29,6 +29,11 @@ def name_peaks(axes: Any, peaks: Sequence[Peak], drawn: Floats, most: int = 12) 
     everything drawn, in axis units. most: largest number of names.
     """
     axes.figure.canvas.draw()  # computes the layout, so that pixel sizes are valid
+    write_names(axes, peaks, drawn, most)
+
+
+def write_names(axes: Any, peaks: Sequence[Peak], drawn: Floats, most: int = 12) -> None:
+    """`name_peaks` on a figure whose layout is computed."""
     (first, last), (low, high) = sorted(axes.get_xlim()), axes.get_ylim()
     pixels = axes.transData.transform(drawn)
     boxes: list[Any] = []

@@ -12,7 +12,7 @@ from rotor.arrays import Floats
 from rotor.observed.model import Component, Sight
 from rotor.observed.overlay_table import line_table, modelled
 from rotor.observed.spectrum import ABSORBANCE, KELVIN, ObservedSpectrum
-from rotor.plots.names import SPACE, Peak, name_peaks
+from rotor.plots.names import SPACE, Peak, write_names
 from rotor.plots.picture import BLUE, GREY, ORANGE, PALETTE, WIDTH_INCHES, checked_suffix, new_figure, save, styled
 
 PANELS = 6  # on a page
@@ -84,19 +84,26 @@ def overlay_figure(
             min(PAGE_INCHES[1], 1.2 + 2.6 * len(page)) if len(page) <= PANELS else 1.2 + 1.9 * len(page),
         )
         figure = new_figure(size)
-        for place, number in enumerate(page, start=1):
-            axes = figure.add_subplot(len(page), 1, place)
+        panels = [figure.add_subplot(len(page), 1, place) for place in range(1, len(page) + 1)]
+        for axes, number in zip(panels, page, strict=True):
             _panel(axes, spectrum, brightness, edges[number], unidentified_mhz)
-            figure.canvas.draw()
-            _name(axes, lines, names, spectrum, brightness)
-        axes.set_xlabel("Frequency (GHz)")
+        panels[-1].set_xlabel("Frequency (GHz)")
         handles = {
-            name: handle for each in figure.axes for handle, name in zip(*each.get_legend_handles_labels(), strict=True)
+            name: handle for each in panels for handle, name in zip(*each.get_legend_handles_labels(), strict=True)
         }
         figure.legend(handles.values(), handles, loc="outside lower right", ncols=len(handles))
         titles = {KELVIN: "Brightness temperature (K)", ABSORBANCE: "Absorbance"}
         figure.supylabel(titles.get(spectrum.unit, f"Intensity ({spectrum.unit})"), fontsize=9)
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)
+        # once for the page, since the layout of all panels takes some tenths of a second: sizes in pixels, then the final limits
+        figure.draw_without_rendering()
+        peaks = [_peaks(axes, lines, names) for axes in panels]
+        for axes, named in zip(panels, peaks, strict=True):
+            _leave_space(axes, named)
+        figure.draw_without_rendering()
+        for axes, named in zip(panels, peaks, strict=True):
+            write_names(axes, named, _drawn(axes, spectrum, brightness), _MOST_NAMES)
+        figure.set_layout_engine("none")  # names change no layout
     return figure
 
 
@@ -122,7 +129,7 @@ def _panel(
     bottom = float(min(y.min(initial=0.0), m.min(initial=0.0)))
     axes.set_xlim(edges[0] / 1e3, edges[1] / 1e3)
     axes.locator_params(axis="x", nbins=6)  # frequencies in full, such as 233.8255, without an offset
-    axes.ticklabel_format(axis="x", useOffset=False)
+    axes.ticklabel_format(axis="x", useOffset=False, useMathText=False)  # parsing takes 10 ms a label
     axes.set_ylim(1.05 * bottom, SPACE * top + 0.15 * top)
     marked = [at / 1e3 for at in unidentified if edges[0] <= at <= edges[1]]
     if marked:
@@ -137,15 +144,13 @@ def _panel(
         )
 
 
-def _name(
-    axes: Any, lines: Mapping[str, Any], names: Sequence[str], spectrum: ObservedSpectrum, brightness: Floats
-) -> None:
-    """Name modelled lines in the colour of their species; a star marks a blend."""
+def _peaks(axes: Any, lines: Mapping[str, Any], names: Sequence[str]) -> list[Peak]:
+    """Modelled lines of a panel in the colour of their species; a star marks a blend."""
     first, last = (1e3 * edge for edge in axes.get_xlim())
     # brightness has its unit in the name
     total, observed = (lines[name] if name in lines else lines[f"{name}_k"] for name in ("total", "observed"))
     rows = np.flatnonzero([first <= at <= last for at in lines["observed_mhz"].tolist()])
-    peaks = [
+    return [
         Peak(
             float(lines["observed_mhz"][i]) / 1e3,
             max(float(total[i]), float(observed[i])),
@@ -154,10 +159,13 @@ def _name(
         )
         for i in rows
     ]
-    _leave_space(axes, peaks)
+
+
+def _drawn(axes: Any, spectrum: ObservedSpectrum, brightness: Floats) -> Floats:
+    """Tips of the spectrum and the model in a panel (n, 2)."""
+    first, last = (1e3 * edge for edge in axes.get_xlim())
     inside = (spectrum.frequency_mhz >= first) & (spectrum.frequency_mhz <= last)
-    drawn = np.stack([spectrum.frequency_mhz[inside] / 1e3, np.maximum(spectrum.intensity, brightness)[inside]], axis=1)
-    name_peaks(axes, peaks, drawn, _MOST_NAMES)
+    return np.stack([spectrum.frequency_mhz[inside] / 1e3, np.maximum(spectrum.intensity, brightness)[inside]], axis=1)
 
 
 def _leave_space(axes: Any, peaks: Sequence[Peak]) -> None:
