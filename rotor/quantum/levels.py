@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
 
-AnyBlock = Any  # SolvedBlock, MomentBlock or SpinBlock
+AnyBlock = Any  # SolvedBlock or SpinBlock
 Connections = tuple[list[tuple[AnyBlock, AnyBlock]], Callable[[AnyBlock, AnyBlock], Floats]]
 """Pairs of blocks that an operator connects, and the function that returns the reduced elements between them."""
 
@@ -81,6 +81,11 @@ class Block(ABC):
         """How spins are treated, None where nothing was asked, which means exactly."""
         return None
 
+    @property
+    def moments(self) -> SpeciesMoments | None:
+        """The elements of a species of internal rotation; None for other states."""
+        return None
+
 
 class SpeciesMoments(ABC):
     """Elements of molecule-fixed tensors between the blocks of one species, and derivatives of its states."""
@@ -91,70 +96,35 @@ class SpeciesMoments(ABC):
         """Whether functions of K and -K are combined."""
 
     @abstractmethod
-    def connect(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> bool:
+    def connect(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> bool:
         """Whether tensors, by pairs of states, have elements between the states of two blocks of the species."""
 
     @abstractmethod
-    def reduced(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
+    def reduced(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> NDArray[Any]:
         """Reduced elements (n_up, n_low) of one component; those of odd rank without their factor i where functions are `combined`."""
 
     @abstractmethod
-    def slopes(self, block: MomentBlock, names: Sequence[str]) -> Floats:
+    def slopes(self, block: SolvedBlock, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of the states of a block by constants of the Hamiltonian."""
 
 
-@dataclass(frozen=True, eq=False)
-class MomentBlock(Block):
-    """States of one total angular momentum solved together, of a species that has its own moments.
-
-    twice_j: twice this momentum. number: of the solved block in its species. states: which of its states these are, as the moments of the
-    species count them. components: 2 where the states σ and -σ coincide.
-    """
+class SpeciesFunctions(NamedTuple):
+    """Functions of a block of one species: twice the total angular momentum, numbers of the block and of its states in the species."""
 
     twice_j: int
     number: int
     states: Ints
-    energies_mhz: Floats
-    start: int
-    components: int
-    moments: SpeciesMoments
-
-    @property
-    def twice_total(self) -> int:
-        """Twice the total angular momentum."""
-        return self.twice_j
-
-    @property
-    def stop(self) -> int:
-        """The row behind the last state."""
-        return self.start + len(self.states)
-
-    @property
-    def combined(self) -> bool:
-        """Whether functions of K and -K are combined."""
-        return self.moments.combined
-
-    @property
-    def paired(self) -> bool:
-        """σ and -σ coincide."""
-        return self.components > 1
-
-    def connects(self, low: MomentBlock, tensors: Tensors) -> bool:
-        """Whether tensors, by pairs of states, have elements between the states of this block and another one."""
-        return low.moments is self.moments and self.moments.connect(self, low, tensors)
-
-    def amplitudes(self, low: MomentBlock, tensors: Tensors) -> Floats:
-        """Magnitudes of reduced elements (n_up, n_low), whose squares are the strengths of all components together."""
-        return np.asarray(np.sqrt(self.components) * np.abs(self.moments.reduced(self, low, tensors)))
 
 
 @dataclass(frozen=True, eq=False)
 class SolvedBlock(Block):
-    """Wang blocks of one J, or functions |N K⟩, solved together: energies (n,) in MHz, rising, and eigenvectors (n, n) in columns.
+    """States solved together over Wang blocks of one J, functions |N K⟩, or functions of a species of internal rotation.
 
-    parts: the state v and the functions of each range of rows; `parts` of spins have the names of these too. start: place of the first
-    state in the arrays of `Levels`. labels: (n, 3) v, Ka, Kc of the states of a coupled block. mixing: (n,) squared overlaps with the
-    functions that name them. Functions of a coupled block carry the factor of `j_operators.phase`, those of a block without labels do not.
+    energies (n,) in MHz, rising, and eigenvectors (functions, n) in columns. parts: the state v and the functions of each range of rows;
+    `parts` of spins have the names of these too. start: place of the first state in the arrays of `Levels`. labels: (n, 3) v, Ka, Kc of the
+    states of a coupled block. mixing: (n,) squared overlaps with the functions that name them. moments: of a species, which has its own;
+    components: 2 where its states σ and -σ coincide. Functions of a coupled block carry the factor of `j_operators.phase`, those of a Wang
+    block without labels do not.
     """
 
     parts: tuple[Any, ...]
@@ -163,12 +133,13 @@ class SolvedBlock(Block):
     start: int = 0
     labels: Ints | None = None
     mixing: Floats | None = None
+    moments: SpeciesMoments | None = None
+    components: int = 1
 
     @property
-    def basis(self) -> WangBlock:
-        """The Wang block, of a block of a single one."""
-        basis: WangBlock = self.parts[0].basis
-        return basis
+    def basis(self) -> Any:
+        """The Wang block, of a block of a single one, or the functions of a species."""
+        return self.parts[0].basis
 
     @property
     def j(self) -> int:
@@ -177,13 +148,23 @@ class SolvedBlock(Block):
 
     @property
     def twice_total(self) -> int:
-        """2J."""
-        return 2 * self.j
+        """2J, with internal rotation and spins 2F."""
+        return 2 * self.j if self.moments is None else int(self.basis.twice_j)
+
+    @property
+    def combined(self) -> bool:
+        """Whether functions of K and -K are combined."""
+        return self.axial_k is None if self.moments is None else self.moments.combined
+
+    @property
+    def paired(self) -> bool:
+        """σ and -σ coincide."""
+        return bool(self.axial_k) or self.components > 1
 
     @property
     def alone(self) -> bool:
         """Whether it is a Wang block that nothing couples with others."""
-        return self.labels is None
+        return self.labels is None and self.moments is None
 
     def elements(self, low: SolvedBlock, between: Callable[[Any, Any], Floats | None]) -> Floats | None:
         """⟨r'|X|r⟩ (n_up, n_low) between the states of two blocks from the elements of X between their parts; None where it is zero."""

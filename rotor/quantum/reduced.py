@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum.levels import AnyBlock, Connections, MomentBlock, SolvedBlock
+from rotor.quantum.levels import AnyBlock, Connections, SolvedBlock
 from rotor.quantum.tensors import BodyTensor, Tensors, acting_on, add_acting_on, rank_of, tensor_between
 
 
@@ -30,8 +30,8 @@ def connections(blocks: Sequence[AnyBlock], tensors: Tensors) -> Connections:
 
         return connections_of(blocks, tensor_moments(blocks[0].shared, tensors))
     pairs = list(pairs_where(blocks, rank_of(tensors), lambda up, low: _connects(up, low, tensors)))
-    if isinstance(blocks[0], MomentBlock):
-        return pairs, lambda up, low: up.amplitudes(low, tensors)
+    if blocks[0].moments is not None:
+        return pairs, lambda up, low: np.sqrt(up.components) * np.abs(up.moments.reduced(up, low, tensors))
     return pairs, lambda up, low: _coupled_amplitudes(up, low, tensors)
 
 
@@ -60,9 +60,9 @@ def pairs_where(
                     yield up, low
 
 
-def _connects(up: AnyBlock, low: AnyBlock, tensors: Tensors) -> bool:
-    if isinstance(up, MomentBlock):
-        return up.connects(low, tensors)
+def _connects(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> bool:
+    if up.moments is not None:
+        return low.moments is up.moments and up.moments.connect(up, low, tensors)
     tensors_of_parts = ((tensor_between(tensors, p.v, q.v), p, q) for p in up.parts for q in low.parts)
     return any(tensor is not None and tensor.between(p.basis, q.basis) is not None for tensor, p, q in tensors_of_parts)
 

@@ -20,7 +20,7 @@ from rotor.quantum.basis.state_elements import linear_blocks_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
 from rotor.quantum.label_blocks import expectations, unit_diagonals
-from rotor.quantum.levels import Levels, MomentBlock
+from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
 from rotor.tops.operators import Operators, Powers
@@ -53,7 +53,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
             raise ValueError(f"no parameter {name} here to derive by: the effects have {', '.join(by_name)}")
     rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
 
-    if levels.blocks and isinstance(levels.blocks[0], MomentBlock):
+    if levels.blocks and levels.blocks[0].moments is not None:
         return np.concatenate([block.moments.slopes(block, names) for block in levels.blocks])[rows]
     if "f" in levels.quanta or are_with_spins(levels):
         from rotor.quantum.spins.linear_blocks import derivatives

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
-from rotor.quantum.levels import AnyBlock, Connections, Levels, MomentBlock, SolvedBlock
+from rotor.quantum.levels import AnyBlock, Connections, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import connections, pairs_where
 
@@ -97,14 +97,14 @@ class ReducedElements:
             if not second.with_spins:
                 moment = self._moment(operator, first, second)
                 return moment if moment is not None and moment.any() else None
-        elif isinstance(first, MomentBlock):
-            return first.moments.reduced(first, second, operator.tensors(self.states, self.representation))
+        elif first.moments is not None:
+            return np.asarray(first.moments.reduced(first, second, operator.tensors(self.states, self.representation)))
         elements = self._connections(operator)[1](first, second)
         return elements / np.sqrt(2.0) if self.paired[up] else elements  # that of one sign of K
 
     def _moment(self, magnet: Magnet, up: AnyBlock, low: AnyBlock) -> Floats | None:
         """Elements of the magnetic moment; None where they are zero."""
-        if isinstance(up, MomentBlock):
+        if up.moments is not None:
             raise ValueError(
                 "internal rotation in a magnetic field is not computed: the turning group adds a moment along its axis, proportional to "
                 "<p - rho·P>, which shifts E levels to first order and whose g value is not among the constants; leave its constants "

@@ -24,8 +24,9 @@ from rotor.quantum.internal_rotation.levels import (
     turning_tops,
 )
 from rotor.quantum.internal_rotation.nuclei import Nuclei
-from rotor.quantum.levels import Levels, MomentBlock, SpeciesMoments
+from rotor.quantum.levels import Levels, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
 from rotor.quantum.tensors import BodyTensor, Tensors, cartesian_of
+from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 if TYPE_CHECKING:
@@ -45,27 +46,26 @@ class HyperfineMoments(SpeciesMoments):
         """Whether functions of K and -K are combined."""
         return self.levels.levels.functions.folded
 
-    def connect(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> bool:
+    def connect(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> bool:
         """Whether a dipole has elements between the states of two blocks."""
         return any(True for _ in self._pieces(up, low, tensors))
 
-    def reduced(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
+    def reduced(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> NDArray[Any]:
         """Reduced elements (n_up, n_low) of a dipole."""
-        total = np.zeros((len(up.states), len(low.states)))
-        return sum(
-            (value * block[np.ix_(up.states, low.states)] for value, block in self._pieces(up, low, tensors)), total
-        )
+        places = np.ix_(up.basis.states, low.basis.states)
+        total = np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
+        return sum((value * block[places] for value, block in self._pieces(up, low, tensors)), total)
 
-    def _pieces(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> Iterator[tuple[float, NDArray[Any]]]:
+    def _pieces(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> Iterator[tuple[float, NDArray[Any]]]:
         """Components of a dipole along the axes of the rho-axis frame, each with the elements of its unit vector."""
         for axis, value in _along_axes(tensors[0, 0], self.model.angle, self.model.has_plane):
-            block = self.levels.space.tensors[f"mu {axis}"].blocks.get((up.number, low.number))
+            block = self.levels.space.tensors[f"mu {axis}"].blocks.get((up.basis.number, low.basis.number))
             if block is not None:
                 yield value, block
 
-    def slopes(self, block: MomentBlock, names: Sequence[str]) -> Floats:
+    def slopes(self, block: SolvedBlock, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of the states of a block, by the constants of the top, of the internal rotor and of the nuclei."""
-        rotation, spins = self.levels.slopes(self.levels.space.starts()[block.number] + block.states)
+        rotation, spins = self.levels.slopes(self.levels.space.starts()[block.basis.number] + block.basis.states)
         constants = [*self.model.values, *self.levels.nuclei.values]
         slopes = np.hstack([rotation @ self.model.jacobian, spins])
         none = np.zeros(len(slopes))
@@ -98,7 +98,7 @@ def hyperfine_levels(
         raise ValueError(
             "spins of several nuclei beside equivalent tops: their exchange is not computed; leave one of them"
         )
-    blocks, pieces = list[MomentBlock](), list[Columns]()
+    blocks, pieces = list[SolvedBlock](), list[Columns]()
     whole = [name for name in nuclei.sums if name not in nuclei.halves]
     for name in model.species:
         species = species_with_spins(model, constants, name, nuclei, nmin, nmax)
@@ -109,8 +109,9 @@ def hyperfine_levels(
                 continue
             sector, components = species.space.sectors[number], degeneracies.components(name)
             columns = {key: column[here] for key, column in quanta.items()}
-            start = blocks[-1].stop if blocks else 0
-            blocks.append(MomentBlock(sector.twice_j, number, here, sector.energies[here], start, components, moments))
+            vectors = sector.labels["vectors"][:, here]
+            parts = (Part(0, SpeciesFunctions(sector.twice_j, number, here), 0),)
+            blocks.append(SolvedBlock(parts, sector.energies[here], vectors, moments=moments, components=components))
             pieces.append(
                 {
                     "species": np.full(len(here), name),
@@ -120,7 +121,7 @@ def hyperfine_levels(
                 }
             )
     energies = np.concatenate([block.energies_mhz for block in blocks])
-    levels = table_of_pieces(top, effects, nmax, pieces, energies, tuple(blocks), nuclei.halves)
+    levels = table_of_pieces(top, effects, nmax, pieces, energies, tuple(placed(blocks)), nuclei.halves)
     return replace(levels, quanta=levels.quanta | {name: levels.quanta[name] // 2 for name in whole})
 
 

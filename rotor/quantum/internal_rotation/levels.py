@@ -18,9 +18,10 @@ from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
 from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_tops
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
-from rotor.quantum.levels import Levels, MomentBlock, SpeciesMoments
+from rotor.quantum.levels import Levels, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
 from rotor.quantum.operators.rotation import body_tensor
 from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
+from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants, sigma_species
 
 if TYPE_CHECKING:
@@ -48,14 +49,14 @@ class TorsionMoments(SpeciesMoments):
         """Whether functions of K and -K are combined."""
         return self.levels.functions.folded
 
-    def connect(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> bool:
+    def connect(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> bool:
         """Whether a tensor has elements between two blocks."""
-        return (up.number, low.number) in self._between(tensors)
+        return (up.basis.number, low.basis.number) in self._between(tensors)
 
-    def reduced(self, up: MomentBlock, low: MomentBlock, tensors: Tensors) -> NDArray[Any]:
+    def reduced(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> NDArray[Any]:
         """Reduced elements (n_up, n_low) of a tensor."""
-        entries = self._between(tensors)[up.number, low.number]
-        bra, ket = self._vectors(up), self._vectors(low)
+        entries = self._between(tensors)[up.basis.number, low.basis.number]
+        bra, ket = up.vectors, low.vectors
         shape = len(bra), len(ket)
         if shape[0] * shape[1] <= FEW:
             matrix: Any = np.zeros(shape, dtype=entries.values.dtype)
@@ -66,16 +67,11 @@ class TorsionMoments(SpeciesMoments):
             matrix = csr_array((entries.values[0], (entries.rows, entries.columns)), shape=shape)
         return np.asarray(bra.conj().T @ (matrix @ ket))
 
-    def slopes(self, block: MomentBlock, names: Sequence[str]) -> Floats:
+    def slopes(self, block: SolvedBlock, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of the states of a block, by the constants of the top and of the internal rotor."""
         constants = list(self.model.values)
-        slopes = self.levels.slopes(block.states) @ self.model.jacobian
+        slopes = self.levels.slopes(block.basis.states) @ self.model.jacobian
         return np.asarray(slopes[:, [constants.index(name) for name in names]])
-
-    def _vectors(self, block: MomentBlock) -> NDArray[Any]:
-        """The states of a block over its functions (functions, n)."""
-        solved = self.levels.solved
-        return solved.vectors(block.number)[1][:, solved.linear.rank[block.states]]
 
     def _between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
         """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
@@ -112,13 +108,13 @@ def torsion_rotation_levels(
     refuse_axes(top)
     model = turning_tops(top, constants)
     degeneracies = Degeneracies.from_model(model, constants)
-    blocks, pieces = list[MomentBlock](), list[Columns]()
+    blocks, pieces = list[SolvedBlock](), list[Columns]()
     for name in model.species:
         species = species_blocks(model, name, jmin, jmax, constants.functions).solve_once(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
         components = degeneracies.components(name)
-        blocks += _blocks(species, model, blocks[-1].stop if blocks else 0, components)
+        blocks += _blocks(species, model, components)
         pieces.append(
             {
                 "species": np.full(len(species.rows), name),
@@ -128,7 +124,7 @@ def torsion_rotation_levels(
             }
         )
     energies = np.concatenate([block.energies_mhz for block in blocks])
-    return table_of_pieces(top, effects, jmax, pieces, energies, tuple(blocks))
+    return table_of_pieces(top, effects, jmax, pieces, energies, tuple(placed(blocks)))
 
 
 def energies_alone(
@@ -188,7 +184,7 @@ def _refuse_long_sums(size: int) -> None:
 
 def table_of_pieces(
     top: Top, effects: tuple[QuantumEffect, ...], jmax: int, pieces: Sequence[Columns], energies: Floats,
-    blocks: tuple[MomentBlock, ...] = (), halves: frozenset[str] = frozenset(),
+    blocks: tuple[SolvedBlock, ...] = (), halves: frozenset[str] = frozenset(),
 ) -> Levels:  # fmt: skip
     """Levels from columns of quantum numbers, components and weights, piece by piece; sums with spins are doubled."""
     columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
@@ -301,16 +297,17 @@ class Degeneracies:
         return np.full(len(rows), weights[species] // int(np.gcd.reduce(list(weights.values()))))
 
 
-def _blocks(species: SpeciesLevels, model: TurningTops, start: int, components: int) -> list[MomentBlock]:
+def _blocks(species: SpeciesLevels, model: TurningTops, components: int) -> list[SolvedBlock]:
     """Blocks of one species with the states that are levels, in the order of its rows."""
-    moments, linear, blocks = TorsionMoments(species, model), species.solved.linear, list[MomentBlock]()
+    moments, linear, blocks = TorsionMoments(species, model), species.solved.linear, list[SolvedBlock]()
     number_of = linear.block[species.rows]
     for number in species.blocks:
         rows = species.rows[number_of == number]
         if len(rows):
             twice_j, energies = 2 * int(linear.labels["J"][rows[0]]), species.solved.energies[rows]
-            blocks.append(MomentBlock(twice_j, number, rows, energies, start, components, moments))
-            start += len(rows)
+            vectors = species.solved.vectors(number)[1][:, linear.rank[rows]]
+            parts = (Part(0, SpeciesFunctions(twice_j, number, rows), 0),)
+            blocks.append(SolvedBlock(parts, energies, vectors, moments=moments, components=components))
     return blocks
 
 

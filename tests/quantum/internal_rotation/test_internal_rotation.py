@@ -229,10 +229,9 @@ def test_strengths_obey_the_sum_rule_over_all_torsional_states():
         from rotor.quantum.tensors import body_tensor
 
         tensors = {(0, 0): body_tensor((2.55, 0.87, 0.0), 1, "Ir")}
-        if block.connects(block, tensors):
-            same_level[block.start : block.start + len(block.energies_mhz)] = (
-                np.diag(block.amplitudes(block, tensors)) ** 2
-            )
+        if block.moments.connect(block, block, tensors):
+            squares = block.components * np.abs(np.diag(block.moments.reduced(block, block, tensors))) ** 2
+            same_level[block.start : block.start + len(block.energies_mhz)] = squares
     expected = levels.states * (2.55**2 + 0.87**2)
     assert np.allclose(
         (total + same_level)[low], expected[low], rtol=1e-6
