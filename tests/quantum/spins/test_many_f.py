@@ -15,6 +15,7 @@ from rotor.quantum.spins import many_f, many_f_lines
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import intensity_cut
+from rotor.spectra.lines import line_list
 from rotor.spectra.transitions import all_transitions
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
@@ -98,3 +99,16 @@ def test_levels_without_a_weight_make_no_lines():
     weight[::3] = 0
     transitions = all_transitions(replace(levels, weight=weight), DIPOLE, cut=intensity_cut(levels, 5.0, 100.0, -7.0))
     assert (weight[transitions.lower] > 0).all()
+
+
+def test_elements_of_large_blocks_are_those_of_small_ones(monkeypatch):
+    """Columns multiplied one kind after another, and whole matrices."""
+    spins = SpinConstants.parse("chi_aa(14N_1)=-4 chi_ab(14N_1)=1 chi_aa(14N_2)=2 chi_bb-cc(14N_2)=3 MHz")
+    top = Top.from_constants("A=9000 B=3500 C=2600 MHz", dipole_abc_debye=(1.0, 0.5, 0.0), spin_constants=spins)
+    strengths = []
+    for large in (0, 1 << 40):
+        monkeypatch.setattr(many_f_lines, "_LARGE", large)
+        lines = line_list(top, jmax=4, temperature_k=10.0, effects=effects_of(top, True))
+        strengths.append(lines.strength_debye2[np.lexsort((lines.lower, lines.upper))])
+    assert len(strengths[0]) == len(strengths[1]) > 1000
+    assert np.abs(strengths[0] - strengths[1]).max() < 1e-12
