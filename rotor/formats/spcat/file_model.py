@@ -5,7 +5,7 @@ Each group of connected states has a top that represents its symmetry, and the o
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,29 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.file_spins import coupled_spin_lines, coupled_spins, with_their_spins
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_axes
+from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, CodedLine
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET
 from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, line_moment, split_dipoles
-from rotor.formats.spcat.hamiltonian.file_effect import (
-    CodedLine,
-    FileEffect,
-    coded_lines,
-    ignored_states,
-    real_lines,
-)
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, l_doubled_pairs, named_by_l
-from rotor.formats.spcat.hamiltonian.labels import named_by
+from rotor.formats.spcat.hamiltonian.file_effect import FileEffect
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l
+from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by
 from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
-from rotor.formats.spcat.hamiltonian.phases import Phases, read_phases, turned_axis, turned_odd_axes, with_dipoles
+from rotor.formats.spcat.hamiltonian.phases import Phases, turned_axis, turned_odd_axes, with_dipoles
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, falls_with_k
-from rotor.formats.spcat.hamiltonian.series import Series, file_series
 from rotor.formats.spcat.hamiltonian.states import ALL_K, StateOptions, file_states
 from rotor.formats.spcat.hamiltonian.symmetry import (
     SpeciesPairs,
-    forbidden,
-    l_values,
+    exchange_part,
+    halved_across,
     species_pairs,
-    symmetric_part,
     weights_agree,
 )
 from rotor.formats.spcat.hamiltonian.undiagonalized import refuse_other_functions, without_diagonalization
@@ -46,7 +38,8 @@ from rotor.quantum.connected import connected_parts
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
-from rotor.quantum.spins.operators import is_axial
+from rotor.quantum.spins.operators import ByElements, is_axial
+from rotor.quantum.spins.scheme import Spin
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -164,11 +157,6 @@ def _components(levels: Levels, oblate: bool) -> list[tuple[Ints, Ints, Ints, In
     return [(other, k, k, alike) if oblate else (k, other, k, alike) for other, alike in pairs]
 
 
-def line_names(file: ParameterFile) -> tuple[str, ...]:
-    """The parameter lines as `file_effect.coded_lines` names them."""
-    return tuple(f"{parameter.code}#{place}" for place, parameter in enumerate(file.parameters, 1))
-
-
 def connected_groups(
     file: ParameterFile,
     intensities: IntensityFile,
@@ -187,26 +175,15 @@ def connected_groups(
         states = tuple(state.with_all_k() for state in states)
     elif highest_n is not None:
         states = tuple(state.with_k_to(highest_n) for state in states)
-    first = file.options[0]
-    doubled = l_doubled_pairs(states)
-    members, oblate = paired_states(doubled), first.nvib < 0
-    dipoles, others = split_dipoles(intensities.dipoles, len(states))
-    phases = read_phases(file, len(states), members)
-    axes_within_states = moments_within_states(dipoles, others, states, members)
-    phases = with_dipoles(phases, axes_within_states, oblate, as_spcat and bool(phases.odd))
-    lines = _acting(file, states, doubled, phases.odd)[0]
-    dipoles, others = _doubled_dipoles(dipoles, doubled), _doubled_others(others, doubled)
-    pairs = [line.states for line in lines if line.states] + list(dipoles) + [code.states for _, code in others]
-    lines = with_their_spins(lines, states)[0]
-    light = Light(dipoles, others, file_series(file, len(states), doubled), phases, axes_within_states)
-    return [
-        _group([states[v] for v in numbers], lines, light, first, as_spcat, file.title, doubled)
-        for numbers in connected_parts(len(states), [*pairs, *doubled])
-    ]
+    coded = CodedFile(file, states)
+    light = _light(coded, intensities, as_spcat)
+    edges = [line.states for line in coded.acting if line.states]
+    edges += [*light.dipoles, *(code.states for _, code in light.others), *coded.pairs]
+    return [_group(coded, numbers, light, as_spcat) for numbers in connected_parts(len(states), edges)]
 
 
 class Light(NamedTuple):
-    """Dipoles of a file by pairs of states, other moments, constants of series, phases, and `moments_within_states`.
+    """Dipoles of a file by pairs of states, other moments, phases, and `moments_within_states`.
 
     Unless more electric moments within states have odd order (a dipole, TYP 0, 3, 4, ...) than even order, the program multiplies each
     moment between two states by i.
@@ -214,13 +191,29 @@ class Light(NamedTuple):
 
     dipoles: Dipoles
     others: list[tuple[Dipole, DipoleCode]]
-    series: Series
     phases: Phases
     axes_within_states: list[tuple[int, bool]]
 
 
+def _light(coded: CodedFile, intensities: IntensityFile, as_spcat: bool) -> Light:
+    """The moments of an .int file; those of the state K l > 0 of an l-doubled pair act on both states."""
+    dipoles, others = split_dipoles(intensities.dipoles, len(coded.states))
+    axes = moments_within_states(dipoles, others, coded)
+    phases = with_dipoles(coded.phases, axes, coded.oblate, as_spcat and bool(coded.phases.odd))
+    return Light(
+        {pair: mu for states, mu in dipoles.items() for pair in _at_components(states, coded.pairs)},
+        [
+            (dipole, code._replace(states=pair))
+            for dipole, code in others
+            for pair in _at_components(code.states, coded.pairs)
+        ],
+        phases,
+        axes,
+    )
+
+
 def moments_within_states(
-    dipoles: Dipoles, others: list[tuple[Dipole, DipoleCode]], states: tuple[StateOptions, ...], members: frozenset[int]
+    dipoles: Dipoles, others: list[tuple[Dipole, DipoleCode]], coded: CodedFile
 ) -> list[tuple[int, bool]]:
     """Axes of electric moments within one state that connect levels of equal weight, and whether their order is even."""
     plain = [(v, axis, False) for (v, w), mu in dipoles.items() for axis, value in enumerate(mu, 1) if v == w and value]
@@ -230,79 +223,9 @@ def moments_within_states(
         if code.axis in (1, 2, 3) and len(set(code.states)) == 1
     ]
     return [
-        (axis, odd) for v, axis, odd in plain if v in members or weights_agree("abc"[axis - 1], states[v], states[v])
-    ]
-
-
-def left_out(file: ParameterFile) -> list[str]:
-    """A sentence for each parameter that the declared symmetry forbids, or whose spins or states do not exist."""
-    states = file_states(file)
-    doubled = l_doubled_pairs(states)
-    lines, reasons = _acting(file, states, doubled, read_phases(file, len(states), paired_states(doubled)).odd)
-    return ignored_states(file, len(states)) + reasons + with_their_spins(lines, states)[1]
-
-
-def paired_states(doubled: list[Pair]) -> frozenset[int]:
-    """The states of l-doubled pairs."""
-    return frozenset(v for pair in doubled for v in pair)
-
-
-def _acting(
-    file: ParameterFile, states: tuple[StateOptions, ...], doubled: list[Pair], odd: frozenset[str]
-) -> tuple[list[CodedLine], list[str]]:
-    """The lines that symmetry allows and that are real with the odd axes of the file, and why others are left out."""
-    lines, forbidden = allowed(coded_lines(file, len(states), doubled), states, doubled, file.options[0].nvib < 0)
-    lines, imaginary = real_lines(lines, odd, paired_states(doubled))
-    return lines, forbidden + imaginary
-
-
-def allowed(
-    lines: list[CodedLine], states: tuple[StateOptions, ...], doubled: list[Pair], oblate: bool
-) -> tuple[list[CodedLine], list[str]]:
-    """The parameter lines that the declared symmetry allows, as in SPCAT, and why others are left out.
-
-    lines: all supported parameters. states: all states of the file. doubled: the l-doubled pairs. oblate: whether z is the c axis.
-    Returns: lines that act; a sentence for each line that is left out.
-    """
-    l_of = l_values(states, doubled)
-    acting, reasons = list[CodedLine](), list[str]()
-    for line in lines:
-        concerned = [(v, v) for v in range(len(states))] if line.states is None else [line.states]
-        why = []
-        for low, high in concerned:
-            del_l = abs(l_of.get(low, 0) - l_of.get(high, 0)) * (-1 if line.reversed_ else 1)
-            both_states = states[low], states[high]
-            why.append(
-                forbidden(line.symmetry, *both_states, del_l, bool({low, high} & set(l_of)), line.operator.spins)
-            )
-        if all(why):
-            reasons.append(line.left_out(why[0]))
-            continue
-        folded = line.symmetry.square and any(_turns_alone(states[v], line) for pair in concerned for v in pair)
-        axes = basis_axes(oblate)
-        acting.append(line._replace(operator=symmetric_part(line.operator, axes)) if folded else line)
-    return acting, list(dict.fromkeys(reasons))  # a line of the file may be one for each state
-
-
-def _turns_alone(state: StateOptions, line: CodedLine) -> bool:
-    """Whether an axis of more than two folds leaves an operator invariant: it acts on none of three equivalent spins."""
-    touches = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
-    return state.fold > 2 and not touches
-
-
-def _doubled_dipoles(dipoles: Dipoles, pairs: list[Pair]) -> Dipoles:
-    """Dipoles with those of the state K l > 0 of an l-doubled pair copied to both states."""
-    return {
-        pair_of_states: moment for states, moment in dipoles.items() for pair_of_states in _at_components(states, pairs)
-    }
-
-
-def _doubled_others(others: list[tuple[Dipole, DipoleCode]], pairs: list[Pair]) -> list[tuple[Dipole, DipoleCode]]:
-    """Other moments, with those of the state K l > 0 of an l-doubled pair copied to both states."""
-    return [
-        (dipole, code._replace(states=pair_of_states))
-        for dipole, code in others
-        for pair_of_states in _at_components(code.states, pairs)
+        (axis, odd)
+        for v, axis, odd in plain
+        if v in coded.members or weights_agree("abc"[axis - 1], coded.states[v], coded.states[v])
     ]
 
 
@@ -317,32 +240,26 @@ def _at_components(states: tuple[int, int], pairs: list[Pair]) -> list[tuple[int
     return [states, (firsts[low], firsts[low])] if low in firsts else [states]
 
 
-def _group(
-    states: list[StateOptions],
-    lines: list[CodedLine],
-    light: Light,
-    first: Options,
-    as_spcat: bool,
-    title: str,
-    doubled: list[Pair],
-) -> Group:
-    """The group of these states."""
-    oblate = first.nvib < 0
-    numbers = tuple(state.number for state in states)
+def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -> Group:
+    """The group of the states with these numbers."""
+    first, oblate, axes, doubled = coded.options, coded.oblate, coded.axes, coded.pairs
+    states = [coded.states[v] for v in numbers]
     spins = states[0].spins
     if any((state.spins, state.equivalent) != (spins, states[0].equivalent) for state in states):
-        raise ValueError(f"states {numbers} are connected and have different spins: that is read but not computed yet")
+        raise ValueError(
+            f"states {tuple(numbers)} are connected and have different spins: that is read but not computed yet"
+        )
     here = {v: place for place, v in enumerate(numbers)}
     moments = {(here[b], here[a]): mu for (a, b), mu in light.dipoles.items() if a in here and b in here}
     acting = [(dipole, code) for dipole, code in light.others if set(code.states) <= set(here)]
     beside = tuple(
         line_moment(
-            dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, light.series
+            dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, coded.series
         )
         for dipole, code in acting
     )
-    group_lines = [line for line in lines if line.states is None or set(line.states) <= set(here)]
-    usable = coupled_spin_lines(group_lines, states, not doubled, basis_axes(oblate))
+    group_lines = [line for line in coded.usable if line.states is None or set(line.states) <= set(here)]
+    usable = coupled_spin_lines(group_lines, states, not doubled, axes)
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
     if kind in ("prolate", "oblate") and beside:
@@ -357,12 +274,12 @@ def _group(
         )
     elif light.phases.between_i:
         moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
-    axes, apart = basis_axes(oblate), _apart(states, pairs)
-    effect = FileEffect(usable, numbers, coupled, moments, limits, beside, first.ixx, pairs, axes, turned, apart)
+    apart = _apart(states, pairs)
+    effect = FileEffect(usable, tuple(numbers), coupled, moments, limits, beside, first.ixx, pairs, axes, turned, apart)
     if pairs:  # raises for operators forbidden between l-doubled states, before levels are solved
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP)
-    top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=title)
+    top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=coded.file.title)
     kmax = states[0].kmax if kind in ("prolate", "oblate") else ALL_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.spind < 0)
 
@@ -424,3 +341,68 @@ def _limits(states: list[StateOptions]) -> dict[int, tuple[int, int]]:
     """KNMIN and KNMAX by state, where they restrict the basis."""
     cut = [(place, state) for place, state in enumerate(states) if state.kmin > 0 or state.kmax < ALL_K]
     return {place: (state.kmin, state.kmax) for place, state in cut}
+
+
+# spins
+
+
+def coupled_spin_lines(
+    lines: Iterable[CodedLine], states: Sequence[StateOptions], by_exchange: bool, axes: str
+) -> tuple[CodedLine, ...]:
+    """The lines of connected states in functions of the total spin of equivalent nuclei.
+
+    lines: all lines between these states and within them. states: the connected states, which have the same spins. by_exchange: whether
+    levels of a state with even and odd total spin of two nuclei have different weights; not for l-doubled states. axes: axes x, y, z of
+    the basis.
+    Returns: lines without those of spins that these states do not have.
+    """
+    first = states[0]
+    usable = tuple(line for line in lines if line.highest_spin <= len(first.spins))
+    if first.equivalent == 2 and by_exchange:
+        state_of = {state.number: state for state in states}
+        return tuple(part for line in usable for part in _by_exchange(line, state_of))
+    if first.equivalent == 3:
+        return tuple(_with_threefold_factors(line, len(first.spins), axes) for line in usable)
+    return usable
+
+
+def _by_exchange(line: CodedLine, state_of: Mapping[int, StateOptions]) -> list[CodedLine]:
+    """A line restricted to the part that connects levels of equal weight, with one line for each state if this part differs."""
+    if not line.operator.spins:
+        return [line]
+    if line.states:
+        return [line._replace(exchange=exchange_part(line.symmetry.axis, *(state_of[v] for v in line.states)))]
+    part_by_state = {v: exchange_part(line.symmetry.axis, state, state) for v, state in state_of.items()}
+    if len(set(part_by_state.values())) == 1:
+        return [line._replace(exchange=next(iter(part_by_state.values())))]
+    return [line._replace(states=(v, v), exchange=part) for v, part in part_by_state.items()]
+
+
+def _with_threefold_factors(line: CodedLine, spins: int, axes: str) -> CodedLine:
+    """A line with SPCAT's factors for three equivalent spins."""
+    # only terms that touch the three equivalent spins change
+    touches = max(line.operator.spins, default=0) > spins - 3
+    if touches and isinstance(line.operator.rotor, ByElements):
+        raise ValueError(
+            f"parameter {line.parameter.code}: a term of higher order or of a series with three equivalent spins {NOT_YET}"
+        )
+    return line._replace(operator=halved_across(line.operator, axes)) if touches else line
+
+
+def coupled_spins(state: StateOptions, first: Options) -> tuple[Spin, ...]:
+    """The spins of a state in the order of coupling, equivalent last ones with a total; ValueError for unsupported options."""
+    others = len(state.spins) - state.equivalent  # spins without a total
+    _check_three(state, others, first)
+    return tuple(
+        Spin(f"I{place}", twice, total="I_tot" if place > others else "") for place, twice in enumerate(state.spins, 1)
+    )
+
+
+def _check_three(state: StateOptions, others: int, first: Options) -> None:
+    """Raise ValueError for options that are not supported with a total spin of three."""
+    if state.equivalent < 3:
+        return
+    if first.diag in BY_DIAG:
+        raise ValueError(f"DIAG = {first.diag} with a total spin of three nuclei {NOT_YET}; expected 0 or 3")
+    if first.ixx >> (others + 1):
+        raise ValueError(f"IXX = {first.ixx}: a total spin of three nuclei that is taken for conserved {NOT_YET}")

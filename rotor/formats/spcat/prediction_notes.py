@@ -9,7 +9,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from rotor.formats.spcat.file_model import Group, left_out, moments_within_states, paired_states
+from rotor.formats.spcat.file_model import Group, moments_within_states
+from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, coded_file
 from rotor.formats.spcat.hamiltonian.dipole_codes import (
     EVEN_ORDER,
     DipoleCode,
@@ -17,16 +18,16 @@ from rotor.formats.spcat.hamiltonian.dipole_codes import (
     deviates_in_spcat,
     split_dipoles,
 )
-from rotor.formats.spcat.hamiltonian.l_doubled import l_doubled_pairs
-from rotor.formats.spcat.hamiltonian.phases import read_phases, with_dipoles
-from rotor.formats.spcat.hamiltonian.states import StateOptions, file_states
+from rotor.formats.spcat.hamiltonian.phases import with_dipoles
+from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile, npar_notes
 
 
 def file_notes(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes that follow from the files without their levels."""
-    return [*npar_notes(parameters), *left_out(parameters), *_moment_notes(parameters, intensities, as_spcat)]
+    coded = coded_file(parameters)
+    return [*npar_notes(parameters), *coded.left_out, *_moment_notes(coded, intensities, as_spcat)]
 
 
 def qrot_notes(request: Request, as_spcat: bool) -> list[str]:
@@ -45,11 +46,10 @@ def _choice(program: str, as_spcat: bool) -> str:
     )
 
 
-def _moment_notes(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
+def _moment_notes(coded: CodedFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes on dipole lines for which SPCAT deviates from its documentation, and on their phases."""
-    states = file_states(parameters)
-    dipoles, others = split_dipoles(intensities.dipoles, len(states))
-    oblate = parameters.options[0].nvib < 0
+    dipoles, others = split_dipoles(intensities.dipoles, len(coded.states))
+    oblate = coded.oblate
     wrong = [str(dipole.code) for dipole, code in others if deviates_in_spcat(code, oblate)]
     notes = []
     if wrong:
@@ -57,13 +57,9 @@ def _moment_notes(parameters: ParameterFile, intensities: IntensityFile, as_spca
         program = "SPCAT computes another moment than its documentation says (docs/spcat_codes.md)"
         notes.append(f"{lines}: {_choice(program, as_spcat)}")
 
-    members = paired_states(l_doubled_pairs(states))
-    file_phases, within = (
-        read_phases(parameters, len(states), members),
-        moments_within_states(dipoles, others, states, members),
-    )
-    phases = with_dipoles(file_phases, within, oblate, False)
-    if phases.odd and with_dipoles(file_phases, within, oblate, True) != phases:
+    within = moments_within_states(dipoles, others, coded)
+    phases = with_dipoles(coded.phases, within, oblate, False)
+    if phases.odd and with_dipoles(coded.phases, within, oblate, True) != phases:
         program = "SPCAT settles the phases along axes without odd parameters by the dipoles, SPFIT does not"
         notes.append(f"phases: {_choice(program, as_spcat)}")
     if phases.between_i and not phases.odd and _has_unlike_orders(dipoles, [code for _, code in others if code.axis]):

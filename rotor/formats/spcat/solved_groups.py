@@ -11,9 +11,10 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints, end_to_end
-from rotor.formats.spcat.file_model import Group, connected_groups, line_names
+from rotor.formats.spcat.file_model import Group, connected_groups
 from rotor.formats.spcat.file_quanta import Format
 from rotor.formats.spcat.hamiltonian.code_table import join_code, split_code
+from rotor.formats.spcat.hamiltonian.coded_file import line_names
 from rotor.formats.spcat.hamiltonian.codes import file_constants
 from rotor.formats.spcat.hamiltonian.states import file_states
 from rotor.formats.spcat.text.int_file import IntensityFile, Request

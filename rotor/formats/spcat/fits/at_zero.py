@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, split_code
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind
+from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, coded_file
 from rotor.formats.spcat.hamiltonian.codes import is_held
-from rotor.formats.spcat.hamiltonian.l_doubled import l_doubled_pairs
-from rotor.formats.spcat.hamiltonian.states import file_states
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.connected import connected_parts
 
@@ -23,9 +22,10 @@ Place = tuple[int, int, int]  # the two states and the symmetry of an operator
 
 def left_at_zero(file: ParameterFile) -> frozenset[int]:
     """Places of parameters of value 0 that are held, or that connect otherwise unconnected sets and therefore remain 0."""
-    places = _places(file)
+    coded = coded_file(file)
+    places = _places(coded)
     acting = (place for place, p in zip(places, file.parameters, strict=True) if place and p.value)
-    set_of_node = _sets(acting, len(file_states(file)))
+    set_of_node = _sets(acting, len(coded.states))
     apart = [place is not None and all(set_of_node[a] != set_of_node[b] for a, b in _edges(place)) for place in places]
     return frozenset(
         i for i, p in enumerate(file.parameters) if not p.value and (p.constrained or is_held(p) or apart[i])
@@ -38,12 +38,11 @@ def stay_at_zero(file: ParameterFile) -> list[str]:
     return [p.label or str(p.code) for p in remaining if not (p.constrained or is_held(p))]
 
 
-def _places(file: ParameterFile) -> list[Place | None]:
+def _places(coded: CodedFile) -> list[Place | None]:
     """States and symmetry of the operator of each parameter without spins between definite states; None for others."""
-    states = file_states(file)
-    if any(state.spins for state in states) or l_doubled_pairs(states):
-        return [None] * len(file.parameters)
-    return [_place(split_code(parameter.code, len(states)), len(states)) for parameter in file.parameters]
+    if any(state.spins for state in coded.states) or coded.pairs:
+        return [None] * len(coded.digits)
+    return [_place(digits, len(coded.states)) for digits in coded.digits]
 
 
 def _place(digits: Digits, states: int) -> Place | None:

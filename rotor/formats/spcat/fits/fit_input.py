@@ -131,8 +131,8 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
         constants, matrix = named
         names, kmax = tuple(constants.values), _kmax(file, constants)
     else:
-        from rotor.formats.spcat.file_model import line_names
         from rotor.formats.spcat.fits.fit_states import FileLevels
+        from rotor.formats.spcat.hamiltonian.coded_file import line_names
 
         matrix, names = np.eye(len(file.parameters)), line_names(file)
         model = partial(FileLevels.from_labels, file)
@@ -164,15 +164,15 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
 
 def _notes_on_codes(file: ParameterFile) -> list[str]:
     """Notes on parameters that act on no level, and on free ones that a fit does not move from 0."""
-    from rotor.formats.spcat.file_model import left_out
     from rotor.formats.spcat.fits.at_zero import stay_at_zero
     from rotor.formats.spcat.fits.fit_states import groups_for_fit
+    from rotor.formats.spcat.hamiltonian.coded_file import coded_file
     from rotor.formats.spcat.hamiltonian.undiagonalized import UNDIAGONALIZED_NOTE
 
     stay = stay_at_zero(file)
     at_zero = f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"
     below = any(group.diag < 0 and not group.is_diagonal for group in groups_for_fit(file))
-    return left_out(file) + ([at_zero] if stay else []) + ([UNDIAGONALIZED_NOTE] if below else [])
+    return coded_file(file).left_out + ([at_zero] if stay else []) + ([UNDIAGONALIZED_NOTE] if below else [])
 
 
 def _largest_error(header: Header) -> float:

@@ -14,10 +14,11 @@ from functools import partial
 import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
-from rotor.formats.spcat.file_model import Group, connected_groups, line_names
+from rotor.formats.spcat.file_model import Group, connected_groups
 from rotor.formats.spcat.file_quanta import Format, listed_quanta, quanta_format
 from rotor.formats.spcat.fits.at_zero import left_at_zero
 from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
+from rotor.formats.spcat.hamiltonian.coded_file import line_names
 from rotor.formats.spcat.hamiltonian.l_doubled import functions_by_l, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import has_other_names, named_by, naming_by, over_basis, spin_naming_by
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal

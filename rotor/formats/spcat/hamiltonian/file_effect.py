@@ -1,31 +1,19 @@
-"""The Hamiltonian of a .par or .var file as one effect, with parameter lines by code and the states and spins of the file.
-
-For files with one state and no spin see `codes.constants_of`, which gives named constants.
-"""
+"""The Hamiltonian of a .par or .var file as one effect, with parameter lines by code and the states and spins of the file."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Symmetry, split_code
-from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, basis_axes
+from rotor.formats.spcat.hamiltonian.coded_file import CodedLine
+from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs, spin_terms_with_pairs
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, k_energy
 from rotor.formats.spcat.hamiltonian.phases import half_turned
-from rotor.formats.spcat.hamiltonian.series import (
-    Series,
-    coded_operator,
-    file_series,
-    refuse_within_pairs,
-)
 from rotor.formats.spcat.hamiltonian.spin_operators import single_j_operator
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
-from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
@@ -42,143 +30,6 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float, float]
 _STORED_TO = 100  # J; the operators of a higher J take too much memory together
-
-
-class CodedLine(NamedTuple):
-    """One parameter line: name, value, operator, and the two states, lower first (None: all states).
-
-    reversed_: whether the code has V2 > V1. symmetry: of the code. exchange: part of an operator with one of two equivalent spins that
-    acts: 1 the part that is even under their exchange, -1 the odd part, 0 both.
-    """
-
-    name: str
-    value: float
-    operator: CodedOperator
-    states: tuple[int, int] | None
-    reversed_: bool = False
-    symmetry: Symmetry = Symmetry()
-    exchange: int = 0
-
-    @property
-    def code(self) -> str:
-        """The code in the file."""
-        return self.name.partition("#")[0]
-
-    def left_out(self, why: str) -> str:
-        """Note on a line that is left out, as SPCAT does."""
-        return f"parameter {self.code} is left out, as SPCAT does: {why}"
-
-
-def coded_lines(file: ParameterFile, states: int, pairs: Sequence[Pair] = ()) -> list[CodedLine]:
-    """The parameter lines of a file; a series with constants of each state gives one line for each.
-
-    Parameters of value zero are skipped, as are those between a state and 9 (99, 999), which are place holders in SPFIT, those of states
-    that do not exist (`ignored_states`), and constants of series.
-
-    file: codes, values in MHz, and labels; NVIB below 0 for the oblate basis, XOPT. states: number of states, |NVIB|. pairs: l-doubled
-    pairs, in which an odd operator acts with the sign of l.
-    Returns: operators and the states that they connect.
-    Raises ValueError with the line, for an unknown operator or one that violates time reversal.
-    """
-    options = file.options[0]
-    if not 0 <= options.xopt < 80:
-        raise ValueError(f"XOPT = {options.xopt}: expected PHASE + 10 NEWLZ + 20 NOFC + 40 G12, 0 to 79")
-    series = file_series(file, states, pairs)
-    result: list[CodedLine] = []
-    for place, parameter in enumerate(file.parameters, 1):
-        digits = split_code(parameter.code, states)
-        missing = digits.is_place_holder(states) or digits.missing_state(states) is not None
-        # a line without a value, or for no state of the file, adds nothing
-        if parameter.value == 0.0 or digits.is_constant or missing:
-            continue
-        label = f" /{parameter.label}" if parameter.label else ""
-        try:
-            coded = _coded_lines(digits, states, series, options)
-            lines = [_within_pairs(line, digits, pairs, options) for line in coded]
-        except ValueError as error:
-            raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
-        result += [line._replace(name=f"{parameter.code}#{place}", value=parameter.value) for line in lines]
-    return result
-
-
-def ignored_states(file: ParameterFile, states: int) -> list[str]:
-    """A sentence for each parameter of a state that does not exist, which SPCAT ignores."""
-    reasons = list[str]()
-    for parameter in file.parameters:
-        missing = split_code(parameter.code, states).missing_state(states)
-        if missing is not None and parameter.value:
-            why = f"state {missing} does not exist, NVIB = {states} counts from 0"
-            reasons.append(f"parameter {parameter.code} is left out, as SPCAT does: {why}")
-    return reasons
-
-
-def _coded_lines(digits: Digits, count: int, series: Series, options: Options) -> list[CodedLine]:
-    """The lines of a code; a series in all states gives one line for each state, with its constants."""
-    oblate = options.nvib < 0
-    symmetry, axes, states = digits.symmetry(oblate), basis_axes(oblate), digits.states(count)
-    targets: list[tuple[int, int] | None] = [states]
-    if states is None and digits.is_series:
-        targets = [(v, v) for v in range(count)]
-    back = digits.v2 > digits.v1
-    return [
-        CodedLine("", 0.0, coded_operator(digits, axes, series, target), target, back, symmetry) for target in targets
-    ]
-
-
-def _within_pairs(line: CodedLine, digits: Digits, pairs: Sequence[Pair], options: Options) -> CodedLine:
-    """The line as it acts on l-doubled states: with NEWLZ, operators of the state with K l ≤ 0 have the sign of l.
-
-    Raises ValueError for operators that violate time reversal, and for unsupported series.
-    """
-    firsts = {pair.second: pair.first for pair in pairs}
-    members = frozenset(v for pair in pairs for v in pair)
-    states = line.states
-    if states:
-        refuse_within_pairs(digits, states, members)
-    if not states or states[0] != states[1] or states[0] not in members:
-        return line
-    v, newlz, level = states[0], options.newlz, digits.kind is Kind.LEVEL
-    if newlz and v in firsts and level:
-        return _half_difference(line, digits, firsts[v], options)
-    if newlz and line.operator.odd != (v in firsts) and not level:
-        raise ValueError(
-            "with NEWLZ an operator that time reversal turns around is named by the state with K l ≤ 0, any other by the one with K l > 0"
-        )
-    return line._replace(states=(firsts[v], firsts[v])) if newlz and v in firsts else line
-
-
-def _half_difference(line: CodedLine, digits: Digits, first: int, options: Options) -> CodedLine:
-    """TYP 80 to 89 of the state with K l ≤ 0, with NEWLZ: half the difference of the energies of one K with K l > 0 and K l < 0."""
-    operator = k_energy(digits.level_k, digits.nsq, 1j if options.nvib > 0 else -1j)
-    return line._replace(operator=CodedOperator(by_j=operator, odd=True), states=(first, first))
-
-
-def real_lines(
-    lines: Sequence[CodedLine], odd: frozenset[str], doubled: frozenset[int]
-) -> tuple[list[CodedLine], list[str]]:
-    """The lines that are real in the phases of a file, and reasons why imaginary ones within one state are left out.
-
-    lines: supported parameters. odd: the axes along which operators within one state are odd, see `phases`. doubled: l-doubled states, in
-    which odd operators act with the sign of l.
-    Returns: lines that act; a sentence for each line that is left out.
-    Raises ValueError for an odd operator that is invariant under all half turns, which is imaginary in any phases.
-    """
-    acting, reasons = list[CodedLine](), list[str]()
-    for line in lines:
-        axis, between = line.symmetry.axis, bool(line.states and line.states[0] != line.states[1])
-        within_plain_state = not between and not (line.states and line.states[0] in doubled)
-        if within_plain_state and not axis and line.operator.odd:
-            raise ValueError(
-                f"parameter {line.code}: the operator changes sign under time reversal and under no half turn; it can only connect "
-                "different states"
-            )
-        if not within_plain_state or not axis or line.operator.odd == (axis in odd):
-            acting.append(line)
-            continue
-        kind, others = ("even", "odd") if axis in odd else ("odd", "even")
-        why = f"it is {kind} under time reversal; within one state those along {axis} are {others} ones here"
-        reasons.append(line.left_out(f"{why} (by their number, or by PHASE of XOPT)"))
-    return acting, list(dict.fromkeys(reasons))
 
 
 def _stored(operator_at: OperatorOfJ) -> OperatorOfJ:
@@ -241,7 +92,7 @@ class FileEffect(QuantumEffect):
 
     def parameters(self, top: Top) -> dict[str, float]:
         """Values in MHz by code and number of the line."""
-        return {line.name: line.value for line, _ in self._group_lines}
+        return {line.name: line.parameter.value for line, _ in self._group_lines}
 
     def operators(self, top: Top) -> dict[str, Operators]:
         """The operators of the first state."""
@@ -322,7 +173,7 @@ class FileEffect(QuantumEffect):
         try:
             return couplings_with_pairs(line.name, operator_at, operator.odd, states, line.reversed_, self.pairs)
         except ValueError as error:
-            raise ValueError(f"parameter {line.code}: {error}") from None
+            raise ValueError(f"parameter {line.parameter.code}: {error}") from None
 
     def spins(self, top: Top) -> tuple[Spin, ...]:
         """The spins, in the order of the file."""
@@ -381,12 +232,12 @@ class FileEffect(QuantumEffect):
             return [term]
         if isinstance(term.rotor, ByElements):
             raise ValueError(
-                f"parameter {line.code}: a spin term of higher order or of a series, of l-doubled states, {NOT_YET}"
+                f"parameter {line.parameter.code}: a spin term of higher order or of a series, of l-doubled states, {NOT_YET}"
             )
         try:
             return spin_terms_with_pairs(term, states, line.reversed_, self.pairs, self.axes)
         except ValueError as error:
-            raise ValueError(f"parameter {line.code}: {error}") from None
+            raise ValueError(f"parameter {line.parameter.code}: {error}") from None
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
         """The dipoles of the .int file."""

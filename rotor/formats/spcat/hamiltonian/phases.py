@@ -19,8 +19,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from rotor.formats.spcat.hamiltonian.code_table import split_code
-from rotor.formats.spcat.text.par import ParameterFile
+from rotor.formats.spcat.hamiltonian.code_table import Digits
+from rotor.formats.spcat.text.par import Options
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator, half_turn
 
@@ -42,19 +42,17 @@ class Phases(NamedTuple):
         return ("abc"[axis - 1] in self.odd) != self.between_i
 
 
-def read_phases(file: ParameterFile, states: int, doubled: frozenset[int]) -> Phases:
+def read_phases(options: Options, codes: Iterable[Digits], states: int, doubled: frozenset[int]) -> Phases:
     """The phases by PHASE of XOPT; without it an axis is odd if more parameters along it are odd than even.
 
     A parameter of all states counts once for each state, even if its value is 0. Parameters of l-doubled states do not count.
     """
-    first = file.options[0]
-    oblate = first.nvib < 0
-    if first.phase:
-        odd = frozenset(axis for bit, axis in enumerate(AXES_OF_PHASE[oblate]) if first.phase >> bit & 1)
+    oblate = options.nvib < 0
+    if options.phase:
+        odd = frozenset(axis for bit, axis in enumerate(AXES_OF_PHASE[oblate]) if options.phase >> bit & 1)
         return Phases(odd, frozenset("abc"))
     more: dict[str, int] = {}
-    for parameter in file.parameters:
-        d = split_code(parameter.code, states)
+    for d in codes:
         count = (
             len(set(range(states)) - doubled)
             if d.states(states) is None

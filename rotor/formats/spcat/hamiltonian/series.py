@@ -28,11 +28,11 @@ from math import pi
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Tensor, split_code
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Tensor
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, code_operator
 from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, single_j_operator
-from rotor.formats.spcat.text.par import Parameter, ParameterFile
+from rotor.formats.spcat.text.par import Options, Parameter
 from rotor.frozen import dataclass
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
@@ -51,28 +51,26 @@ class Series:
     g12: bool = False
 
 
-def file_series(file: ParameterFile, states: int, pairs: Iterable[tuple[int, int]] = ()) -> Series:
+def file_series(
+    constants: Iterable[tuple[Digits, Parameter]], options: Options, states: int, pairs: Iterable[tuple[int, int]] = ()
+) -> Series:
     """The constants of the series of a file.
 
-    file: codes and values; NOFC and G12 in its first option line. states: number of states. pairs: l-doubled states, which share the
-    constants of the one with the lower number.
+    constants: parameters that are one, with the fields of their codes. options: first option line, with NOFC and G12. states: number of
+    states. pairs: l-doubled states, which share the constants of the one with the lower number.
     Returns: constants; those without a parameter are 0.
     Raises ValueError for a code with TYP 91 to 99 that is not a constant.
     """
-    options = file.options[0]
     series = Series(nofc=options.nofc, g12=options.g12)
-    for parameter in file.parameters:
-        d = split_code(parameter.code, states)
-        if not d.is_constant:
-            continue
+    for d, parameter in constants:
         both = d.states(states)  # constants of a series without states hold for all
         for pair in [both] if both else [(v, v) for v in range(states)]:
             _set(series, d, parameter, pair)
     for pair in pairs:
         lower, other = min(pair), max(pair)
         series.rho[other] = series.rho.get(lower, 0.0)
-        for constants in (series.a, series.b):
-            constants.update({(n, other, other): constants.get((n, lower, lower), 0.0) for n in range(5)})
+        for values in (series.a, series.b):
+            values.update({(n, other, other): values.get((n, lower, lower), 0.0) for n in range(5)})
     return series
 
 

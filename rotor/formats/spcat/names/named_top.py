@@ -16,14 +16,11 @@ from math import gcd
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.file_model import allowed
-from rotor.formats.spcat.file_spins import with_their_spins
 from rotor.formats.spcat.hamiltonian.code_table import PAIRS, TYPES_BETWEEN, Kind, join_code, split_code
+from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, CodedLine, coded_file
 from rotor.formats.spcat.hamiltonian.codes import ALONG, HELD_BELOW, MEAN, basis_axes, file_constants, is_linear
 from rotor.formats.spcat.hamiltonian.dipole_codes import split_dipoles
-from rotor.formats.spcat.hamiltonian.file_effect import CodedLine, coded_lines, ignored_states, real_lines
-from rotor.formats.spcat.hamiltonian.phases import read_phases
-from rotor.formats.spcat.hamiltonian.states import StateOptions, file_states, state_options
+from rotor.formats.spcat.hamiltonian.states import StateOptions, state_options
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
 from rotor.formats.spcat.model import NO_NAME, fold_parts, option_weights
 from rotor.formats.spcat.text.int_file import IntensityFile
@@ -51,16 +48,11 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     The Hamiltonian is that of the files with every K to N in the basis.
     Raises ValueError with the field or the parameter, for terms without a name.
     """
-    states, first = file_states(file), file.options[0]
-    _refuse(file, states)
-    lines, left_out = allowed(coded_lines(file, len(states)), states, [], first.nvib < 0)
-    odd = read_phases(file, len(states), frozenset()).odd
-    lines, imaginary = real_lines(lines, odd, frozenset())
-    lines, without_spins = with_their_spins(lines, states)
-    left_out += imaginary + without_spins + ignored_states(file, len(states))
-    if odd and any(line.symmetry.axis for line in lines):
+    coded = coded_file(file)
+    _refuse(coded)
+    states, first, rows, odd = coded.states, coded.options, coded.usable, coded.phases.odd
+    if odd and any(line.symmetry.axis for line in rows):
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
-    rows = [(line, file.parameters[int(line.name.partition("#")[2]) - 1]) for line in lines]
 
     letter, parameters_of_states = _letter(file, rows), _parameters_by_state(rows, len(states))
     constants, energies = [], []
@@ -73,7 +65,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     _refuse_unlike(constants)
     turned = (constants[0].kind, first.nvib < 0) in (("prolate", True), ("oblate", False))
     weights = _weights(file, states, constants[0].kind in ("prolate", "oblate"))
-    couplings, dipoles = _couplings(rows, len(states), first, turned), _dipoles(intensities, len(states), turned)
+    couplings, dipoles = _couplings(rows, first, turned), _dipoles(intensities, len(states), turned)
     _refuse_phases(couplings, dipoles)
     top = Top.from_constants(
         constants[0],
@@ -84,13 +76,12 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
         states=_states(constants, energies, couplings, weights, dipoles),
         spin_constants=_spins(rows, states, turned, first.nvib < 0, errors),
     )
-    return replace(top, notes=(*top.notes, *left_out))
+    return replace(top, notes=(*top.notes, *coded.left_out))
 
 
-def _refuse(file: ParameterFile, states: tuple[StateOptions, ...]) -> None:
+def _refuse(coded: CodedFile) -> None:
     """Raise ValueError for options and operators without named constants."""
-    first = file.options[0]
-    digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
+    first, states, digits = coded.options, coded.states, coded.digits
     reasons = {
         "FF, EX, TYP 90 to 99: a Fourier or Euler series": any(d.is_series or d.is_constant for d in digits),
         f"IXX = {first.ixx}: a sum of angular momenta that is held for conserved": first.ixx != 0,
@@ -123,22 +114,22 @@ def _refuse_unlike(constants: list[Constants]) -> None:
         raise ValueError(f"states of the kinds {' and '.join(kinds)} in one file: a top has one kind of constants")
 
 
-def _letter(file: ParameterFile, rows: list[tuple[CodedLine, Parameter]]) -> str:
+def _letter(file: ParameterFile, rows: list[CodedLine]) -> str:
     """The letter of the reduction of all states: the one that a state shows, else that of the file."""
-    plain = [split_code(p.code, abs(file.options[0].nvib)) for line, p in rows if line.operator.plain is not None]
-    letters = frozenset().union(*(d.reductions for d in plain))
+    letters = frozenset().union(*(line.digits.reductions for line in rows if line.operator.plain is not None))
     return "s" if "S" in letters else "a" if letters else file.options[0].chr
 
 
-def _parameters_by_state(rows: list[tuple[CodedLine, Parameter]], count: int) -> list[list[Parameter]]:
+def _parameters_by_state(rows: list[CodedLine], count: int) -> list[list[Parameter]]:
     """The parameters of each state without spins, with the codes of one state; parameters of all states occur in each."""
     by_state: list[list[Parameter]] = [[] for _ in range(count)]
-    for line, parameter in rows:
-        if line.operator.rotor is not None or (line.states and line.states[0] != line.states[1]):
+    for line in rows:
+        parameter = line.parameter
+        if line.operator.rotor is not None or line.is_between:
             continue
         if line.operator.plain is None:
             raise ValueError(f"parameter {parameter.code}: a term of this kind in one state {NO_NAME}")
-        digits = split_code(parameter.code, count)._replace(v1=0, v2=0)
+        digits = line.digits._replace(v1=0, v2=0)
         plain = replace(parameter, code=join_code(digits), constrained=False, text="")
         parts = [plain]
         if digits.kind is Kind.SQUARE and len(line.operator.plain) == 2:  # across an axis of more than two folds
@@ -151,16 +142,17 @@ def _parameters_by_state(rows: list[tuple[CodedLine, Parameter]], count: int) ->
     return by_state
 
 
-def _couplings(rows: list[tuple[CodedLine, Parameter]], count: int, first: Options, turned: bool) -> dict[str, float]:
+def _couplings(rows: list[CodedLine], first: Options, turned: bool) -> dict[str, float]:
     """Interactions of two states without spins, by name; values of equal names are added."""
     values: dict[str, float] = {}
     sign = -1.0 if first.nvib < 0 else 1.0  # of G in an oblate basis
-    for line, parameter in rows:
-        if line.operator.rotor is not None or line.states is None or line.states[0] == line.states[1]:
+    for line in rows:
+        parameter = line.parameter
+        if line.operator.rotor is not None or not line.is_between:
             continue
         if turned:
             raise ValueError(f"parameter {parameter.code}: a coupling of states whose symmetry axis is not z {NO_NAME}")
-        digits, terms = split_code(parameter.code, count), dict[str, float]()
+        digits, terms = line.digits, dict[str, float]()
         if digits.typ in _BETWEEN:
             factor = sign if digits.tensor.odd else 1.0
             terms[_with_powers(_BETWEEN[digits.typ], digits.nsq, digits.ksq)] = factor
@@ -172,7 +164,7 @@ def _couplings(rows: list[tuple[CodedLine, Parameter]], count: int, first: Optio
         if not terms:
             raise ValueError(f"parameter {parameter.code}: this coupling of two states {NO_NAME}")
         for name, factor in terms.items():
-            full = f"{name}[{line.states[0]},{line.states[1]}]"
+            full = f"{name}[{','.join(map(str, line.states or ()))}]"
             values[full] = values.get(full, 0.0) + factor * parameter.value
     return values
 
@@ -295,12 +287,13 @@ def _element(matrix: Floats, letters: str) -> float:
 
 
 def _spins(
-    rows: list[tuple[CodedLine, Parameter]], states: tuple[StateOptions, ...], turned: bool, oblate: bool, errors: bool
+    rows: list[CodedLine], states: tuple[StateOptions, ...], turned: bool, oblate: bool, errors: bool
 ) -> SpinConstants | None:
     sizes, called = states[0].spins, _spin_names(rows, states[0].spins)
     equivalent = states[0].equivalent
     sums: dict[tuple[str, str], _Sum] = {}
-    for line, parameter in rows:
+    for line in rows:
+        parameter = line.parameter
         if line.operator.rotor is None:
             continue
         try:
@@ -339,11 +332,11 @@ def _single_nucleus(line: CodedLine, state: StateOptions, oblate: bool) -> Coded
     return line._replace(operator=halved_across(line.operator, basis_axes(oblate))) if acts_on_three else line
 
 
-def _spin_names(rows: list[tuple[CodedLine, Parameter]], sizes: tuple[int, ...]) -> list[str]:
+def _spin_names(rows: list[CodedLine], sizes: tuple[int, ...]) -> list[str]:
     """Names of the spins: S or the isotope in labels of parameters with one spin, if the size agrees; else I1, I2, ..."""
     names = [f"I{place}" for place in range(1, len(sizes) + 1)]
-    for line, parameter in rows:
-        places, inside = set(line.operator.spins), re.search(r"\(([^(),]+)\)", parameter.label)
+    for line in rows:
+        places, inside = set(line.operator.spins), re.search(r"\(([^(),]+)\)", line.parameter.label)
         if inside and len(places) == 1 and (name := inside[1].strip()) not in names:
             place = min(places) - 1
             if name.startswith("S") or is_isotope(name, sizes[place]):

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from full_matrix_rotor import momenta, reduced_vector
 
-from rotor.formats.spcat.file_model import connected_groups, left_out
+from rotor.formats.spcat.file_model import connected_groups
+from rotor.formats.spcat.hamiltonian.coded_file import coded_file
 from rotor.formats.spcat.names.named_top import named_top
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
@@ -153,11 +154,11 @@ def test_a_spin_along_the_axis():
 def test_those_of_the_rarer_kind_are_left_out_with_a_note():
     """One odd and one even operator along a: the program takes the even one; PHASE 4 the other."""
     both = (*ABC, (200099, 70.0), (210099, 20.0))
-    assert [note[:16] for note in left_out(_file(both))] == ["parameter 200099"]
-    assert [note[:16] for note in left_out(_file(both, phase=4))] == ["parameter 210099"]
-    assert left_out(_file(both, phase=8)) == left_out(_file(both))
+    assert [note[:16] for note in coded_file(_file(both)).left_out] == ["parameter 200099"]
+    assert [note[:16] for note in coded_file(_file(both, phase=4)).left_out] == ["parameter 210099"]
+    assert coded_file(_file(both, phase=8)).left_out == coded_file(_file(both)).left_out
     common_parameters = (*both[:3], (11, 9.0), (200099, 70.0), (210000, 20.0))  # the odd one counts twice
-    assert [note[:16] for note in left_out(_file(common_parameters, nvib=2))] == ["parameter 210000"]
+    assert [note[:16] for note in coded_file(_file(common_parameters, nvib=2)).left_out] == ["parameter 210000"]
     assert _energies(_file(both), 3) == pytest.approx(_energies(_file((*ABC, both[-1])), 3), abs=ROUND_OFF_MHZ)
 
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from places import ORACLES
 
-from rotor.formats.spcat.file_model import connected_groups, left_out
+from rotor.formats.spcat.file_model import connected_groups
+from rotor.formats.spcat.hamiltonian.coded_file import coded_file
 from rotor.formats.spcat.hamiltonian.dipole_codes import line_moment, split_dipole
 from rotor.formats.spcat.hamiltonian.operators import code_operator
 from rotor.formats.spcat.predict import predict, predict_file
@@ -213,7 +214,7 @@ def test_totals_of_three_that_do_not_compute_are_named(options, says):
 
 def test_terms_of_three_nuclei_that_spcat_leaves_out_are_noted():
     file = read_par((KINDS / "forbidden_three_i_tot" / "forbidden_three_i_tot.var").read_bytes())
-    notes = left_out(file)
+    notes = coded_file(file).left_out
     assert len(notes) == 4
     assert sum("the first is named, or the first and the second" in note for note in notes) == 3
     assert sum("no multiple of 3" in note for note in notes) == 1

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from full_matrix_rotor import momenta
 
-from rotor.formats.spcat.file_model import connected_groups, left_out
-from rotor.formats.spcat.hamiltonian.file_effect import coded_lines
+from rotor.formats.spcat.file_model import connected_groups
+from rotor.formats.spcat.hamiltonian.coded_file import coded_file
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
 from rotor.formats.spcat.text.par import read_par
@@ -94,7 +94,7 @@ def test_sine_between_states(code, function_of_k):
 )
 def test_what_does_not_compute_is_named(options, code, says):
     with pytest.raises(ValueError, match=says):
-        coded_lines(_file(((code, 1.0),), options), 1)
+        _ = coded_file(_file(((code, 1.0),), options)).lines
 
 
 def test_newlz_names_the_sign_of_l():
@@ -136,4 +136,4 @@ def test_constants_of_series_are_pure_numbers_in_files_with_wavenumbers():
 def test_a_note_on_a_parameter_stands_once():
     options = "a 1 3 0 20 0 2 1 3 0 1 0\n"
     file = _file((*((code + 99, value) for code, value in ABC), (910099, RHO), (1_000_210_099, 3.0)), options)
-    assert len(left_out(file)) == 1
+    assert len(coded_file(file).left_out) == 1
