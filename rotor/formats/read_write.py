@@ -145,29 +145,22 @@ def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
 def read_spcat_top(path: Path, *, errors: bool = False, alone: bool = True) -> Top:
     """The top of a .par or .var file with the dipole of the .int file of the same name, or of an .int file likewise.
 
-    Constants in cm⁻¹ (FLAGS of the .int file) become MHz. errors: of files with spins or several states, whether errors of parameters
-    become uncertainties. alone: whether levels are those of the constants, with every K, which a note says where the file has fewer K.
+    Constants in cm⁻¹ (FLAGS of the .int file) become MHz. errors: whether errors of parameters become uncertainties. alone:
+    whether levels are those of the constants, with every K, which a note says where the file has fewer K.
     """
-    from rotor.formats.spcat.hamiltonian.states import file_states, is_single_state
-    from rotor.formats.spcat.model import names_what_is_not_there, spcat_top
+    from rotor.formats.spcat.hamiltonian.states import file_states
     from rotor.formats.spcat.names.named_top import named_top
     from rotor.formats.spcat.prediction_notes import range_notes
     from rotor.formats.spcat.text.int_file import read_int
-    from rotor.formats.spcat.text.par import read_par
+    from rotor.formats.spcat.text.par import parameters_beside, read_par
     from rotor.formats.spcat.wavenumbers import FROM, files_in_mhz
 
     intensities = path.with_suffix(".int")
-    parameters = path
-    if path.suffix.lower() == ".int":
-        beside = [path.with_suffix(suffix) for suffix in (".var", ".par")]
-        parameters = next((p for p in beside if p.exists()), path)
-        if parameters == path:
-            raise ValueError(f"{path}: an .int file has no constants; its .var or .par must stand beside it")
+    parameters = parameters_beside(path) if path.suffix.lower() == ".int" else path
     file, light = read_par(parameters), read_int(intensities) if intensities.exists() else None
     if light is not None and light.request.flags >= FROM:
         file, light = files_in_mhz(file, light)
-    plain = is_single_state(file) and not names_what_is_not_there(file)
-    top = spcat_top(file, light) if plain else named_top(file, light, errors=errors)
+    top = named_top(file, light, errors=errors)
     notes = range_notes(file_states(file), parameters.name) if alone else []
     return replace(top, notes=(*top.notes, *notes), symmetry_checked=False)
 

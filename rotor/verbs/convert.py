@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -93,7 +92,7 @@ def parameters_of(source: str) -> Path:
     path = Path(source)
     if path.suffix.lower() != ".int":
         return path
-    from rotor.formats.spcat.predict import parameters_beside
+    from rotor.formats.spcat.text.par import parameters_beside
 
     return parameters_beside(path)
 
@@ -105,12 +104,8 @@ def top_with_errors(source: str, note: Note = silent) -> Top:
         return top_of_word(source, note)
 
     from rotor.formats.read_write import read_spcat_top
-    from rotor.formats.spcat.hamiltonian.codes import file_constants
-    from rotor.formats.spcat.hamiltonian.states import is_single_state
-    from rotor.formats.spcat.text.par import read_par
 
-    file, top = read_par(path), read_spcat_top(path, errors=True)
-    return replace(top, constants=file_constants(file, errors=True)) if is_single_state(file) else top
+    return read_spcat_top(path, errors=True)
 
 
 def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Callable[[Path], None]:

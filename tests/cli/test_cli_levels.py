@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.formats.spcat.model import spcat_top
+from rotor.formats.spcat.names.named_top import named_top
 from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.level_list import level_list
@@ -136,7 +136,7 @@ def test_blocks_and_energies_are_those_of_spcat(shared: Path, case):
     """Every level of the reference's list with the same block, rank, degeneracy and energy."""
     folder = shared / "reference" / "spcat" / case
     reference = read_egy(gzip.decompress((folder / f"{case}.egy.gz").read_bytes()))
-    top = spcat_top(read_par(folder / f"{case}.var"), read_int(folder / f"{case}.int"))
+    top = named_top(read_par(folder / f"{case}.var"), read_int(folder / f"{case}.int"))
     ours = level_list(answer_levels(LevelsRequest(top, jmax=20)).table)
     places = {tuple(row): i for i, row in enumerate(ours.quanta.tolist())}
     rows = [i for i in range(len(reference)) if reference.quanta[i, 0] <= 20]

@@ -1,19 +1,13 @@
-"""Conversion between a top of one vibrational state and .var and .int files: constants, spin weights, dipole."""
+"""Option lines of tops, spin weights of option lines, and the .int file of a top."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from rotor.formats.spcat.hamiltonian.code_table import split_code, state_digits
-from rotor.formats.spcat.hamiltonian.codes import (
-    NOT_YET,
-    PLURAL_NOT_YET,
-    file_constants,
-    is_linear,
-    parameter_lines,
-)
+from rotor.formats.spcat.hamiltonian.code_table import state_digits
+from rotor.formats.spcat.hamiltonian.codes import NO_NAME, PLURAL_NOT_YET, is_linear
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
-from rotor.formats.spcat.text.par import Header, Options, ParameterFile
+from rotor.formats.spcat.text.par import Options
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
@@ -21,11 +15,6 @@ from rotor.tops.top import Top
 # the classes of (Ka, Kc) that are even under a half turn about the axis: Ka, Ka + Kc and Kc tell a, b and c
 _EVEN = {1: ("ee", "eo"), 2: ("ee", "oo"), 3: ("ee", "oe")}
 FOLD = {6: 3, 9: 5}  # IAX of tops with one kind of E levels
-
-
-NO_NAME = (
-    "cannot be said by the named constants of a top; predict from the files themselves, with rotor spectrum FILE.int"
-)
 
 
 def option_weights(options: Options, symmetric: bool = True) -> SpinWeights:
@@ -130,51 +119,6 @@ def _coded_weights(weights: SpinWeights, oblate: bool) -> tuple[int, int, int, i
             if all(len(side) == 1 for side in sides):
                 return iax, sides[0].pop(), sides[1].pop(), 0
     raise ValueError(f"spin weights {dict(by_class)}: one option line of SPFIT cannot say these")
-
-
-def file_dipole(file: IntensityFile) -> tuple[float, float, float]:
-    """(μa, μb, μc) in D from the dipole lines of the lowest state; lines of one code are added."""
-    components = [0.0, 0.0, 0.0]
-    for dipole in file.dipoles:
-        if dipole.code not in (1, 2, 3):
-            raise ValueError(
-                f"dipole {dipole.code}: a component other than 1, 2, 3 (a, b, c of the lowest state) {NOT_YET}"
-            )
-        components[dipole.code - 1] += dipole.value
-    return components[0], components[1], components[2]
-
-
-def spcat_top(parameters: ParameterFile, intensities: IntensityFile | None = None) -> Top:
-    """The top of a .par or .var file, with the dipole of an optional .int file.
-
-    The symmetry axis of a symmetric top is a if prolate and c if oblate, independent of the basis of the file. Raises ValueError for spins,
-    more than one vibrational state, and internal rotation.
-    """
-    constants = file_constants(parameters)
-    if intensities is not None and intensities.request.flags >= 1000:
-        raise ValueError(f"FLAGS = {intensities.request.flags}: constants in cm⁻¹ {PLURAL_NOT_YET}")
-    dipole = file_dipole(intensities) if intensities else None
-    oblate_basis = parameters.options[0].nvib < 0
-    if dipole and (constants.kind, oblate_basis) in (("prolate", True), ("oblate", False)):
-        dipole = dipole[::-1]
-    weights = option_weights(parameters.options[0], constants.kind in ("prolate", "oblate"))
-    name = parameters.title
-    return Top.from_constants(
-        constants, dipole_abc_debye=dipole, spin_weights=weights, name=name, symmetry_checked=False
-    )
-
-
-def names_what_is_not_there(parameters: ParameterFile) -> bool:
-    """Whether a file with one state and no spin has parameters of a spin or another state, which SPCAT ignores."""
-    digits = [split_code(parameter.code) for parameter in parameters.parameters]
-    return any(d.spins or (not d.is_place_holder(1) and d.missing_state(1) is not None) for d in digits)
-
-
-def parameter_file(top: Top, kmax: int) -> ParameterFile:
-    """The .var or .par file of a top, for levels with K up to `kmax`."""
-    parameters = parameter_lines(top.constants)
-    header = Header(npar=len(parameters), nline=1, nitr=1, errtst=1e6)  # ERRTST of 1e6 keeps every line
-    return ParameterFile(top.name, header, (option_line(top.constants, top.spin_weights, kmax),), parameters)
 
 
 def intensity_file(top: Top, request: Request) -> IntensityFile:

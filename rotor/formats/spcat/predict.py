@@ -10,7 +10,6 @@ import os
 from collections.abc import Callable
 from dataclasses import field, replace
 from functools import cached_property, partial
-from pathlib import Path
 
 from rotor.formats.spcat import wavenumbers
 from rotor.formats.spcat.block_numbers import numbered_blocks
@@ -30,7 +29,7 @@ from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
-from rotor.formats.spcat.text.par import ParameterFile, read_par
+from rotor.formats.spcat.text.par import ParameterFile, parameters_beside, read_par
 from rotor.frozen import dataclass
 from rotor.spectra.lines import Lines
 
@@ -64,15 +63,6 @@ def predict_file(path: str | os.PathLike[str], *, as_spcat: bool = False, full_b
     as_spcat, full_basis: see `predict`. Raises ValueError, with file and line, for unreadable or unsupported input.
     """
     return predict(read_par(parameters_beside(path)), read_int(path), as_spcat=as_spcat, full_basis=full_basis)
-
-
-def parameters_beside(path: str | os.PathLike[str]) -> Path:
-    """The .var file of the same name as an .int file, else its .par file."""
-    beside = [Path(path).with_suffix(suffix) for suffix in (".var", ".par")]
-    existing = next((p for p in beside if p.exists()), None)
-    if existing is None:
-        raise ValueError(f"{path}: an .int file has no constants; its .var or .par must stand beside it")
-    return existing
 
 
 def predict(

@@ -16,8 +16,7 @@ from rotor.arrays import Floats
 from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.spcat.fits.fit_input import packed_correlations
-from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix
-from rotor.formats.spcat.model import parameter_file
+from rotor.formats.spcat.hamiltonian.codes import FIXED
 from rotor.formats.spcat.names.named_parameters import named_parameters
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.tops.top import Top
@@ -36,13 +35,9 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     highest = max(int(fit.lines.upper[:, 0].max()), int(fit.lines.lower[:, 0].max()), _KNMAX)
     if isinstance(fit.named, TopConstants) and fit.named.in_field:
         raise ValueError("lines in an electric field: SPFIT's files have none")
-    if isinstance(fit.named, TopConstants):
-        file, codes = named_parameters(fit.named, title, min(highest, 359))  # 359 is SPCAT's largest KNMAX
-        matrix: Floats = np.asarray(np.linalg.pinv(codes), dtype=np.float64)
-    else:
-        file = parameter_file(Top.from_constants(fit.named, name=title), kmax=min(highest, 359))
-        matrix = constants_and_matrix(file)[1]
-        codes = np.asarray(np.linalg.pinv(matrix), dtype=np.float64)
+    named = fit.named if isinstance(fit.named, TopConstants) else TopConstants(Top.from_constants(fit.named))
+    file, codes = named_parameters(named, title, min(highest, 359))  # 359 is SPCAT's largest KNMAX
+    matrix: Floats = np.asarray(np.linalg.pinv(codes), dtype=np.float64)
     back = codes @ fit.parameters.matrix  # derivatives of SPFIT's parameters by the free constants
     back[np.abs(back) < _ROUND_OFF] = 0.0
     if int(back.any(axis=1).sum()) == len(fit.parameters.names):

@@ -23,6 +23,9 @@ from rotor.tops.operators import Operators, axis_order, spelled_powers, spelled_
 
 NOT_YET = "is read but not computed yet"
 PLURAL_NOT_YET = "are read but not computed yet"
+NO_NAME = (
+    "cannot be said by the named constants of a top; predict from the files themselves, with rotor spectrum FILE.int"
+)
 
 AXES = {basis: axis_order(basis) for basis in ("Ir", "IIIl")}  # x, y, z of the two bases
 
@@ -68,34 +71,12 @@ A_REDUCTION = _named(sorted(published.A_REDUCTION.items(), key=_by_order))
 
 
 def _whole_code(parameter: Parameter) -> int:
-    """The code for the lowest state; ValueError for a parameter that is not supported."""
+    """The code for the lowest state; ValueError unless it is that of a rotational operator of this state alone."""
     d = split_code(parameter.code)
-    label = f" /{parameter.label}" if parameter.label else ""
-    reasons = {
-        "a Fourier or Euler series": d.ex or d.ff or d.kind is Kind.EULER,
-        "a spin": d.has_spin,
-        "a level of its own": d.kind is Kind.LEVEL,
-        "a Coriolis term, or one that turns the axes,": d.kind is Kind.TENSOR,
-        "another vibrational state": d.states(1) not in ((0, 0), None),
-        "a vibrational energy": d.is_energy,
-    }
-    for what, applies in reasons.items():
-        if applies:
-            why = "has no name here; predict from the file itself" if what.endswith("series") else NOT_YET
-            raise ValueError(f"parameter {parameter.code}{label}: {what} {why}")
+    if not d.is_orthorhombic or d.is_energy or d.states(1) not in ((0, 0), None):
+        label = f" /{parameter.label}" if parameter.label else ""
+        raise ValueError(f"parameter {parameter.code}{label}: its operator {NO_NAME}")
     return join_code(d._replace(v1=0, v2=0))
-
-
-def _single_state(options: tuple[Options, ...]) -> Options:
-    """The option line of a file with one state."""
-    first = options[0]
-    if abs(first.nvib) != 1 or len(options) > 1:
-        raise ValueError(f"NVIB = {first.nvib}, {len(options)} option lines: more than one vibrational state {NOT_YET}")
-    if abs(first.spind) != 1:
-        raise ValueError(f"SPIND = {first.spind}: a spin {NOT_YET}")
-    if first.knmin != 0:
-        raise ValueError(f"KNMIN = {first.knmin}: a range of K that does not begin with 0 {NOT_YET}")
-    return first
 
 
 def file_constants(file: ParameterFile, *, errors: bool = False) -> Constants:
@@ -106,7 +87,7 @@ def file_constants(file: ParameterFile, *, errors: bool = False) -> Constants:
     error below 1e-30 holds a parameter).
 
     Raises ValueError, with the parameter, for operators that have no name here or are not supported."""
-    options = _single_state(file.options)
+    options = file.options[0]
     values, spreads = _summed(file.parameters)
     rigid = {code: values.pop(code) for code in _RIGID if code in values}
     kind = _kind(options, rigid, values)

@@ -16,13 +16,21 @@ from math import gcd
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.hamiltonian.code_table import PAIRS, TYPES_BETWEEN, Kind, join_code, split_code
+from rotor.formats.spcat.hamiltonian.code_table import PAIRS, TYPES_BETWEEN, Digits, Kind, join_code, split_code
 from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, CodedLine, coded_file
-from rotor.formats.spcat.hamiltonian.codes import ALONG, HELD_BELOW, MEAN, basis_axes, file_constants, is_linear
+from rotor.formats.spcat.hamiltonian.codes import (
+    ALONG,
+    HELD_BELOW,
+    MEAN,
+    NO_NAME,
+    basis_axes,
+    file_constants,
+    is_linear,
+)
 from rotor.formats.spcat.hamiltonian.dipole_codes import split_dipoles
-from rotor.formats.spcat.hamiltonian.states import StateOptions, state_options
+from rotor.formats.spcat.hamiltonian.states import StateOptions, is_single_state, state_options
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
-from rotor.formats.spcat.model import NO_NAME, fold_parts, option_weights
+from rotor.formats.spcat.model import fold_parts, option_weights
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.frozen import dataclass
@@ -54,7 +62,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     if odd and any(line.symmetry.axis for line in rows):
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
 
-    letter, parameters_of_states = _letter(file, rows), _parameters_by_state(rows, len(states))
+    letter, parameters_of_states = _letter(file, rows), _parameters_by_state(coded)
     constants, energies = [], []
     for v, parameters in enumerate(parameters_of_states):
         option = replace(state_options(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
@@ -120,26 +128,35 @@ def _letter(file: ParameterFile, rows: list[CodedLine]) -> str:
     return "s" if "S" in letters else "a" if letters else file.options[0].chr
 
 
-def _parameters_by_state(rows: list[CodedLine], count: int) -> list[list[Parameter]]:
+def _parameters_by_state(coded: CodedFile) -> list[list[Parameter]]:
     """The parameters of each state without spins, with the codes of one state; parameters of all states occur in each."""
+    count = len(coded.states)
     by_state: list[list[Parameter]] = [[] for _ in range(count)]
-    for line in rows:
-        parameter = line.parameter
+    for line in coded.usable:
         if line.operator.rotor is not None or line.is_between:
             continue
         if line.operator.plain is None:
-            raise ValueError(f"parameter {parameter.code}: a term of this kind in one state {NO_NAME}")
-        digits = line.digits._replace(v1=0, v2=0)
-        plain = replace(parameter, code=join_code(digits), constrained=False, text="")
+            raise ValueError(f"parameter {line.parameter.code}: a term of this kind in one state {NO_NAME}")
+        plain = _of_one_state(line.parameter, line.digits)
         parts = [plain]
-        if digits.kind is Kind.SQUARE and len(line.operator.plain) == 2:  # across an axis of more than two folds
+        if line.digits.kind is Kind.SQUARE and len(line.operator.plain) == 2:  # across an axis of more than two folds
             parts = [
                 replace(plain, code=MEAN, value=plain.value / 2),
                 replace(plain, code=ALONG, value=-plain.value / 2),
             ]
         for v in range(count) if line.states is None else line.states[:1]:
             by_state[v] += parts
+    if is_single_state(coded.file):  # a constant of value 0 has a name as well
+        zeros = zip(coded.file.parameters, coded.digits, strict=True)
+        by_state[0] += [
+            _of_one_state(p, d) for p, d in zeros if not p.value and d.is_orthorhombic and not max(d.states(1) or (0,))
+        ]
     return by_state
+
+
+def _of_one_state(parameter: Parameter, digits: Digits) -> Parameter:
+    """A parameter with the code of the lowest state."""
+    return replace(parameter, code=join_code(digits._replace(v1=0, v2=0)), constrained=False, text="")
 
 
 def _couplings(rows: list[CodedLine], first: Options, turned: bool) -> dict[str, float]:

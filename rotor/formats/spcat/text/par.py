@@ -6,6 +6,7 @@ import os
 import re
 from dataclasses import field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
@@ -109,6 +110,15 @@ class ParameterFile:
 
 _HEADER = {"npar": 0, "nline": 1, "nitr": 1, "nxpar": 0, "thresh": 0.0, "errtst": 1e6, "frac": 1.0, "cal": 1.0}
 _OPTIONS = ("spind", "nvib", "knmin", "knmax", "ixx", "iax", "wtpl", "wtmn", "vsym", "ewt", "diag", "xopt")
+
+
+def parameters_beside(path: str | os.PathLike[str]) -> Path:
+    """The .var file of the same name as an .int file, else its .par file."""
+    beside = [Path(path).with_suffix(suffix) for suffix in (".var", ".par")]
+    existing = next((p for p in beside if p.exists()), None)
+    if existing is None:
+        raise ValueError(f"{path}: an .int file has no constants; its .var or .par must stand beside it")
+    return existing
 
 
 def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
