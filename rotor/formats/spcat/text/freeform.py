@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import MISSING, fields
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from rotor.formats.packed import load
 
@@ -158,6 +160,48 @@ def _present(line: Line, words: Sequence[Word], index: int, name: str, optional:
     if word.text is None and not optional:
         raise line.error(word.column, f"{name} is missing")
     return word
+
+
+def numbers(
+    line: Line, words: Sequence[Word], defaults: Mapping[str, Any], names: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, Any]:
+    """The numbers of a line by key, integers where the default is one; a default of MISSING must be stated.
+
+    names: of numbers in errors, by default the key in capital letters.
+    """
+    values = {}
+    for index, (key, default) in enumerate(defaults.items()):
+        read = number if isinstance(default, float) else whole
+        values[key] = read(line, words, index, names.get(key, key.upper()), None if default is MISSING else default)
+    return values
+
+
+def defaults_of(record: type) -> dict[str, Any]:
+    """The numbers of a record and their defaults."""
+    return {each.name: each.default for each in fields(record) if each.compare and not isinstance(each.default, str)}
+
+
+def as_read(thing: Any, read: Callable[[Line], Any]) -> str:
+    """The text from which a thing was read if reading it gives the thing, else nothing."""
+    text: str = thing.text
+    return text if text and read(Line(text, 0, "stored text")) == thing else ""
+
+
+def read_title(line: Line) -> str:
+    """The title in the first line of a file."""
+    return line.body.removeprefix("\ufeff").strip()
+
+
+def title_text(title: str, stored: str) -> str:
+    """The line of a title, as it was read if it says the same."""
+    return stored if stored and read_title(Line(stored, 1, "")) == title else one_line(title)
+
+
+def one_line(text: str) -> str:
+    """A line of a title or of a parameter; ValueError for a text of several lines."""
+    if "\n" in text or "\r" in text:
+        raise ValueError(f"{text!r}: a title or label is one line")
+    return text + "\n"
 
 
 def spell(value: float) -> str:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from dataclasses import field
-from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import source_name
-from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, whole
+from rotor.formats.spcat.text import freeform
+from rotor.formats.spcat.text.freeform import Line
 from rotor.frozen import dataclass
 from rotor.spectra.intensity import MOST_LOG10
 from rotor.table import counted
@@ -62,12 +62,9 @@ class IntensityFile:
     title_text: str = field(default="", compare=False)
 
 
-_REQUEST = {
-    "flags": 0, "tag": 999, "qrot": 1000.0, "fbgn": 0, "fend": 0,
-    "str0": -100.0, "str1": -100.0, "fqlim_ghz": 9999.99, "temperature_k": 300.0, "maxv": -1,
-}  # fmt: skip
+_REQUEST = freeform.defaults_of(Request)
+_NAMES = {"fqlim_ghz": "FQLIM", "temperature_k": "TEMP"}
 _LEAST_MHZ = 0.00005
-_NAMES = ("FLAGS", "TAG", "QROT", "FBGN", "FEND", "STR0", "STR1", "FQLIM", "TEMP", "MAXV")
 
 
 def read_int(source: str | os.PathLike[str] | bytes) -> IntensityFile:
@@ -75,7 +72,7 @@ def read_int(source: str | os.PathLike[str] | bytes) -> IntensityFile:
 
     Raises ValueError with file, line, column and the rule that is broken.
     """
-    lines = read_lines(source)
+    lines = freeform.read_lines(source)
     if len(lines) < 2:
         name = lines[0].file if lines else source_name(source)
         raise ValueError(
@@ -84,21 +81,12 @@ def read_int(source: str | os.PathLike[str] | bytes) -> IntensityFile:
     end = next((i for i, line in enumerate(lines) if i >= 2 and line.blank), len(lines))
     dipoles = tuple(_dipole(line) for line in lines[2:end])
     rest = "".join(line.text for line in lines[end:])
-    return IntensityFile(_title(lines[0]), _request(lines[1]), dipoles, rest, lines[0].text)
-
-
-def _title(line: Line) -> str:
-    return line.body.removeprefix("\ufeff").strip()
+    return IntensityFile(freeform.read_title(lines[0]), _request(lines[1]), dipoles, rest, lines[0].text)
 
 
 def _request(line: Line) -> Request:
-    words, _ = read_words(line, 0, len(_REQUEST))
-    values: dict[str, Any] = {}
-    for index, (key, default) in enumerate(_REQUEST.items()):
-        if isinstance(default, int):
-            values[key] = whole(line, words, index, _NAMES[index], default)
-        else:
-            values[key] = number(line, words, index, _NAMES[index], default)
+    words, _ = freeform.read_words(line, 0, len(_REQUEST))
+    values = freeform.numbers(line, words, _REQUEST, _NAMES)
     for key in ("str0", "str1"):
         if values[key] > MOST_LOG10:
             raise line.error(
@@ -108,26 +96,22 @@ def _request(line: Line) -> Request:
 
 
 def _dipole(line: Line) -> Dipole:
-    words, rest = read_code(line)
-    words += read_words(line, rest, 1)[0]
-    code = whole(line, words, 0, "the dipole's code")
-    value = number(line, words, 1, "the dipole's value")
+    words, rest = freeform.read_code(line)
+    words += freeform.read_words(line, rest, 1)[0]
+    code = freeform.whole(line, words, 0, "the dipole's code")
+    value = freeform.number(line, words, 1, "the dipole's value")
     return Dipole(abs(code), value, code < 0, line.text)
 
 
 def format_int(file: IntensityFile) -> bytes:
     """The text of an .int file; each line as it was read, as long as it says the same."""
-    if "\n" in file.title or "\r" in file.title:
-        raise ValueError(f"{file.title!r}: a title is one line")
-    stored = file.title_text and _title(Line(file.title_text, 1, "")) == file.title
-    pieces = [file.title_text if stored else file.title + "\n"]
-    request = file.request
-    same = request.text and _request(Line(request.text, 2, "stored text")) == request
-    pieces.append(request.text if same else _request_text(request))
-    for dipole in file.dipoles:
-        same = dipole.text and _dipole(Line(dipole.text, 3, "stored text")) == dipole
-        pieces.append(dipole.text if same else f"{'-' if dipole.grouped else ''}{dipole.code} {dipole.value!r}\n")
-    return encode([*pieces, file.rest])
+    request = freeform.as_read(file.request, _request) or _request_text(file.request)
+    dipoles = [freeform.as_read(dipole, _dipole) or _dipole_text(dipole) for dipole in file.dipoles]
+    return freeform.encode([freeform.title_text(file.title, file.title_text), request, *dipoles, file.rest])
+
+
+def _dipole_text(dipole: Dipole) -> str:
+    return f"{'-' if dipole.grouped else ''}{dipole.code} {dipole.value!r}\n"
 
 
 def _request_text(r: Request) -> str:

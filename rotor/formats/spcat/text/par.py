@@ -7,11 +7,11 @@ import re
 from dataclasses import field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import source_name
-from rotor.formats.spcat.text.freeform import Line, encode, number, read_code, read_lines, read_words, spell, whole
+from rotor.formats.spcat.text import freeform
+from rotor.formats.spcat.text.freeform import Line
 from rotor.frozen import dataclass
 from rotor.table import counted
 
@@ -108,8 +108,7 @@ class ParameterFile:
     title_text: str = field(default="", compare=False)
 
 
-_HEADER = {"npar": 0, "nline": 1, "nitr": 1, "nxpar": 0, "thresh": 0.0, "errtst": 1e6, "frac": 1.0, "cal": 1.0}
-_OPTIONS = ("spind", "nvib", "knmin", "knmax", "ixx", "iax", "wtpl", "wtmn", "vsym", "ewt", "diag", "xopt")
+_HEADER, _OPTIONS = freeform.defaults_of(Header), freeform.defaults_of(Options)
 
 
 def parameters_beside(path: str | os.PathLike[str]) -> Path:
@@ -128,7 +127,7 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
     such as "!": what follows is preserved and has no bearing.
     Raises ValueError with file, line, column and the rule that is broken.
     """
-    lines = read_lines(source)
+    lines = freeform.read_lines(source)
     if len(lines) < 3:
         name = lines[0].file if lines else source_name(source)
         raise ValueError(f"{name}: {counted(len(lines), 'line')}; expected a title, limits, options and parameters")
@@ -146,47 +145,36 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
         end += 1
     parameters = tuple(_parameter(line) for line in lines[first:end])
     rest = "".join(line.text for line in lines[end:])
-    return ParameterFile(_title(lines[0]), header, tuple(options), parameters, rest, lines[0].text)
-
-
-def _title(line: Line) -> str:
-    return line.body.removeprefix("\ufeff").strip()
+    return ParameterFile(freeform.read_title(lines[0]), header, tuple(options), parameters, rest, lines[0].text)
 
 
 def _header(line: Line) -> Header:
-    words, _ = read_words(line, 0, len(_HEADER), abutting=True)
-    values: dict[str, Any] = {"npar": whole(line, words, 0, "NPAR")}
-    for index, (name, default) in enumerate(_HEADER.items()):
-        if isinstance(default, int):
-            values[name] = whole(line, words, index, name.upper(), values.get(name, default))
-        else:
-            values[name] = number(line, words, index, name.upper(), default)
-    if values["npar"] < 0:
-        raise line.error(0, f"NPAR is {values['npar']}; it counts the parameters")
-    return Header(**values, text=line.text)
+    words, _ = freeform.read_words(line, 0, len(_HEADER), abutting=True)
+    header = Header(**freeform.numbers(line, words, _HEADER), text=line.text)
+    if header.npar < 0:
+        raise line.error(0, f"NPAR is {header.npar}; it counts the parameters")
+    return header
 
 
 def _options(line: Line, defaults: Options) -> Options:
     """An option line; the first one sets the defaults of those that follow, but for VSYM."""
     letter = _LETTER.match(line.body)
     start = letter.end() if letter else 0
-    spins, rest = read_code(line, start)
-    words = spins + read_words(line, rest, len(_OPTIONS) - 1)[0]
+    spins, rest = freeform.read_code(line, start)
+    words = spins + freeform.read_words(line, rest, len(_OPTIONS) - 1)[0]
     defaults = replace(defaults, vsym=0)
-    values = {
-        name: whole(line, words, index, name.upper(), getattr(defaults, name)) for index, name in enumerate(_OPTIONS)
-    }
+    values = freeform.numbers(line, words, {name: getattr(defaults, name) for name in _OPTIONS})
     return Options(chr=(letter and (letter[1] or letter[2])) or defaults.chr, **values, text=line.text)
 
 
 def _parameter(line: Line) -> Parameter:
-    code_word, rest = read_code(line)
-    code = whole(line, code_word, 0, "the parameter code")
-    others, end = read_words(line, rest, 2)
+    code_word, rest = freeform.read_code(line)
+    code = freeform.whole(line, code_word, 0, "the parameter code")
+    others, end = freeform.read_words(line, rest, 2)
     words = code_word + others
     # SPCAT takes a line without one for the last parameter, without a word
-    value = number(line, words, 1, "the parameter's value")
-    error = number(line, words, 2, "the parameter's error") if len(words) > 2 and words[2].text else None
+    value = freeform.number(line, words, 1, "the parameter's value")
+    error = freeform.number(line, words, 2, "the parameter's error") if len(words) > 2 and words[2].text else None
     tail = line.body[end:]
     label = tail.partition("/")[2].strip() if "/" in tail else ""
     negative = words[0].text is not None and words[0].text.startswith("-")
@@ -203,13 +191,12 @@ def npar_notes(file: ParameterFile) -> list[str]:
 
 def format_par(file: ParameterFile) -> bytes:
     """The text of a parameter file; each line as it was read, as long as it says the same."""
-    title = file.title_text if _title(Line(file.title_text, 1, "")) == file.title else ""
-    return encode([
-        title or _line(file.title),
-        _as_read(file.header, _header) or _header_text(file.header),
-        *(_as_read(options, partial(_options, defaults=_defaults(file, at))) or _options_text(options)
+    return freeform.encode([
+        freeform.title_text(file.title, file.title_text),
+        freeform.as_read(file.header, _header) or _header_text(file.header),
+        *(freeform.as_read(options, partial(_options, defaults=_defaults(file, at))) or _options_text(options)
           for at, options in enumerate(file.options)),
-        *(_as_read(parameter, _parameter) or _parameter_text(parameter) for parameter in file.parameters),
+        *(freeform.as_read(parameter, _parameter) or _parameter_text(parameter) for parameter in file.parameters),
         file.rest,
     ])  # fmt: skip
 
@@ -218,21 +205,9 @@ def _defaults(file: ParameterFile, at: int) -> Options:
     return file.options[0] if at else Options()
 
 
-def _as_read(thing: Any, read: Any) -> str:
-    """The text a thing was read from if reading it gives the thing, otherwise nothing."""
-    text: str = thing.text
-    return text if text and read(Line(text, 0, "stored text")) == thing else ""
-
-
-def _line(text: str) -> str:
-    if "\n" in text or "\r" in text:
-        raise ValueError(f"{text!r}: a title or label is one line")
-    return text + "\n"
-
-
 def _header_text(h: Header) -> str:
     counts = f"{h.npar:5d}{h.nline:6d}{h.nitr:5d}{h.nxpar:5d}"
-    return f"{counts} {spell(h.thresh)} {spell(h.errtst)} {spell(h.frac)} {spell(h.cal)}\n"
+    return f"{counts} {freeform.spell(h.thresh)} {freeform.spell(h.errtst)} {freeform.spell(h.frac)} {freeform.spell(h.cal)}\n"
 
 
 def _options_text(options: Options) -> str:
@@ -245,7 +220,7 @@ def _parameter_text(parameter: Parameter) -> str:
     code = f"{'-' if parameter.constrained else ''}{parameter.code}"
     error = "" if parameter.error is None else f" {parameter.error:.8E}"
     label = f" /{parameter.label}" if parameter.label else ""
-    return _line(f"{code:>13} {spell(parameter.value):>23}{error}{label}")
+    return freeform.one_line(f"{code:>13} {freeform.spell(parameter.value):>23}{error}{label}")
 
 
 def write_par(file: ParameterFile, path: str | os.PathLike[str]) -> None:

@@ -20,6 +20,7 @@ ENERGY, DEGENERACY, TAG, QNFMT = slice(31, 41), slice(41, 44), slice(44, 51), sl
 QUANTA = 55  # where the quantum numbers begin
 
 _BLANK, _MINUS, _POINT, _ZERO = (ord(c) for c in " -.0")
+_TENS = 10 ** np.arange(1, 18)  # the least numbers of two digits, three, ...
 
 
 class Columns(NamedTuple):
@@ -70,19 +71,6 @@ def round_decimal(values: NDArray[np.float64], decimals: int) -> tuple[NDArray[n
     return magnitude + ((above_half > 0) | ((above_half == 0) & (magnitude % 2 == 1))), fits
 
 
-def _put_digits(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask:
-    """Whole numbers with their sign, right-justified, digit by digit; false where they need more columns than `out` has."""
-    left, sign = magnitude, negative
-    for column in range(out.shape[1] - 1, -1, -1):
-        left, digit = np.divmod(left, 10)
-        out[:, column] = _ZERO + digit
-        if column != out.shape[1] - 1:
-            beyond = (left == 0) & (digit == 0)
-            out[beyond, column] = np.where(sign[beyond], _MINUS, _BLANK)
-            sign = sign & ~beyond
-    return np.asarray((left == 0) & ~sign)
-
-
 @cache
 def _group_table(size: int, last: bool) -> Text:
     """Texts of `size` digits, (2 · 10^size, size): first with zeros in front, for numbers that go on before them, then with blanks.
@@ -123,17 +111,11 @@ def _put_signed(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask
     fits = _put_natural(out, magnitude)
     if not negative.any():
         return fits
-    width = out.shape[1] - 1
-    if width > 4:  # a long field has few negative numbers
-        rows = np.flatnonzero(negative)
-        text = np.empty((len(rows), width + 1), dtype=np.uint8)
-        fits[rows] = _put_digits(text, magnitude[rows], negative[rows])
-        out[rows] = text
-        return fits
-    for digits in range(1, width + 1):  # of a short one the sign stands before the first of few digits
-        least = 10 ** (digits - 1) if digits > 1 else 0
-        out[negative & (magnitude >= least) & (magnitude < 10**digits), width - digits] = _MINUS
-    return np.asarray(fits & ~(negative & (magnitude >= 10**width)))
+    rows = np.flatnonzero(negative)
+    sign = out.shape[1] - 2 - np.searchsorted(_TENS, magnitude[rows], side="right")  # before the first digit
+    fits[rows] &= sign >= 0
+    out[rows[sign >= 0], sign[sign >= 0]] = _MINUS
+    return fits
 
 
 def _put_decimal(out: Text, values: NDArray[np.float64], decimals: int) -> Mask:
