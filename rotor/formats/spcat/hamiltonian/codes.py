@@ -8,7 +8,7 @@ for that representation.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -87,25 +87,7 @@ def file_constants(file: ParameterFile, *, errors: bool = False) -> Constants:
     error below 1e-30 holds a parameter).
 
     Raises ValueError, with the parameter, for operators that have no name here or are not supported."""
-    options = file.options[0]
-    values, spreads = _summed(file.parameters)
-    rigid = {code: values.pop(code) for code in _RIGID if code in values}
-    kind = _kind(options, rigid, values)
-    reduction = _reduction(options, values) if kind == "asymmetric" else None
-
-    names = _code_names(values, kind, reduction)
-    named: dict[str, Any] = _rigid_constants(options, rigid, kind)
-    named |= {names[code].name: names[code].sign * value for code, value in values.items()}
-
-    codes = {item.name: item.code for item in names.values()} | {name: c for c, name in _rigid_names(kind).items()}
-    uncertainties = {name: spreads.get(codes[name]) for name in named if name in codes} if errors else {}
-    return Constants(
-        kind=kind,
-        reduction=reduction,
-        representation=_representation(options) if kind == "asymmetric" else None,
-        uncertainties={name: spread for name, spread in uncertainties.items() if spread and spread > HELD_BELOW},
-        **named,
-    )
+    return _constants_and_factors(file, errors)[0]
 
 
 def constants_and_matrix(file: ParameterFile) -> tuple[Constants, NDArray[np.float64]]:
@@ -117,20 +99,46 @@ def constants_and_matrix(file: ParameterFile) -> tuple[Constants, NDArray[np.flo
     >>> constants.values["A"], matrix.tolist()
     (9.0, [[1.0, 1.0], [0.0, 1.0]])
     """
-    constants = file_constants(file)
-    options, names = file.options[0], list(constants.values)
-    factors_by_code: dict[int, dict[str, float]] = {}
-    for code in {_whole_code(parameter) for parameter in file.parameters}:
-        if code in _RIGID:
-            factors_by_code[code] = _rigid_constants(options, {code: 1.0}, constants.kind)
-        else:
-            named = _code_names([code], constants.kind, constants.reduction)[code]
-            factors_by_code[code] = {named.name: float(named.sign)}
+    constants, factors = _constants_and_factors(file)
+    names = list(constants.values)
     matrix = np.zeros((len(names), len(file.parameters)))
     for column, parameter in enumerate(file.parameters):
-        for name, factor in factors_by_code[_whole_code(parameter)].items():
+        for name, factor in factors[_whole_code(parameter)].items():
             matrix[names.index(constants.spelling(name)), column] += factor
     return constants, matrix
+
+
+def _constants_and_factors(file: ParameterFile, errors: bool = False) -> tuple[Constants, Factors]:
+    """The constants of a file, and the factors in them of each of its codes."""
+    options = file.options[0]
+    values, spreads = _summed(file.parameters)
+    distortion = [code for code in values if code not in _RIGID]
+    kind = _kind(options, values)
+    reduction = _reduction(options, distortion) if kind == "asymmetric" else None
+    representation = "Ir" if options.nvib > 0 else "IIIl"
+
+    rigid = _rigid_factors(kind, AXES[representation])
+    useless = next((code for code in values if code in _RIGID and code not in rigid), None)
+    if useless is not None:
+        raise ValueError(f"parameter {useless} does nothing in a {kind} top, whose constant is {MEAN}; leave it out")
+    factors = rigid | {
+        code: {named.name: float(named.sign)} for code, named in _code_names(distortion, kind, reduction).items()
+    }
+    named: dict[str, Any] = {name: 0.0 for name in RIGID if any(name in row for row in rigid.values())}
+    codes_of: dict[str, list[int]] = {}
+    for code in [*(code for code in rigid if code in values), *distortion]:
+        for name, factor in factors[code].items():
+            named[name] = named.get(name, 0.0) + factor * values[code]
+            codes_of.setdefault(name, []).append(code)
+    alone = {name: spreads[codes[0]] for name, codes in codes_of.items() if len(codes) == 1} if errors else {}
+    constants = Constants(
+        kind=kind,
+        reduction=reduction,
+        representation=representation if kind == "asymmetric" else None,
+        uncertainties={name: spread for name, spread in alone.items() if spread and spread > HELD_BELOW},
+        **named,
+    )
+    return constants, factors
 
 
 def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int, float | None]]:
@@ -168,14 +176,19 @@ MEAN, ALONG, ACROSS = term_code(1, 0, 0), term_code(0, 1, 0), term_code(0, 0, 1)
 _RIGID = (*SQUARES, MEAN, ALONG, ACROSS)
 
 
-def _rigid_names(kind: str) -> dict[int, str]:
-    """Codes of rotational constants that are one parameter each."""
-    return SQUARES if kind == "asymmetric" else {MEAN: "B"}
+Factors = dict[int, dict[str, float]]  # by code, factors by name of a constant
 
 
-def _representation(options: Options) -> str:
-    """Ir or IIIl."""
-    return "Ir" if options.nvib > 0 else "IIIl"
+def _rigid_factors(kind: str, axes: str) -> Factors:
+    """The factors of Na², Nb², Nc², of N², Nz², and of N₊² + N₋² = 2 (Nx² - Ny²), in A, B, C."""
+    if kind in ("linear", "spherical"):
+        return {MEAN: {"B": 1.0}}
+    if kind in ("prolate", "oblate"):
+        axis = "A" if kind == "prolate" else "C"
+        return {MEAN: {"B": 1.0, axis: 1.0}, ALONG: {axis: 1.0}}
+    x, y, z = (axis.upper() for axis in axes)
+    squares = {code: {name: 1.0} for code, name in SQUARES.items()}
+    return squares | {MEAN: dict.fromkeys(RIGID, 1.0), ALONG: {z: 1.0}, ACROSS: {x: 2.0, y: -2.0}}
 
 
 def is_linear(options: Options) -> bool:
@@ -183,39 +196,19 @@ def is_linear(options: Options) -> bool:
     return options.knmin == options.knmax == 0
 
 
-def _kind(options: Options, rigid: Mapping[int, float], distortion: Mapping[int, float]) -> str:
+def _kind(options: Options, values: Mapping[int, float]) -> str:
     """Kind of top; if all terms are diagonal in K the constants decide, not the basis of the file."""
     if is_linear(options):
         return "linear"
-    digits = [split_code(code) for code in (*rigid, *distortion)]
+    digits = [split_code(code) for code in values]
     if any(d.kind is not Kind.SCALAR for d in digits):
         return "asymmetric"
     if not any(d.ksq for d in digits):
         return "spherical"
-    return "prolate" if rigid.get(ALONG, 0.0) >= 0 else "oblate"
+    return "prolate" if values.get(ALONG, 0.0) >= 0 else "oblate"
 
 
-def _rigid_constants(options: Options, rigid: Mapping[int, float], kind: str) -> dict[str, float]:
-    """A, B, C from Na², Nb², Nc² and from N², Nz², N₊² + N₋² = 2 (Nx² - Ny²)."""
-    mean, along, across = (rigid.get(code, 0.0) for code in (MEAN, ALONG, ACROSS))
-    if kind in ("linear", "spherical"):
-        useless = next((code for code in rigid if code != MEAN), None)
-        if useless is not None:
-            raise ValueError(
-                f"parameter {useless} does nothing in a {kind} top, whose constant is {MEAN}; leave it out"
-            )
-        return {"B": mean}
-    if kind in ("prolate", "oblate"):
-        return {"A": mean + along, "B": mean} if kind == "prolate" else {"B": mean, "C": mean + along}
-    x, y, z = (axis.upper() for axis in AXES[_representation(options)])
-    constants = {name: rigid.get(code, 0.0) + mean for code, name in SQUARES.items()}
-    constants[z] += along
-    constants[x] += 2 * across
-    constants[y] -= 2 * across
-    return constants
-
-
-def _reduction(options: Options, distortion: Mapping[int, float]) -> str | None:
+def _reduction(options: Options, distortion: Sequence[int]) -> str | None:
     """A if K² multiplies an off-diagonal term, S if K changes by more than two, else the letter of the file."""
     in_a, in_s = ([code for code in distortion if letter in split_code(code).reductions] for letter in "AS")
     if in_a and in_s:
@@ -234,51 +227,22 @@ def _vocabulary(kind: str, reduction: str | None) -> tuple[Named, ...]:
     return SYMMETRIC if kind in ("prolate", "oblate") else LINEAR
 
 
-def parameter_lines(constants: Constants) -> tuple[Parameter, ...]:
-    """The parameter lines of named constants, with their uncertainties as errors, or 1e-37 (fixed) without an uncertainty.
+def code_factors(constants: Constants) -> Factors:
+    """The codes of named constants, with the factors of the constants in the value of each.
 
-    Raises ValueError for representations other than Iʳ and IIIˡ.
-
-    >>> [(p.code, p.value, p.label) for p in parameter_lines(Constants(B=6081.5, D=0.0013))]
-    [(100, 6081.5, 'B'), (200, -0.0013, '-D')]
+    >>> code_factors(Constants(A=9000.0, B=6081.5, DJ=0.0013))
+    {1000: {'A': 1.0, 'B': -1.0}, 100: {'B': 1.0}, 200: {'DJ': -1.0}}
     """
-    representation = constants.representation
-    if constants.kind == "asymmetric" and representation not in AXES:
-        raise ValueError(
-            f"constants in representation {representation}: SPFIT's files have Ir and IIIl alone; convert them first"
-        )
-    return (*_rigid_parameters(constants), *_distortion_parameters(constants))
-
-
-def _rigid_parameters(constants: Constants) -> tuple[Parameter, ...]:
-    spread = constants.uncertainties
-    if constants.kind == "asymmetric":
-        return tuple(Parameter(code, constants[name], spread.get(name, FIXED), name) for code, name in SQUARES.items())
-    b = constants["B"]
-    lines = [Parameter(MEAN, b, spread.get("B", FIXED), "B")]
+    rigid: Factors = {MEAN: {"B": 1.0}}
     axis = {"prolate": "A", "oblate": "C"}.get(constants.kind)
-    if axis:
-        lines.insert(0, Parameter(ALONG, constants[axis] - b, spread.get(axis, FIXED), f"{axis}-B"))
-    return tuple(lines)
-
-
-def _distortion_parameters(constants: Constants) -> tuple[Parameter, ...]:
-    spread = constants.uncertainties
+    if constants.kind == "asymmetric":
+        rigid = {code: {name: 1.0} for code, name in SQUARES.items()}
+    elif axis:
+        rigid = {ALONG: {axis: 1.0, "B": -1.0}} | rigid
     vocabulary = _vocabulary(constants.kind, constants.reduction)
+    named = {item.code: {item.name: float(item.sign)} for item in vocabulary if item.name in constants}
     unnamed = [name for name in constants.values if name not in (*RIGID, *(item.name for item in vocabulary))]
-    named = tuple(
-        Parameter(
-            item.code,
-            item.sign * constants[item.name],
-            spread.get(item.name, FIXED),
-            f"{'-' if item.sign < 0 else ''}{item.name}",
-        )
-        for item in vocabulary
-        if item.name in constants
-    )
-    return named + tuple(
-        Parameter(_operator_code(name), constants[name], spread.get(name, FIXED), name) for name in unnamed
-    )
+    return rigid | named | {_operator_code(name): {name: 1.0} for name in unnamed}
 
 
 def _operator_code(name: str) -> int:

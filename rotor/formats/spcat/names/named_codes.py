@@ -31,9 +31,7 @@ from rotor.formats.spcat.hamiltonian.code_table import (
     square_typ,
     typ_across,
 )
-from rotor.formats.spcat.hamiltonian.codes import AXES, basis_axes, constants_and_matrix, parameter_lines
-from rotor.formats.spcat.model import option_line
-from rotor.formats.spcat.text.par import Header, ParameterFile
+from rotor.formats.spcat.hamiltonian.codes import AXES, basis_axes, code_factors
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.spin_effect import ParameterName, parse_name
 from rotor.quantum.effects.spin_rotation import SpinRotation
@@ -41,7 +39,6 @@ from rotor.quantum.effects.spin_spin import SpinSpin
 from rotor.quantum.spins.operators import Cosines, CosinesWithN
 from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
 from rotor.tops.constants import Constants
-from rotor.tops.spins.spin_weights import SpinWeights
 
 _CROSS = {places: typ_across(letters) for letters, places in PAIRS.items()}
 _KINDS = (NuclearQuadrupole, SpinRotation, SpinSpin)
@@ -86,14 +83,10 @@ def _rotational_codes(constants: TopConstants) -> Codes:
         state_constants = Constants(
             kind=constants.kind, reduction=constants.reduction, representation=constants.representation, **values
         )
-        option = option_line(state_constants, SpinWeights(), 1)
-        file = ParameterFile("", Header(npar=1), (option,), parameter_lines(state_constants))
-        read_back, matrix = constants_and_matrix(file)
-        back = np.linalg.inv(matrix)
-        for parameter, row in zip(file.parameters, back, strict=True):
-            code = join_code(split_code(parameter.code)._replace(v1=v, v2=v), states)
-            suffix = f"[{v}]" if v else ""
-            out[code] = {f"{name}{suffix}": float(f) for name, f in zip(read_back.values, row, strict=True) if f}
+        suffix = f"[{v}]" if v else ""
+        for code, factors in code_factors(state_constants).items():
+            full = join_code(split_code(code)._replace(v1=v, v2=v), states)
+            out[full] = {f"{name}{suffix}": factor for name, factor in factors.items()}
     return out
 
 
