@@ -23,9 +23,9 @@ import numpy as np
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.file_quanta import pattern_numbers, pattern_steps
 from rotor.formats.spcat.hamiltonian.code_table import TURNS, Digits, Kind, split_code
 from rotor.formats.spcat.hamiltonian.states import SPECIES, StateOptions, species_numbers
-from rotor.formats.spcat.pattern_numbers import pattern_numbers, pattern_steps
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.frozen import dataclass
 from rotor.quantum.levels import Levels

@@ -18,9 +18,15 @@ from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET
 from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, line_moment, split_dipoles
 from rotor.formats.spcat.hamiltonian.file_effect import FileEffect
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l
-from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by
-from rotor.formats.spcat.hamiltonian.moment_phases import by_order, turned_moments
-from rotor.formats.spcat.hamiltonian.phases import Phases, turned_axis, turned_odd_axes, with_dipoles
+from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by, refuse_other_functions, without_diagonalization
+from rotor.formats.spcat.hamiltonian.phases import (
+    Phases,
+    by_order,
+    turned_axis,
+    turned_moments,
+    turned_odd_axes,
+    with_dipoles,
+)
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, falls_with_k
 from rotor.formats.spcat.hamiltonian.states import ALL_K, StateOptions, file_states
 from rotor.formats.spcat.hamiltonian.symmetry import (
@@ -30,7 +36,6 @@ from rotor.formats.spcat.hamiltonian.symmetry import (
     species_pairs,
     weights_agree,
 )
-from rotor.formats.spcat.hamiltonian.undiagonalized import refuse_other_functions, without_diagonalization
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.frozen import dataclass

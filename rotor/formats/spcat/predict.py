@@ -15,8 +15,8 @@ from rotor.formats.spcat import wavenumbers
 from rotor.formats.spcat.block_numbers import numbered_blocks
 from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, group_lines, group_transitions
 from rotor.formats.spcat.file_quanta import Format, quanta_format
+from rotor.formats.spcat.hamiltonian.labels import UNDIAGONALIZED_NOTE
 from rotor.formats.spcat.hamiltonian.states import file_states
-from rotor.formats.spcat.hamiltonian.undiagonalized import UNDIAGONALIZED_NOTE
 from rotor.formats.spcat.prediction_notes import (
     basis_notes,
     falling_diagonal_notes,

@@ -167,7 +167,7 @@ def _notes_on_codes(file: ParameterFile) -> list[str]:
     from rotor.formats.spcat.fits.at_zero import stay_at_zero
     from rotor.formats.spcat.fits.fit_states import groups_for_fit
     from rotor.formats.spcat.hamiltonian.coded_file import coded_file
-    from rotor.formats.spcat.hamiltonian.undiagonalized import UNDIAGONALIZED_NOTE
+    from rotor.formats.spcat.hamiltonian.labels import UNDIAGONALIZED_NOTE
 
     stay = stay_at_zero(file)
     at_zero = f"{', '.join(stay)}: at 0 they change no level to first order, and stay there; give other starts"

@@ -2,7 +2,11 @@
 
 Each parameter line of the file is a constant, named as in `file_effect`. Connected states are solved together, for those F in which a line
 has a level. Levels are identified by the quantum numbers that the file lists. Levels of lines without resolved hyperfine structure have F
-below 0; see `unresolved`.
+below 0.
+
+The energy of such a level is that of the level |F| without the first-order contribution of the last NXPAR parameters, E - Σ p ∂E/∂p, and
+its derivative by these parameters is 0 (`dnuadd` in the source of H. M. Pickett's program). F = -1 stands for minus the sum of angular
+momenta before F, or N (`linein`); if |F| is below 10 and has no such level, the next F up to 9 are tried (`getblk`).
 """
 
 from __future__ import annotations
@@ -17,7 +21,6 @@ from rotor.arrays import Floats, Ints, distinct
 from rotor.formats.spcat.file_model import Group, connected_groups
 from rotor.formats.spcat.file_quanta import Format, listed_quanta, quanta_format
 from rotor.formats.spcat.fits.at_zero import left_at_zero
-from rotor.formats.spcat.fits.unresolved import HIGHEST_SEARCHED, excluded_parameters, refuse_far_f, spelled_out
 from rotor.formats.spcat.hamiltonian.coded_file import line_names
 from rotor.formats.spcat.hamiltonian.l_doubled import functions_by_l, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import has_other_names, named_by, naming_by, over_basis, spin_naming_by
@@ -275,3 +278,35 @@ def _row(rows: dict[tuple[int, ...], int], label: tuple[int, ...], form: Format)
         return rows.get(label, -1)
     turned = (label[0], -label[1], *label[2:])
     return rows.get(turned, -1)
+
+
+HIGHEST_SEARCHED = 9  # highest F that is tried for a level with F below 0 if |F| has none
+
+
+def excluded_parameters(file: ParameterFile) -> Ints:
+    """Places of the last NXPAR parameter lines that follow no parameter before them."""
+    first = len(file.parameters) - file.header.nxpar
+    # a constrained parameter follows the last free one above it
+    leaders = np.maximum.accumulate([0 if p.constrained else place for place, p in enumerate(file.parameters)])
+    return np.flatnonzero(leaders >= first)
+
+
+def spelled_out(labels: Ints, form: Format) -> Ints:
+    """F of labels with F below 0, with -1 replaced by minus the sum of angular momenta before it."""
+    before = -labels[:, -2 if form.spins > 1 and not form.aggregate else 0]
+    return np.where((labels[:, -1] == -1) & (before < 0), before, labels[:, -1])
+
+
+def refuse_far_f(labels: Ints, reduced: Ints, form: Format, names: tuple[str, ...], twice_spins: int) -> None:
+    """Refuse labels with F below 0 whose |F| cannot result from N and the spins.
+
+    labels (n, quanta): quantum numbers by level, N first. reduced (m,): places of labels with F below 0. form: format of the quantum
+    numbers of the file. names: names of the columns. twice_spins: twice the sum of all spins.
+    Raises MissingLevelsError with the first such label, and the places of all.
+    """
+    reduced_labels = labels[reduced]
+    far = reduced[np.abs(-spelled_out(reduced_labels, form) - reduced_labels[:, 0]) > (twice_spins + 1) // 2]
+    if len(far):
+        first = " ".join(map(str, labels[far[0]].tolist()))
+        text = f"there is no level {first} ({', '.join(names)}): F and N differ by more than the spins"
+        raise MissingLevelsError(text, far)
