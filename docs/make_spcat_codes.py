@@ -14,8 +14,7 @@ from rotor.formats.spcat.hamiltonian.code_table import split_code
 from rotor.formats.spcat.hamiltonian.codes import AXES
 from rotor.formats.spcat.hamiltonian.dipole_codes import line_moment, split_dipole
 from rotor.formats.spcat.hamiltonian.l_doubled import l_doubled_pairs
-from rotor.formats.spcat.hamiltonian.operators import code_operator
-from rotor.formats.spcat.hamiltonian.series import Series, series_term
+from rotor.formats.spcat.hamiltonian.series import Series, coded_operator
 from rotor.formats.spcat.hamiltonian.states import file_states
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import read_par
@@ -260,9 +259,7 @@ def operator_answer(code: int) -> str:
     digits = split_code(code)
     if digits.is_constant:
         return "a constant of a series"
-    if digits.is_series:
-        return answer(lambda: series_term(digits, AXES["Ir"], Series(), (0, 0)))
-    return answer(lambda: code_operator(digits, AXES["Ir"]))
+    return answer(lambda: coded_operator(digits, AXES["Ir"], Series(), (0, 0)))
 
 
 def type_rows() -> list[str]:

@@ -12,9 +12,9 @@ from typing import NamedTuple
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Symmetry, split_code
 from rotor.formats.spcat.hamiltonian.codes import basis_axes
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, l_doubled_pairs
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, k_energy
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator
 from rotor.formats.spcat.hamiltonian.phases import Phases, read_phases
-from rotor.formats.spcat.hamiltonian.series import Series, coded_operator, file_series, refuse_within_pairs
+from rotor.formats.spcat.hamiltonian.series import Series, coded_operator, file_series, level_term, refuse_within_pairs
 from rotor.formats.spcat.hamiltonian.states import StateOptions, file_states
 from rotor.formats.spcat.hamiltonian.symmetry import forbidden, l_values, symmetric_part
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
@@ -176,8 +176,7 @@ class CodedFile:
             return line
         first = firsts[states[0]]
         if level:  # half the difference of the energies of one K with K l > 0 and K l < 0
-            energy = k_energy(line.digits.level_k, line.digits.nsq, -1j if self.oblate else 1j)
-            line = line._replace(operator=CodedOperator(by_j=energy, odd=True))
+            line = line._replace(operator=level_term(line.digits, self.axes, sine=True))
         return line._replace(states=(first, first))
 
     @cached_property

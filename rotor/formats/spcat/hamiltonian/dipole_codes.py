@@ -187,8 +187,9 @@ def _fourier_moment(
     words = type_words(0, code.axis, oblate, as_spcat=as_spcat)
     if sine:
         words = tuple(word._replace(factor=imaginary(oblate) * word.factor) for word in words)
-    function_of_k = k_factor(n, sine, series, code.states)
-    return Moment(value, states[::-1], written=Written(words, bool(code.axis), factor_of_k=function_of_k))
+    factor = k_factor(n, sine, series, code.states)
+    written = Written(words, bool(code.axis), factor_of_k=lambda n, above, below: factor(n, n, above, below))
+    return Moment(value, states[::-1], written=written)
 
 
 def _meaning(code: DipoleCode) -> str:

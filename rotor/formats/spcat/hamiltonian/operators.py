@@ -5,7 +5,7 @@
 | TYP 0; 1, 2, 3; 3 + n | 1; Na², Nb², Nc²; N₊^2n + N₋^2n |
 | TYP 20, 40, 60 | Na, Nb, Nc, between states with the factor i, in an oblate basis -i |
 | TYP 21, 41, 61 | NbNc + NcNb, NaNc + NcNa, NaNb + NbNa |
-| TYP 20 + n, 40 + n, 60 + n, 11 + n | tensors of rank L made of N alone, see `_tensor_in_n`; of odd L between states with the factor i |
+| TYP 20 + n, 40 + n, 60 + n, 11 + n | tensors of rank L made of N alone, see `spin_operators`; of odd L between states with the factor i |
 | TYP 80 + n | the energy of K = 10 n + KSQ alone, with N^2NSQ |
 | I1 | one N is replaced by that spin: Σ c_ij ½{φ_pi, N_j} S_p; TYP 20, 40, 60: φ_a·S, between states |
 | I1 = I2 | two N are: (Ia² - I²/3)/(2I(2I-1)), ... |
@@ -20,26 +20,20 @@ own levels.) Any other code is refused with its meaning.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from functools import lru_cache
 
-import numpy as np
-
-from rotor.formats.spcat.hamiltonian.code_table import SPIN_ALONG_Z, Digits, Kind, Tensor, square_typ
+from rotor.formats.spcat.hamiltonian.code_table import SPIN_ALONG_Z, Digits, Kind, square_typ
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
-from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, tensor_with_spins
+from rotor.formats.spcat.hamiltonian.spin_operators import tensor_in_n, tensor_with_spins
 from rotor.frozen import dataclass
 from rotor.quantum.effects.interactions import with_powers
 from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
 from rotor.quantum.states import OperatorOfJ
-from rotor.quantum.wang.j_operators import JOperator, anticommutator, components
 from rotor.tops.operators import Operators
 
 REFUSED = {
     "commutator": "a commutator of a spin term with N² (the program's is not ½i[N², S], which C_ab-ba names here)",
-    "own": "a power of N·S of one K",
     "series": "a term of a series without the constants of its file",
     "szsz": "N_z S_z together with another operator",
 }
@@ -71,41 +65,18 @@ def code_operator(digits: Digits, axes: str) -> CodedOperator:
     _refuse(digits)
     if digits.projects_spin:  # N_z S_z of the first spin: the product of both projections on z
         digits = digits._replace(i1=1, typ=square_typ(axes[2]), ns=digits.ns - SPIN_ALONG_Z)
-    level = digits.kind is Kind.LEVEL
-    if level and digits.spins:
-        product = _with_spins(digits._replace(typ=0, ksq=0), axes)
-        k = digits.level_k
-        assert product.rotor is not None
-        restricted = multiplied(
-            product.rotor, lambda m, n, above, below: 1.0 * ((abs(above) == k) & (above == below)), 1.0, False
-        )
-        return replace(product, rotor=restricted)
     if digits.has_spin:
         return _with_spins(digits, axes)
-    if level:
-        return CodedOperator(by_j=k_energy(digits.level_k, digits.nsq))
     if digits.kind is Kind.TENSOR:
         return CodedOperator(by_j=_operator_by_j(digits, axes), odd=digits.tensor.odd)
     return CodedOperator(plain=_plain(digits, axes))
-
-
-def k_energy(k_of_code: int, n2: int, factor: complex = 0.0) -> OperatorOfJ:
-    """N^2p for functions with |K| = 10 (TYP - 80) + KSQ only; a factor ± i multiplies the sign of K."""
-
-    def operator(j: int, representation: str) -> JOperator:
-        k = np.arange(-j, j + 1)
-        diagonal = (np.abs(k) == k_of_code) * (factor * np.sign(k) if factor else 1.0)
-        return JOperator(j, {0: (j * (j + 1.0)) ** n2 * diagonal.astype(np.complex128)})
-
-    return operator
 
 
 def _refuse(d: Digits) -> None:
     """Raise ValueError for codes that are not supported."""
     reasons = {
         "commutator": d.i1 == 0 and d.i2 > 0,
-        "own": d.kind is Kind.LEVEL and bool(d.ns),
-        "series": bool(d.ff or d.ex) or d.kind is Kind.EULER,
+        "series": bool(d.ff or d.ex) or d.kind in (Kind.EULER, Kind.LEVEL),
         "szsz": d.projects_spin and (d.kind is not Kind.SCALAR or bool(d.spins)),
     }
     for reason, applies in reasons.items():
@@ -126,41 +97,9 @@ def _plain(d: Digits, axes: str) -> Operators:
 
 
 def _operator_by_j(d: Digits, axes: str) -> OperatorOfJ:
-    """Operators by J with half anticommutators of the powers, and the factor i (-i in an oblate basis) if odd under time reversal."""
-    powers = ParameterName("", d.nsq, d.ksq)
-    factor = imaginary(axes, d.tensor.odd)
-
-    def operator(j: int, representation: str) -> JOperator:
-        return with_powers(factor * _tensor_in_j(d.tensor, j, representation, axes[2]), powers)
-
-    return operator
-
-
-@lru_cache(maxsize=1024)
-def _tensor_in_j(tensor: Tensor, j: int, representation: str, z: str) -> JOperator:
-    """`_tensor_in_n` of one J, cached for the parameters of one TYP."""
-    return _tensor_in_n(tensor, components(j, representation), z)
-
-
-def _tensor_in_n(tensor: Tensor, n_abc: Mapping[str, JOperator], z: str) -> JOperator:
-    """The Hermitian operator of a tensor, from Na, Nb, Nc.
-
-    With X, Y, Z = Nc, Nb, Na (prolate) or Na, Nb, Nc (oblate), E = (X + iY)^K and {A, B} = AB + BA,
-
-        K = L:      ½ (E + E†), or (E - E†)/2i
-        K = L - 1:  ¼ √(2L) {Z, E + E†}, or {Z, E - E†}/i in its place;  Z where L = 1;  twice that without an axis
-
-    the tensor T^L_K(N) normalised as N^L times the spherical harmonic C^L_K, divided by C^L_L of its stretched component. The species
-    decides between the two forms: operators along X have X, {Y, Z}, ...; along Y: Y, {X, Z}, ...; along Z: Z, {X, Y}, ...
-    """
-    x, y = ("c", "b") if z == "a" else ("a", "b")
-    k, cosine = tensor.shape(z)
-    if k == 0:
-        return n_abc[z]
-    raised, lowered = (n_abc[x] + 1j * n_abc[y]) ** k, (n_abc[x] - 1j * n_abc[y]) ** k
-    pair = raised + lowered if cosine else -1j * (raised - lowered)  # i(raised - lowered) is Hermitian, as the sum is
-    # symmetrized products with Nz where the rank exceeds the ladder
-    return 0.5 * pair if k == tensor.rank else tensor.factor_below() * anticommutator(n_abc[z], pair)
+    """Operators by J with half anticommutators of the powers."""
+    powers, tensor = ParameterName("", d.nsq, d.ksq), tensor_in_n(d.tensor, axes)
+    return lambda j, representation: with_powers(tensor(j, representation), powers)
 
 
 def _with_spins(d: Digits, axes: str) -> CodedOperator:

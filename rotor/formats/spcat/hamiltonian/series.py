@@ -37,7 +37,7 @@ from rotor.frozen import dataclass
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.wang.j_operators import JOperator
 
-Factor = Callable[[int, Floats, Floats], Floats]  # function of J, K' and K''
+Factor = Callable[[int, int, Floats, Floats], Floats]  # function of N', N'', K' and K''
 
 
 @dataclass(frozen=True)
@@ -114,9 +114,21 @@ def series_term(d: Digits, axes: str, series: Series, states: tuple[int, int]) -
 
 def coded_operator(d: Digits, axes: str, series: Series, states: tuple[int, int] | None) -> CodedOperator:
     """The operator of a code, with a series between two states; see `code_operator` and `series_term`."""
-    if states is None or not d.is_series:
-        return code_operator(d, axes)
-    return series_term(d, axes, series, states)
+    if states is not None and d.is_series:
+        return series_term(d, axes, series, states)
+    return level_term(d, axes) if d.kind is Kind.LEVEL else code_operator(d, axes)
+
+
+def level_term(d: Digits, axes: str, sine: bool = False) -> CodedOperator:
+    """The energy of one K, |K| = 10 (TYP - 80) + KSQ; half the difference of the energies of K and -K if it is a sine."""
+    if d.ns:
+        raise ValueError("a power of N·S of one K is read but not computed yet")
+
+    def of_one_k(m: int, n: int, above: Floats, below: Floats) -> Floats:
+        chosen = (np.abs(above) == d.level_k) & (above == below)
+        return np.asarray(chosen * (np.sign(above) if sine else 1.0))
+
+    return _multiplied(code_operator(d._replace(typ=0, ksq=0), axes), of_one_k, sine, axes)
 
 
 def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float, float]:
@@ -130,7 +142,7 @@ def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
     """Factor of a Fourier term."""
     up, low = angles_by_k(n, series, states)
 
-    def factor(j: int, above: Floats, below: Floats) -> Floats:
+    def factor(m: int, n_low: int, above: Floats, below: Floats) -> Floats:
         angle = up * above + low * below
         turned = np.where(np.minimum(abs(above), abs(below)) % 2 == 1, -1.0, 1.0) if series.g12 and n % 2 else 1.0
         return np.asarray(turned * (np.where(above == -below, 0.0, np.sin(angle)) if sine else np.cos(angle)))
@@ -142,10 +154,10 @@ def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
     """Factor of an element in a Fourier term: a single K with NOFC; ½(K' + K'') for the sine of n = 0, as in the program.
 
     n: the harmonic. sine: sine or cosine. series: the constants of the file. states: the states of K' and of K''.
-    Returns: function of J, K' and K''.
+    Returns: function of N', N'', K' and K''.
     """
     if sine and n == 0:
-        return lambda j, above, below: (above + below) / 2
+        return lambda m, low, above, below: (above + below) / 2
     if n and series.nofc:
         return _sampled(n, sine)
     return _fourier(n, sine, series, states)
@@ -154,7 +166,7 @@ def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
 def _sampled(n: int, sine: bool) -> Factor:
     """Factor with NOFC, which selects a single K."""
 
-    def factor(j: int, above: Floats, below: Floats) -> Floats:
+    def factor(m: int, n_low: int, above: Floats, below: Floats) -> Floats:
         twice = above + below
         # the mean of both K, rounded up, is n
         return np.where((abs(twice) + 1) // 2 == n, np.sign(twice) if sine else 1.0, 0.0)
@@ -173,35 +185,25 @@ def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Cod
         raise ValueError(f"EX = {d.ex}: there are five Euler series, EX 1 to 5")
     a, b = (constants.get((number, *states), 0.0) for constants in (series.a, series.b))
     base = code_operator(d.base, axes)
-    if base.rotor is not None:
-        function = _euler_function(a, b, d.nsq, ksq, extra)
-        mean = lambda m, n, above, below: (function(m, above) + function(n, below)) / 2  # noqa: E731
-        return replace(base, rotor=multiplied(base.rotor, mean, 1.0, base.odd))
-    if base.by_j is not None:
+    if base.plain is None:
         return _multiplied(base, _mean(d.nsq, ksq, (a, b), extra), False, axes)
     parts = [
         _by_elements(single_j_operator({(0, 0, n): factor}), _mean(d.nsq + p, ksq + q, (a, b), extra), 1.0)
-        for (p, q, n), factor in (base.plain or {}).items()
+        for (p, q, n), factor in base.plain.items()
     ]
     return replace(base, plain=None, by_j=_summed(parts))
 
 
 def _mean(n2: int, k2: int, constants: tuple[float, float], extra: bool) -> Factor:
-    """½(f' + f'') with NSQ and KSQ, divided by D once more if `extra`."""
-    f = _euler_function(*constants, n2, k2, extra)
-    # the mean over both functions keeps the element Hermitian
-    return lambda j, above, below: 0.5 * (f(j, above) + f(j, below))
+    """½(f' + f'') with NSQ and KSQ, divided by D once more if `extra`; the mean over both functions keeps the element Hermitian."""
+    a, b = constants
 
-
-def _euler_function(a: float, b: float, n2: int, k2: int, extra: bool) -> Callable[[int, Floats], Floats]:
-    """f as a function of J and K."""
-
-    def f(j: int, k: Floats) -> Floats:
-        square = j * (j + 1.0) - k**2
+    def f(n: int, k: Floats) -> Floats:
+        square = n * (n + 1.0) - k**2
         below = 1 + a * k**2 + b * square
         return np.asarray((square / below) ** n2 * (k**2 / below) ** k2 / (below if extra else 1.0))
 
-    return f
+    return lambda m, n, above, below: 0.5 * (f(m, above) + f(n, below))
 
 
 def _summed(parts: Sequence[OperatorOfJ]) -> OperatorOfJ:
@@ -221,7 +223,7 @@ def _multiplied(base: CodedOperator, factor: Factor, sine: bool, axes: str) -> C
     phase = imaginary(axes, sine)
     whole = 1.0 / phase if base.odd else phase
     if base.rotor is not None:
-        alike = multiplied(base.rotor, lambda m, n, above, below: factor(n, above, below), whole, base.odd != sine)
+        alike = multiplied(base.rotor, factor, whole, base.odd != sine)
         return replace(base, rotor=alike, odd=base.odd != sine)
     operator_at = base.by_j or single_j_operator(base.plain or {})
     return replace(base, plain=None, by_j=_by_elements(operator_at, factor, whole), odd=base.odd != sine)
@@ -233,7 +235,7 @@ def _by_elements(operator_at: OperatorOfJ, factor: Factor, whole: complex) -> Op
     def operator(j: int, representation: str) -> JOperator:
         k = np.arange(-j, j + 1.0)
         bands = operator_at(j, representation).bands
-        return JOperator(j, {q: whole * factor(j, k + q, k) * band for q, band in bands.items()})
+        return JOperator(j, {q: whole * factor(j, j, k + q, k) * band for q, band in bands.items()})
 
     return operator
 

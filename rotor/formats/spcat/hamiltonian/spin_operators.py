@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -29,26 +30,33 @@ from rotor.tops.operators import Operators
 
 FactorOfBoth = Callable[[int, int, Floats, Floats], Floats]  # function of N', N, K', K
 OverK = Callable[[int, int, str], Complexes]  # function of N', N and the representation
+Where = tuple[int, int, str]  # N', N, representation
+Elements = Any  # over |N k⟩: an array (2N' + 1, 2N + 1), or without spins a JOperator, whose bands are few
 
 
 @lru_cache(maxsize=256)
 def tensor_with_spins(tensor: Tensor, spins: int, axes: str) -> ByElements:
-    """A tensor above second order with one or two different spins, or none, with a factor i (-i in an oblate basis) for odd rank."""
-    order = tensor.rank
-    rank = min(order, spins)
-    if not tensor.axis and not tensor.odd:
-        frame = (axes[0], axes[1], axes[2])
-        return ByElements(rank, lambda m, n, rep: _with_conjugate(order, order, rank, True, frame, (m, n, rep)))
-    k, cosine = tensor.shape(axes[2])
-    frame = ("c", "b", "a") if axes[2] == "a" else ("a", "b", "c")
-    factor = (0.5 if k == order else tensor.factor_below()) * imaginary(axes, tensor.odd)
+    """A tensor with one or two different spins, or none, with a factor i (-i in an oblate basis) for odd rank."""
+    rank = min(tensor.rank, spins)
 
     def matrix(m: int, n: int, representation: str) -> Complexes:
-        if order == 1 and k == 0:
-            return imaginary(axes, True) * _vector(frame[2], rank, (m, n, representation))
-        return factor * _with_conjugate(order, k, rank, cosine, frame, (m, n, representation))
+        if rank:
+            return np.asarray(_tensor(tensor, rank, axes, (m, n, representation)))
+        return tensor_in_n(tensor, axes)(n, representation).matrix if m == n else _nothing(m, n)
 
     return ByElements(rank, matrix, tensor.odd)
+
+
+@lru_cache(maxsize=256)
+def tensor_in_n(tensor: Tensor, axes: str) -> OperatorOfJ:
+    """A tensor of N alone, as an operator of one N; each N is computed once for the parameters of one TYP."""
+
+    @lru_cache(maxsize=1024)
+    def operator(n: int, representation: str) -> JOperator:
+        whole: JOperator = _tensor(tensor, 0, axes, (n, n, representation))
+        return whole
+
+    return operator
 
 
 def imaginary(axes: str, odd: bool) -> complex:
@@ -58,36 +66,41 @@ def imaginary(axes: str, odd: bool) -> complex:
     return 1j if axes[2] == "a" else -1j
 
 
-Where = tuple[int, int, str]  # N', N, representation
+def _tensor(tensor: Tensor, rank: int, axes: str, where: Where) -> Elements:
+    """The elements of a tensor in which spins replace as many N as its rank after contraction says.
 
-
-def _with_conjugate(
-    order: int, k: int, rank: int, cosine: bool, frame: tuple[str, str, str], where: Where
-) -> Complexes:
-    """E + E†, or (E - E†)/i, with spins replacing N; {Z, E} replaces E for K = L - 1."""
-    right = 1.0 if "".join(frame) in ("abc", "bca", "cab") else -1.0
-    up, down = (_stretched(order, rank, frame, sign, where) for sign in (1, -1))
+    E + E†, or (E - E†)/i, with {Z, E} in place of E for K = L - 1 (the head of this module); Z or φ_z where L = 1. The species decides
+    between the two forms: operators along X have X, {Y, Z}, ...; along Y: Y, {X, Z}, ...; along Z: Z, {X, Y}, ...
+    """
+    order, k, cosine = tensor.rank, tensor.rank, True
+    x, y, z, factor = axes[0], axes[1], axes[2], 1.0 + 0.0j
+    if tensor.axis or tensor.odd:
+        k, cosine = tensor.shape(z)
+        x, y = ("c", "b") if z == "a" else ("a", "b")
+        factor = (0.5 if k == order else tensor.factor_below()) * imaginary(axes, tensor.odd)
+        if k == 0:
+            return imaginary(axes, True) * _vector(z, rank, where)
+    right = 1.0 if x + y + z in ("abc", "bca", "cab") else -1.0
+    up, down = (_stretched(order, rank, (x, y, z), sign, where) for sign in (1, -1))
     if k < order:
-        up = right / order * _commutator(frame, -1, up, where)
-        down = -right / order * _commutator(frame, 1, down, where)
-    return np.asarray(up + down if cosine else -1j * (up - down))
+        up = right / order * _commutator((x, y, z), -1, up, where)
+        down = -right / order * _commutator((x, y, z), 1, down, where)
+    return factor * (up + down if cosine else -1j * (up - down))
 
 
-def _stretched(order: int, rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
+def _stretched(order: int, rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Elements:
     """A of the head of this module, or the operator with - in place of +."""
     _, n, representation = where
-    return np.asarray(_cosine_ladder(rank, frame, sign, where) @ _n(frame, sign, n, representation, order - rank))
+    of_n = _n(frame, sign, n, representation, order - rank)
+    return _cosine_ladder(rank, frame, sign, where) @ of_n.matrix if rank else of_n
 
 
 def _cosine_ladder(rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
     """φ± or φ± φ± over |N k⟩."""
     m, n, representation = where
     x, y, _ = frame
-    if rank == 0:
-        # rank 0 is a number: no change of N
-        return np.eye(2 * n + 1, dtype=np.complex128) if m == n else np.zeros((2 * m + 1, 2 * n + 1), np.complex128)
     if rank == 1:
-        return _vector(x, 1, where) + sign * 1j * _vector(y, 1, where)
+        return np.asarray(_vector(x, 1, where) + sign * 1j * _vector(y, 1, where))
     i, k = "abc".index(x), "abc".index(y)
     tensors = np.zeros((2, 3, 3))
     tensors[0, i, i], tensors[0, k, k], tensors[1, i, k], tensors[1, k, i] = 1.0, -1.0, 1.0, 1.0
@@ -97,28 +110,34 @@ def _cosine_ladder(rank: int, frame: tuple[str, str, str], sign: int, where: Whe
     return np.asarray(real + sign * 1j * imaginary)
 
 
-def _vector(axis: str, rank: int, where: Where) -> Complexes:
+def _vector(axis: str, rank: int, where: Where) -> Elements:
     """φ along an axis; for rank 0, N."""
     m, n, representation = where
     if rank == 0:
-        square = components(n, representation)[axis].matrix
-        return square if m == n else np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
+        return components(n, representation)[axis]
     along = [float(axis == letter) for letter in "abc"]
     return symmetric_top_elements(m, n, spherical_components(along, 1, representation))
 
 
 @lru_cache(maxsize=1024)
-def _n(frame: tuple[str, str, str], sign: int, n: int, representation: str, power: int) -> Complexes:
+def _n(frame: tuple[str, str, str], sign: int, n: int, representation: str, power: int) -> JOperator:
     """(N_x ± iN_y) to a power."""
     n_abc = components(n, representation)
-    return ((n_abc[frame[0]] + sign * 1j * n_abc[frame[1]]) ** power).matrix
+    return (n_abc[frame[0]] + sign * 1j * n_abc[frame[1]]) ** power
 
 
-def _commutator(frame: tuple[str, str, str], sign: int, operator: Complexes, where: Where) -> Complexes:
+def _commutator(frame: tuple[str, str, str], sign: int, operator: Elements, where: Where) -> Elements:
     """[N∓, operator]."""
     m, n, representation = where
     left, right = (_n(frame, sign, j, representation, 1) for j in (m, n))
-    return np.asarray(left @ operator - operator @ right)
+    if not isinstance(operator, JOperator):
+        return np.asarray(left.matrix @ operator - operator @ right.matrix)
+    return left @ operator - operator @ right
+
+
+def _nothing(m: int, n: int) -> Complexes:
+    """No elements between N' and N."""
+    return np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
 
 
 def multiplied(rotor: Rotor, factor: FactorOfBoth, whole: complex, odd: bool) -> ByElements:
@@ -169,14 +188,14 @@ def single_j_operator(operators: Operators) -> OperatorOfJ:
 def _power_elements(rotor: Scalar, m: int, n: int) -> Complexes:
     """Elements of powers of N."""
     if m != n:
-        return np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
+        return _nothing(m, n)
     return single_j_operator(dict(rotor.operators))(n, "").matrix
 
 
 def _with_n(c: Floats, where: Where) -> Complexes:
     """Σ c_ij ½{φ_i, N_j}."""
     m, n, representation = where
-    total = np.zeros((2 * m + 1, 2 * n + 1), dtype=np.complex128)
+    total = _nothing(m, n)
     up, low = components(m, representation), components(n, representation)
     for i, letter in enumerate("abc"):
         cosine = _vector(letter, 1, where)

@@ -99,6 +99,7 @@ def _refuse(coded: CodedFile) -> None:
         f"EWT = {first.ewt}: an l-doubled state": any(s.l_code for s in states),
         f"XOPT = {first.xopt}: NEWLZ, NOFC or G12": first.xopt >= 10,
         "KNMIN: a range of K that does not begin with 0": any(s.kmin for s in states),
+        "the energy of the only state": len(states) == 1 and any(line.digits.is_energy for line in coded.usable),
         "SPIND: spins that differ from state to state": len({s.spins for s in states}) > 1,
         "KNMAX: linear states beside others": len({s.linear for s in states}) > 1,
     }
