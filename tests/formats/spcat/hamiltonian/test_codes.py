@@ -310,6 +310,16 @@ def test_what_the_files_cannot_say_is_refused():
         model.intensity_file(Top.from_constants("B=1 MHz"), Request())
     with pytest.raises(ValueError, match=r"dipole 30001: a moment other than a plain component"):
         named_top(file_of((100, 5.0)), read_int(SAMPLES / "co_4.int"))
+    with pytest.raises(ValueError, match="the energy of the only state cannot be said"):
+        named_top(file_of((100, 5.0), (0, 1.0)))
+
+
+def test_a_constant_of_value_zero_keeps_its_name():
+    assert dict(named_top(file_of((100, 5.0), (1000, 2.0), (200, 0.0))).constants.values) == {
+        "A": 7.0,
+        "B": 5.0,
+        "DJ": 0.0,
+    }
 
 
 def test_the_symmetry_axis_is_where_the_kind_says():
