@@ -219,13 +219,11 @@ def _connects(reach: _Reach, a: SubBlock, b: SubBlock, change: Ints) -> bool:
 def sub_blocks(group: Group, levels: Levels, negative: bool) -> tuple[list[SubBlock], Ints]:
     """Sub-block and |K| of each level of a group; negative: for a symmetric top, of the component -K."""
     quanta, n = levels.quanta, levels.rotational
-    v = np.array([state.number for state in group.states])[levels.quantum("v")]
-    k = group.basis_k(levels)
+    v, k, names = group.numbers(levels), group.basis_k(levels), group.spin_names(levels)
     if "kc" in quanta:
         species = species_numbers(quanta["ka"], quanta["kc"], group.oblate)
     else:
         species = np.where(k % 2, 1 if negative else 2, 3 if negative else 0)
         species = np.where(k == 0, 3 * (n % 2), species)  # K = 0 has one function, even or odd as N
-    names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []
     pattern = pattern_numbers(group, levels, names) if names else np.zeros(len(n), dtype=np.int64)
     return [SubBlock(*row) for row in zip(v.tolist(), species.tolist(), pattern.tolist(), strict=True)], k

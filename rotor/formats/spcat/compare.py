@@ -79,8 +79,8 @@ def compare(reference: Catalogue, ours: Catalogue) -> Comparison:
     others = len(reference) + len(ours) - len(left) - len(right)
     left, right = _components_added(left, width), _components_added(right, width)
 
-    keys = _keys(left, right, width)
-    _, at_left, at_right = np.intersect1d(keys.left, keys.right, assume_unique=True, return_indices=True)
+    keys, our_keys = _keys(left, right, width)
+    _, at_left, at_right = np.intersect1d(keys, our_keys, assume_unique=True, return_indices=True)
     return Comparison(
         reference=left,
         ours=right,
@@ -176,19 +176,19 @@ def _components_added(catalogue: Catalogue, width: int) -> Catalogue:
     return merged.take(np.argsort(merged.frequency_mhz, kind="stable"))
 
 
-class _Keys(NamedTuple):
-    left: Rows
-    right: Rows
+def _numbered(*tables: NDArray[Any]) -> list[Rows]:
+    """An integer for each row of tables of labels, equal for equal labels."""
+    _, code = np.unique(np.concatenate(tables), axis=0, return_inverse=True)
+    ends = np.cumsum([len(table) for table in tables])[:-1]
+    return np.split(code.reshape(-1).astype(np.int64), ends)
 
 
-def _keys(left: Catalogue, right: Catalogue, width: int) -> _Keys:
-    """An integer for each line, from its label and its place among lines with this label."""
-    labels = np.concatenate([_labels(left, width), _labels(right, width)])
-    _, code = np.unique(labels, axis=0, return_inverse=True)
-    code = code.reshape(-1).astype(np.int64)
-    places = [_place_within(code[: len(left)]), _place_within(code[len(left) :])]
-    most = 1 + max((int(p.max(initial=0)) for p in places), default=0)
-    return _Keys(code[: len(left)] * most + places[0], code[len(left) :] * most + places[1])
+def _keys(left: Catalogue, right: Catalogue, width: int) -> list[Rows]:
+    """An integer for each line of both catalogues, from its label and its place among lines with this label."""
+    codes = _numbered(_labels(left, width), _labels(right, width))
+    places = [_place_within(code) for code in codes]
+    most = 1 + max(int(place.max(initial=0)) for place in places)
+    return [code * most + place for code, place in zip(codes, places, strict=True)]
 
 
 def _place_within(code: Rows) -> Rows:
@@ -236,15 +236,12 @@ def with_measured_lines(predicted: Catalogue, measured: Catalogue) -> Catalogue:
     width = min(_count(predicted), _count(measured))
     seen = _ground(measured, width)
     seen = seen.take(seen.tag < 0)
-    labels = np.concatenate([_labels(predicted, width), _labels(seen, width)])
-    _, code = np.unique(labels, axis=0, return_inverse=True)
-    code = code.reshape(-1)
-    predicted_code, seen_code = code[: len(predicted)], code[len(predicted) :]
+    predicted_code, seen_code = _numbered(_labels(predicted, width), _labels(seen, width))
     _, once, times = np.unique(seen_code, return_index=True, return_counts=True)
     if (times > 1).any():  # several measured lines of one label: they must be one frequency
         _refuse_two_frequencies(seen, seen_code)
 
-    source = np.full(int(code.max(initial=-1)) + 1, -1)
+    source = np.full(1 + max(int(code.max(initial=-1)) for code in (predicted_code, seen_code)), -1)
     source[seen_code[once]] = once
     row = source[predicted_code]
     is_measured = row >= 0
@@ -298,9 +295,7 @@ def without_spins(catalogue: Catalogue) -> Catalogue:
     upper, lower = (
         np.where(dropped, np.int16(BLANK), side) for side in (catalogue.quanta_upper, catalogue.quanta_lower)
     )
-    labels = np.concatenate([upper, lower], axis=1)
-    _, code = np.unique(labels, axis=0, return_inverse=True)
-    code = np.asarray(code).reshape(-1)
+    (code,) = _numbered(np.concatenate([upper, lower], axis=1))
     _, first = np.unique(code, return_index=True)
     weight = 10.0 ** (catalogue.lgint - catalogue.lgint.max(initial=-np.inf))  # scaled: no sum overflows
     total = np.bincount(code, weight)

@@ -76,6 +76,14 @@ class Group:
         """|K| of levels along the axis of the basis."""
         return levels.quantum("k" if "kc" not in levels.quanta else "kc" if self.oblate else "ka")
 
+    def numbers(self, levels: Levels) -> Ints:
+        """The state in the file of each level."""
+        return np.asarray(np.array([state.number for state in self.states])[levels.quantum("v")])
+
+    def spin_names(self, levels: Levels) -> list[str]:
+        """The quantum numbers of levels that spins add."""
+        return [name for name in levels.quanta if name not in ("v", "n", "k", "ka", "kc")] if self.spins else []
+
     def levels(self, twice_f: tuple[int, int], executor: Executor | None = None) -> Levels:
         """The levels with doubled F from the first to the last of `twice_f`, with the weights of the file.
 

@@ -99,8 +99,8 @@ def listed_quanta(group: Group, levels: Levels, form: Format, negative: bool = F
     v = levels.quantum("v")
     columns = [n, *_rotation(group, levels, v, form, negative)]
     if form.states:
-        columns.append(np.array([state.number for state in group.states])[v])
-    names = [name for name in quanta if name not in ("v", "n", "k", "ka", "kc")] if group.spins else []
+        columns.append(group.numbers(levels))
+    names = group.spin_names(levels)
     # half-integers are rounded up in these files
     totals = [(quanta[name] + 1) // 2 if name in levels.halves else quanta[name] for name in names] or [n]
     if form.aggregates(len(group.spins)):

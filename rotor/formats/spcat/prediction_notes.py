@@ -120,10 +120,9 @@ def _energies(groups: Iterable[Group], twice_f: int) -> tuple[dict[tuple[int, ..
     energies, count = dict[tuple[int, ...], float](), 0
     for group in groups:
         levels = group.levels((twice_f, twice_f))
-        numbers, quanta = np.array([state.number for state in group.states]), dict(levels.quanta)
-        v = numbers[quanta.pop("v", np.zeros(len(levels), dtype=np.int64))]
         exist = levels.weight > 0
-        labels = np.column_stack([v, *quanta.values()])[exist]
+        others = [values for name, values in levels.quanta.items() if name != "v"]
+        labels = np.column_stack([group.numbers(levels), *others])[exist]
         energies |= dict(zip(map(tuple, labels.tolist()), levels.energy_mhz[exist].tolist(), strict=True))
         count += int(levels.components[exist].sum())
     return energies, count

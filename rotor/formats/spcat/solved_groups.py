@@ -51,12 +51,6 @@ class SolvedGroup(NamedTuple):
     levels: Levels
     spread: Floats | None
 
-    @property
-    def numbers(self) -> Ints:
-        """The state in the file of each level."""
-        numbers = np.array([state.number for state in self.group.states])
-        return np.asarray(numbers[self.levels.quantum("v")])
-
 
 def solved_groups(parameters: ParameterFile, groups: list[Group], request: Request, form: Format) -> list[SolvedGroup]:
     """The levels of all groups from FBGN to FEND, with their errors; levels of states above MAXV have weight 0.
@@ -70,7 +64,7 @@ def solved_groups(parameters: ParameterFile, groups: list[Group], request: Reque
         solved_group = SolvedGroup(group, levels, _spread(group, levels, names, factor))
         if request.maxv >= 0 and form.states:
             # a weight of 0 leaves the level out of lines, but in the table
-            weight = np.where(solved_group.numbers <= request.maxv, levels.weight, 0)
+            weight = np.where(group.numbers(levels) <= request.maxv, levels.weight, 0)
             solved_group = solved_group._replace(levels=replace(levels, weight=weight))
         solved.append(solved_group)
     if not any((each.levels.weight > 0).any() for each in solved):
@@ -141,7 +135,7 @@ def _joined(solved: Sequence[SolvedGroup], form: Format) -> Levels:
     most = max(tables, key=lambda levels: len(levels.quanta))
     quanta: dict[str, Ints] = {}
     if form.states:
-        quanta["v"] = np.concatenate([each.numbers for each in solved])
+        quanta["v"] = np.concatenate([each.group.numbers(each.levels) for each in solved])
     for name in [name for name in most.quanta if name != "v"]:
         quanta[name] = np.concatenate([_column(levels, name, most) for levels in tables])
     joined: dict[str, Any] = {

@@ -109,7 +109,9 @@ def test_derivatives_are_differences(name: str):
             both = []
             for sign in (1, -1):
                 lines = tuple(
-                    line._replace(value=line.value + sign * step) if line.name == name_of else line
+                    line._replace(parameter=replace(line.parameter, value=line.parameter.value + sign * step))
+                    if line.name == name_of
+                    else line
                     for line in group.effect.lines
                 )
                 moved = replace(group, effect=replace(group.effect, lines=lines))

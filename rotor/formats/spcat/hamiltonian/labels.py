@@ -24,18 +24,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, clear_functions, connected_groups
-from rotor.quantum.label_tracking import Follows, NamedFunctions, Naming
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.parts import assigned, names_of_block
 from rotor.quantum.wang.basis import WangBlock, names_of
+
+if TYPE_CHECKING:
+    from rotor.quantum.label_tracking import NamedFunctions, Naming
 
 BY_DIAG = (1, 2, 4, 5)  # values of DIAG whose labels differ from the default ones
 _OF_WANG = (0, 2)  # values of DIAG that group by Wang blocks
@@ -100,20 +101,12 @@ def renamed(levels: Levels, tables: Sequence[Ints], shares: Sequence[Floats]) ->
 
 def naming_by(diag: int, oblate: bool, diagonal: Diagonal = Diagonal.RISES) -> Naming:
     """Rule that labels states without spins while constants change."""
-    return partial(_named_functions, diag, oblate, diagonal)
 
+    def named(blocks: Sequence[tuple[int, WangBlock]], representation: str) -> NamedFunctions:
+        functions = _joined([(v, basis, None, np.empty((basis.size, 0))) for v, basis in blocks], representation)
+        return _named_functions(functions, None, diag, oblate, diagonal)
 
-def _named_functions(
-    diag: int, oblate: bool, diagonal: Diagonal, blocks: Sequence[tuple[int, WangBlock]], representation: str
-) -> NamedFunctions:
-    pieces = [(v, basis, None, np.empty((basis.size, 0))) for v, basis in blocks]
-    functions = _joined(pieces, representation)
-
-    def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        at = places(functions._replace(amplitudes=vectors), -energies if oblate else energies, diag, diagonal)
-        return functions.names[at]
-
-    return NamedFunctions(_groups(functions, diag), namer, _follows(diag, diagonal))
+    return named
 
 
 def spin_naming_by(
@@ -121,25 +114,31 @@ def spin_naming_by(
 ) -> NamedFunctions:
     """Rule that labels the states of a block with spins while constants change, over its basis functions."""
     functions = wang_functions(over_basis(block), representation)
-    turn, row_of_function = functions.amplitudes, functions.amplitudes.argmax(axis=1)
-    groups = np.empty(len(turn), dtype=np.int64)
-    groups[row_of_function] = _groups(functions, diag)
+    return _named_functions(functions, functions.amplitudes, diag, oblate, diagonal)
+
+
+def _named_functions(
+    functions: Functions, turn: Floats | None, diag: int, oblate: bool, diagonal: Diagonal
+) -> NamedFunctions:
+    """Rule of DIAG; turn: the functions in rows over the basis of the eigenvectors, None where they are this basis."""
+    from rotor.quantum.label_tracking import Follows, NamedFunctions
+
+    groups = _groups(functions, diag)
+    if turn is not None:
+        groups = groups[np.argsort(turn.argmax(axis=1))]
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:
-        at = places(functions._replace(amplitudes=turn @ vectors), -energies if oblate else energies, diag, diagonal)
+        amplitudes = vectors if turn is None else turn @ vectors
+        at = places(functions._replace(amplitudes=amplitudes), -energies if oblate else energies, diag, diagonal)
         return functions.names[at]
 
-    return NamedFunctions(groups, namer, _follows(diag, diagonal))
+    changes = diagonal is not Diagonal.RISES or diag in _ANEW
+    return NamedFunctions(groups, namer, Follows.NOTHING if changes else Follows.GROUPS)
 
 
 def _groups(functions: Functions, diag: int) -> Ints:
     """The group of each function in which levels are labelled by their order."""
     return np.arange(len(functions.k)) if diag == 1 else functions.wang if diag in _OF_WANG else functions.pattern
-
-
-def _follows(diag: int, diagonal: Diagonal) -> Follows:
-    """How labels are followed while constants change."""
-    return Follows.NOTHING if diagonal is not Diagonal.RISES or diag in _ANEW else Follows.GROUPS
 
 
 def has_other_names(levels: Levels, diag: int, diagonal: Diagonal) -> bool:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -25,13 +24,12 @@ from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Rot
 from rotor.quantum.states import OperatorOfJ
 from rotor.quantum.symmetric_top_elements import symmetric_top_elements
 from rotor.quantum.tensors import Complexes, spherical_components
-from rotor.quantum.wang.j_operators import JOperator, components, identity, lowering, raising
+from rotor.quantum.wang.j_operators import JOperator, anticommutator, components, identity, lowering, raising
 from rotor.tops.operators import Operators
 
 FactorOfBoth = Callable[[int, int, Floats, Floats], Floats]  # function of N', N, K', K
 OverK = Callable[[int, int, str], Complexes]  # function of N', N and the representation
 Where = tuple[int, int, str]  # N', N, representation
-Elements = Any  # over |N k⟩: an array (2N' + 1, 2N + 1), or without spins a JOperator, whose bands are few
 
 
 @lru_cache(maxsize=256)
@@ -41,7 +39,7 @@ def tensor_with_spins(tensor: Tensor, spins: int, axes: str) -> ByElements:
 
     def matrix(m: int, n: int, representation: str) -> Complexes:
         if rank:
-            return np.asarray(_tensor(tensor, rank, axes, (m, n, representation)))
+            return _tensor(tensor, rank, axes, (m, n, representation))
         return tensor_in_n(tensor, axes)(n, representation).matrix if m == n else _nothing(m, n)
 
     return ByElements(rank, matrix, tensor.odd)
@@ -49,12 +47,32 @@ def tensor_with_spins(tensor: Tensor, spins: int, axes: str) -> ByElements:
 
 @lru_cache(maxsize=256)
 def tensor_in_n(tensor: Tensor, axes: str) -> OperatorOfJ:
-    """A tensor of N alone, as an operator of one N; each N is computed once for the parameters of one TYP."""
+    """A tensor of N alone, as an operator of one N; each N is computed once for the parameters of one TYP.
+
+    With X, Y, Z = Nc, Nb, Na (prolate) or Na, Nb, Nc (oblate), E = (X + iY)^K and {A, B} = AB + BA,
+
+        K = L:      ½ (E + E†), or (E - E†)/2i
+        K = L - 1:  ¼ √(2L) {Z, E + E†}, or {Z, E - E†}/i in its place;  Z where L = 1;  twice that without an axis
+
+    the tensor T^L_K(N) normalised as N^L times the spherical harmonic C^L_K, divided by C^L_L of its stretched component. The species
+    decides between the two forms: operators along X have X, {Y, Z}, ...; along Y: Y, {X, Z}, ...; along Z: Z, {X, Y}, ...
+    """
+    x, y = ("c", "b") if axes[2] == "a" else ("a", "b")
+    k, cosine = tensor.shape(axes[2])
+    factor = imaginary(axes, tensor.odd)
 
     @lru_cache(maxsize=1024)
     def operator(n: int, representation: str) -> JOperator:
-        whole: JOperator = _tensor(tensor, 0, axes, (n, n, representation))
-        return whole
+        n_abc = components(n, representation)
+        along = n_abc[axes[2]]
+        if k == 0:
+            return factor * along
+        raised, lowered = (n_abc[x] + 1j * n_abc[y]) ** k, (n_abc[x] - 1j * n_abc[y]) ** k
+        pair = (
+            raised + lowered if cosine else -1j * (raised - lowered)
+        )  # i(raised - lowered) is Hermitian, as the sum is
+        # symmetrized products with Nz where the rank exceeds the ladder
+        return factor * (0.5 * pair if k == tensor.rank else tensor.factor_below() * anticommutator(along, pair))
 
     return operator
 
@@ -66,12 +84,8 @@ def imaginary(axes: str, odd: bool) -> complex:
     return 1j if axes[2] == "a" else -1j
 
 
-def _tensor(tensor: Tensor, rank: int, axes: str, where: Where) -> Elements:
-    """The elements of a tensor in which spins replace as many N as its rank after contraction says.
-
-    E + E†, or (E - E†)/i, with {Z, E} in place of E for K = L - 1 (the head of this module); Z or φ_z where L = 1. The species decides
-    between the two forms: operators along X have X, {Y, Z}, ...; along Y: Y, {X, Z}, ...; along Z: Z, {X, Y}, ...
-    """
+def _tensor(tensor: Tensor, rank: int, axes: str, where: Where) -> Complexes:
+    """The elements of `tensor_in_n` with as many spins in place of N as the rank after contraction says; φ_z for Z where L = 1."""
     order, k, cosine = tensor.rank, tensor.rank, True
     x, y, z, factor = axes[0], axes[1], axes[2], 1.0 + 0.0j
     if tensor.axis or tensor.odd:
@@ -79,20 +93,19 @@ def _tensor(tensor: Tensor, rank: int, axes: str, where: Where) -> Elements:
         x, y = ("c", "b") if z == "a" else ("a", "b")
         factor = (0.5 if k == order else tensor.factor_below()) * imaginary(axes, tensor.odd)
         if k == 0:
-            return imaginary(axes, True) * _vector(z, rank, where)
+            return imaginary(axes, True) * _vector(z, where)
     right = 1.0 if x + y + z in ("abc", "bca", "cab") else -1.0
     up, down = (_stretched(order, rank, (x, y, z), sign, where) for sign in (1, -1))
     if k < order:
         up = right / order * _commutator((x, y, z), -1, up, where)
         down = -right / order * _commutator((x, y, z), 1, down, where)
-    return factor * (up + down if cosine else -1j * (up - down))
+    return np.asarray(factor * (up + down if cosine else -1j * (up - down)))
 
 
-def _stretched(order: int, rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Elements:
+def _stretched(order: int, rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
     """A of the head of this module, or the operator with - in place of +."""
     _, n, representation = where
-    of_n = _n(frame, sign, n, representation, order - rank)
-    return _cosine_ladder(rank, frame, sign, where) @ of_n.matrix if rank else of_n
+    return np.asarray(_cosine_ladder(rank, frame, sign, where) @ _n(frame, sign, n, representation, order - rank))
 
 
 def _cosine_ladder(rank: int, frame: tuple[str, str, str], sign: int, where: Where) -> Complexes:
@@ -100,7 +113,7 @@ def _cosine_ladder(rank: int, frame: tuple[str, str, str], sign: int, where: Whe
     m, n, representation = where
     x, y, _ = frame
     if rank == 1:
-        return np.asarray(_vector(x, 1, where) + sign * 1j * _vector(y, 1, where))
+        return _vector(x, where) + sign * 1j * _vector(y, where)
     i, k = "abc".index(x), "abc".index(y)
     tensors = np.zeros((2, 3, 3))
     tensors[0, i, i], tensors[0, k, k], tensors[1, i, k], tensors[1, k, i] = 1.0, -1.0, 1.0, 1.0
@@ -110,29 +123,25 @@ def _cosine_ladder(rank: int, frame: tuple[str, str, str], sign: int, where: Whe
     return np.asarray(real + sign * 1j * imaginary)
 
 
-def _vector(axis: str, rank: int, where: Where) -> Elements:
-    """φ along an axis; for rank 0, N."""
+def _vector(axis: str, where: Where) -> Complexes:
+    """φ along an axis."""
     m, n, representation = where
-    if rank == 0:
-        return components(n, representation)[axis]
     along = [float(axis == letter) for letter in "abc"]
     return symmetric_top_elements(m, n, spherical_components(along, 1, representation))
 
 
 @lru_cache(maxsize=1024)
-def _n(frame: tuple[str, str, str], sign: int, n: int, representation: str, power: int) -> JOperator:
+def _n(frame: tuple[str, str, str], sign: int, n: int, representation: str, power: int) -> Complexes:
     """(N_x ± iN_y) to a power."""
     n_abc = components(n, representation)
-    return (n_abc[frame[0]] + sign * 1j * n_abc[frame[1]]) ** power
+    return ((n_abc[frame[0]] + sign * 1j * n_abc[frame[1]]) ** power).matrix
 
 
-def _commutator(frame: tuple[str, str, str], sign: int, operator: Elements, where: Where) -> Elements:
+def _commutator(frame: tuple[str, str, str], sign: int, operator: Complexes, where: Where) -> Complexes:
     """[N∓, operator]."""
     m, n, representation = where
     left, right = (_n(frame, sign, j, representation, 1) for j in (m, n))
-    if not isinstance(operator, JOperator):
-        return np.asarray(left.matrix @ operator - operator @ right.matrix)
-    return left @ operator - operator @ right
+    return np.asarray(left @ operator - operator @ right)
 
 
 def _nothing(m: int, n: int) -> Complexes:
@@ -198,7 +207,7 @@ def _with_n(c: Floats, where: Where) -> Complexes:
     total = _nothing(m, n)
     up, low = components(m, representation), components(n, representation)
     for i, letter in enumerate("abc"):
-        cosine = _vector(letter, 1, where)
+        cosine = _vector(letter, where)
         for k, other in enumerate("abc"):
             if c[i, k]:
                 total += c[i, k] / 2 * (cosine @ low[other].matrix + up[other].matrix @ cosine)
