@@ -7,6 +7,7 @@ of odd rank i times real, their squares summed over all M the line strengths.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -19,20 +20,29 @@ def connections(blocks: Sequence[AnyBlock], tensors: Tensors) -> Connections:
     """Every pair (up, low) of blocks that the tensors connect, and the function that returns their reduced elements (n_up, n_low).
 
     Each pair occurs once, the higher or equal J (or F) first, J rising; a block with itself where it has elements between its states.
+    The function can be sent to another process.
     """
     if not blocks:
-        return [], lambda up, low: np.zeros((0, 0))
+        return [], no_elements
     if blocks[0].alone:
         tensor = tensors[0, 0]
-        return list(connected_wang_blocks(blocks, tensor)), lambda up, low: wang_amplitudes(up, low, tensor)
+        return list(connected_wang_blocks(blocks, tensor)), partial(wang_amplitudes, tensor=tensor)
     if blocks[0].with_spins:
         from rotor.quantum.spins.many_f_lines import connections_of, tensor_moments
 
         return connections_of(blocks, tensor_moments(blocks[0].shared, tensors))
     pairs = list(pairs_where(blocks, rank_of(tensors), lambda up, low: _connects(up, low, tensors)))
-    if blocks[0].moments is not None:
-        return pairs, lambda up, low: np.sqrt(up.components) * np.abs(up.moments.reduced(up, low, tensors))
-    return pairs, lambda up, low: _coupled_amplitudes(up, low, tensors)
+    return pairs, partial(_coupled_amplitudes if blocks[0].moments is None else _by_moments, tensors=tensors)
+
+
+def no_elements(up: AnyBlock, low: AnyBlock) -> Floats:
+    """Elements of an operator that connects no blocks."""
+    return np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
+
+
+def _by_moments(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> Floats:
+    assert up.moments is not None
+    return np.asarray(np.sqrt(up.components) * np.abs(up.moments.reduced(up, low, tensors)))
 
 
 def _coupled_amplitudes(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> Floats:

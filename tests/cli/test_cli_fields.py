@@ -135,12 +135,16 @@ def test_stark_with_the_spin_of_a_nucleus(call):
     assert Path("a.png").stat().st_size > 10_000
 
 
-@pytest.mark.slow
-def test_workers_change_no_number(call):
+@pytest.mark.parametrize(
+    "arguments",
+    [("H2O", "--states", "J<=1", "--tilt", "30", "--intensity", "1e8 W/cm2"), ("formamide", "--hyperfine", "--states", "J<=0")],
+    ids=["one state", "spins"],
+)  # fmt: skip
+def test_workers_change_no_number(call, arguments):
+    """Blocks of states go to other processes with what computes their elements."""
     results = []
     for workers in ("1", "2"):
-        arguments = ("H2O", "--field", "0,100", "--states", "J<=1", "--tilt", "30", "--intensity", "1e11 W/cm2")
-        code, out, err = call("stark", *arguments, "--workers", workers, "--json", "-")
+        code, out, err = call("stark", *arguments, "--field", "0,1", "--workers", workers, "--json", "-")
         assert (code, err) == (0, "")
         results.append(json.loads(out)["states"])
     assert results[0] == results[1]

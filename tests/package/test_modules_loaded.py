@@ -39,7 +39,8 @@ LOADED = {  # of FAMILIES, what a kind has a use for
     "emission": {"rotor.spectra", "rotor.spectra.emission"},
     "fit": {"rotor.fitting", "rotor.spectra", "rotor.quantum.effects.interactions", *SPINS_NAMED},
     "fluid": {"rotor.fluids", "rotor.classical", "rotor.classical.gas", "ase", "numba"},
-    "assign": {"rotor.assignment", "rotor.fitting", "rotor.spectra", "rotor.quantum.effects.interactions", "numba", *SPINS_NAMED},
+    "assign": {"rotor.assignment", "rotor.observed", "rotor.fitting", "rotor.spectra", "rotor.quantum.effects.interactions", "numba"}
+    | SPINS_NAMED,
 }  # fmt: skip
 OCS = 'molecule = "OCS"\n'
 BODY = "[body]\nmoments = [1.0, 2.0, 3.0]\nangular_velocity = [1.0, 2.0, 3.0]\n"

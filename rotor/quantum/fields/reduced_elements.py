@@ -18,7 +18,7 @@ from rotor.arrays import Floats
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import AnyBlock, Connections, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.reduced import connections, pairs_where
+from rotor.quantum.reduced import connections, no_elements, pairs_where
 
 Pair = tuple[int, int]  # numbers of blocks, the higher or equal F first
 
@@ -80,7 +80,7 @@ class ReducedElements:
                 self._acting[operator.key] = _magnetic_connections(operator, self.states, self.blocks)
             else:
                 tensors = operator.tensors(self.states, self.representation)
-                self._acting[operator.key] = connections(self.blocks, tensors) if tensors else ([], _no_elements)
+                self._acting[operator.key] = connections(self.blocks, tensors) if tensors else ([], no_elements)
         return self._acting[operator.key]
 
     def between(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
@@ -131,11 +131,6 @@ def _magnetic_connections(magnet: Magnet, states: Sequence[int], blocks: Sequenc
     moments = [Moment(1.0, (v, v), tensor=g) for v in states]
     moments += [Moment(value, (v, v), spin=name) for v in states for name, value in nuclei]
     return connections_of(blocks, spin_moments(shared, moments))
-
-
-def _no_elements(up: AnyBlock, low: AnyBlock) -> Floats:
-    """Elements of an operator that connects no blocks."""
-    return np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
 
 
 def _rotational_moment(g: Floats, up: SolvedBlock, low: SolvedBlock, representation: str) -> Floats | None:

@@ -9,7 +9,7 @@ see `coupling.moment_coefficients`, which has the coefficients of magnetic momen
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import product
 from typing import Any, NamedTuple
@@ -155,7 +155,11 @@ def connections_of(blocks: Sequence[Any], moments: Moments) -> Connections:
                 sizes = len(block_at[up].energies_mhz), len(block_at[low].energies_mhz)
                 elements[up, low] = rows.amplitudes[place, : sizes[0], : sizes[1]].copy()
     pairs = [(block_at[up], block_at[low]) for up, low in sorted(elements, key=lambda pair: pair[::-1])]
-    return pairs, lambda up, low: elements[up.start, low.start]
+    return pairs, partial(_between_blocks, elements)
+
+
+def _between_blocks(elements: Mapping[tuple[int, int], Floats], up: SpinBlock, low: SpinBlock) -> Floats:
+    return elements[up.start, low.start]
 
 
 def groups_of_blocks(blocks: Sequence[SpinBlock], levels: int) -> list[GroupStates]:
