@@ -22,12 +22,16 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.fields.axial import AxialSpace
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.map_request import MapRequest, terms_over
 from rotor.quantum.fields.solver import DENSE, Matrix, Terms, solve_fields, solve_together
 
 FIRST_BASIS = 64
 HELD = 1 << 17  # most numbers in a temporary array: more leave the cache
+# states solved above a few followed ones, of which the rest may lower one below them; states of one K, which differ in J alone, do
+# not come close
+ABOVE = 2
 PART_OF_TOLERANCE = 0.1  # share of the tolerance for states below J max that a basis leaves out
 
 
@@ -68,7 +72,11 @@ def solve_blocks(
 ) -> list[BlockStates]:
     """The states that a map follows in blocks of the space of `jmax + request.margin`; the bound of truncation is added to the solver's."""
     orders = [basis_order(block, jmax) for block, _ in blocks]
-    counts = [count_of(request, block, order) for (block, _), order in zip(blocks, orders, strict=True)]
+    followed = [count_of(request, block, order) for (block, _), order in zip(blocks, orders, strict=True)]
+    counts = [
+        count if isinstance(block.space, AxialSpace) else min(len(order), count + count // 4 + ABOVE)
+        for (block, _), order, count in zip(blocks, orders, followed, strict=True)
+    ]
     bases = [
         enough_states(terms, order, count, fields, request.tolerance_mhz)
         for (_, terms), order, count in zip(blocks, orders, counts, strict=True)
@@ -79,11 +87,18 @@ def solve_blocks(
         parts = [terms_over(terms, places) for (_, terms), (places, _) in zip(blocks, bases, strict=True)]
         solved = solve_together(list(zip(parts, counts, strict=True)), fields, request.tolerance_mhz)
     out = []
-    for (block, terms), order, (places, _), states in zip(blocks, orders, bases, solved, strict=True):
+    for (block, terms), order, count, (places, _), states in zip(blocks, orders, followed, bases, solved, strict=True):
         energies, vectors, error = states
-        bound = error + left_out_mhz(terms, places, energies, vectors, fields)
-        out.append(BlockStates(block, block.rows[order[: energies.shape[1]]], energies, places, vectors, bound))
+        bound = _by_rank(energies, error + left_out_mhz(terms, places, energies, vectors, fields))[:, :count]
+        out.append(
+            BlockStates(block, block.rows[order[:count]], energies[:, :count], places, vectors[:, :, :count], bound)
+        )
     return out
+
+
+def _by_rank(energies: Floats, error: Floats) -> Floats:
+    """Errors (f, s) of the energy of each rank: a state above, which the rest lowers further, may take its place."""
+    return np.maximum(error, energies - np.sort(energies - error, axis=1))
 
 
 def solve_block(request: MapRequest, block: FieldBlock, fields: Floats, jmax: int) -> BlockStates:
