@@ -108,6 +108,7 @@ class ParameterFile:
     title_text: str = field(default="", compare=False)
 
 
+MOST_STATES = 999
 _HEADER, _OPTIONS = freeform.defaults_of(Header), freeform.defaults_of(Options)
 
 
@@ -164,6 +165,11 @@ def _options(line: Line, defaults: Options) -> Options:
     words = spins + freeform.read_words(line, rest, len(_OPTIONS) - 1)[0]
     defaults = replace(defaults, vsym=0)
     values = freeform.numbers(line, words, {name: getattr(defaults, name) for name in _OPTIONS})
+    if abs(values["nvib"]) > MOST_STATES:
+        raise line.error(
+            0,
+            f"NVIB is {values['nvib']}; expected at most {MOST_STATES} states, as codes have three digits for a state",
+        )
     return Options(chr=(letter and (letter[1] or letter[2])) or defaults.chr, **values, text=line.text)
 
 

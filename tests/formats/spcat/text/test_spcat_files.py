@@ -141,6 +141,7 @@ def test_options_left_out_have_defaults():
         (b"t\nx\na 1\n", r"line 2, column 1: 'x' is no number"),
         (b"t\n\na 1\n", r"line 2, column 1: NPAR is missing"),
         (b"t\n-1\na 1\n", r"line 2, column 1: NPAR is -1"),
+        (b"t\n1\na 1 1000\n", r"line 3, column 1: NVIB is 1000; expected at most 999 states"),
         (b"t\n1.5\na 1\n", r"NPAR = 1.5: expected a whole number"),
         (b"t\n1\na 1 1 0 20 0 1 one\n", r"line 3, column 16: 'one' is no number"),
         (b"t\n1\na 1 1 0 20 0 1 1 1 -1\n", "line 3, .*another option line"),
