@@ -23,9 +23,9 @@ def _file(parameters, options="a 1 1 0 20 0 1 1 1 0 1 0\n"):
 
 
 def _energies(file, j):
-    (group,) = connected_groups(file, IntensityFile("", Request(), ()))
-    levels = group.levels((2 * j, 2 * j))
-    return np.sort(levels.energy_mhz[levels.rotational == j])
+    groups = connected_groups(file, IntensityFile("", Request(), ()))
+    levels = [group.levels((2 * j, 2 * j)) for group in groups]
+    return np.sort(np.concatenate([each.energy_mhz[each.rotational == j] for each in levels]))
 
 
 def _plain(j):
@@ -110,6 +110,18 @@ def test_newlz_names_the_sign_of_l():
     assert np.array_equal(plain.energy_lower_cm, explicit.energy_lower_cm)
     with pytest.raises(ValueError, match="with NEWLZ"):
         predict(_file((*common, (200011, -277854.0)), options[10]), request)
+
+
+def test_half_the_difference_of_the_energies_of_one_k():
+    """With NEWLZ TYP 80 of the state with K l ≤ 0 raises K = 1 with K l > 0 and lowers K = 1 with K l < 0 by as much."""
+    option_card = "s -1 {n} 0 20 0 6 2 2 {more} {ewt} 1 10\n"
+    options = "".join(option_card.format(n=n, more=m, ewt=e) for n, m, e in [(3, -1, 1), (1, -1, 101), (2, 0, 201)])
+    common = ((1099, 148900.0), (199, 9198.9), (11, 3.0e5), (200022, -277854.0))  # K l > 0 lies lower
+    plain, moved = (_energies(_file((*common, *more), options), 1) for more in ((), ((801022, 50.0),)))
+    shifts = np.sort(moved) - np.sort(plain)
+    assert np.unique(np.round(shifts, 6)).tolist() == [-50, 0, 50]
+    energy = np.sort(plain)
+    assert energy[shifts > 25].max() < energy[shifts < -25].min()
 
 
 def test_moments_of_other_kinds_with_errors_of_constants():
