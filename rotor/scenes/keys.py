@@ -64,7 +64,7 @@ def _file_keys(outputs: tuple[Output, ...]) -> dict[str, Field]:
     return files
 
 
-def keys_of(structure: Any) -> Keys:
+def declared_keys(structure: Any) -> Keys:
     """Keys of a table that a dataclass of declared fields describes."""
     return {field.last: field for field in all_fields(structure).values()}
 
@@ -88,7 +88,7 @@ def kinds_in(hint: Any) -> tuple[Any, ...]:
     return get_args(hint) if isinstance(hint, UnionType) else (hint,)
 
 
-def kinds_of(field: Field) -> tuple[Any, ...]:
+def value_kinds(field: Field) -> tuple[Any, ...]:
     """The types that a value of a field may have, that of its word for None among them."""
     return (*kinds_in(field.reader.scene_type), *([str] if field.none else []))
 
@@ -149,7 +149,7 @@ def checked_table(keys: Keys, values: Any, place: str) -> dict[str, Any]:
 def checked_value(field: Field, value: Any, place: str) -> Any:
     """The value of a key; ValueError, with its place, for a value of a wrong type."""
     if not isinstance(field.reader, Choices):
-        return _typed(value, kinds_of(field), place)
+        return _typed(value, value_kinds(field), place)
     if not isinstance(value, list | tuple):
         raise _wrong_type(place, value, (list,))
     return [_chosen(field.reader, item, f"{place}[{number}]") for number, item in enumerate(value)]
@@ -166,7 +166,7 @@ def _chosen(choices: Choices, item: Any, place: str) -> dict[str, Any]:
     if not isinstance(kind, str):
         raise _wrong_type(f"{place}.{word}", kind, (str,)) if kind is not None else _wrong_type(place, item, (dict,))
     rest = {key: value for key, value in item.items() if key != word}
-    return {word: kind, **checked_table(keys_of(kinds[kind]), rest, place)}
+    return {word: kind, **checked_table(declared_keys(kinds[kind]), rest, place)}
 
 
 def _typed(value: Any, kinds: tuple[Any, ...], place: str) -> Any:
@@ -176,7 +176,7 @@ def _typed(value: Any, kinds: tuple[Any, ...], place: str) -> Any:
         if base is Any:
             return value
         if is_dataclass(base) and isinstance(value, Mapping):
-            return checked_table(keys_of(base), value, place)
+            return checked_table(declared_keys(base), value, place)
         if base is list and isinstance(value, list | tuple):
             return [_typed(item, kinds_in(inner[0]), f"{place}[{number}]") for number, item in enumerate(value)]
         if base is dict and isinstance(value, Mapping):

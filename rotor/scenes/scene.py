@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.frozen import dataclass
 from rotor.requests.accuracy import Stated
 from rotor.requests.choices import nearest
-from rotor.scenes.keys import UnknownKeyError, checked_table, inner_tables, keys_of, tables_of
+from rotor.scenes.keys import UnknownKeyError, checked_table, declared_keys, inner_tables, tables_of
 from rotor.verbs.calculation import Outcome
 from rotor.verbs.verb import SCENE_VERBS, Verb, verb_of
 
@@ -125,7 +125,7 @@ def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
 
     Raises ValueError for an unknown version or kind, unknown keys and wrong types.
     """
-    verb = _verb_of(content.get("schema"), content.get("kind"), where)
+    verb = _kind_verb(content.get("schema"), content.get("kind"), where)
     tables = tables_of(verb)
     values = {key: value for key, value in content.items() if key not in ("schema", "kind")}
     try:
@@ -141,7 +141,7 @@ def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
     return Scene(verb.name, head | {name: table for name, table in inner.items() if table})
 
 
-def _verb_of(schema: Any, kind: Any, where: str) -> Verb:
+def _kind_verb(schema: Any, kind: Any, where: str) -> Verb:
     if schema != SCHEMA:
         problem = "it has none" if schema is None else f"this one has {schema!r}"
         raise ValueError(f"{where}: expected schema = {SCHEMA}, the version of the format, and {problem}")
@@ -157,7 +157,7 @@ def _other_place(key: str, verb: Verb) -> str:
     first = tables.pop("")
     if key in first or key in tables:
         return "; it stands before the first table"
-    tables |= {name: keys_of(part) for name, field in first.items() for part in inner_tables(field).values()}
+    tables |= {name: declared_keys(part) for name, field in first.items() for part in inner_tables(field).values()}
     places = [name for name, keys in tables.items() if key in keys]
     return f"; it is a key of {' and '.join(f'[{name}]' for name in places)}" if places else ""
 

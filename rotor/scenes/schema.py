@@ -8,7 +8,7 @@ from typing import Any, get_args, get_origin
 
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, Field
-from rotor.scenes.keys import Keys, about, keys_of, kinds_in, kinds_of, shown_default, tables_of
+from rotor.scenes.keys import Keys, about, declared_keys, kinds_in, shown_default, tables_of, value_kinds
 from rotor.scenes.scene import SCHEMA
 from rotor.verbs.verb import SCENE_VERBS, verb_of
 
@@ -72,10 +72,10 @@ def _field_schema(field: Field) -> dict[str, Any]:
     if field.example is not None:
         described["examples"] = [field.example]
     if not isinstance(field.reader, Choices):
-        return _type_schema(kinds_of(field)) | described
+        return _type_schema(value_kinds(field)) | described
     word = field.reader.word
     kinds = {
-        name: table_schema(keys_of(kind), (kind.__doc__ or "").splitlines()[0], (word, name))
+        name: table_schema(declared_keys(kind), (kind.__doc__ or "").splitlines()[0], (word, name))
         for name, kind in field.reader.load().items()
     }
     return {"type": "array", "items": {"anyOf": list(kinds.values())}} | described
@@ -89,7 +89,7 @@ def _type_schema(kinds: tuple[Any, ...]) -> dict[str, Any]:
         if base is Any:
             schemas.append({})
         elif is_dataclass(base):
-            schemas.append(table_schema(keys_of(base), (base.__doc__ or "").splitlines()[0]))
+            schemas.append(table_schema(declared_keys(base), (base.__doc__ or "").splitlines()[0]))
         elif base is list:
             schemas.append({"type": "array", "items": _type_schema(kinds_in(inner[0]))})
         elif base is dict:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rotor.requests.field import Field
-from rotor.scenes.keys import Keys, about, inner_tables, is_list, keys_of, shown_default, tables_of
+from rotor.scenes.keys import Keys, about, declared_keys, inner_tables, is_list, shown_default, tables_of
 from rotor.scenes.scene import SCHEMA
 from rotor.scenes.scene_file import toml_value
 from rotor.verbs.verb import SCENE_VERBS, Verb, verb_of
@@ -50,7 +50,7 @@ def _lines(verb: Verb) -> Iterator[str]:
         else:
             inner[key] = field
     for key, field in inner.items():
-        keys = keys_of(next(iter(inner_tables(field).values())))
+        keys = declared_keys(next(iter(inner_tables(field).values())))
         is_example = is_list(field) and shown_default(field) is not None
         tag = [TAGS[key]] if key in TAGS else []
         yield from _table(

@@ -26,7 +26,7 @@ from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins
-from rotor.quantum.spins.parts import assigned, functions_by_sub_block, labels_by_shares, names_of_block
+from rotor.quantum.spins.parts import assigned, block_names, functions_by_sub_block, labels_by_shares
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -148,7 +148,7 @@ def _names_with_spins(block: SpinBlock) -> NamedFunctions:
     if block.allowed:
         names, sizes, order = block.allowed.names, block.allowed.sizes, np.arange(len(block.allowed.names))
     else:
-        names, sizes, _ = names_of_block(block.parts, block.patterns)
+        names, sizes, _ = block_names(block.parts, block.patterns)
         order = functions_by_sub_block(block.parts)
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:

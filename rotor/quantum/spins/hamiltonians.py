@@ -9,7 +9,16 @@ import numpy as np
 
 from rotor.arrays import Floats, Workspace
 from rotor.quantum.spins.blocks import Plan
-from rotor.quantum.spins.many_f import Coefficients, Frame, Group, Tables, between, of_all_f, tables_of, write_between
+from rotor.quantum.spins.many_f import (
+    Coefficients,
+    Frame,
+    Group,
+    Tables,
+    between,
+    coefficients_by_f,
+    tables_of,
+    write_between,
+)
 from rotor.quantum.spins.pattern_tables import couplings_by_f
 
 
@@ -26,7 +35,7 @@ def hamiltonians(
         if contracted:
             each = [couplings_by_f(scheme, channel, frame.twice_f[0], frame.twice_f[-1]) for channel in channels]
             whole = each[0] if len(each) == 1 else np.add.reduce(each)
-            acting.append((tables_of(contracted, frame), of_all_f(whole, frame)))
+            acting.append((tables_of(contracted, frame), coefficients_by_f(whole, frame)))
     space = Workspace()
     for group, numbers in grouped:
         kinds_of_group = [kinds[number] for number in numbers]

@@ -271,14 +271,14 @@ def are_connected(up: Group, low: Group, step: int, tables: Tables) -> bool:
     return any((a.kind, b.kind, (step + a.rise - b.rise) // 2) in tables for a in up.rotations for b in low.rotations)
 
 
-def of_all_f(coefficients: Floats, frame: Frame) -> Coefficients:
+def coefficients_by_f(coefficients: Floats, frame: Frame) -> Coefficients:
     """Coefficients from an array (F, patterns', patterns) for all F of the frame."""
 
-    def of_some(twice_f: Ints) -> Callable[[slice, slice], Floats]:
+    def coefficients_at(twice_f: Ints) -> Callable[[slice, slice], Floats]:
         chosen = coefficients[frame.rows_of_f(twice_f)]
         return lambda left, right: chosen[:, left, right]
 
-    return of_some
+    return coefficients_at
 
 
 class Between(NamedTuple):
@@ -302,7 +302,7 @@ def between(
 ) -> Iterator[Between]:  # fmt: skip
     """Elements c(F) ⟨r'‖X‖r⟩ between blocks `chosen` of a group and those of another with doubled row + step.
 
-    tables: elements of the rotation. coefficients: between patterns (`of_all_f`). states: most states' and states.
+    tables: elements of the rotation. coefficients: between patterns (`coefficients_by_f`). states: most states' and states.
     """
     coefficients_of_f = coefficients(low.twice_f[chosen])
     twice_rows = low.twice_rows[chosen]

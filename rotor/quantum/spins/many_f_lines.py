@@ -28,11 +28,11 @@ from rotor.quantum.spins.many_f import (
     Tables,
     are_connected,
     between,
-    of_all_f,
+    coefficients_by_f,
     tables_of,
     write_between,
 )
-from rotor.quantum.spins.pattern_tables import tensors_by_f, tensors_of_columns
+from rotor.quantum.spins.pattern_tables import column_tensors, tensors_by_f
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import Tensors, rank_of
 
@@ -216,8 +216,8 @@ def _coefficients(scheme: Scheme, frame: Frame, acting: Acting, rise: int) -> Co
     """Coefficients of a moment from each doubled F to F + rise: of all patterns, or of each pair of groups where these are many."""
     arguments = scheme, acting.rank, rise, frame.twice_f[0], frame.twice_f[-1], acting.spin
     if scheme.equivalent or len(frame.twice_f) * len(frame.n_patterns) ** 2 <= _IN_MEMORY:
-        return of_all_f(tensors_by_f(*arguments), frame)
-    return lambda twice_f: partial(tensors_of_columns, *arguments, twice_f)
+        return coefficients_by_f(tensors_by_f(*arguments), frame)
+    return lambda twice_f: partial(column_tensors, *arguments, twice_f)
 
 
 def _elements(

@@ -179,7 +179,7 @@ class Names(NamedTuple):
     sub_blocks: Ints
 
 
-def names_of_block(parts: Sequence[SpinPart], patterns: Ints) -> Names:
+def block_names(parts: Sequence[SpinPart], patterns: Ints) -> Names:
     """Labels of the levels of a block with these patterns."""
     distinct = {part.number: (place, part.rotor) for place, part in enumerate(parts)}
     rotors, places = [rotor for _, rotor in distinct.values()], dict(zip(distinct, range(len(distinct)), strict=True))

@@ -81,7 +81,7 @@ def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int, ac
     return _by_f(table, _coefficients_of_step(scheme, table.patterns, rank, step, acting), step)
 
 
-def tensors_of_columns(
+def column_tensors(
     scheme: Scheme, rank: int, step: int, first: int, last: int, acting: int | None, twice_f: Ints, left: slice,
     right: slice,
 ) -> Floats:  # fmt: skip

@@ -32,7 +32,7 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, clear_functions, connected_groups
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.blocks import SpinBlock
-from rotor.quantum.spins.parts import assigned, names_of_block
+from rotor.quantum.spins.parts import assigned, block_names
 from rotor.quantum.wang.basis import WangBlock, names_of
 
 if TYPE_CHECKING:
@@ -354,7 +354,7 @@ def _functions_as_states(block: SolvedBlock | SpinBlock, representation: str) ->
         names, amplitudes = functions.names, functions.amplitudes
     else:  # |N K⟩ with each pattern: the rows of the vectors
         assert isinstance(block, SpinBlock)
-        names, amplitudes = names_of_block(block.parts, block.patterns).labels, block.vectors
+        names, amplitudes = block_names(block.parts, block.patterns).labels, block.vectors
     diagonal: Floats = amplitudes**2 @ block.energies_mhz
     order = np.argsort(diagonal, kind="stable")  # stable: equal diagonal elements keep the order of functions
     vectors = (block.vectors @ amplitudes.T)[:, order]

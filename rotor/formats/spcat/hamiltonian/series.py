@@ -124,11 +124,11 @@ def level_term(d: Digits, axes: str, sine: bool = False) -> CodedOperator:
     if d.ns:
         raise ValueError("a power of N·S of one K is read but not computed yet")
 
-    def of_one_k(m: int, n: int, above: Floats, below: Floats) -> Floats:
+    def factor_for_k(m: int, n: int, above: Floats, below: Floats) -> Floats:
         chosen = (np.abs(above) == d.level_k) & (above == below)
         return np.asarray(chosen * (np.sign(above) if sine else 1.0))
 
-    return _multiplied(code_operator(d._replace(typ=0, ksq=0), axes), of_one_k, sine, axes)
+    return _multiplied(code_operator(d._replace(typ=0, ksq=0), axes), factor_for_k, sine, axes)
 
 
 def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float, float]:

@@ -138,7 +138,7 @@ def _parameters_by_state(coded: CodedFile) -> list[list[Parameter]]:
             continue
         if line.operator.plain is None:
             raise ValueError(f"parameter {line.parameter.code}: a term of this kind in one state {NO_NAME}")
-        plain = _of_one_state(line.parameter, line.digits)
+        plain = _with_lowest_state(line.parameter, line.digits)
         parts = [plain]
         if line.digits.kind is Kind.SQUARE and len(line.operator.plain) == 2:  # across an axis of more than two folds
             parts = [
@@ -150,12 +150,14 @@ def _parameters_by_state(coded: CodedFile) -> list[list[Parameter]]:
     if is_single_state(coded.file):  # a constant of value 0 has a name as well
         zeros = zip(coded.file.parameters, coded.digits, strict=True)
         by_state[0] += [
-            _of_one_state(p, d) for p, d in zeros if not p.value and d.is_orthorhombic and not max(d.states(1) or (0,))
+            _with_lowest_state(p, d)
+            for p, d in zeros
+            if not p.value and d.is_orthorhombic and not max(d.states(1) or (0,))
         ]
     return by_state
 
 
-def _of_one_state(parameter: Parameter, digits: Digits) -> Parameter:
+def _with_lowest_state(parameter: Parameter, digits: Digits) -> Parameter:
     """A parameter with the code of the lowest state."""
     return replace(parameter, code=join_code(digits._replace(v1=0, v2=0)), constrained=False, text="")
 

@@ -176,7 +176,7 @@ def numbers(
     return values
 
 
-def defaults_of(record: type) -> dict[str, Any]:
+def default_values(record: type) -> dict[str, Any]:
     """The numbers of a record and their defaults."""
     return {each.name: each.default for each in fields(record) if each.compare and not isinstance(each.default, str)}
 

@@ -62,7 +62,7 @@ class IntensityFile:
     title_text: str = field(default="", compare=False)
 
 
-_REQUEST = freeform.defaults_of(Request)
+_REQUEST = freeform.default_values(Request)
 _NAMES = {"fqlim_ghz": "FQLIM", "temperature_k": "TEMP"}
 _LEAST_MHZ = 0.00005
 

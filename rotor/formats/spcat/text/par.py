@@ -109,7 +109,7 @@ class ParameterFile:
 
 
 MOST_STATES = 999
-_HEADER, _OPTIONS = freeform.defaults_of(Header), freeform.defaults_of(Options)
+_HEADER, _OPTIONS = freeform.default_values(Header), freeform.default_values(Options)
 
 
 def parameters_beside(path: str | os.PathLike[str]) -> Path:
