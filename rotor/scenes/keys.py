@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import is_dataclass
 from functools import cache
 from types import UnionType
@@ -111,18 +111,18 @@ def shown_default(field: Field) -> Any:
 
 
 class UnknownKeyError(ValueError):
-    """A table has no such key. place: of the table; empty before the first table."""
+    """A table has no such key. place: of the table; empty before the first table. names: of the keys that it has."""
 
-    def __init__(self, key: str, value: Any, place: str, keys: Keys) -> None:
+    def __init__(self, key: str, value: Any, place: str, names: Iterable[str]) -> None:
         super().__init__(key)
-        self.key, self.value, self.place, self.keys = key, value, place, keys
+        self.key, self.value, self.place, self.names = key, value, place, names
 
     def text(self, elsewhere: str) -> str:
         """The message. elsewhere: where a scene has such a key; empty if nowhere."""
         inside = self.place if self.place.endswith("]") else f"[{self.place}]"
         table = inside if self.place else "a scene of this kind"
         other = "" if isinstance(self.value, Mapping) else elsewhere
-        return f"{table} has no key {self.key!r}{other or '; ' + nearest(self.key, self.keys)}"
+        return f"{table} has no key {self.key!r}{other or '; ' + nearest(self.key, self.names)}"
 
 
 def checked_table(keys: Keys, values: Any, place: str) -> dict[str, Any]:
@@ -194,5 +194,5 @@ def _wrong_type(place: str, value: Any, kinds: tuple[Any, ...]) -> ValueError:
     """The error for a value of none of these types."""
     allowed = dict.fromkeys(_WORDS.get(get_origin(kind) or kind, "a table") for kind in kinds)
     decimal = isinstance(value, float) and float not in kinds
-    found = "a number with a decimal point" if decimal else _WORDS.get(type(value), type(value).__name__)
-    return ValueError(f"{place}: expected {' or '.join(allowed)}, found {found}")
+    actual = "a number with a decimal point" if decimal else _WORDS.get(type(value), type(value).__name__)
+    return ValueError(f"{place}: expected {' or '.join(allowed)}, found {actual}")

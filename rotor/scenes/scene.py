@@ -131,7 +131,7 @@ def scene_of(content: Mapping[str, Any], where: str = "scene") -> Scene:
     try:
         for key, value in values.items():
             if key not in tables and key not in tables[""]:
-                raise UnknownKeyError(key, value, "", {**tables[""], **tables})  # type: ignore[dict-item]
+                raise UnknownKeyError(key, value, "", [*tables[""], *tables])
         inner = {name: checked_table(keys, values.get(name) or {}, name) for name, keys in tables.items() if name}
         head = checked_table(tables[""], {key: value for key, value in values.items() if key not in inner}, "")
     except UnknownKeyError as error:

@@ -64,6 +64,11 @@ def table_schema(keys: Keys, description: str, tag: tuple[str, str] | None = Non
     }
 
 
+def _structure_schema(structure: Any, tag: tuple[str, str] | None = None) -> dict[str, Any]:
+    """Schema of a table that a dataclass of declared fields describes, with the first line of its text."""
+    return table_schema(declared_keys(structure), (structure.__doc__ or "").splitlines()[0], tag)
+
+
 def _field_schema(field: Field) -> dict[str, Any]:
     """Schema of a key: its type, description, default and example."""
     described: dict[str, Any] = {"description": about(field)}
@@ -74,10 +79,7 @@ def _field_schema(field: Field) -> dict[str, Any]:
     if not isinstance(field.reader, Choices):
         return _type_schema(value_kinds(field)) | described
     word = field.reader.word
-    kinds = {
-        name: table_schema(declared_keys(kind), (kind.__doc__ or "").splitlines()[0], (word, name))
-        for name, kind in field.reader.load().items()
-    }
+    kinds = {name: _structure_schema(kind, (word, name)) for name, kind in field.reader.load().items()}
     return {"type": "array", "items": {"anyOf": list(kinds.values())}} | described
 
 
@@ -89,7 +91,7 @@ def _type_schema(kinds: tuple[Any, ...]) -> dict[str, Any]:
         if base is Any:
             schemas.append({})
         elif is_dataclass(base):
-            schemas.append(table_schema(declared_keys(base), (base.__doc__ or "").splitlines()[0]))
+            schemas.append(_structure_schema(base))
         elif base is list:
             schemas.append({"type": "array", "items": _type_schema(kinds_in(inner[0]))})
         elif base is dict:

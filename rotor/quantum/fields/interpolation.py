@@ -11,7 +11,7 @@ a few of them the fields that remain are divided into halves.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from itertools import pairwise
 from typing import Any
 
@@ -27,6 +27,7 @@ FAILURES = 3  # fields of a range at which interpolation may fail
 TINY = 1e-300  # instead of 0 in a denominator
 
 Vectors = NDArray[Any]
+States = tuple[Floats, Vectors, Floats]  # energies, vectors in columns and errors of the states of one matrix
 
 
 def interpolated_states(
@@ -37,19 +38,17 @@ def interpolated_states(
     matrix_at: H (n, n) at the field of a place. largest_mhz: residual of interpolated vectors.
     """
     first = matrix_at(0)
-    energies, errors = np.empty((len(fields), count)), np.zeros((len(fields), count))
+    energies, errors = np.empty((len(fields), count)), np.empty((len(fields), count))
     vectors = np.empty((len(fields), len(first), count), dtype=first.dtype)
     full: dict[int, Vectors] = {}
 
-    def keep(place: int, states: Sequence[Any]) -> None:
-        energies[place], vectors[place] = states[0][:count], states[1][:, :count]
-        if len(states) > 2:
-            errors[place] = states[2][:count]
+    def store(place: int, states: States) -> None:
+        energies[place], vectors[place], errors[place] = states[0][:count], states[1][:, :count], states[2][:count]
 
     def solve(place: int) -> Vectors:
         if place not in full:
-            keep(place, states := np.linalg.eigh(matrix_at(place)))
-            full[place] = states[1]
+            values, full[place] = np.linalg.eigh(matrix_at(place))
+            store(place, (values, full[place], np.zeros(len(values))))
         return full[place]
 
     ranges = [(0, len(fields))]
@@ -63,11 +62,13 @@ def interpolated_states(
         between = Interpolation(fields, anchors, np.array([solve(place) for place in anchors.tolist()]))
         failures = 0
         for place in range(start, stop):
-            if place not in full and (states := improved(matrix_at(place), between.at(place), largest_mhz)) is not None:
-                keep(place, states)
-            elif place not in full:
-                solve(place)
-                failures += 1
+            if place in full:
+                continue
+            if (states := improved(matrix_at(place), between.at(place), largest_mhz)) is not None:
+                store(place, states)
+                continue
+            solve(place)
+            failures += 1
             if failures > FAILURES:
                 middle = (place + 1 + stop) // 2
                 ranges += [(middle, stop), (place + 1, middle)]
@@ -114,7 +115,7 @@ def chebyshev_places(fields: Floats) -> Ints:
     return np.unique(np.abs(fields[:, None] - nodes).argmin(axis=0))
 
 
-def improved(matrix: Vectors, vectors: Vectors, largest_mhz: float) -> tuple[Floats, Vectors, Floats] | None:
+def improved(matrix: Vectors, vectors: Vectors, largest_mhz: float) -> States | None:
     """Energies, vectors and errors by energy of approximate eigenvectors of a matrix; None if a residual or an overlap is too large."""
     acted = matrix @ vectors
     energies = np.einsum("nk,nk->k", vectors.conj(), acted).real

@@ -27,9 +27,8 @@ FIRST_ANCHORS = 5  # fields that are solved in full first
 SPANNED = 101  # fields at which a basis for diabatic labels is tested
 BUFFER = 4  # further states in a reduced basis
 PART_OF_TOLERANCE = 0.1  # share of the tolerance for the error of a reduced basis
-SUBSET = (
-    1 / 8
-)  # shares of the states above which all of them take less time than the lowest alone (LAPACK's evd and evr)
+# share of the states above which all of them take less time than the lowest alone (LAPACK's evd and evr)
+SUBSET = 1 / 8
 DEPENDENT = 1e-7  # directions of a basis with smaller singular values, relative to the largest, are left out
 
 

@@ -304,7 +304,7 @@ def functions_of_blocks(plan: Plan, all_f: Sequence[int]) -> list[SpinBlock]:
     groups = groups_by_number(groups_of(all_twice_f, columns, frame))
     out = []
     for number, twice_f in enumerate(all_twice_f.tolist()):
-        patterns, parts = table.patterns[twice_f], columns.of_block(number)
+        patterns, parts = table.patterns[twice_f], columns.block_parts(number)
         energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
         labels = np.concatenate([_labels_of_functions(part, patterns[part.patterns]) for part in parts])
         results = energies, np.zeros((0, 0)), labels, np.ones(len(energies))

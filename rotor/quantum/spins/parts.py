@@ -69,7 +69,7 @@ class PartColumns:
         return np.asarray(self.numbers[self.begins])
 
     @cached_property
-    def of_one_state(self) -> bool:
+    def single_states(self) -> bool:
         """Whether each rotational block is a single Wang block, or one function |N K⟩."""
         return all(len(rotor.parts) == 1 for rotor in self.rotors)
 
@@ -79,7 +79,7 @@ class PartColumns:
         columns = (column[parts] for column in (self.numbers, self.first, self.last, self.stops))
         return PartColumns(self.rotors, self.counts[blocks], *columns)
 
-    def of_block(self, block: int) -> tuple[SpinPart, ...]:
+    def block_parts(self, block: int) -> tuple[SpinPart, ...]:
         """The parts of a block."""
         parts, start = list[SpinPart](), 0
         here = slice(int(self.begins[block]), int(self.begins[block] + self.counts[block]))
@@ -98,7 +98,7 @@ class PartsOfBlock(Sequence[SpinPart]):
 
     @cached_property
     def _parts(self) -> tuple[SpinPart, ...]:
-        return self._columns.of_block(self._block)
+        return self._columns.block_parts(self._block)
 
     @overload
     def __getitem__(self, place: int) -> SpinPart: ...
@@ -138,12 +138,12 @@ def labels_by_shares(names: Ints, sizes: Ints, vectors: Floats) -> tuple[Ints, F
 
 def over_functions(columns: PartColumns, blocks: Sequence[int], vectors: Floats) -> Floats:
     """Vectors (blocks, n, n) over rotational functions instead of states; unchanged if each state belongs to one Wang block anyway."""
-    if columns.of_one_state:
+    if columns.single_states:
         return vectors
     pairs = zip(blocks, vectors, strict=True)
     return np.stack(
         [
-            np.concatenate([_over_functions(part, vectors_of_block) for part in columns.of_block(block)])
+            np.concatenate([_over_functions(part, vectors_of_block) for part in columns.block_parts(block)])
             for block, vectors_of_block in pairs
         ]
     )

@@ -10,6 +10,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.coupling import (
@@ -36,6 +37,12 @@ class PatternTable(NamedTuple):
     patterns: dict[int, Ints]
     places: dict[int, Ints]
     distances: Ints
+
+    def present(self, twice_f: int) -> NDArray[np.bool_]:
+        """Whether an F has the pattern of each number."""
+        mask = np.zeros(len(self.distances), dtype=bool)
+        mask[self.places.get(twice_f, [])] = True
+        return mask
 
 
 @lru_cache(maxsize=16)
@@ -92,9 +99,7 @@ def column_tensors(
     table = pattern_table(scheme, first, last)
     bra, ket = table.distances[left, :-1] + step, table.distances[right, :-1]
     up, low = np.nonzero(within_reach(rank, bra, ket))
-    present = {f: np.isin(np.arange(len(table.distances)), places) for f, places in table.places.items()}
-    nowhere = np.zeros(len(table.distances), dtype=bool)
-    both = [present.get(f + step, nowhere)[left][up] & present.get(f, nowhere)[right][low] for f in twice_f.tolist()]
+    both = [table.present(f + step)[left][up] & table.present(f)[right][low] for f in twice_f.tolist()]
     at, pair = np.nonzero(both)
     up, low, f = up[pair], low[pair], twice_f[at, None]
     out = np.zeros((len(twice_f), len(bra), len(ket)))
