@@ -189,7 +189,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         return _run(arguments)
     except _UsageError as error:
-        return _fail(WRONG_INPUT, _usage_text(error), arguments)
+        return _fail(WRONG_INPUT, _usage_text(error, arguments), arguments)
     except (NoAnswerError, RunStopped) as error:
         return _fail(NO_ANSWER, str(error), arguments)
     except BrokenPipeError:  # the reader closed the pipe: write nothing more, also at exit
@@ -229,7 +229,7 @@ def _run(arguments: list[str]) -> int:
         return end.exit_code
 
 
-def _usage_text(error: Exception) -> str:
+def _usage_text(error: Exception, arguments: list[str]) -> str:
     """Message of the command-line parser, with a remedy for superfluous words."""
     text = str(error.format_message())  # type: ignore[attr-defined]
     if text.startswith("No such command") and text.endswith("."):  # with a guess, the text ends with a question mark
@@ -239,6 +239,9 @@ def _usage_text(error: Exception) -> str:
     extra = text.removeprefix("Got unexpected extra argument(s) ").removeprefix("Got unexpected extra argument ")
     if extra == text:
         return text
+    for option, number, unit in zip(arguments, arguments[1:], arguments[2:], strict=False):
+        if option.startswith("--") and number[-1:].isdigit() and extra.strip("()").split()[0] == unit:
+            return f"{option} {number} {unit}: a number and its unit are one word or stand in quotes: {option} '{number} {unit}'"
     return f"{extra.strip('()')}: more than the command takes; an option begins with --, --help shows what there is"
 
 

@@ -63,6 +63,7 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["info", "CO", "--isotope", " "], "--isotope: the text given is empty"),
         (["emission", "CO", "", "--band", "ALMA3"], "SOURCE: the text given is empty"),
         (["spectrum", "CO", "HCN"], "error: HCN: more than the command takes"),
+        (["spectrum", "CO", "--temperature", "5", "K", "--jmax", "3"], "stand in quotes: --temperature '5 K'"),
         (["structure"], "FAMILY is missing"),
         (["spectrum", "empty.int"], "empty.var: 0 lines"),
         (["spectrum", "CO", "--temperature", "1e300"], "expected a temperature up to 1e+06 K"),
