@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Facts, Part
 from rotor.reports.sources import source_facts
-from rotor.tops.facts import estimated_errors_mhz, top_formula
+from rotor.tops.facts import estimated_errors_mhz, is_estimated_dipole, known_digits, top_formula
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -131,18 +131,6 @@ def rigid_fact(top: Top) -> tuple[str, str]:
     return "rigid top", f"{rigid} MHz, distortion neglected"
 
 
-def known_digits(value: float, error: float | None, digits: int = 12) -> str:
-    """Number rounded to two uncertain digits of its error; with `digits` digits if no error is estimated.
-
-    >>> known_digits(6011.70626348, 72.0), known_digits(6011.70626348, 0.6), known_digits(6011.70626348, None)
-    ('6012', '6011.71', '6011.70626348')
-    """
-    if not error:
-        return f"{value:.{digits}g}"
-    decimals = 1 - math.floor(math.log10(error))
-    return f"{round(value, decimals):.{max(decimals, 0)}f}"
-
-
 def form_text(constants: Constants) -> str:
     """Reduction and representation of an asymmetric top, such as "A-reduction, Ir"."""
     reduction = f"{constants.reduction}-reduction, " if constants.reduction else ""
@@ -154,11 +142,6 @@ def vector_text(vector: Sequence[float] | None, names: Sequence[str] = ("μa", "
     if vector is None:
         return "not known"
     return ", ".join(f"{name} {round(x, 6) + 0.0:.6g}" for name, x in zip(names, vector, strict=True)) + " D"
-
-
-def is_estimated_dipole(top: Top) -> bool:
-    """Whether the dipole is estimated, with an error of 0.2 D."""
-    return top.dipole_source.startswith("estimate")
 
 
 def dipole_text(top: Top) -> str:

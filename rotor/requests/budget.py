@@ -125,6 +125,9 @@ class ErrorBudget:
         yield from sorted(known, key=lambda pair: -(pair[1].value or 0.0))
         yield from ((name, term) for name, term in named if term.value is None)
 
+    def __str__(self) -> str:
+        return self.line()
+
     def line(self) -> str:
         """One line of a report: each size with the first clause of its source; --errors has the full sources."""
         texts = []

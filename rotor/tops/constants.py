@@ -120,11 +120,9 @@ class Constants:
         return hash((self.kind, self.reduction, self.representation, frozenset(self.values.items())))
 
     def __repr__(self) -> str:
-        form = ", ".join(filter(None, (self.reduction and f"{self.reduction}-reduction", self.representation)))
-        rigid = ", ".join(f"{name} {self.values[name]:.10g}" for name in self.values if name in "ABC")
-        more = sum(name not in "ABC" for name in self.values)
-        rest = f", {more} of distortion" if more else ""
-        return f"Constants({self.kind}: {rigid} MHz{rest}{f' ({form})' if form else ''})"
+        from rotor.tops.facts import constants_line
+
+        return f"Constants({constants_line(self, {})})"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuilt, (self._settings(), dict(self.values))

@@ -122,22 +122,23 @@ class Top:
         return hash(self.constants)
 
     def __repr__(self) -> str:
-        formula = self.molecule.formula if self.molecule is not None else ""
-        name = ", ".join(dict.fromkeys(filter(None, (self.name, formula))))
-        dipole = self.dipole_abc_debye
-        dipole_text = "not known" if dipole is None else ", ".join(f"{mu + 0.0:.5g}" for mu in dipole) + " D"
-        inner = repr(self.constants).removeprefix("Constants(").removesuffix(")")
-        return f"Top({f'{name}, ' if name else ''}{inner}; dipole {dipole_text})"
+        from rotor.tops.facts import short_text
+
+        return f"Top({short_text(self)})"
 
     def _repr_html_(self) -> str:
         """The constants with their errors, for notebooks."""
         import html
 
-        errors = self.constants.uncertainties
-        rows = "".join(
-            f"<tr><td>{name}</td><td>{value:.12g}</td><td>{f'{errors[name]:.2g}' if name in errors else ''}</td></tr>"
-            for name, value in self.constants.values.items()
-        )
+        from rotor.tops.facts import estimated_errors_mhz, known_digits
+
+        measured, estimated = self.constants.uncertainties, estimated_errors_mhz(self)
+        rows = ""
+        for name, value in self.constants.values.items():
+            error = f"{measured[name]:.2g}" if name in measured else ""
+            if name in estimated:
+                error = f"about {known_digits(estimated[name], estimated[name])}"
+            rows += f"<tr><td>{name}</td><td>{known_digits(value, estimated.get(name))}</td><td>{error}</td></tr>"
         head = "<tr><th></th><th>MHz</th><th>±</th></tr>"
         return f"<p>{html.escape(repr(self))}</p><table>{head}{rows}</table>"
 

@@ -11,7 +11,7 @@ from rotor.reports.progress import sum_progress
 from rotor.reports.screen import Part, Table, record_table
 from rotor.requests.fill import Entries, read_fields
 from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_info
-from rotor.tops.facts import estimated_errors_mhz
+from rotor.tops.facts import estimated_errors_mhz, known_digits
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 from rotor.verbs.molecule import POLARIZABILITY
@@ -105,15 +105,9 @@ def _constants_table(top: Top) -> Table:
     rows = []
     for name, mhz in top.constants.values.items():
         guess = estimated.get(name)
-        error = (
-            f"{stated[name]:.2g}"
-            if name in stated
-            else f"about {top_facts.known_digits(guess, guess)}"
-            if guess
-            else ""
-        )
-        wavenumber = top_facts.known_digits(mhz / MHZ_PER_CM, guess and guess / MHZ_PER_CM, 10)
-        rows.append((name, top_facts.known_digits(mhz, guess), error, wavenumber))
+        error = f"{stated[name]:.2g}" if name in stated else f"about {known_digits(guess, guess)}" if guess else ""
+        wavenumber = known_digits(mhz / MHZ_PER_CM, guess and guess / MHZ_PER_CM, 10)
+        rows.append((name, known_digits(mhz, guess), error, wavenumber))
     return Table("", ("constant", "MHz", "± MHz", "cm-1"), rows, frozenset({"constant"}))
 
 
@@ -192,8 +186,7 @@ def _conformers_table(records: Sequence[Mapping[str, Any]], top: Top) -> Table |
     rows, relative = [], (top.molecule.uncertainty or 0.0) if top.molecule is not None else 0.0
     for number, conformer in enumerate(records, start=1):
         constants = [
-            top_facts.known_digits(x, relative * x) if x < float("inf") else "-"
-            for x in conformer["rotational_constants_mhz"]
+            known_digits(x, relative * x) if x < float("inf") else "-" for x in conformer["rotational_constants_mhz"]
         ]
         dipole = [f"{mu + 0.0:.2f}" for mu in conformer["dipole_abc_debye"] or ()] or ["-"] * 3
         rows.append([str(number), f"{conformer['energy_kj_per_mol']:.2f}", *constants, *dipole])

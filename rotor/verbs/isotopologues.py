@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 from rotor.formats.molecules.isotopologue_request import IsotopologuesAnswer, IsotopologuesRequest, answer_isotopologues
 from rotor.reports.screen import Part, Table, record_table
-from rotor.reports.top_facts import error_facts, is_estimated_dipole, known_digits
-from rotor.tops.facts import estimated_errors_mhz
+from rotor.reports.top_facts import error_facts
+from rotor.tops.facts import estimated_errors_mhz, is_estimated_dipole, known_digits
 from rotor.tops.isotopes.isotopologues import Isotopologue
 from rotor.tops.top import Top
 from rotor.verbs.molecule import POLARIZABILITY, REFINEMENT, STATES

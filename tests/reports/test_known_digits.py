@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 import rotor
-from rotor.reports.top_facts import known_digits
-from rotor.tops.facts import estimated_errors_mhz
+from rotor.tops.facts import estimated_errors_mhz, known_digits
 
 
 @pytest.mark.parametrize(
@@ -35,6 +34,15 @@ def test_info_of_a_guessed_geometry(call):
     assert content["estimated_errors_mhz"]["A"] == pytest.approx(0.012 * content["constants_mhz"]["A"], rel=1e-12)
     assert content["uncertainties_mhz"] == {}
     assert "A 288700, B 37720, C 33360 MHz (good to about 1.2 %)" in call("levels", "SMILES:C=O", "--jmax", "1")[1]
+
+
+def test_a_guessed_top_shows_the_digits_that_are_known():
+    top = rotor.read("SMILES:C=O")
+    text = "Top(C=O, CH2O, asymmetric: A 288700, B 37720, C 33360 MHz (Ir); dipole"
+    assert repr(top).startswith(text), repr(top)
+    assert re.search(r"dipole -?\d\.?\d?, 0, 0 D \(estimated\)\)$", repr(top)), repr(top)
+    assert "<td>A</td><td>288700</td><td>about 3500</td>" in top._repr_html_()
+    assert "<td>B</td><td>6081.492114</td>" in rotor.Top.from_constants("B=6081.492114 MHz")._repr_html_()
 
 
 def test_isotopologues_have_the_error_of_scaling(call):

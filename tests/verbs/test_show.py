@@ -87,6 +87,7 @@ def test_a_notebook_shows_how_far_a_result_can_be_trusted():
     line = f"<p>{html.escape(result.errors.line())}</p>"
     assert result._repr_html_().endswith(line)
     assert result.scene().run()._repr_html_().endswith(line)
+    assert str(result.errors) == result.errors.line()
 
 
 def test_tops_molecules_and_constants_are_one_line():
