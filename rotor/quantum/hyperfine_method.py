@@ -22,7 +22,7 @@ TOLERANCE_MHZ = 1e-4
 
 def are_with_spins(levels: Levels) -> bool:
     """Whether levels were solved in blocks with spins, whatever their quantum numbers are."""
-    return any(block.with_spins for block in levels.blocks[:1])
+    return any(block.spins is not None for block in levels.blocks[:1])
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ class HyperfineMethod(QuantumEffect):
 
 def used_method(levels: Levels) -> Used | None:
     """What was used for levels with spins; None without spins, and where nothing was asked, which means exact."""
-    return levels.blocks[0].used if levels.blocks else None
+    spins = levels.blocks[0].spins if levels.blocks else None
+    return None if spins is None else spins.shared.used
 
 
 def hyperfine_facts(top: Top, levels: Levels) -> dict[str, Any] | None:

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,10 +28,6 @@ if TYPE_CHECKING:
     from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
 
-AnyBlock = Any  # SolvedBlock or SpinBlock
-Connections = tuple[list[tuple[AnyBlock, AnyBlock]], Callable[[AnyBlock, AnyBlock], Floats]]
-"""Pairs of blocks that an operator connects, and the function that returns the reduced elements between them."""
-
 FEW_LEVELS = 64  # among which one is found by looking at all
 
 
@@ -42,49 +38,6 @@ class Used:
     method: str
     estimate_mhz: float
     tolerance_mhz: float
-
-
-class Block(ABC):
-    """States solved together: energies (n,) in MHz, rising, at the rows `start` ... of the levels."""
-
-    with_spins: ClassVar[bool] = False
-    energies_mhz: Floats
-    start: int
-
-    @property
-    @abstractmethod
-    def twice_total(self) -> int:
-        """Twice the total angular momentum."""
-
-    @property
-    def axial_k(self) -> int | None:
-        """|K| where K is good, None where functions are those of Wang."""
-        return None
-
-    @property
-    def combined(self) -> bool:
-        """Whether functions are combined so that reduced elements of odd rank are i times real."""
-        return self.axial_k is None
-
-    @property
-    def paired(self) -> bool:
-        """Whether states stand for their mirror images too: K and -K, σ and -σ."""
-        return bool(self.axial_k)
-
-    @property
-    def alone(self) -> bool:
-        """Whether it is a Wang block that nothing couples with others."""
-        return False
-
-    @property
-    def used(self) -> Used | None:
-        """How spins are treated, None where nothing was asked, which means exactly."""
-        return None
-
-    @property
-    def moments(self) -> SpeciesMoments | None:
-        """The elements of a species of internal rotation; None for other states."""
-        return None
 
 
 class SpeciesMoments(ABC):
@@ -117,14 +70,15 @@ class SpeciesFunctions(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class SolvedBlock(Block):
-    """States solved together over Wang blocks of one J, functions |N K⟩, or functions of a species of internal rotation.
+class SolvedBlock:
+    """States solved together over Wang blocks of one J, functions |N K⟩, of a species of internal rotation, or with spins.
 
     energies (n,) in MHz, rising, and eigenvectors (functions, n) in columns. parts: the state v and the functions of each range of rows;
-    `parts` of spins have the names of these too. start: place of the first state in the arrays of `Levels`. labels: (n, 3) v, Ka, Kc of the
-    states of a coupled block. mixing: (n,) squared overlaps with the functions that name them. moments: of a species, which has its own;
-    components: 2 where its states σ and -σ coincide. Functions of a coupled block carry the factor of `j_operators.phase`, those of a Wang
-    block without labels do not.
+    those of the rotation beside spins have the names of these too. start: place of the first state in the arrays of `Levels`. labels: of
+    states of coupled blocks v, Ka, Kc (n, 3); with spins v, Ka (K if axial), Kc and the doubled pattern N, J ... F, (n, 3 + pattern).
+    mixing: (n,) squared overlaps with the functions that name them. moments: of a species, which has its own; components: 2 where its
+    states σ and -σ coincide. spins: the functions of a block of one F (`spins.blocks.SpinFunctions`), which has no other parts. Functions
+    of a coupled block carry the factor of `j_operators.phase`, those of a Wang block without labels do not.
     """
 
     parts: tuple[Any, ...]
@@ -135,6 +89,7 @@ class SolvedBlock(Block):
     mixing: Floats | None = None
     moments: SpeciesMoments | None = None
     components: int = 1
+    spins: Any = None
 
     @property
     def basis(self) -> Any:
@@ -148,17 +103,24 @@ class SolvedBlock(Block):
 
     @property
     def twice_total(self) -> int:
-        """2J, with internal rotation and spins 2F."""
+        """Twice the total angular momentum: 2J, with spins 2F."""
+        if self.spins is not None:
+            return int(self.spins.twice_f)
         return 2 * self.j if self.moments is None else int(self.basis.twice_j)
 
     @property
+    def axial_k(self) -> int | None:
+        """|K| where levels with spins have a good K, else None."""
+        return None if self.spins is None else self.spins.axial_k
+
+    @property
     def combined(self) -> bool:
-        """Whether functions of K and -K are combined."""
+        """Whether functions of K and -K are combined, so that reduced elements of odd rank are i times real."""
         return self.axial_k is None if self.moments is None else self.moments.combined
 
     @property
     def paired(self) -> bool:
-        """σ and -σ coincide."""
+        """Whether states stand for their mirror images too: K and -K, σ and -σ."""
         return bool(self.axial_k) or self.components > 1
 
     @property
@@ -178,7 +140,11 @@ class SolvedBlock(Block):
         return total
 
 
-def placed(blocks: Iterable[Any]) -> Iterator[Any]:
+Connections = tuple[list[tuple[SolvedBlock, SolvedBlock]], Callable[[SolvedBlock, SolvedBlock], Floats]]
+"""Pairs of blocks that an operator connects, and the function that returns the reduced elements between them."""
+
+
+def placed(blocks: Iterable[SolvedBlock]) -> Iterator[SolvedBlock]:
     """Blocks that have states, with the row of the first state of each."""
     start = 0
     for block in blocks:
@@ -216,7 +182,7 @@ class Levels(Table):
     weight: Ints
     halves: frozenset[str] = frozenset()
     effects: tuple[QuantumEffect, ...] = ()
-    blocks: tuple[Any, ...] = field(default=(), repr=False)
+    blocks: tuple[SolvedBlock, ...] = field(default=(), repr=False)
     mixing: Floats | None = None
 
     def __len__(self) -> int:
@@ -399,7 +365,7 @@ def levels_table(
 def levels_of_blocks(
     top: Top,
     effects: tuple[QuantumEffect, ...],
-    blocks: tuple[Any, ...],
+    blocks: tuple[SolvedBlock, ...],
     quanta: dict[str, NDArray[Any]],
     jmax: int,
     representation: str,

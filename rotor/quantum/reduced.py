@@ -12,11 +12,11 @@ from functools import partial
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum.levels import AnyBlock, Connections, SolvedBlock
+from rotor.quantum.levels import Connections, SolvedBlock
 from rotor.quantum.tensors import BodyTensor, Tensors, acting_on, add_acting_on, rank_of, tensor_between
 
 
-def connections(blocks: Sequence[AnyBlock], tensors: Tensors) -> Connections:
+def connections(blocks: Sequence[SolvedBlock], tensors: Tensors) -> Connections:
     """Every pair (up, low) of blocks that the tensors connect, and the function that returns their reduced elements (n_up, n_low).
 
     Each pair occurs once, the higher or equal J (or F) first, J rising; a block with itself where it has elements between its states.
@@ -27,15 +27,15 @@ def connections(blocks: Sequence[AnyBlock], tensors: Tensors) -> Connections:
     if blocks[0].alone:
         tensor = tensors[0, 0]
         return list(connected_wang_blocks(blocks, tensor)), partial(wang_amplitudes, tensor=tensor)
-    if blocks[0].with_spins:
+    if blocks[0].spins is not None:
         from rotor.quantum.spins.many_f_lines import connections_of, tensor_moments
 
-        return connections_of(blocks, tensor_moments(blocks[0].shared, tensors))
+        return connections_of(blocks, tensor_moments(blocks[0].spins.shared, tensors))
     pairs = list(pairs_where(blocks, rank_of(tensors), lambda up, low: _connects(up, low, tensors)))
     return pairs, partial(_coupled_amplitudes if blocks[0].moments is None else _by_moments, tensors=tensors)
 
 
-def no_elements(up: AnyBlock, low: AnyBlock) -> Floats:
+def no_elements(up: SolvedBlock, low: SolvedBlock) -> Floats:
     """Elements of an operator that connects no blocks."""
     return np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
 
@@ -56,10 +56,10 @@ def _coupled_amplitudes(up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> 
 
 
 def pairs_where(
-    blocks: Iterable[AnyBlock], rank: int, connects: Callable[[AnyBlock, AnyBlock], bool]
-) -> Iterator[tuple[AnyBlock, AnyBlock]]:
+    blocks: Iterable[SolvedBlock], rank: int, connects: Callable[[SolvedBlock, SolvedBlock], bool]
+) -> Iterator[tuple[SolvedBlock, SolvedBlock]]:
     """The pairs (up, low) that a test connects, of those whose total angular momenta differ by `rank` at most."""
-    by_total: dict[int, list[AnyBlock]] = {}
+    by_total: dict[int, list[SolvedBlock]] = {}
     for block in blocks:
         by_total.setdefault(block.twice_total, []).append(block)
     for twice, lows in sorted(by_total.items()):

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum import reduced
-from rotor.quantum.levels import Block, Levels, single_block
+from rotor.quantum.levels import Levels, SolvedBlock, single_block
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.symmetric_top_elements import coupling
 from rotor.quantum.tensors import body_tensor
@@ -235,13 +235,13 @@ def _inelastic(levels: Levels, transitions: RamanTransitions) -> RamanTransition
     )
 
 
-def _distinct_pairs(up: Block, low: Block) -> NDArray[np.bool_]:
+def _distinct_pairs(up: SolvedBlock, low: SolvedBlock) -> NDArray[np.bool_]:
     """Mask of distinct pairs of states of two blocks: all, or the strict lower triangle for a block with itself."""
     all_pairs = np.ones((len(up.energies_mhz), len(low.energies_mhz)), dtype=bool)
     return np.tril(all_pairs, -1) if up is low else all_pairs
 
 
-def _between(levels: Levels, up: Block, low: Block, strength: Floats) -> RamanTransitions:
+def _between(levels: Levels, up: SolvedBlock, low: SolvedBlock, strength: Floats) -> RamanTransitions:
     """All transitions between the states of two blocks, except of a state with itself."""
     i, k = np.nonzero(_distinct_pairs(up, low))
     first, second = k + low.start, i + up.start

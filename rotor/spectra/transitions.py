@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices, Workspace
 from rotor.frozen import dataclass
-from rotor.quantum.levels import Block, Levels, SolvedBlock
+from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import connections, wang_columns
 from rotor.quantum.stacked_blocks import are_whole
@@ -37,7 +37,7 @@ Rows = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²
 Amplitudes = Callable[
     [Any, Sequence[Any]], Floats
 ]  # of a block with several others, side by side: (n_up, sum of n_low)
-Pair = tuple[Block, Block]  # two blocks with an allowed transition, the block of higher or equal J first
+Pair = tuple[SolvedBlock, SolvedBlock]  # two blocks with an allowed transition, the block of higher or equal J first
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def all_transitions(
         )
 
     blocks, incomplete = _existing_blocks(levels)
-    solved = [block for block in blocks if isinstance(block, SolvedBlock) and block.alone]
+    solved = [block for block in blocks if block.alone]
     if cut is not None and solved and len(solved) == len(blocks) and are_whole(solved) and not moments:
         vector = body_tensor(dipoles[0, 0], 1, levels.representation)
         strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
@@ -105,7 +105,7 @@ def all_transitions(
 
 
 def _connections(
-    levels: Levels, blocks: list[Block], dipoles: Mapping[tuple[int, int], Vector], moments: Sequence[Moment]
+    levels: Levels, blocks: list[SolvedBlock], dipoles: Mapping[tuple[int, int], Vector], moments: Sequence[Moment]
 ) -> tuple[list[Pair], Amplitudes]:
     """Pairs of blocks that the moments connect, and the function of their amplitudes."""
     if moments:
@@ -126,7 +126,7 @@ def _side_by_side(pair_amplitudes: Callable[[Any, Any], Floats]) -> Amplitudes:
     return lambda up, lows: np.hstack([pair_amplitudes(up, low) for low in lows])
 
 
-def _existing_blocks(levels: Levels) -> tuple[list[Block], bool]:
+def _existing_blocks(levels: Levels) -> tuple[list[SolvedBlock], bool]:
     """Blocks with levels of nonzero spin weight, and whether some of them also contain levels of zero weight."""
     if (levels.weight > 0).all():
         return list(levels.blocks), False
@@ -211,17 +211,17 @@ def _selected_lines(
 
 
 def _many_f_transitions(
-    levels: Levels, blocks: list[Block], dipoles: Mapping[tuple[int, int], Vector], range_mhz: tuple[float, float],
+    levels: Levels, blocks: list[SolvedBlock], dipoles: Mapping[tuple[int, int], Vector], range_mhz: tuple[float, float],
     cut: IntensityCut,
 ) -> Transitions | None:  # fmt: skip
     """All transitions of levels with spins that were solved for many F together; None for other levels."""
     needed = cut.needed
-    if not blocks or not blocks[0].with_spins or not (needed > 0).all():
+    if not blocks or blocks[0].spins is None or not (needed > 0).all():
         return None
     from rotor.quantum.spins.many_f_lines import amplitudes_of_groups, tensor_moments
 
     tensors = {states: body_tensor(mu, 1, str(levels.representation)) for states, mu in dipoles.items()}
-    groups = amplitudes_of_groups(blocks, tensor_moments(blocks[0].shared, tensors), len(levels))  # type: ignore
+    groups = amplitudes_of_groups(blocks, tensor_moments(blocks[0].spins.shared, tensors), len(levels))
     energies, needed = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
     space = Workspace()
     return _joined([_group_transitions(energies, needed, group, range_mhz, cut, space) for group in groups])
@@ -291,9 +291,9 @@ def _upward_lines(
     return _rows(transitions, keep)
 
 
-def _by_upper(pairs: list[Pair]) -> Iterator[tuple[Block, list[Block]]]:
+def _by_upper(pairs: list[Pair]) -> Iterator[tuple[SolvedBlock, list[SolvedBlock]]]:
     """Each upper block with all lower blocks of its lines; lines inside a block are a separate item."""
-    lows_of: dict[int, tuple[Block, list[Block]]] = {}
+    lows_of: dict[int, tuple[SolvedBlock, list[SolvedBlock]]] = {}
     for up, low in pairs:
         if up is low:
             yield up, [low]
@@ -303,7 +303,12 @@ def _by_upper(pairs: list[Pair]) -> Iterator[tuple[Block, list[Block]]]:
 
 
 def _candidates(
-    levels: Levels, up: Block, lows: list[Block], amplitude: Floats, needed: Floats, range_mhz: tuple[float, float]
+    levels: Levels,
+    up: SolvedBlock,
+    lows: list[SolvedBlock],
+    amplitude: Floats,
+    needed: Floats,
+    range_mhz: tuple[float, float],
 ) -> Rows:
     """Lines between all states of a block and others in the range that may reach the cut."""
     rows = np.concatenate([np.arange(low.start, low.start + len(low.energies_mhz), dtype=np.int32) for low in lows])

@@ -10,22 +10,22 @@ from rotor.quantum.spins.operators import AxialState, tensor_elements
 
 def elements_of_parts(up, low, tensors):
     """⟨F'‖T‖F⟩ (n_up, n_low); those of |N K⟩ count both signs of K."""
-    total, scheme = np.zeros((len(up.vectors), len(low.vectors))), up.shared.scheme
-    if not abs(up.twice_f - low.twice_f) <= 2 <= up.twice_f + low.twice_f:
+    total, scheme = np.zeros((len(up.vectors), len(low.vectors))), up.spins.shared.scheme
+    if not abs(up.twice_total - low.twice_total) <= 2 <= up.twice_total + low.twice_total:
         return total
     if scheme.equivalent:
-        (bra, left), (ket, right) = (scheme.recoupling(block.twice_f) for block in (up, low))
+        (bra, left), (ket, right) = (scheme.recoupling(block.twice_total) for block in (up, low))
         t = left.T @ moment_coefficients(scheme.twice, 1, None, bra, ket) @ right
         t = np.where(np.abs(t) > 1e-13, t, 0.0)
     else:
-        t = moment_coefficients(scheme.twice, 1, None, up.patterns, low.patterns)
+        t = moment_coefficients(scheme.twice, 1, None, up.spins.patterns, low.spins.patterns)
 
     def between(first, second):
         tensor = tensors.get((first.v, second.v))
         return None if tensor is None else tensor_elements(first.basis, second.basis, tensor)
 
-    for a in up.parts:
-        for b in low.parts:
+    for a in up.spins.parts:
+        for b in low.spins.parts:
             element = a.rotor.elements(b.rotor, between)
             if element is not None:
                 bases = a.rotor.parts[0].basis, b.rotor.parts[0].basis

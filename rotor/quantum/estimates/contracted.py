@@ -26,7 +26,6 @@ from rotor.quantum.basis.state_elements import StateTerms
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock
-from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins, rotation_blocks
 from rotor.quantum.spins.parts import SpinPart, assigned, named_states
 
@@ -224,13 +223,13 @@ def contracted_levels(
     chosen = _blocks_with(levels, rows)
     if max(len(block.energies_mhz) for block, _ in chosen) < _LARGE:
         return None
-    shared = levels.blocks[0].shared
-    rotors = {part.number: part.rotor for block, _ in chosen for part in block.parts}
+    shared = levels.blocks[0].spins.shared
+    rotors = {part.number: part.rotor for block, _ in chosen for part in block.spins.parts}
     terms = StateTerms.from_effects(top, effects, names, shared.representation)
     rotations = rotation_blocks(terms, len(names), list(rotors.values()), shared.representation)
     linear = linear_blocks_of_spins(top, effects, names, [block for block, _ in chosen])
     blocks = tuple(
-        (tuple(block.parts), matrices, targets) for (block, targets), matrices in zip(chosen, linear, strict=True)
+        (block.spins.parts, matrices, targets) for (block, targets), matrices in zip(chosen, linear, strict=True)
     )
     contracted = ContractedLevels(len(rows), rotors, dict(zip(rotors, rotations, strict=True)), blocks, 0.0)
     window = _window(contracted, values_mhz)
@@ -240,19 +239,19 @@ def contracted_levels(
     return replace(contracted, window_mhz=window)
 
 
-def _blocks_with(levels: Levels, rows: Ints) -> list[tuple[SpinBlock, tuple[_Target, ...]]]:
+def _blocks_with(levels: Levels, rows: Ints) -> list[tuple[SolvedBlock, tuple[_Target, ...]]]:
     """The blocks that contain the rows, with the labels in each."""
     starts = np.array([block.start for block in levels.blocks])
     block_of_row = np.searchsorted(starts, rows, side="right") - 1
     with_targets = []
     for number in np.unique(block_of_row).tolist():
         block = levels.blocks[number]
-        stops = np.array([part.place.stop for part in block.parts])
+        stops = np.array([part.place.stop for part in block.spins.parts])
         targets = []
         for place in np.flatnonzero(block_of_row == number).tolist():
             function = int(rows[place]) - block.start
             part = int(np.searchsorted(stops, function, side="right"))
-            chosen_part = block.parts[part]
+            chosen_part = block.spins.parts[part]
             pattern = (function - chosen_part.place.start) // len(chosen_part.rotor.energies_mhz)
             targets.append(_Target(place, part, pattern, tuple(block.labels[function, :3].tolist())))
         with_targets.append((block, tuple(targets)))

@@ -7,7 +7,7 @@ The levels are solved once. Blocks that contain a label are then expanded over b
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,15 +24,15 @@ from rotor.quantum.label_tracking import (
 from rotor.quantum.labelled_states import by_overlaps
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock
-from rotor.quantum.spins.blocks import SpinBlock
+from rotor.quantum.spins.blocks import SpinFunctions
 from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins
-from rotor.quantum.spins.parts import assigned, block_names, functions_by_sub_block, labels_by_shares
+from rotor.quantum.spins.parts import assigned, functions_by_sub_block, labels_by_shares, names_of_parts
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-Functions = Callable[[SolvedBlock | SpinBlock], tuple[Floats, Ints]]
-SpinNaming = Callable[[SpinBlock, str], NamedFunctions]
+Functions = Callable[[SolvedBlock], tuple[Floats, Ints]]
+SpinNaming = Callable[[SolvedBlock, str], NamedFunctions]
 """How the states of a block with spins are labelled, from the block and the representation, over its functions as rows of vectors."""
 
 
@@ -69,7 +69,7 @@ def unit_levels(
         if spin_naming:
             return rows_of_block, rows[rows_of_block] - block.start
         state_of = {tuple(name): state for state, name in enumerate(names.tolist())}
-        if functions and isinstance(block, SpinBlock):
+        if functions and block.spins:
             requested = _names_by(block, *functions(block))[rows[rows_of_block] - block.start]
         else:
             requested = (
@@ -87,18 +87,20 @@ def _quanta(levels: Levels) -> Ints:
     return np.stack([levels.quantum("v"), levels.quanta["ka"], levels.quanta["kc"]], axis=1)
 
 
-def _names(block: Any) -> Ints:
+def _names(block: SolvedBlock) -> Ints:
     """Labels of the states of a solved block; only the rank for a single Wang block."""
-    return np.arange(len(block.energies_mhz))[:, None] if block.alone else block.labels
+    return np.arange(len(block.energies_mhz))[:, None] if block.labels is None else block.labels
 
 
-def _names_by(block: SpinBlock, functions: Floats, names: Ints) -> Ints:
+def _names_by(block: SolvedBlock, functions: Floats, names: Ints) -> Ints:
     """Labels of the states of a block from their overlaps with functions over the basis."""
-    rows = [block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1) for part in block.parts]
+    rows = [
+        block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1) for part in block.spins.parts
+    ]
     over_basis = np.concatenate(
         [
             np.matmul(part.rotor.vectors, part_rows).reshape(-1, block.vectors.shape[1])
-            for part, part_rows in zip(block.parts, rows, strict=True)
+            for part, part_rows in zip(block.spins.parts, rows, strict=True)
         ]
     )
     return np.asarray(names[assigned((functions @ over_basis) ** 2, np.ones(len(names), dtype=np.int64))])
@@ -108,13 +110,13 @@ def _named_blocks(
     top: Top,
     levels: Levels,
     names: Sequence[str],
-    blocks: Sequence[Any],
+    blocks: Sequence[SolvedBlock],
     functions: Functions | None,
     naming: Naming | None,
     spin_naming: SpinNaming | None,
 ) -> Iterator[NamedBlock]:
     """The linear block of each solved block with the rule that labels its states."""
-    if isinstance(blocks[0], SpinBlock):
+    if blocks[0].spins:
         linear_blocks = linear_blocks_of_spins(top, levels.effects, names, blocks)
     else:
         linear_blocks = linear_blocks_of(top, levels, names, blocks)
@@ -122,8 +124,8 @@ def _named_blocks(
     for linear, block in zip(linear_blocks, blocks, strict=True):
         if functions:
             yield _turned(linear, *functions(block))
-        elif isinstance(block, SpinBlock):
-            yield linear, (spin_naming(block, representation) if spin_naming else _names_with_spins(block))
+        elif block.spins:
+            yield linear, (spin_naming(block, representation) if spin_naming else _names_with_spins(block.spins))
         elif naming:
             yield linear, naming(vertices_of(block), representation)
         elif block.alone:
@@ -143,12 +145,12 @@ def _turned(block: LinearBlock, functions: Floats, names: Ints) -> NamedBlock:
     return block.turned(functions), NamedFunctions(sub_blocks, namer, Follows.MOSTLY)
 
 
-def _names_with_spins(block: SpinBlock) -> NamedFunctions:
+def _names_with_spins(block: SpinFunctions) -> NamedFunctions:
     """Labels by Wang blocks and patterns, or by the functions that exchange allows."""
     if block.allowed:
         names, sizes, order = block.allowed.names, block.allowed.sizes, np.arange(len(block.allowed.names))
     else:
-        names, sizes, _ = block_names(block.parts, block.patterns)
+        names, sizes, _ = names_of_parts(block.columns.only(block.number), block.patterns)
         order = functions_by_sub_block(block.parts)
 
     def namer(matrix: Floats, energies: Floats, vectors: Floats) -> Ints:

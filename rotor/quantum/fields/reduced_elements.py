@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
-from rotor.quantum.levels import AnyBlock, Connections, Levels, SolvedBlock
+from rotor.quantum.levels import Connections, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import connections, no_elements, pairs_where
 
@@ -31,7 +31,7 @@ class ReducedElements:
 
     def __init__(self, levels: Levels) -> None:
         self.levels = levels
-        self.blocks: tuple[AnyBlock, ...] = levels.blocks
+        self.blocks: tuple[SolvedBlock, ...] = levels.blocks
         quanta = levels.quanta
         self.states = tuple(np.unique(quanta["v"]).tolist()) if "v" in quanta else (0,)
         self._cache: dict[tuple[Key, Pair], NDArray[Any] | None] = {}
@@ -63,10 +63,10 @@ class ReducedElements:
         """Pairs of blocks between which the operator has elements."""
         number = {block.start: i for i, block in enumerate(self.blocks)}
 
-        def acts(up: AnyBlock, low: AnyBlock) -> bool:
+        def acts(up: SolvedBlock, low: SolvedBlock) -> bool:
             return self.between(operator, number[up.start], number[low.start]) is not None
 
-        if isinstance(operator, Contraction) or self.blocks[0].with_spins:
+        if isinstance(operator, Contraction) or self.blocks[0].spins is not None:
             pairs, _ = self._connections(operator)
         else:
             pairs = list(pairs_where(self.blocks, operator.rank, acts))
@@ -94,7 +94,7 @@ class ReducedElements:
         """Elements of a pair of blocks, computed anew."""
         first, second = self.blocks[up], self.blocks[low]
         if isinstance(operator, Magnet):
-            if not second.with_spins:
+            if second.spins is None:
                 moment = self._moment(operator, first, second)
                 return moment if moment is not None and moment.any() else None
         elif first.moments is not None:
@@ -102,7 +102,7 @@ class ReducedElements:
         elements = self._connections(operator)[1](first, second)
         return elements / np.sqrt(2.0) if self.paired[up] else elements  # that of one sign of K
 
-    def _moment(self, magnet: Magnet, up: AnyBlock, low: AnyBlock) -> Floats | None:
+    def _moment(self, magnet: Magnet, up: SolvedBlock, low: SolvedBlock) -> Floats | None:
         """Elements of the magnetic moment; None where they are zero."""
         if up.moments is not None:
             raise ValueError(
@@ -120,12 +120,12 @@ def _matrix(g: Floats) -> Any:
     return tuple(tuple(row) for row in g.tolist())
 
 
-def _magnetic_connections(magnet: Magnet, states: Sequence[int], blocks: Sequence[AnyBlock]) -> Connections:
+def _magnetic_connections(magnet: Magnet, states: Sequence[int], blocks: Sequence[SolvedBlock]) -> Connections:
     """`connections` of ½ Σ g_ij {Φ_i, N_j} and g_I I of each state, of levels with spins."""
     from rotor.quantum.spins.many_f_lines import connections_of
     from rotor.quantum.spins.moments import spin_moments
 
-    shared = blocks[0].shared
+    shared = blocks[0].spins.shared
     scheme, g = shared.scheme, _matrix(magnet.g)
     nuclei = [(name, value / scheme.count_of((scheme.place(name),))) for name, value in magnet.nuclei.items()]
     moments = [Moment(1.0, (v, v), tensor=g) for v in states]

@@ -325,8 +325,8 @@ def _refuse_unknown_nuclei(elements: ReducedElements, operators: Sequence[FieldO
     nuclei = {name for operator in operators if isinstance(operator, Magnet) for name in operator.nuclei}
     if not nuclei:
         return
-    shared = getattr(elements.blocks[0], "shared", None)
-    spin_names = [] if shared is None else [spin.name for spin in shared.scheme.spins]
+    spins = elements.blocks[0].spins
+    spin_names = [] if spins is None else [spin.name for spin in spins.shared.scheme.spins]
     if unknown := sorted(nuclei - set(spin_names)):
         raise ValueError(f"g of {', '.join(unknown)}: the spins of these effects are {', '.join(spin_names) or 'none'}")
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from rotor.arrays import Floats, Ints, numbers_in_runs
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER
-from rotor.quantum.levels import Block, SolvedBlock, Used
+from rotor.quantum.levels import SolvedBlock, Used
 from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, stacks_of, within_blocks
 from rotor.quantum.spins.families import families_of, links_of_stacks
 from rotor.quantum.spins.many_f import Group, frame_of, groups_by_number, groups_of
@@ -69,44 +69,32 @@ class Shared:
         return self.stacks[0].axial
 
 
-@dataclass(frozen=True)
-class SpinBlock(Block):
-    """States of one F that are solved together: energies (n,) in MHz, rising, and eigenvectors (functions, n) over the parts.
+@dataclass(frozen=True, eq=False)
+class SpinFunctions:
+    """The functions of a block of one F.
 
-    patterns: all coupling patterns of the F, doubled. labels: (n, columns) v, Ka (K if axial), Kc and the doubled pattern N, J ... F.
-    mixing: (n,) weight of the sub-block that labels each state. start: row of the first state. allowed: functions that exchange allows.
-    group: blocks of other F solved in the same array. twice_row: its row in tables, doubled (`many_f.Frame`).
+    patterns: all coupling patterns of the F, doubled. columns, number: its parts among those of many blocks. group: blocks of other F
+    solved in the same array. twice_row: its row in tables, doubled (`many_f.Frame`). allowed: functions that exchange allows.
     """
-
-    with_spins: ClassVar[bool] = True
 
     twice_f: int
     patterns: Ints
-    parts: Sequence[SpinPart]
-    energies_mhz: Floats
-    vectors: Floats
-    labels: Ints
-    mixing: Floats
+    columns: PartColumns
+    number: int
     shared: Shared
-    group: Group = field(repr=False, compare=False)
+    group: Group
     twice_row: int
-    start: int = 0
     allowed: Allowed | None = None
 
-    @property
-    def twice_total(self) -> int:
-        """2F."""
-        return self.twice_f
+    @cached_property
+    def parts(self) -> tuple[SpinPart, ...]:
+        """The parts, made when they are read first."""
+        return self.columns.block_parts(self.number)
 
     @property
     def axial_k(self) -> int | None:
         """|K| where K is a good quantum number."""
         return getattr(self.parts[0].rotor.parts[0].basis, "axial_k", None)
-
-    @property
-    def used(self) -> Used | None:
-        """Treatment of the spins, the same for all blocks of a calculation."""
-        return self.shared.used
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +284,7 @@ def _key(n: Ints, symmetry_class: Ints) -> Ints:
     return 2 * n + symmetry_class
 
 
-def functions_of_blocks(plan: Plan, all_f: Sequence[int]) -> list[SpinBlock]:
+def functions_of_blocks(plan: Plan, all_f: Sequence[int]) -> list[SolvedBlock]:
     """Basis functions of the blocks of all F, without vectors: labels and energies are those of the rotational states."""
     table = pattern_table(plan.shared.scheme, all_f[0], all_f[-1])
     frame = plan.shared.cache["frame"] = frame_of(plan.shared.stacks, table)
@@ -307,8 +295,9 @@ def functions_of_blocks(plan: Plan, all_f: Sequence[int]) -> list[SpinBlock]:
         patterns, parts = table.patterns[twice_f], columns.block_parts(number)
         energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
         labels = np.concatenate([_labels_of_functions(part, patterns[part.patterns]) for part in parts])
-        results = energies, np.zeros((0, 0)), labels, np.ones(len(energies))
-        out.append(SpinBlock(twice_f, patterns, parts, *results, plan.shared, *groups[number]))
+        spins = SpinFunctions(twice_f, patterns, columns, number, plan.shared, *groups[number])
+        mixing = np.ones(len(energies))
+        out.append(SolvedBlock((), energies, np.zeros((0, 0)), labels=labels, mixing=mixing, spins=spins))
     return out
 
 

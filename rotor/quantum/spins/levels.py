@@ -10,8 +10,8 @@ import numpy as np
 
 from rotor.arrays import hold_freed_memory
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import Levels, levels_of_blocks, placed
-from rotor.quantum.spins.blocks import Shared, SpinBlock, contracted_plan, functions_of_blocks
+from rotor.quantum.levels import Levels, SolvedBlock, levels_of_blocks, placed
+from rotor.quantum.spins.blocks import Shared, contracted_plan, functions_of_blocks
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.rotor import Exist
 from rotor.quantum.spins.scheme import scheme_of
@@ -46,7 +46,7 @@ def levels_of_f(
 ) -> Levels:
     """The levels with vectors of all doubled F in `all_f` whose label has N within `n_range`, by default all.
 
-    exist: takes labels (n, columns as `SpinBlock.labels`) and returns whether each level exists, (n,) of bool. Blocks without an existing
+    exist: takes labels (n, columns as `SolvedBlock.labels`) and returns whether each level exists, (n,) of bool. Blocks without an existing
     level are not solved. In an axial top v and K decide.
     """
     hold_freed_memory()
@@ -80,22 +80,22 @@ def _range_of_n(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence[in
     return min(max(0, (f - total) // 2) for f in all_f), max((f + total) // 2 for f in all_f)
 
 
-def _within(block: SpinBlock, n_range: tuple[int, int]) -> SpinBlock:
+def _within(block: SolvedBlock, n_range: tuple[int, int]) -> SolvedBlock:
     """The states of a block whose N lies in a range."""
-    n = block.labels[:, 3] // 2
+    n = np.asarray(block.labels)[:, 3] // 2
     chosen = (n >= n_range[0]) & (n <= n_range[1])
     cut = {name: getattr(block, name)[chosen] for name in ("energies_mhz", "labels", "mixing")}
     return replace(block, vectors=block.vectors[:, chosen], **cut)
 
 
 def _table(
-    top: Top, effects: tuple[QuantumEffect, ...], shared: Shared, blocks: tuple[SpinBlock, ...], jmax: int
+    top: Top, effects: tuple[QuantumEffect, ...], shared: Shared, blocks: tuple[SolvedBlock, ...], jmax: int
 ) -> Levels:
     """The table of the levels of these blocks."""
     if not blocks:
         raise ValueError("no level with these spins exists in the range of F")
     labels = np.concatenate([block.labels for block in blocks])
-    axial = isinstance(blocks[0].parts[0].rotor.parts[0].basis, AxialState)
+    axial = isinstance(blocks[0].spins.parts[0].rotor.parts[0].basis, AxialState)
     quanta = {"v": labels[:, 0]} if any(effect.states(top) for effect in effects) else {}
     quanta |= {"n": labels[:, 3] // 2}
     if axial:

@@ -21,7 +21,7 @@ from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
-from rotor.quantum.spins.blocks import Shared, SpinBlock
+from rotor.quantum.spins.blocks import Shared, SpinFunctions
 from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, stacks_of
 from rotor.quantum.spins.many_f import Frame, Group
 from rotor.quantum.spins.many_f_lines import groups_of_blocks
@@ -260,7 +260,7 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
     """∂E/∂c (rows, names) of levels with spins, MHz per MHz; ValueError for levels without vectors."""
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")
-    tables = function_tables(top, levels.effects, names, levels.blocks[0].shared)
+    tables = function_tables(top, levels.effects, names, levels.blocks[0].spins.shared)
     out = np.zeros((len(levels) + 1, len(names)))  # the last row takes the padding
     for states in groups_of_blocks(levels.blocks, len(levels)):
         group, sizes = states.group, [len(block.vectors) for block in states.blocks]
@@ -287,18 +287,18 @@ def _slopes(acting: Acting, vectors: Sequence[Floats]) -> Floats:
 
 
 def linear_blocks_of_spins(
-    top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], blocks: Sequence[SpinBlock]
+    top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], blocks: Sequence[SolvedBlock]
 ) -> list[LinearBlock]:
     """Linear blocks of the blocks of one calculation, over basis functions or the functions that exchange allows."""
-    tables = function_tables(top, effects, names, blocks[0].shared)
+    tables = function_tables(top, effects, names, blocks[0].spins.shared)
     out = []
-    for block in blocks:
+    for block in (solved.spins for solved in blocks):
         linear = linear_block(block.parts[-1].place.stop, list(_elements(block, tables)))
         out.append(linear.turned(block.allowed.products.T) if block.allowed else linear)
     return out
 
 
-def _elements(block: SpinBlock, tables: FunctionTables) -> Iterator[WeightedElements]:
+def _elements(block: SpinFunctions, tables: FunctionTables) -> Iterator[WeightedElements]:
     """Elements of the lower triangle of a block."""
     group, size = block.group, block.parts[-1].place.stop
     at = group.places[block.twice_row]

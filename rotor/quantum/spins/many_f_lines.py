@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Indices, Ints, Workspace, runs_of_similar_size
 from rotor.frozen import dataclass
-from rotor.quantum.levels import Connections
-from rotor.quantum.spins.blocks import Shared, SpinBlock
+from rotor.quantum.levels import Connections, SolvedBlock
+from rotor.quantum.spins.blocks import Shared
 from rotor.quantum.spins.contraction import tensors_of_stacks
 from rotor.quantum.spins.many_f import (
     Coefficients,
@@ -74,7 +74,7 @@ class GroupStates:
     """Solved blocks of a group by rising row. places: index by doubled row. rows: of the levels, (blocks, states)."""
 
     group: Group
-    blocks: list[SpinBlock]
+    blocks: list[SolvedBlock]
     places: dict[int, int]
     rows: Indices
 
@@ -126,13 +126,13 @@ def tensor_moments(shared: Shared, tensors: Tensors) -> Moments:
 
 
 def amplitudes_of_groups(
-    blocks: Sequence[SpinBlock], moments: Moments, levels: int, both_orders: bool = False
+    blocks: Sequence[SolvedBlock], moments: Moments, levels: int, both_orders: bool = False
 ) -> Iterator[Rows]:
     """Real reduced elements between all blocks, many at a time, each pair of blocks once; `levels` is the row of padding.
 
     Amplitudes are zero beyond a block. both_orders: pairs of blocks of one F occur in both orders.
     """
-    shared = blocks[0].shared
+    shared = blocks[0].spins.shared
     frame: Frame = shared.cache["frame"]
     groups = groups_of_blocks(blocks, levels)
     space = Workspace()
@@ -143,7 +143,7 @@ def amplitudes_of_groups(
                 yield from _between(up, low, rise, rise + 2 * frame.count * rise_of_k, moments, shared, space)
 
 
-def connections_of(blocks: Sequence[Any], moments: Moments) -> Connections:
+def connections_of(blocks: Sequence[SolvedBlock], moments: Moments) -> Connections:
     """The pairs of blocks that moments connect, F rising, and the function that returns their reduced elements (n_up, n_low)."""
     block_at, count = {block.start: block for block in blocks}, blocks[-1].start + len(blocks[-1].energies_mhz)
     elements: dict[tuple[int, int], Floats] = {}
@@ -158,27 +158,27 @@ def connections_of(blocks: Sequence[Any], moments: Moments) -> Connections:
     return pairs, partial(_between_blocks, elements)
 
 
-def _between_blocks(elements: Mapping[tuple[int, int], Floats], up: SpinBlock, low: SpinBlock) -> Floats:
+def _between_blocks(elements: Mapping[tuple[int, int], Floats], up: SolvedBlock, low: SolvedBlock) -> Floats:
     return elements[up.start, low.start]
 
 
-def groups_of_blocks(blocks: Sequence[SpinBlock], levels: int) -> list[GroupStates]:
+def groups_of_blocks(blocks: Sequence[SolvedBlock], levels: int) -> list[GroupStates]:
     """The groups in which blocks were solved with these blocks; levels: the row of padding."""
-    members: dict[int, tuple[list[SpinBlock], list[int]]] = {}
-    rows = np.array([block.twice_row for block in blocks])
+    members: dict[int, tuple[list[SolvedBlock], list[int]]] = {}
+    rows = np.array([block.spins.twice_row for block in blocks])
     for number, row in zip((order := np.argsort(rows, kind="stable")).tolist(), rows[order].tolist(), strict=True):
-        blocks_and_rows = members.setdefault(id(blocks[number].group), ([], []))
+        blocks_and_rows = members.setdefault(id(blocks[number].spins.group), ([], []))
         blocks_and_rows[0].append(blocks[number])
         blocks_and_rows[1].append(row)
     return [_states_of_group(*alike, levels) for alike in members.values()]
 
 
-def _states_of_group(blocks: list[SpinBlock], twice_rows: list[int], levels: int) -> GroupStates:
+def _states_of_group(blocks: list[SolvedBlock], twice_rows: list[int], levels: int) -> GroupStates:
     """Blocks of one group by rising row."""
     sizes = np.array([len(block.energies_mhz) for block in blocks])
     starts, numbers = np.array([block.start for block in blocks], dtype=np.int32), np.arange(max(sizes), dtype=np.int32)
     rows = np.where(numbers < sizes[:, None], starts[:, None] + numbers, np.int32(levels))
-    group = blocks[0].group
+    group = blocks[0].spins.group
     return GroupStates(group, blocks, {row: place for place, row in enumerate(twice_rows)}, rows)
 
 
@@ -189,7 +189,7 @@ def _between(
     """Elements between two groups, whose doubled F differ by `rise` and doubled rows by `step`."""
     frame: Frame = shared.cache["frame"]
     chosen = [row for row in low.places if row + step in up.places]
-    chosen = [row for row in chosen if 2 * low.blocks[low.places[row]].twice_f + rise >= 2 * moments.rank]
+    chosen = [row for row in chosen if 2 * low.blocks[low.places[row]].spins.twice_f + rise >= 2 * moments.rank]
     sums = [
         [
             (acting.tables, _coefficients(shared.scheme, frame, acting, rise))

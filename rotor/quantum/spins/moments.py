@@ -19,7 +19,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.spins.blocks import Shared, SpinBlock
+from rotor.quantum.spins.blocks import Shared
 from rotor.quantum.spins.many_f import Tables
 from rotor.quantum.spins.many_f_lines import Acting, Moments
 from rotor.quantum.spins.operators import AxialState, CosinesWithN, tensor_elements, tensor_of
@@ -111,9 +111,9 @@ def moments_of(
     levels: Levels, dipoles: dict[tuple[int, int], tuple[float, float, float]], moments: Sequence[Moment]
 ) -> Moments:
     """Dipoles by pairs of states and other moments, for levels with spins; ValueError for levels without."""
-    if not levels.blocks or not isinstance(levels.blocks[0], SpinBlock):
+    if not levels.blocks or levels.blocks[0].spins is None:
         raise ValueError("moments besides plain dipoles need levels that were solved with spins")
-    return spin_moments(levels.blocks[0].shared, with_dipoles(dipoles, moments))
+    return spin_moments(levels.blocks[0].spins.shared, with_dipoles(dipoles, moments))
 
 
 def with_dipoles(

@@ -7,8 +7,9 @@ each sub-block has as many levels as functions. Among the levels of one sub-bloc
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple, overload
+from typing import NamedTuple
 
 import numpy as np
 
@@ -79,6 +80,12 @@ class PartColumns:
         columns = (column[parts] for column in (self.numbers, self.first, self.last, self.stops))
         return PartColumns(self.rotors, self.counts[blocks], *columns)
 
+    def only(self, block: int) -> PartColumns:
+        """The parts of a block, with its rotational blocks alone."""
+        chosen = self.chosen(np.array([block]))
+        numbers, places = np.unique(chosen.numbers, return_inverse=True)
+        return replace(chosen, rotors=[self.rotors[number] for number in numbers.tolist()], numbers=places)
+
     def block_parts(self, block: int) -> tuple[SpinPart, ...]:
         """The parts of a block."""
         parts, start = list[SpinPart](), 0
@@ -88,27 +95,6 @@ class PartColumns:
             parts.append(SpinPart(number, self.rotors[number], slice(first, last), slice(start, stop)))
             start = stop
         return tuple(parts)
-
-
-class PartsOfBlock(Sequence[SpinPart]):
-    """The parts of one block of many, made when they are read first."""
-
-    def __init__(self, columns: PartColumns, block: int) -> None:
-        self._columns, self._block = columns, block
-
-    @cached_property
-    def _parts(self) -> tuple[SpinPart, ...]:
-        return self._columns.block_parts(self._block)
-
-    @overload
-    def __getitem__(self, place: int) -> SpinPart: ...
-    @overload
-    def __getitem__(self, place: slice) -> tuple[SpinPart, ...]: ...
-    def __getitem__(self, place: int | slice) -> SpinPart | tuple[SpinPart, ...]:
-        return self._parts[place]
-
-    def __len__(self) -> int:
-        return len(self._parts)
 
 
 def named_states(rotor: SolvedBlock, vectors: Floats) -> Ints:
@@ -177,14 +163,6 @@ class Names(NamedTuple):
     labels: Ints
     sizes: Ints
     sub_blocks: Ints
-
-
-def block_names(parts: Sequence[SpinPart], patterns: Ints) -> Names:
-    """Labels of the levels of a block with these patterns."""
-    distinct = {part.number: (place, part.rotor) for place, part in enumerate(parts)}
-    rotors, places = [rotor for _, rotor in distinct.values()], dict(zip(distinct, range(len(distinct)), strict=True))
-    numbered = [part._replace(number=places[part.number]) for part in parts]
-    return names_of_parts(PartColumns.from_parts(rotors, [numbered]), patterns)
 
 
 def names_of_parts(columns: PartColumns, patterns: Ints, first_rows: Ints | int = 0) -> Names:

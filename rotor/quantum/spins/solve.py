@@ -12,15 +12,16 @@ from itertools import accumulate
 import numpy as np
 
 from rotor.arrays import Floats, Ints, end_to_end
-from rotor.quantum.spins.blocks import Members, Plan, SpinBlock, States, blocks_of_f, diagonalised
+from rotor.quantum.levels import SolvedBlock
+from rotor.quantum.spins.blocks import Members, Plan, SpinFunctions, States, blocks_of_f, diagonalised
 from rotor.quantum.spins.hamiltonians import hamiltonians
 from rotor.quantum.spins.many_f import Group, frame_of, groups_by_number, groups_of
-from rotor.quantum.spins.parts import PartsOfBlock, labels_by_shares, names_of_parts, over_functions
+from rotor.quantum.spins.parts import labels_by_shares, names_of_parts, over_functions
 from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import Exist
 
 
-def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) -> list[SpinBlock]:
+def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) -> list[SolvedBlock]:
     """Solve the blocks of all doubled F in which a level exists (`levels.levels_of_f`): by F, then by the lowest member of each family."""
     shared = plan.shared
     table = pattern_table(shared.scheme, all_f[0], all_f[-1])
@@ -39,16 +40,12 @@ def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) 
         solutions = _states(plan, members, grouped)
     groups = groups_by_number(grouped)
     twice_f, starts = members.twice_f.tolist(), (np.cumsum(members.levels) - members.levels).tolist()
-    out: list[SpinBlock] = [None] * len(twice_f)  # type: ignore[list-item]
+    out: list[SolvedBlock] = [None] * len(twice_f)  # type: ignore[list-item]
     for states in solutions:
         for i, energies, vectors, labels, mixing in _named(states, members):
-            f, parts, allowed = (
-                twice_f[i],
-                PartsOfBlock(members.parts, i),
-                members.allowed[i] if members.allowed else None,
-            )
-            results = energies, vectors, labels, mixing
-            out[i] = SpinBlock(f, patterns[f], parts, *results, shared, *groups[i], starts[i], allowed)
+            f, allowed = twice_f[i], members.allowed[i] if members.allowed else None
+            spins = SpinFunctions(f, patterns[f], members.parts, i, shared, *groups[i], allowed)
+            out[i] = SolvedBlock((), energies, vectors, starts[i], labels, mixing, spins=spins)
     return out
 
 

@@ -40,7 +40,7 @@ def test_pairs_are_those_of_all_blocks(name: str):
         (up.start, low.start): elements
         for low in blocks
         for up in blocks
-        if (up.twice_f, up.start) >= (low.twice_f, low.start)
+        if (up.twice_total, up.start) >= (low.twice_total, low.start)
         and (elements := elements_of_parts(up, low, tensors)).any()
     }
     assert [(up.start, low.start) for up, low in pairs] == sorted(expected, key=lambda pair: pair[::-1])

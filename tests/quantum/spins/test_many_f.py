@@ -48,7 +48,7 @@ def _levels(case: str):
 @pytest.mark.parametrize("case", CASES)
 def test_levels_are_those_of_one_block_at_a_time(case, monkeypatch):
     together = _levels(case)
-    assert len({id(block.group) for block in together.blocks}) < len(together.blocks)
+    assert len({id(block.spins.group) for block in together.blocks}) < len(together.blocks)
     monkeypatch.setattr(many_f, "_MOST", 0)
     apart = _levels(case)
     assert np.abs(together.energy_mhz - apart.energy_mhz).max() < 1e-9
@@ -69,7 +69,7 @@ def test_elements_are_sums_over_parts(case):
             expected = elements_of_parts(up, low, tensors)
             if (up.start, low.start) in starts:
                 assert np.abs(amplitudes(up, low) - expected).max() < 1e-12
-            elif up.twice_f > low.twice_f or (up.twice_f == low.twice_f and up.start >= low.start):
+            elif up.twice_total > low.twice_total or (up.twice_total == low.twice_total and up.start >= low.start):
                 assert not expected.any()
 
 

@@ -34,7 +34,6 @@ from rotor.quantum.label_tracking import AssignedLevels, LabelledBlocks, without
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError
 from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation
 
@@ -257,7 +256,7 @@ def _assign_functions(
 def _label_functions(group: Group, levels: Levels) -> Functions:
     """The functions, over the basis, that label levels of l-doubled states, and their labels."""
 
-    def functions_of(block: SolvedBlock | SpinBlock) -> tuple[Floats, Ints]:
+    def functions_of(block: SolvedBlock) -> tuple[Floats, Ints]:
         functions = functions_by_l(over_basis(block), group.effect.pairs, str(levels.representation))
         return functions.amplitudes, functions.names
 

@@ -32,7 +32,6 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.labels import Functions, places, renamed, wang_functions
 from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import SpinBlock
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor
 from rotor.quantum.spins.scheme import SpinTerm
 from rotor.quantum.states import Coupling, OperatorOfJ
@@ -206,7 +205,7 @@ def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
 _UNCOUPLED = "l-doubled states without a coupling of their components; give -2Aζ (TYP 20) for them"
 
 
-def functions_by_l(block: SolvedBlock | SpinBlock, pairs: Sequence[Pair], representation: str) -> Functions:
+def functions_by_l(block: SolvedBlock, pairs: Sequence[Pair], representation: str) -> Functions:
     """The functions that label the states of a block: |K, l⟩ ± |-K, -l⟩ with K l > 0 and with K l < 0 of a pair, else Wang functions.
 
     (x ± y)/√2 of one K has K l > 0 if ⟨x|Nz l|y⟩ is positive, which it is for x with Ka + Kc - N + K even. A half turn across the axis

@@ -31,8 +31,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, clear_functions, connected_groups
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.spins.blocks import SpinBlock
-from rotor.quantum.spins.parts import assigned, block_names
+from rotor.quantum.spins.blocks import SpinFunctions
+from rotor.quantum.spins.parts import assigned, names_of_parts
 from rotor.quantum.wang.basis import WangBlock, names_of
 
 if TYPE_CHECKING:
@@ -73,8 +73,8 @@ def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diago
     tables, shares = [], []
     for block in levels.blocks:
         clear = _clear_labels(block, oblate, str(levels.representation)) if diag == 0 and rises else None
-        if diag == 3 and rises and isinstance(block, SpinBlock) and not _connects_wang_blocks(block):
-            clear = block.labels, block.mixing
+        if diag == 3 and rises and block.spins and not _connects_wang_blocks(block.spins):
+            clear = np.asarray(block.labels), np.asarray(block.mixing)
         if clear is not None:
             tables.append(clear[0])
             shares.append(clear[1])
@@ -110,7 +110,7 @@ def naming_by(diag: int, oblate: bool, diagonal: Diagonal = Diagonal.RISES) -> N
 
 
 def spin_naming_by(
-    diag: int, oblate: bool, diagonal: Diagonal, block: SpinBlock, representation: str
+    diag: int, oblate: bool, diagonal: Diagonal, block: SolvedBlock, representation: str
 ) -> NamedFunctions:
     """Rule that labels the states of a block with spins while constants change, over its basis functions."""
     functions = wang_functions(over_basis(block), representation)
@@ -147,14 +147,12 @@ def has_other_names(levels: Levels, diag: int, diagonal: Diagonal) -> bool:
     return "kc" in levels.quanta and (anew or any(_needs_names(block, diag) for block in levels.blocks))
 
 
-def _needs_names(block: object, diag: int) -> bool:
+def _needs_names(block: SolvedBlock, diag: int) -> bool:
     """Whether a block contains several Wang blocks (with spins: of one v and pattern, and DIAG is 3)."""
-    if isinstance(block, SpinBlock):
-        return diag == 3 and _connects_wang_blocks(block)
-    return isinstance(block, SolvedBlock) and len(block.parts) > 1
+    return diag == 3 and _connects_wang_blocks(block.spins) if block.spins else len(block.parts) > 1
 
 
-def _connects_wang_blocks(block: SpinBlock) -> bool:
+def _connects_wang_blocks(block: SpinFunctions) -> bool:
     """Whether a block with spins contains several Wang blocks of one v and pattern; False if only some functions exist."""
     if block.allowed is not None:
         return False
@@ -167,9 +165,9 @@ def _connects_wang_blocks(block: SpinBlock) -> bool:
     return len(set(held)) < len(held)
 
 
-def _clear_labels(block: object, oblate: bool, representation: str) -> tuple[Ints, Floats] | None:
+def _clear_labels(block: SolvedBlock, oblate: bool, representation: str) -> tuple[Ints, Floats] | None:
     """Labels v, Ka, Kc of DIAG 0 and weights, if each state has more than half of its weight in one Wang block; else None."""
-    if not isinstance(block, SolvedBlock) or block.alone:
+    if block.spins or block.alone:
         return None
     # squares over each part: the weight of the part
     weights_of_parts = np.add.reduceat(block.vectors**2, [part.start for part in block.parts], axis=0)
@@ -262,32 +260,32 @@ def _by_k2(functions: Functions, members: Ints, states: Ints, shares: Floats, en
     return functions_of_states
 
 
-def over_basis(block: SolvedBlock | SpinBlock) -> SolvedBlock | SpinBlock:
+def over_basis(block: SolvedBlock) -> SolvedBlock:
     """The block with its basis functions in place of its states."""
-    if not isinstance(block, SpinBlock):
+    if not block.spins:
         return replace(block, vectors=np.eye(len(block.vectors)))
-    parts = [
-        part._replace(rotor=replace(part.rotor, vectors=np.eye(len(part.rotor.energies_mhz)))) for part in block.parts
-    ]
-    return replace(block, parts=tuple(parts), vectors=np.eye(block.parts[-1].place.stop))
+    columns = block.spins.columns.only(block.spins.number)
+    rotors = [replace(rotor, vectors=np.eye(len(rotor.energies_mhz))) for rotor in columns.rotors]
+    spins = replace(block.spins, columns=replace(columns, rotors=rotors), number=0)
+    return replace(block, spins=spins, vectors=np.eye(spins.parts[-1].place.stop))
 
 
-def wang_functions(block: SolvedBlock | SpinBlock, representation: str) -> Functions:
+def wang_functions(block: SolvedBlock, representation: str) -> Functions:
     """The functions |N K ±⟩ of a solved block, with all coupling patterns, by part, pattern and K."""
-    if isinstance(block, SpinBlock):
+    if block.spins:
         return _functions_with_spins(block, representation)
     return _joined([(part.v, part.basis, None, block.vectors[part.place]) for part in block.parts], representation)
 
 
-def _functions_with_spins(block: SpinBlock, representation: str) -> Functions:
+def _functions_with_spins(block: SolvedBlock, representation: str) -> Functions:
     """The functions of a block with spins."""
     pieces = []
-    for part in block.parts:
+    for part in block.spins.parts:
         rows = block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1)
         for wang_part in part.rotor.parts:
             assert isinstance(wang_part.basis, WangBlock)
             inside = np.einsum("kr,prn->pkn", part.rotor.vectors[wang_part.place], rows)
-            patterns = block.patterns[part.patterns]
+            patterns = block.spins.patterns[part.patterns]
             pieces += [
                 (wang_part.v, wang_part.basis, pattern, each) for pattern, each in zip(patterns, inside, strict=True)
             ]
@@ -321,7 +319,7 @@ UNDIAGONALIZED_NOTE = (
 def refuse_other_functions(levels: Levels, l_doubled: bool) -> None:
     """Raise ValueError for levels whose functions are not those of the file, so that they have other diagonal elements than in SPCAT."""
     what = "l-doubled states" if l_doubled else "three equivalent spins"
-    if l_doubled or any(getattr(block, "allowed", None) is not None for block in levels.blocks):
+    if l_doubled or any(block.spins and block.spins.allowed for block in levels.blocks):
         raise ValueError(
             f"DIAG is below 0, diagonal elements in place of eigenvalues: those of {what} are not computed; give DIAG = 0 for eigenvalues"
         )
@@ -343,7 +341,7 @@ def without_diagonalization(levels: Levels) -> Levels:
     return replace(named, energy_mhz=energies, blocks=blocks)
 
 
-def _functions_as_states(block: SolvedBlock | SpinBlock, representation: str) -> tuple[SolvedBlock | SpinBlock, Ints]:
+def _functions_as_states(block: SolvedBlock, representation: str) -> tuple[SolvedBlock, Ints]:
     """A block whose states are its functions, and their labels.
 
     The rows of the eigenvectors are rotational states where spins are added. With functions F = T R of rows R, amplitudes A = T V and
@@ -353,13 +351,11 @@ def _functions_as_states(block: SolvedBlock | SpinBlock, representation: str) ->
         functions = wang_functions(block, representation)
         names, amplitudes = functions.names, functions.amplitudes
     else:  # |N K⟩ with each pattern: the rows of the vectors
-        assert isinstance(block, SpinBlock)
-        names, amplitudes = block_names(block.parts, block.patterns).labels, block.vectors
+        columns = block.spins.columns.only(block.spins.number)
+        names, amplitudes = names_of_parts(columns, block.spins.patterns).labels, block.vectors
     diagonal: Floats = amplitudes**2 @ block.energies_mhz
     order = np.argsort(diagonal, kind="stable")  # stable: equal diagonal elements keep the order of functions
     vectors = (block.vectors @ amplitudes.T)[:, order]
     names = names[order]
-    if isinstance(block, SpinBlock):
-        return replace(block, energies_mhz=diagonal[order], vectors=vectors, labels=names), names
     labels = None if block.labels is None else names
     return replace(block, energies_mhz=diagonal[order], vectors=vectors, labels=labels), names
