@@ -54,18 +54,14 @@ def model_of(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators,
         for coupling in couplings_of(top, [effect], representation):
             couplings.setdefault((coupling.bra, coupling.ket), []).append((values[coupling.name], coupling))
         states |= {state.v: state.operators(values) for state in effect.states(top)}
-    _refuse_equal_numbers([0, *(state.v for effect in effects for state in effect.states(top))])
+    numbers = [0, *(state.v for effect in effects for state in effect.states(top))]
+    if len(set(numbers)) < len(numbers):
+        raise ValueError(f"states {numbers}: every state has a number v of its own, and 0 is the top's")
     for pair, linked in couplings.items():
         for v in pair:
             if v not in states:
                 raise ValueError(f"coupling {linked[0][1].name}: state {v} is not defined; known are {sorted(states)}")
     return Model(states, couplings, representation, k_limits_of(top, effects))
-
-
-def _refuse_equal_numbers(numbers: list[int]) -> None:
-    """ValueError where two states have one number."""
-    if len(set(numbers)) < len(numbers):
-        raise ValueError(f"states {numbers}: every state has a number v of its own, and 0 is the top's")
 
 
 def coupled_levels(

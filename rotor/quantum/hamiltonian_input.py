@@ -42,7 +42,7 @@ class HamiltonianInput:
 
 def effects_field() -> Any:
     """The field `effects` of a request: a tuple of effects."""
-    return part(HamiltonianInput, effects_from, saved_effects, SEMI_RIGID)
+    return part(HamiltonianInput, effects_from, lambda effects, request: saved_of_top(effects, request.top), SEMI_RIGID)
 
 
 def takes_spins(hyperfine: bool | None, subject: Any) -> bool:
@@ -99,14 +99,6 @@ def effects_of_each(inputs: HamiltonianInput, subject: Any) -> Any:
         return effects_of_top(inputs if split else plain, molecule, split)
 
     return tuple(map(effects, molecules))
-
-
-def saved_effects(effects: Iterable[QuantumEffect], request: Any) -> HamiltonianInput:
-    """What asks for these effects of a request's top again.
-
-    Raises ValueError for effects that have no name here.
-    """
-    return saved_of_top(effects, request.top)
 
 
 def saved_of_each(effects: Sequence[Iterable[QuantumEffect]], request: Any) -> HamiltonianInput:

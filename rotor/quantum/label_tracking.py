@@ -158,11 +158,6 @@ def _padded(rows: Sequence[Ints], fill: int) -> Ints:
     return out
 
 
-def _filled(values: Floats, count: int) -> Floats:
-    """Values (n,) with zeros behind them."""
-    return np.concatenate([values, np.zeros(count - len(values))])
-
-
 @dataclass(frozen=True, eq=False)
 class _Labelled:
     """Blocks side by side with the labels in them: members (blocks, sub-blocks, functions), 1 where a function is in a sub-block; rows
@@ -211,9 +206,8 @@ class _Labelled:
 
     @cached_property
     def _unclear_at_start(self) -> NDArray[np.bool_]:
-        return self._unclear(
-            self.leading, np.stack([_filled(block.start.shares, self.stack.size) for block in self.tracked])
-        )
+        shares = [np.pad(block.start.shares, (0, self.stack.size - block.block.size)) for block in self.tracked]
+        return self._unclear(self.leading, np.stack(shares))
 
     def _unclear(self, leading: Ints, shares: Floats) -> NDArray[np.bool_]:
         """Blocks (blocks,) with a labelled state whose sub-block and rank among those that lead do not make its name."""

@@ -258,13 +258,12 @@ class Levels(Table):
         else:
             row = int(self.rows_of(**{name: [value] for name, value in quanta.items()})[0])
         if row < 0:
-            label = ", ".join(f"{name} = {value}" for name, value in quanta.items())
-            raise ValueError(f"no level with {label} among {len(self)} levels up to {self._total} = {self.jmax}")
+            label, total = (
+                ", ".join(f"{name} = {value}" for name, value in quanta.items()),
+                "N" if "n" in self.quanta else "J",
+            )
+            raise ValueError(f"no level with {label} among {len(self)} levels up to {total} = {self.jmax}")
         return row
-
-    @property
-    def _total(self) -> str:
-        return "N" if "n" in self.quanta else "J"
 
     def rows_of(self, **quanta: ArrayLike) -> Ints:
         """Rows of the levels with these quantum numbers, arrays (n,) by name; -1 where there is none.

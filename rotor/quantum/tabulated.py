@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.levels import Levels
 from rotor.tops.states.level_table import LevelTable, tabulated_energies
 
 if TYPE_CHECKING:
@@ -78,6 +78,5 @@ def with_tabulated_energies(levels: Levels, table: LevelTable) -> Levels:
     blocks = tuple(
         replace(block, energies_mhz=energy[block.start : block.start + len(block.energies_mhz)])
         for block in levels.blocks
-        if isinstance(block, SolvedBlock)
     )
     return replace(levels, energy_mhz=energy, blocks=blocks)

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from file_covariance import constants_covariance
 
 import rotor
 from rotor.fitting.assignment import Assignments, assignments
@@ -29,7 +30,7 @@ from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.hamiltonian.codes import FIXED
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.formats.spcat.variances import constants_covariance, variance_factor
+from rotor.formats.spcat.variances import variance_factor
 from rotor.quantum.estimates import contracted, labelled_spins
 from rotor.quantum.estimates.contracted import ContractedLevels
 from rotor.tops.constants import Constants

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from file_covariance import constants_covariance
 
 import rotor
 from rotor.fitting.assignment import Assignments, assignments
@@ -20,7 +21,6 @@ from rotor.formats.fit_request import answer_fit, lines_request
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import read_par
-from rotor.formats.spcat.variances import constants_covariance
 from rotor.spectra.lines import line_list
 from rotor.statistics.least_squares import INTERRUPTED, Iteration
 from rotor.tops.constants import Constants

@@ -132,19 +132,15 @@ def _predicted(parameters: ParameterFile, intensities: IntensityFile, as_spcat: 
     notes += falling_diagonal_notes(present, diag, highest)
     if full_basis:
         notes += full_basis_notes(file_states(parameters), highest)
+    without_vectors = [each._replace(levels=replace(each.levels, blocks=())) for each in solved]
     return Prediction(
         as_catalogue(pieces, form, request.tag, linear=linear),
         joined_lines(parameters, solved, [lines.transitions for lines in listed], form, request),
         request.qrot,
         request,
         tuple(notes),
-        partial(_listed_levels, parameters, [_without_blocks(each) for each in solved], form),
+        partial(_listed_levels, parameters, without_vectors, form),
     )
-
-
-def _without_blocks(solved: SolvedGroup) -> SolvedGroup:
-    """A solved group without its matrices, which a list of levels does not need."""
-    return solved._replace(levels=replace(solved.levels, blocks=()))
 
 
 def _listed_levels(parameters: ParameterFile, solved: list[SolvedGroup], form: Format) -> LevelList:

@@ -11,9 +11,8 @@ from itertools import takewhile
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW, constants_and_matrix
+from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
-from rotor.tops.covariance import Covariance
 
 FREE_ABOVE = 1e15  # MHz; a larger a-priori error counts as none, as in SPFIT
 _WIDTH = 10
@@ -46,18 +45,6 @@ def variance_factor(file: ParameterFile) -> Floats | None:
             value = file.parameters[leader].value
             factor[i] = factor[leader] * (parameter.value / value) if value else 0.0
     return factor
-
-
-def constants_covariance(file: ParameterFile) -> Covariance | None:
-    """The covariance of the named constants of a file with one state and no spins; None without estimated errors."""
-    factor = variance_factor(file)
-    if factor is None:
-        return None
-    constants, matrix = constants_and_matrix(file)
-    spread = matrix @ factor
-    rows = np.flatnonzero(spread.any(axis=1))
-    names = tuple(constants.values)
-    return Covariance(tuple(names[i] for i in rows), spread[rows] @ spread[rows].T)
 
 
 def _estimated(parameter: Parameter) -> float:

@@ -157,14 +157,15 @@ def map_request(
     terms = [FieldTerm(1, -units.MHZ_PER_DEBYE_KV_PER_CM, dipole)]
     if light is not None:
         terms.append(FieldTerm(0, -MHZ_ANGSTROM3_W_PER_CM2 * intensity_w_per_cm2, light))
-    observables = {"costheta": _orientation(top, unit), "cos2theta": _alignment(top)}
+    axis = np.eye(3)[figure_axis(top)]
+    cosines = {"costheta": Contraction(axis, unit), "cos2theta": Contraction(np.outer(axis, axis), np.outer(Z, Z))}
     if top.internal_rotation is not None and any(effect.spins(top) for effect in effects):
-        del observables["cos2theta"]  # no elements of rank 2 with spins and internal rotation
+        del cosines["cos2theta"]  # no elements of rank 2 with spins and internal rotation
     return MapRequest(
         top=top,
         effects=tuple(effects),
         terms=tuple(terms),
-        observables=observables,
+        observables=cosines,
         kind=ELECTRIC,
         fields=ELECTRIC.checked(fields_kv_per_cm),
         j_highest=checked_j(j_highest),
@@ -271,17 +272,6 @@ def figure_axis(top: Top) -> int:
     if top.kind != "asymmetric":
         return 2 if top.kind == "oblate" else 0
     return int(np.argmax(np.abs(top.dipole_abc_debye or (1.0, 0.0, 0.0))))
-
-
-def _orientation(top: Top, direction: tuple[float, float, float]) -> Contraction:
-    """cosθ of the figure axis and the field."""
-    return Contraction(np.eye(3)[figure_axis(top)], direction)
-
-
-def _alignment(top: Top) -> Contraction:
-    """cos²θ of the figure axis and Z."""
-    axis = np.eye(3)[figure_axis(top)]
-    return Contraction(np.outer(axis, axis), np.outer(Z, Z))
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
+from rotor.quantum.estimates.derivatives import term_expectations
 from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
-from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
+from rotor.quantum.wang.wang_matrix import JMatrix, scalar_energy
 from rotor.table import counted
 from rotor.tops.operators import Operators
 
@@ -45,15 +45,9 @@ def order_sizes_mhz(
     for powers, value in hamiltonian(top, effects).items():
         by_order.setdefault(2 * sum(powers), {})[powers] = value
     if top.kind == "spherical":  # D_t, whose expansion has terms of J² too, counts as order four
-        by_order = _without_mixture(by_order)
+        by_order[2] = {powers: value for powers, value in by_order.get(2, {}).items() if powers == (1, 0, 0)}
     highest = 0 if top.kind == "linear" else j if kmax is None else min(kmax, j)
     return {order: _row_bound(by_order[order], j, highest) for order in sorted(by_order)}
-
-
-def _without_mixture(by_order: dict[int, Operators]) -> dict[int, Operators]:
-    """Operators by order without the terms of J² in the expansion of D_t."""
-    lower = {powers: value for powers, value in by_order.get(2, {}).items() if powers == (1, 0, 0)}
-    return by_order | {2: lower}
 
 
 def _row_bound(operators: Operators, j: int, kmax: int) -> float:
@@ -163,25 +157,17 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
     There Ka and Kc only count states: distortion exceeds the rigid energies (quartic-only water from J = 15 on). ⟨Jz²⟩ would be a wrong
     criterion, since it decreases a little near the separatrix of a rigid top, whose labels are in order.
     """
-    out: list[tuple[int, str]] = []
-    matrices: dict[int, JMatrix] = {}
-    if hamiltonian(top, levels.effects) == hamiltonian(top, (Rigid(),)):  # a rigid top is in order
-        return out
-    operators = rigid_operators(top.constants)
-    for block in levels.blocks:
-        if not block.alone or block.basis.size == 1:
-            continue
-        j = block.basis.j
-        matrices[j] = matrices[j] if j in matrices else JMatrix(operators, j)
-        rigid = _expectations(block_bands(matrices[j], block.basis), block.vectors)
-        if (np.diff(rigid) < -1e-9 * np.abs(rigid).max()).any():
-            out.append((j, block.basis.species))
-    return out
-
-
-def _expectations(bands: list[Floats], vectors: Floats) -> Floats:
-    """⟨v|H|v⟩ for every column of `vectors`, H given by its diagonals."""
-    total = bands[0] @ vectors**2
-    for n, band in enumerate(bands[1:], 1):
-        total += 2 * (band @ (vectors[:-n] * vectors[n:]))
-    return np.asarray(total)
+    blocks = [block for block in levels.blocks if block.alone and len(block.energies_mhz) > 1]
+    if not blocks or hamiltonian(top, levels.effects) == hamiltonian(top, (Rigid(),)):  # a rigid top is in order
+        return []
+    along_and_across = {
+        powers: value for powers, value in rigid_operators(top.constants).items() if powers[1:] != (0, 0)
+    }
+    rows = np.concatenate([block.start + np.arange(len(block.energies_mhz)) for block in blocks])
+    rigid = term_expectations(levels, list(along_and_across), rows) @ list(along_and_across.values())
+    parts = np.split(rigid, np.cumsum([len(block.energies_mhz) for block in blocks])[:-1])
+    return [
+        (block.j, block.basis.species)
+        for block, part in zip(blocks, parts, strict=True)
+        if (np.diff(part) < -1e-9 * np.abs(part).max()).any()
+    ]

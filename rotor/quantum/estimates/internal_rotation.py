@@ -105,16 +105,6 @@ class LineShifts:
     same: Floats
     other: Floats
 
-    @property
-    def typical_same_mhz(self) -> float:
-        """Median splitting of lines with ΔKa = 0."""
-        return float(np.median(np.abs(self.same)))
-
-    @property
-    def typical_other_mhz(self) -> float:
-        """Median splitting of lines with ΔKa = 1."""
-        return float(np.median(np.abs(self.other)))
-
 
 def line_shifts(constants_mhz: tuple[float, float, float], rotor: InternalRotor, j: int) -> LineShifts:
     """E - A splittings of the lines J+1 ← J.

@@ -263,7 +263,8 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
 def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: int) -> tuple[float, str]:
     """Size of the A - E splitting of lines J+1 ← J, and text on the barrier; the dipole decides between ΔK = 0 and ΔK = 1."""
     barrier, rotor = group.barrier, group.rotor
-    sizes = [("within one K", shifts.typical_same_mhz), ("between two K", shifts.typical_other_mhz)]
+    lines = {"within one K": shifts.same, "between two K": shifts.other}
+    sizes = [(where, float(np.median(np.abs(splittings)))) for where, splittings in lines.items()]
     along = int(np.argmax(np.abs(rotor.rho)))
     if top.dipole_abc_debye is not None and any(top.dipole_abc_debye) and not top.dipole_abc_debye[along]:
         sizes.reverse()

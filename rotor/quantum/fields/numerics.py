@@ -96,11 +96,6 @@ def _describe_in_field(acts: str, good: str, within: str, request: Any, ends: An
     }
 
 
-def _stark_cost(request: Any) -> Cost:
-    """The cost of levels in an electric field."""
-    return _cost_in_field(answer_stark, replace(request, diabatic_gap_mhz=None))
-
-
 ENERGIES = Measure("energy", "MHz", largest_difference)
 STARK = Numerics(
     {"MHz": Goal("energies")},
@@ -109,7 +104,7 @@ STARK = Numerics(
     describe=partial(
         _describe_in_field, "dipole in the field, up to {:g} kV/cm", "|M|", "Stark shift of a stray field"
     ),
-    cost=_stark_cost,
+    cost=lambda request: _cost_in_field(answer_stark, replace(request, diabatic_gap_mhz=None)),
 )
 ZEEMAN = Numerics(
     {"MHz": Goal("energies")},

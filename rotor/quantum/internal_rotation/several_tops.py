@@ -207,7 +207,8 @@ class SeveralTops:
     def _along(self) -> list[Operator]:
         """ρ_i·P of each top."""
         return [
-            _sum([value * axis for value, axis in zip(top.rho_abc, AXES, strict=True) if value]) for top in self.tops
+            sum((value * axis for value, axis in zip(top.rho_abc, AXES, strict=True) if value), Operator())
+            for top in self.tops
         ]
 
     def slopes_by_rho(self, species: Species) -> dict[str, list[Product]]:
@@ -327,8 +328,3 @@ def _lowest(energies: Floats, count: int, exchanged: bool) -> Ints:
     if exchanged and tuple(retained[-1][::-1]) not in set(map(tuple, retained.tolist())):
         retained = np.vstack([retained, retained[-1][::-1]])
     return retained
-
-
-def _sum(operators: list[Operator]) -> Operator:
-    """Sum of operators."""
-    return reduce(lambda x, y: x + y, operators, Operator())

@@ -129,7 +129,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
     named = _named_constants(file)
     if named is not None:
         constants, matrix = named
-        names, kmax = tuple(constants.values), _kmax(file, constants)
+        names, kmax = tuple(constants.values), file.options[0].knmax if constants.kind == "asymmetric" else None
     else:
         from rotor.formats.spcat.fits.fit_states import FileLevels
         from rotor.formats.spcat.hamiltonian.coded_file import line_names
@@ -246,11 +246,6 @@ def _distinct(parameters: Sequence[Parameter]) -> tuple[str, ...]:
     return tuple(
         f"{name}, {1 + names[:i].count(name)}" if names.count(name) > 1 else name for i, name in enumerate(names)
     )
-
-
-def _kmax(file: ParameterFile, constants: Constants) -> int | None:
-    """The largest K of the basis."""
-    return file.options[0].knmax if constants.kind == "asymmetric" else None
 
 
 def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str) -> tuple[Assignments, list[str]]:

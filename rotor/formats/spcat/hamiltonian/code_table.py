@@ -277,18 +277,13 @@ def square_typ(axis: str) -> int:
     return next(row.first for row in TABLE if row.kind is Kind.SQUARE) + "abc".index(axis)
 
 
-def typ_along(axis: str) -> int:
-    """TYP of Na, Nb, Nc."""
-    return _ALONG[axis].first
-
-
 def typ_across(letters: str) -> int:
     """TYP of NbNc + NcNb, ... by two axes."""
     return _ALONG[axis_product(letters[0], letters[1])].first + 1
 
 
 TYPES_BETWEEN = (  # interactions of two states without spins, by name
-    {f"G_{axis}": typ_along(axis) for axis in "abc"}
+    {f"G_{axis}": _ALONG[axis].first for axis in "abc"}
     | {f"F_{letters}": typ_across(letters) for letters in PAIRS}
     | {"W": 0}
     | {f"W_pm{2 * n}": ladder_typ(n) for n in (1, 2, 3)}

@@ -200,15 +200,11 @@ def format_par(file: ParameterFile) -> bytes:
     return freeform.encode([
         freeform.title_text(file.title, file.title_text),
         freeform.as_read(file.header, _header) or _header_text(file.header),
-        *(freeform.as_read(options, partial(_options, defaults=_defaults(file, at))) or _options_text(options)
+        *(freeform.as_read(options, partial(_options, defaults=file.options[0] if at else Options())) or _options_text(options)
           for at, options in enumerate(file.options)),
         *(freeform.as_read(parameter, _parameter) or _parameter_text(parameter) for parameter in file.parameters),
         file.rest,
     ])  # fmt: skip
-
-
-def _defaults(file: ParameterFile, at: int) -> Options:
-    return file.options[0] if at else Options()
 
 
 def _header_text(h: Header) -> str:
