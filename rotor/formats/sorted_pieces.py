@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.formats.atomic_write import open_atomic
+from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.tables import quoted, run
 
 if TYPE_CHECKING:
@@ -45,18 +45,17 @@ def _first_difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     return f"{keys[0]} was {before.get(keys[0])}, is {now[keys[0]]}" if keys else "its settings differ"
 
 
-def sort_pieces(pieces: list[Path], target: Path, record: Mapping[str, Any], folder: Path, memory_mb: int) -> int:
+def sort_pieces(pieces: list[Path], target: Path, record: Mapping[str, Any], folder: Path, memory_mb: int) -> None:
     """DuckDB's external merge sort: what exceeds its memory goes to files in `folder`."""
-    with engine_in(folder, memory_mb) as engine:
+    with engine_in(folder, memory_mb) as engine, atomic_path(target) as unfinished:
         files = ", ".join(quoted(str(piece)) for piece in pieces)
         text = quoted(json.dumps(record, ensure_ascii=False))
         run(
             engine,
-            f"COPY (SELECT * FROM read_parquet([{files}]) ORDER BY frequency_mhz) TO {quoted(str(target))} "
+            f"COPY (SELECT * FROM read_parquet([{files}]) ORDER BY frequency_mhz) TO {quoted(str(unfinished))} "
             f"(FORMAT parquet, KV_METADATA {{provenance: {text}}})",
             target,
         )
-        return row_count(engine, target)
 
 
 @contextmanager

@@ -70,8 +70,8 @@ class SortedLines:
     record: Mapping[str, Any]
     memory_mb: int
 
-    def write(self, target: Path, tag: int = 0) -> None:
-        """Write the list as .parquet, .csv or .cat by the suffix of the name."""
+    def write(self, target: Path, tag: int = 0, progress: Callable[[int, int], object] | None = None) -> None:
+        """Write the list as .parquet, .csv or .cat by the suffix of the name. progress: of the lines of a .cat."""
         if target.suffix.lower() == ".parquet":
             with atomic_path(target) as unfinished:
                 shutil.copyfile(self.file, unfinished)
@@ -87,6 +87,8 @@ class SortedLines:
             for part in _catalogues(self.plan, self.file, tag, self.memory_mb):
                 handle.write(format_lines(part))
                 count += len(part)
+                if progress is not None:
+                    progress(count, self.count)
         write_beside(target, dict(self.record) | {"lines": count})
 
     def strongest_cut(self, count: int) -> tuple[float | None, int]:
@@ -139,9 +141,12 @@ class _Plan:
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID
     twice_spins: tuple[int, ...] = ()
 
-    def piece(self, first: int, last: int) -> Path:
-        """The file of the lines with lower J (or number of the lower F) from `first` to `last`."""
-        return self.folder / f"{'f' if self.twice_spins else 'j'}{first:04d}-{last:04d}.parquet"
+    def piece(self, first: int, last: int, part: int = 0) -> Path:
+        """The file of the lines with lower J (or number of the lower F) from `first` to `last`; of many lines that of a part."""
+        return (
+            self.folder
+            / f"{'f' if self.twice_spins else 'j'}{first:04d}-{last:04d}{f'.{part}' if part else ''}.parquet"
+        )
 
     @property
     def highest(self) -> int:
@@ -282,14 +287,20 @@ def sorted_lines(
     record = _provenance(plan, ranges) | {"errors_from": start.errors_from}
     open_folder(plan.folder, record)
 
-    missing = [r for r in ranges if not plan.piece(*r).exists()]
+    merged = plan.folder / "sorted.parquet"
+    missing = [] if merged.exists() else [r for r in ranges if not plan.piece(*r).exists()]
     jobs = ([plan] * len(missing), *zip(*missing, strict=True)) if missing else ([], [], [])
     before = len(ranges) - len(missing)
     for done, _ in enumerate((executor.map if executor else map)(_make_piece, *jobs), before + 1):
         if progress is not None:
             progress(done, len(ranges))
-    merged = plan.folder / "sorted.parquet"
-    count = sort_pieces([plan.piece(*r) for r in ranges], merged, record, plan.folder, memory_mb)
+    pieces = sorted(plan.folder.glob("[fj]*-*.parquet"))
+    if not merged.exists():
+        sort_pieces(pieces, merged, record, plan.folder, memory_mb)
+    for piece in pieces:
+        piece.unlink()
+    with engine_in(plan.folder, memory_mb) as engine:
+        count = row_count(engine, merged)
     return SortedLines(merged, count, len(missing), before, plan, record, memory_mb)
 
 
@@ -382,7 +393,7 @@ def _provenance(plan: _Plan, ranges: list[tuple[int, int]]) -> dict[str, Any]:
 
 
 def _make_piece(plan: _Plan, first: int, last: int) -> None:
-    """Lines with lower J (or number of F) from `first` to `last`, sorted, as a Parquet file."""
+    """Lines with lower J (or number of F) from `first` to `last`, as Parquet files of bounded length."""
     levels, totals = plan.levels(first, min(last + 1, plan.highest))
     trusted = are_trusted(plan.top, levels, plan.ground_mhz)
     if trusted.any():  # the others may lie far below the ground; without any there are no lines at all
@@ -404,9 +415,11 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
         plan.range_mhz,
         plan.partition,
     )
-    columns = _columns(plan, lines.sorted())
-    with atomic_path(plan.piece(first, last)) as unfinished:
-        copy_columns(columns, unfinished, "(FORMAT parquet)")
+    rows = np.arange(len(lines))
+    parts = [rows[start : start + _BATCH] for start in range(0, len(rows), _BATCH)] or [rows]
+    for number, part in reversed(list(enumerate(parts))):  # the piece is complete with its first part
+        with atomic_path(plan.piece(first, last, number)) as unfinished:
+            copy_columns(_columns(plan, lines.where(part)), unfinished, "(FORMAT parquet)")
 
 
 def _columns(plan: _Plan, lines: Lines) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,15 +25,20 @@ JSON_LINES = 200_000  # limit of JSON, whose text takes about 0.6 kB of memory f
 
 @dataclass(frozen=True, repr=False)
 class LongAnswer(SpectrumAnswer):
-    """A list on disk. lines: the strongest. whole: all lines. span_mhz: first and last frequency. files: not yet written."""
+    """A list on disk. lines: the strongest. whole: all lines. span_mhz: first and last frequency. files: not yet written.
+
+    progress: whether a terminal shows it.
+    """
 
     whole: SortedLines
     span_mhz: tuple[float, float]
     files: list[Path]
+    progress: bool = False
 
     def write(self, path: Path, tag: int) -> None:
         """Write all lines; the pieces on disk are removed after the last file."""
-        self.whole.write(path, tag)
+        with _bar(f"lines in {path.name}", self.progress) as advance:
+            self.whole.write(path, tag, advance)
         self.files.pop()
         if not self.files:
             self.whole.remove()
@@ -116,7 +121,7 @@ def answer_long(
 ) -> LongAnswer:
     """The lines of a request, sorted in a folder beside its first file; an interrupted run resumes from there."""
     paths = _streamed(files)
-    with progress_bar("pieces") if progress else nullcontext() as advance:
+    with _bar("pieces", progress) as advance:
         whole = _sorted(request, Path(f"{paths[0]}.pieces"), advance)
     if "json" in files and whole.count > JSON_LINES:
         raise ValueError(
@@ -126,7 +131,12 @@ def answer_long(
     cut, jmax = complete if "json" in files else whole.strongest_cut(max(strongest, STRONGEST))
     least = request.min_lgint if cut is None else cut
     lines = answer_spectrum(replace(request, jmax=jmax, min_lgint=least)).lines
-    return LongAnswer(request, lines, whole, whole.span_mhz, paths)
+    return LongAnswer(request, lines, whole, whole.span_mhz, paths, progress)
+
+
+def _bar(what: str, shown: bool) -> AbstractContextManager[Callable[[int, int], object] | None]:
+    """A bar on a terminal, else nothing."""
+    return progress_bar(what) if shown else nullcontext()
 
 
 def _sorted(request: SpectrumRequest, folder: Path, progress: Callable[[int, int], object] | None) -> SortedLines:

@@ -214,6 +214,56 @@ def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
     assert not Path("a.cat.pieces").exists()
 
 
+def test_a_piece_of_many_lines_is_written_in_parts(call, folder, monkeypatch, short):
+    """One F of J = 300 has 3.6 million lines with one 14N, whose columns took 0.55 GB at once."""
+    from rotor.formats import streamed_lines
+
+    sizes, true = [], streamed_lines.copy_columns
+    with monkeypatch.context() as patch:
+        patch.setattr(streamed_lines, "_BATCH", 300)
+        patch.setattr(
+            streamed_lines,
+            "copy_columns",
+            lambda columns, path, options: (sizes.append(len(columns["lgint"])), true(columns, path, options)),
+        )
+        assert call(*TYPED, "--cat", "a.cat")[0] == 0
+    assert len(sizes) > 20
+    assert max(sizes) == 300
+    assert _in_memory(call, monkeypatch, *TYPED, "--cat", "b.cat")[0] == 0
+    assert sorted(Path("a.cat").read_text().splitlines()) == sorted(Path("b.cat").read_text().splitlines())
+
+
+def test_a_list_that_is_sorted_is_not_made_again(call, folder, monkeypatch, short):
+    """Interrupted while a file is written: no piece is solved again, and the pieces take no room beside the sorted list."""
+    from rotor.formats import streamed_lines
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(streamed_lines, "format_lines", stop)
+        assert call(*TYPED, "--cat", "a.cat")[0] == 130
+    assert {path.name for path in Path("a.cat.pieces").iterdir()} == {"manifest.json", "sorted.parquet"}
+    with monkeypatch.context() as patch:
+        patch.setattr(streamed_lines, "_make_piece", lambda *_: pytest.fail("solved again"))
+        assert call(*TYPED, "--cat", "a.cat")[0] == 0
+    assert _in_memory(call, monkeypatch, *TYPED, "--cat", "b.cat")[0] == 0
+    assert sorted(Path("a.cat").read_text().splitlines()) == sorted(Path("b.cat").read_text().splitlines())
+
+
+def test_the_lines_that_are_written_are_counted(folder, monkeypatch, short):
+    """The catalogue of 367 million lines is written for half an hour."""
+    from rotor.formats.streamed_lines import sorted_lines
+    from rotor.tops.top import Top
+
+    top = Top.from_constants(CONSTANTS, dipole_abc_debye=(1.2, 1.9, 0.4))
+    lines = sorted_lines(top, Path("a.pieces"), jmax=5, temperature_k=300.0, min_lgint=None, range_mhz=(0.0, float("inf")),
+                         q=1e5, vibrational_factor=1.0)  # fmt: skip
+    counts = []
+    lines.write(Path("a.cat"), progress=lambda done, total: counts.append((done, total)))
+    assert counts[-1][0] == len(Path("a.cat").read_text().splitlines()) <= counts[-1][1] == lines.count
+
+
 # the peak of this program: `ru_maxrss` of a child is at least what its parent had
 MEASURED = """
 import sys

@@ -241,9 +241,12 @@ def _smallest_of_block(request: MapRequest, lowest: int, highest: int, block: Fi
 
 
 def blocks_of_map(request: MapRequest, jmax: int) -> list[FieldBlock]:
-    """Blocks with states of a map, in its order, with J up to J max plus the margin that bounds need."""
+    """Blocks with states of a map, in its order, with J up to J max plus the margin that bounds need; ValueError if they take too long."""
     space = request.space(jmax + request.margin)
-    return [block for m in request.m_values for block in space.blocks(m) if (block.j <= request.j_highest).any()]
+    blocks = [block for m in request.m_values for block in space.blocks(m) if (block.j <= request.j_highest).any()]
+    if not isinstance(space, AxialSpace):  # chains take the time of their energies
+        request.require_work([int((block.j <= jmax).sum()) for block in blocks])
+    return blocks
 
 
 def each_block(
@@ -309,22 +312,23 @@ def _columns(request: MapRequest, jmax: int, blocks: Sequence[FieldBlock]) -> li
 
 def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockStates) -> dict[str, NDArray[Any]]:
     """Columns of the states of a block; the truncation error is NaN for states listed only for their diabatic label."""
-    block, fields, vectors = states.block, request.fields, states.vectors
+    block, fields = states.block, request.fields
     inside, levels = terms_over(terms, states.places), block.levels
     labels = np.array([levels.label(int(row)) for row in states.rows])
     followed = states.j <= request.j_highest
-    by_field = {
-        "energy_mhz": states.energies,
-        "slope": -derivatives(inside, fields, vectors) / request.kind.slope_mhz,
-        "edge_population": (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1),
-        "truncation_mhz": np.where(followed, states.error, np.nan),
-    }
-    for name, operator in request.observables.items():
-        by_field[name] = expectation(over(block.space.dense(block, operator), states.places), vectors)
-    listed = followed
+    listed, diabatic = followed, {}
     if request.diabatic_gap_mhz is not None:
         ranks = _diabatic_ranks(request, inside, len(labels), request.diabatic_gap_mhz)
-        listed, by_field["diabatic_label"] = followed | followed[ranks].any(axis=0), labels[ranks]
+        listed, diabatic = followed | followed[ranks].any(axis=0), {"diabatic_label": labels[ranks]}
+    vectors = states.vectors[:, :, listed]
+    of_listed = {
+        "slope": -derivatives(inside, fields, vectors) / request.kind.slope_mhz,
+        "edge_population": (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1),
+    }
+    for name, operator in request.observables.items():
+        of_listed[name] = expectation(over(block.space.dense(block, operator), states.places), vectors)
+    by_field = {"energy_mhz": states.energies, "truncation_mhz": np.where(followed, states.error, np.nan)} | diabatic
+    of_listed |= {name: values[:, listed] for name, values in by_field.items()}
     by_state = {
         "rank": np.arange(len(labels)),
         "label": labels,
@@ -338,7 +342,7 @@ def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockState
         "field": np.tile(fields, count),
         **{name: np.full(count * len(fields), value) for name, value in by_block.items()},
         **{name: np.repeat(values[listed], len(fields)) for name, values in by_state.items()},
-        **{name: values[:, listed].T.ravel() for name, values in by_field.items()},
+        **{name: values.T.ravel() for name, values in of_listed.items()},
     }
 
 

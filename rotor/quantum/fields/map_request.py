@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -22,7 +22,12 @@ if TYPE_CHECKING:
 
 # largest population of a state in the two highest J of the basis; the error of cosines is about as large
 MOST_AT_EDGE = 1e-6
-MOST_ENERGIES = 600_000  # of a map: about 15 s for an asymmetric top
+MOST_ENERGIES = 1_500_000  # rows of a map, of about 0.6 kB
+# Σ n³ over the blocks of n functions, times the number of fields; 3 to 4·10⁻¹⁰ s of a processor each
+MOST_WORK = 1e12
+SECONDS = 4e-10
+FEWER = "follow states of lower J or of fewer M, or ask for fewer fields"
+MOST_BLOCKS = 8  # of one M, of an asymmetric top
 
 
 class FieldKind(NamedTuple):
@@ -87,16 +92,33 @@ class MapRequest:
         if (energies := self.states * len(self.fields)) > MOST_ENERGIES:
             raise ValueError(
                 f"{self.states:,} states of J up to {self.j_highest} at {len(self.fields)} fields are {energies:,} energies, more than "
-                f"{MOST_ENERGIES:,}: follow states of lower J, or ask for fewer fields"
+                f"{MOST_ENERGIES:,}: {FEWER}"
+            )
+        if self.top.kind == "asymmetric":
+            self.require_work(
+                [math.ceil(count / MOST_BLOCKS) for count in self.states_by_m for _ in range(MOST_BLOCKS)]
+            )
+
+    def require_work(self, sizes: Sequence[int]) -> None:
+        """Raise ValueError if diagonalizing blocks of so many functions at all fields takes too long."""
+        if (work := len(self.fields) * sum(float(size) ** 3 for size in sizes)) > MOST_WORK:
+            raise ValueError(
+                f"states of J up to {self.j_highest} lie in blocks of up to {max(sizes):,} functions, which at {len(self.fields)} "
+                f"fields take some {work * SECONDS / 60:.0f} minutes (a map takes at most {MOST_WORK * SECONDS / 60:.0f}): {FEWER}"
             )
 
     @property
     def states(self) -> int:
         """Number of states to follow; with spins about so many."""
+        return sum(self.states_by_m)
+
+    @property
+    def states_by_m(self) -> list[int]:
+        """Number of states to follow of each |M|."""
         spins = self.top.spin_constants if any(effect.spins(self.top) for effect in self.effects) else None
         of_spins = math.prod(twice + 1 for twice in spins.twice.values()) if spins else 1
         levels = [1 if self.top.kind == "linear" else 2 * j + 1 for j in range(self.j_highest + 1)]
-        return of_spins * sum(count * sum(abs(m) <= j for m in self.m_values) for j, count in enumerate(levels))
+        return [of_spins * sum(levels[max(math.ceil(abs(m)), 0) :]) for m in self.m_values]
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the spaces, which another process makes anew."""

@@ -9,7 +9,9 @@ import pytest
 from field_matrices import contracted_vectors, rigid, states
 
 import rotor
+from rotor.quantum.effects.stark import StarkRequest, answer_stark
 from rotor.quantum.effects.zeeman import ZeemanRequest, answer_zeeman, magnetic_limits, zeeman_map
+from rotor.quantum.fields import map_request
 from rotor.quantum.fields.operators import Magnet
 from rotor.quantum.fields.space import field_space
 from rotor.tops.magnetic import MagneticTensors, tensor_for
@@ -100,11 +102,26 @@ def test_what_of_the_field_is_left_out_is_said():
 
 
 def test_a_map_of_too_many_energies_is_refused():
-    """(2J+1)² states of each J, at all fields: 14,190 of J ≤ 21 at 33 fields are 468,270 and answered, at 50 fields they are not."""
+    """(2J+1)² states of each J, at all fields: their table is in memory."""
     top = Top.from_constants("A=10 B=6 C=4 GHz", magnetic=MagneticTensors(tensor_for("asymmetric", [0.6, -0.2, 0.3])))
     assert ZeemanRequest(top, tuple(range(33)), j_highest=21).map.states == 14_190
-    message = (
-        "14,190 states of J up to 21 at 50 fields are 709,500 energies, more than 600,000: follow states of lower J"
-    )
+    message = "14,190 states of J up to 21 at 120 fields are 1,702,800 energies, more than 1,500,000: follow states of lower J"
     with pytest.raises(ValueError, match=message):
-        answer_zeeman(ZeemanRequest(top, tuple(range(50)), j_highest=21))
+        answer_zeeman(ZeemanRequest(top, tuple(np.arange(120) / 10), j_highest=21))
+
+
+def test_a_map_of_too_large_blocks_is_refused(monkeypatch):
+    """Time grows as the cube of the size of blocks: few energies may take hours, and were computed."""
+    top = Top.from_constants("A=10 B=6 C=4 GHz", dipole_abc_debye=(1.0, 0, 0))
+    message = r"states of J up to {} lie in blocks of up to {} functions, which at {} fields take some \d+ minutes"
+    for j, size, fields in (
+        (100, "1,276", 100),
+        (60, r"1,\d\d\d", 400),
+    ):  # of one M: a bound of 8 blocks, and the blocks
+        few = StarkRequest(top, tuple(np.linspace(0, 10, fields).tolist()), j_highest=j, m_values=(0,))
+        with pytest.raises(ValueError, match=message.format(j, size, fields)):
+            answer_stark(few)
+    small = StarkRequest(top, (0.0, 10.0), j_highest=2)
+    monkeypatch.setattr(map_request, "MOST_WORK", 2e4)  # blocks with the J that the field calls for
+    with pytest.raises(ValueError, match=r"states of J up to 2 lie in blocks of up to \d\d functions"):
+        answer_stark(small)
