@@ -91,6 +91,15 @@ class Field:
         """The name of a value in `Entries`, whatever its origin: the key, or the field's name if it has no key."""
         return self.key or self.name
 
+    @property
+    def default_text(self) -> str:
+        """The default in the help of the option; empty for one that needs no words."""
+        if self.typed is not None:
+            return str(self.typed)
+        if self.default in (None, REQUIRED, (), "", {}) or isinstance(self.default, bool):
+            return ""
+        return self.reader.show(self.default)
+
     def called(self, style: str) -> str:
         """The field's name in errors; style is "option", "key" or "name"."""
         names = {"option": self.flag, "key": self.key, "name": self.name}

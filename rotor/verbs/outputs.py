@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
+from rotor.requests.field import OUTPUT, REQUIRED, Field
 from rotor.requests.fill import Entries
+from rotor.requests.readers import Names, Text
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -78,6 +80,13 @@ class Output:
     def flag(self) -> str:
         """The option."""
         return self.option or "--" + self.name.replace("_", "-")
+
+    @property
+    def field(self) -> Field:
+        """The option as a field."""
+        reader = Names("FILE") if self.many else Text(metavar="FILE")
+        default = REQUIRED if self.required else None
+        return Field(reader, self.help, option=self.flag, name=self.name, panel=OUTPUT, common=True, default=default)
 
 
 def tables(what: str, stem: str) -> tuple[Output, Output]:

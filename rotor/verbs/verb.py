@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, json_text, json_with_rows
-from rotor.requests.field import Field, all_fields, declared
+from rotor.requests.field import OUTPUT, Field, all_fields, declared
 from rotor.requests.fill import Entries, called, naming, read_fields, read_instance, renaming, written_fields
-from rotor.requests.readers import Flag
+from rotor.requests.readers import Flag, Names, Text
 from rotor.table import Table
 from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
 from rotor.verbs.names import declared_verbs as declared_verbs
@@ -119,6 +119,14 @@ class Extra:
     common: bool = False
     many: bool = False
     files: Callable[[str], Mapping[str, str]] | None = None
+
+    @property
+    def field(self) -> Field:
+        """The option as a field."""
+        reader = Names(self.metavar) if self.many else Text(metavar=self.metavar) if self.metavar else Flag()
+        return Field(
+            reader, self.help, option=self.option, name=self.option, panel=self.panel or OUTPUT, common=self.common
+        )
 
 
 class SubjectKind:

@@ -13,53 +13,27 @@ import typer
 import typer.core
 
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_fields
-from rotor.frozen import dataclass
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, Field
-from rotor.requests.readers import Flag
-from rotor.verbs.outputs import Output
-from rotor.verbs.verb import Extra, Verb
+from rotor.requests.readers import Flag, Text
+from rotor.verbs.verb import Verb
 
 JSON_HELP = "Everything printed, as JSON; - is standard output"
+FILE, COUNT = Text(metavar="FILE"), Text(metavar="N")
 SCENE_HELP = "Write down the scene, which 'rotor run' gives again (.toml)"
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """One option of a command. identity: of the input, or the name of the file. kind: of the value of the parser."""
-
-    identity: str
-    flag: str
-    help: str
-    metavar: str = "TEXT"
-    panel: str = OUTPUT
-    common: bool = False
-    kind: Any = str
-    off: bool = False
-    many: bool = False
-    required: bool = False
-
-    @property
-    def name(self) -> str:
-        """The name of the parameter of the function behind it."""
-        return re.sub(r"\W", "_", self.flag.strip("-").lower()) + "_"
-
-
-def parameters_of(verb: Verb) -> list[Parameter]:
-    """Every option of a verb; those of a tool are few, and --help shows all."""
-    parameters = [_input(field) for field in verb.parameters.values()]
-    parameters += [_extra(extra) for extra in verb.extras]
-    parameters += [_file(output) for output in verb.all_outputs]
+def inputs_of(verb: Verb) -> list[Field]:
+    """Every option of a verb as a field: inputs and files; those of a tool are few, and --help shows all."""
+    fields = [*verb.parameters.values(), *(each.field for each in (*verb.extras, *verb.all_outputs))]
     if verb.has_json:
-        parameters.append(Parameter("json", "--json", JSON_HELP, "FILE", OUTPUT, True))
+        fields.append(Field(FILE, JSON_HELP, name="json", panel=OUTPUT, common=True))
     if verb.has_scenes:
-        parameters.append(Parameter("save_scene", "--save-scene", SCENE_HELP, "FILE", OUTPUT))
+        fields.append(Field(FILE, SCENE_HELP, name="save_scene", panel=OUTPUT))
     if any(output.name == "plot" for output in verb.outputs):
-        parameters += [_input(field) for name, field in picture_fields().items() if name not in _left_out(verb)]
+        fields += [field for name, field in picture_fields().items() if name not in _left_out(verb)]
     if verb.spread:
-        parameters.append(
-            Parameter("workers", "--workers", f"Processes over which {verb.spread} are spread", "N", NUMERICS)
-        )
-    return parameters if verb.has_scenes else [replace(parameter, common=True) for parameter in parameters]
+        fields.append(Field(COUNT, f"Processes over which {verb.spread} are spread", name="workers", panel=NUMERICS))
+    return fields if verb.has_scenes else [replace(field, common=True) for field in fields]
 
 
 def _left_out(verb: Verb) -> set[str]:
@@ -68,92 +42,55 @@ def _left_out(verb: Verb) -> set[str]:
     return ({"plot_unit"} if not verb.spectral else set()) | (set() if verb.scaled else {"plot_scale"})
 
 
-def _input(field: Field) -> Parameter:
-    flag = isinstance(field.reader, Flag)
-    default = _default_text(field)
-    help_ = f"{field.help} [{default}]" if default else field.help
-    metavar = field.metavar or field.reader.metavar
-    off = isinstance(field.reader, Flag) and field.reader.off
-    return Parameter(
-        field.identity, field.flag, help_, metavar, field.heading, field.common, bool if flag else str, off, field.reader.many,
-        field.default is REQUIRED,
-    )  # fmt: skip
-
-
-def _default_text(field: Field) -> str:
-    if field.typed is not None:
-        return str(field.typed)
-    if field.default in (None, REQUIRED) or isinstance(field.default, bool) or field.default in ((), "", {}):
-        return ""
-    return field.reader.show(field.default)
-
-
-def _extra(extra: Extra) -> Parameter:
-    kind = str if extra.metavar else bool
-    return Parameter(
-        extra.option,
-        extra.option,
-        extra.help,
-        extra.metavar,
-        extra.panel or OUTPUT,
-        extra.common,
-        kind,
-        many=extra.many,
-    )
-
-
-def _file(output: Output) -> Parameter:
-    return Parameter(
-        output.name, output.flag, output.help, "FILE", OUTPUT, True, many=output.many, required=output.required
-    )
-
-
 def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]], None]) -> Callable[..., None]:
     """A function for typer with one parameter for each option of a verb; run: is given the texts by identity."""
-    options = parameters_of(verb)
-    by_name = {option.name: option for option in options}
+    by_name = {re.sub(r"\W", "_", field.flag.strip("-").lower()) + "_": field for field in inputs_of(verb)}
 
-    def call(context: typer.Context, **typed: Any) -> None:
+    def call(context: typer.Context, help_all: bool = False, **typed: Any) -> None:
         texts = {}
         for name, value in typed.items():
-            if name != "help_all" and value is not None and value != [] and value != ():
-                option = by_name[name]
-                if any(isinstance(text, str) and not text.strip() for text in (value if option.many else [value])):
+            if value is not None and value != [] and value != ():
+                field, several = by_name[name], tuple(value) if isinstance(value, list | tuple) else (value,)
+                if any(isinstance(text, str) and not text.strip() for text in several):
                     raise ValueError(
-                        f"{option.flag}: the text given is empty; expected one that is not, or leave it out"
+                        f"{field.flag}: the text given is empty; expected one that is not, or leave it out"
                     )
-                texts[option.identity] = tuple(value) if option.many else value
+                if len(several) > 1 and not field.reader.many:
+                    raise ValueError(f"{field.flag}: given more than once; it has one value")
+                texts[field.identity] = several if field.reader.many else several[0]
         run(verb, context, texts)
 
-    parameters = [inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)]
-    parameters += [_signature_of(option) for option in options]
-    if any(not option.common for option in options):
-        everything = typer.Option(False, "--help-all", is_eager=True, callback=_show_all, help="Show all options.")
-        parameters.append(
-            inspect.Parameter("help_all", inspect.Parameter.KEYWORD_ONLY, default=everything, annotation=bool)
-        )
+    defaults: dict[str, tuple[Any, Any]] = {"context": (inspect.Parameter.empty, typer.Context)}
+    defaults |= {name: _parameter_of(field) for name, field in by_name.items()}
+    if not all(field.common for field in by_name.values()):
+        show = typer.Option(False, "--help-all", is_eager=True, callback=_show_all, help="Show all options.")
+        defaults["help_all"] = show, bool
+    parameters = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+        for name, (default, kind) in defaults.items()
+    ]
     call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    call.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    call.__annotations__ = {name: kind for name, (_, kind) in defaults.items()}
     call.__doc__ = verb.about
     return call
 
 
-def _signature_of(option: Parameter) -> inspect.Parameter:
-    kind: Any = bool if option.kind is bool else list[str] if option.many else str
-    if not option.flag.startswith("-"):
-        words = molecules_and_files if option.flag == "SOURCE" else None
-        first: Any = ... if option.required else None
-        default = typer.Argument(
-            first, show_default=False, metavar=option.flag, help=f"{option.help}.", autocompletion=words
-        )
-    else:
-        names = f"{option.flag}/--no-{option.flag[2:]}" if option.off else option.flag
-        settings: dict[str, Any] = {} if option.kind is bool else {"metavar": option.metavar}
-        panel = f"{'' if option.common else '+'}{option.panel}"
-        default = typer.Option(
-            None, names, show_default=False, help=f"{option.help}.", rich_help_panel=panel, **settings
-        )
-    return inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind | None)
+def _parameter_of(field: Field) -> tuple[Any, Any]:
+    """The default and the type of a parameter; an option takes a list, so that one with a single value can refuse several."""
+    reader, flag = field.reader, field.flag
+    default, metavar = field.default_text, field.metavar or reader.metavar
+    help_ = f"{field.help} [{default}]." if default else f"{field.help}."
+    if not flag.startswith("-"):
+        words = molecules_and_files if flag == "SOURCE" else None
+        first: Any = ... if field.default is REQUIRED else None
+        argument = typer.Argument(first, show_default=False, metavar=flag, help=help_, autocompletion=words)
+        return argument, (list[str] if reader.many else str) | None
+    panel = f"{'' if field.common else '+'}{field.heading}"
+    if isinstance(reader, Flag):
+        names = f"{flag}/--no-{flag[2:]}" if reader.off else flag
+        return typer.Option(None, names, show_default=False, help=help_, rich_help_panel=panel), bool | None
+    option = typer.Option(None, flag, show_default=False, help=help_, rich_help_panel=panel, metavar=metavar)
+    return option, list[str] | None
 
 
 def molecules_and_files(incomplete: str) -> list[str]:
@@ -178,20 +115,6 @@ class VerbCommand(typer.core.TyperCommand):
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, --help among them."""
         return [_unconverted(parameter) for parameter in super().get_params(ctx)]
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """The arguments; ValueError for an option with a single value that is given twice."""
-        single = {
-            text
-            for parameter in self.params
-            if not parameter.multiple
-            for text in (*parameter.opts, *parameter.secondary_opts)
-        }
-        names = [word.partition("=")[0] for word in args if word.startswith("--")]
-        twice = next((word for word in names if word in single and names.count(word) > 1), None)
-        if twice is not None:
-            raise ValueError(f"{twice}: given more than once; it has one value")
-        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Arguments and options, panel by panel."""
