@@ -55,13 +55,8 @@ def section(name: str, command: Any) -> str:
 
 def row(one: Field) -> str:
     """One input."""
-    default = "" if one.typed is None and not plain(one) else f" [{one.typed or one.reader.show(one.default)}]"
+    default = f" [{text}]" if (text := one.default_text) else ""
     return f"| `{one.flag}` | {code(one.key)} | `{one.name}` | {cell(one.help)}{default} |"
-
-
-def plain(one: Field) -> bool:
-    """Whether a default is worth showing."""
-    return one.default is not None and not isinstance(one.default, bool) and one.default not in ((), "", {})
 
 
 def code(text: str) -> str:

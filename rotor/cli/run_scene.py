@@ -17,7 +17,7 @@ from rotor.frozen import dataclass
 from rotor.reports.error_table import error_parts
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.reports.screen import Part, Table, evenly, json_with_rows
-from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, declared
+from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, Rule, declared
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
 from rotor.verbs.tool import Tool
@@ -55,7 +55,11 @@ class Options:
         ".", Text(metavar="FOLDER"), "Folder of the files that the scene names in [outputs]", panel=OUTPUT
     )
     workers: int | None = declared(
-        None, Whole(1, MOST_WORKERS), "Spread the points of a sweep, or the work, over N processes", panel=NUMERICS
+        None,
+        Whole(1, MOST_WORKERS),
+        "Spread the points of a sweep, or the work, over N processes",
+        panel=NUMERICS,
+        rule=Rule(excludes=("dask",), why="the cluster has its own workers"),
     )
     dask: str | None = declared(
         None,
@@ -68,6 +72,7 @@ class Options:
         Text(metavar="CA,CERT,KEY"),
         "PEM files of an encrypted cluster: authority, certificate, key",
         panel=NUMERICS,
+        rule=Rule(("dask",)),
     )
     record: str | None = declared(
         None,
@@ -173,11 +178,7 @@ def answer(options: Options, _: Work) -> SceneRun | SweepRun:
 
 def _workers(options: Options) -> AbstractContextManager[Executor | None]:
     """Context with a pool of processes or of cluster workers; None for a single process."""
-    if options.dask is None and options.dask_tls is not None:
-        raise ValueError("--dask-tls: goes with --dask, the address of a scheduler")
     if options.dask is not None:
-        if options.workers is not None:
-            raise ValueError("--workers and --dask: give one of them; the cluster has its own workers")
         return _dask_pool(options.dask, options.dask_tls)
     if options.workers in (None, 1):
         return nullcontext()

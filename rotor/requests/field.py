@@ -27,8 +27,18 @@ _PANEL_OF_TABLE = {
     "molecule": MOLECULE, "effects": SPINS, "conditions": CONDITIONS, "vibration": CONDITIONS, "observables": OBSERVABLES,
     "numerics": NUMERICS, "outputs": OUTPUT,
 }  # fmt: skip
+OUTPUTS = "outputs."  # table of the files of a scene
 _DECLARED, _PART = "declared", "part"
 REQUIRED: Any = MISSING  # the default of a field that must be given
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rule:
+    """Fields or files, by identity, that go with a field: at least one of `needs`, none of `excludes`. why: the reason in errors."""
+
+    needs: tuple[str, ...] = ()
+    excludes: tuple[str, ...] = ()
+    why: str = ""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,6 +56,7 @@ class Field:
     typed: the default as a user would type it, if that differs.
     panel: heading in --help.
     knob: how fine an approximation is (`rotor.requests.knob`).
+    rule: other fields or files that it needs or excludes.
     name, default: filled in by `declared_fields`.
     """
 
@@ -61,6 +72,7 @@ class Field:
     panel: str = ""
     metavar: str = ""
     knob: Any = None
+    rule: Rule | None = None
     name: str = ""
     default: Any = None
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import field
 from typing import Any
 
 from rotor.frozen import dataclass
-from rotor.requests.field import REQUIRED, Field, Part, all_fields, declared_fields, names_of, parts_of
+from rotor.requests.field import OUTPUTS, REQUIRED, Field, Part, all_fields, declared_fields, names_of, parts_of
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,24 @@ def read_instance(structure: Any, entries: Entries, subject: Any = None) -> Any:
         raise ValueError(texts[entries.style == "option"])
     with called(structure, entries.style):
         return structure(**read_fields(structure, entries, subject))
+
+
+def refuse_misfits(fields: Collection[Field], given: Collection[str], style: str) -> None:
+    """Raise ValueError for a given field whose rule the other given fields break. given: identities.
+
+    A scene may hold settings that nothing uses, so that only its files are checked. Python writes files afterwards.
+    """
+    ruled = [(item, item.rule) for item in fields if item.rule is not None and item.identity in given]
+    names = {item.identity: item.called(style) for item in fields} if ruled else {}
+    for item, rule in ruled:
+        unused = style == "key" and not item.key.startswith(OUTPUTS)
+        if unused or (style == "name" and any(name.startswith(OUTPUTS) for name in rule.needs)):
+            continue
+        start = f"{names[item.identity]}: {rule.why}{'; ' if rule.why else ''}expected"
+        if rule.needs and not any(name in given for name in rule.needs):
+            raise ValueError(f"{start} with {' or '.join(names[name] for name in rule.needs)}")
+        if other := next((name for name in rule.excludes if name in given), ""):
+            raise ValueError(f"{start} without {names[other]}")
 
 
 class NamedError(ValueError):

@@ -56,9 +56,7 @@ def _file_keys(outputs: tuple[Output, ...]) -> dict[str, Field]:
     files = {}
     for output in outputs:
         if output.scene:
-            reader, example = (Names(), [output.example]) if output.many else (Text(), output.example)
-            default = () if output.many else None
-            files[output.name] = Field(reader, output.help, f"outputs.{output.name}", example=example, default=default)
+            files[output.name] = output.field
         if output.name == "parquet":
             files["json"] = JSON
     return files

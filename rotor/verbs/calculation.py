@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, Self
 from rotor.checks import NoAnswerError
 from rotor.frozen import dataclass
 from rotor.reports.screen import plain
-from rotor.requests.fill import Entries
+from rotor.requests.field import OUTPUTS
+from rotor.requests.fill import Entries, refuse_misfits
 from rotor.table import Table
 from rotor.verbs.outputs import Output, Report
 from rotor.verbs.verb import Place, Subject, Verb, Work
@@ -49,7 +50,11 @@ class Calculation:
     @cached_property
     def inputs(self) -> tuple[Any, Subject]:
         """The request, checked as far as possible before the calculation, and its subject."""
-        verb, work = self.verb, self.work
+        verb, work, entered = self.verb, self.work, self.entries.values
+        given = {name for name, value in entered.items() if value is not None} | {
+            f"{OUTPUTS}{name}" for name in work.files
+        }
+        refuse_misfits(verb.named, given, self.entries.style)
         request, subject = verb.read(self.entries, Place(self.folder, work.note))
         if missing := next((each.flag for each in verb.outputs if each.required and each.name not in work.files), ""):
             raise ValueError(f"{missing} is missing; --help shows what the command takes")

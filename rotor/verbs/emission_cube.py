@@ -10,7 +10,6 @@ import numpy as np
 
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, record_table
-from rotor.requests.field import changed_fields
 from rotor.requests.readers import INFINITE
 from rotor.verbs.observed_request import ObservedRequest, components_of, fit_choices, sight_of, species_in
 from rotor.verbs.outputs import Report
@@ -19,8 +18,6 @@ from rotor.verbs.verb import Work
 if TYPE_CHECKING:
     from rotor.formats.spectra.cube_file import Cube
     from rotor.observed.cube import CubeFit
-
-_SPECTRUM_OUTPUTS = ("csv", "parquet", "profile_csv", "plot", "diagram", "corner")
 
 
 @dataclass(frozen=True)
@@ -89,28 +86,11 @@ def _quantiles(values: Any) -> tuple[float | None, ...]:
 
 
 def refuse(request: ObservedRequest, outputs: Mapping[str, Any], _: Any) -> None:
-    """Refuse options of a single spectrum beside maps, a mask without maps, and pictures without their data."""
-    if "maps" in outputs:
-        if request.fit is None:
-            raise ValueError("--maps: belongs to a fit of a cube; expected with --fit CUBE")
-        if other := next((name for name in _SPECTRUM_OUTPUTS if name in outputs), None):
-            raise ValueError(
-                f"--{other.replace('_', '-')}: needs a single spectrum; expected without --maps, with --pixel X,Y"
-            )
-        of_file = changed_fields(request.spectrum, ("pixel", "row", "baseline"))
-        for field in (*of_file, *changed_fields(request, ("reject", "sample"))):
-            raise ValueError(f"{field.flag}: needs a single spectrum; expected without --maps")
-        return
-    if request.mask is not None:
-        raise ValueError("--mask: belongs to maps of a cube; expected with --maps FILE")
-    if "corner" in outputs and not request.sample:
-        raise ValueError("--corner: a picture of draws; expected with --sample N")
+    """Refuse a picture of draws without its package, before the fit."""
     if "corner" in outputs:
         from rotor.observed.sampling import load_corner
 
-        load_corner()  # a package that is missing shows before the fit
-    if "diagram" in outputs and request.fit is None:
-        raise ValueError("--diagram: rotational diagrams of a fit; expected with --fit FILE")
+        load_corner()
 
 
 def answer(request: ObservedRequest, work: Work) -> Mapped:

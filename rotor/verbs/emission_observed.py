@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
-from rotor.requests.field import changed_fields, declared_fields
+from rotor.requests.field import Rule, changed_fields, declared_fields
 from rotor.verbs import emission_cube
 from rotor.verbs.emission_cube import Mapped
-from rotor.verbs.observed_file import json_of, spectrum_facts
+from rotor.verbs.observed_file import SINGLE, json_of, spectrum_facts
 from rotor.verbs.observed_request import (
     FIT_OPTIONS,
+    SINGLE_FIT,
     ObservedRequest,
     components_of,
     each_species,
@@ -273,15 +274,31 @@ OBSERVED = Tool(
     table=lambda answer: answer.table,
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the lines, or the fitted parameters, as CSV"),
-        Output("parquet", (".parquet",), "Write them as Parquet"),
-        Output("profile_csv", (".csv",), "Write observed and modelled brightness as CSV", of=profile),
-        Output("plot", PICTURES, "Draw pages of panels", draw),
+        Output("csv", (".csv",), "Write the lines, or the fitted parameters, as CSV", rule=SINGLE),
+        Output("parquet", (".parquet",), "Write them as Parquet", rule=SINGLE),
+        Output("profile_csv", (".csv",), "Write observed and modelled brightness as CSV", of=profile, rule=SINGLE),
+        Output("plot", PICTURES, "Draw pages of panels", draw, rule=SINGLE),
         Output(
-            "diagram", (".csv", *PICTURES), "Rotational diagrams of the fitted species as CSV or picture", draw_diagrams
+            "diagram",
+            (".csv", *PICTURES),
+            "Rotational diagrams of the fitted species as CSV or picture",
+            draw_diagrams,
+            rule=SINGLE_FIT,
         ),
-        Output("corner", PICTURES, "Draw the sample of every pair of parameters (extra sampling)", draw_corner),
-        Output("maps", (".fits",), "Fit every pixel of a cube and write maps of the parameters", emission_cube.write),
+        Output(
+            "corner",
+            PICTURES,
+            "Draw the sample of every pair of parameters (extra sampling)",
+            draw_corner,
+            rule=Rule(("sample",), SINGLE.excludes, "a picture of draws"),
+        ),
+        Output(
+            "maps",
+            (".fits",),
+            "Fit every pixel of a cube and write maps of the parameters",
+            emission_cube.write,
+            rule=Rule(("fit",), why="belongs to a cube"),
+        ),
     ),
     check=emission_cube.refuse,
     withheld=withheld,

@@ -23,7 +23,7 @@ from rotor.formats.fit_request import (
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
+from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, Rule, declared
 from rotor.requests.readers import Flag, NameList, Text, Whole
 from rotor.table import Table as Columns
 from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
@@ -63,7 +63,11 @@ class FitShown(ErrorsShown):
         None, NameList(), "Build the model from these constants, one at a time", panel=OBSERVABLES, common=True
     )
     all_orders: bool = declared(
-        False, Flag(), "With --choose: constants of all orders compete from the first step", panel=OBSERVABLES
+        False,
+        Flag(),
+        "With --choose: constants of all orders compete from the first step",
+        panel=OBSERVABLES,
+        rule=Rule(("choose",)),
     )
     suggest: str | None = declared(
         None,
@@ -106,8 +110,6 @@ def answer(request: FitRequest, work: Work) -> FitAnswer:
     from rotor.formats.fit_further import chosen_fit, with_further
 
     further: FitShown = work.shown
-    if further.all_orders and further.choose is None:
-        raise ValueError("all_orders: expected with choose, which names the constants to choose from")
     if further.choose is not None and "save_scene" in work.files:
         raise ValueError(
             "choose: a scene holds no choice of constants; choose first, then save the fit of those constants"

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
-from rotor.requests.field import CONDITIONS, declared
+from rotor.requests.field import CONDITIONS, Rule, declared
 from rotor.requests.readers import INFINITE, Names, Numbers, Quantity, Text, Whole
 from rotor.verbs.molecule import with_some_dipole
 from rotor.verbs.subjects import top_of_word
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from rotor.observed.spectrum import ObservedSpectrum
 
 PANEL = "Observed spectrum"
+
+
+SINGLE = Rule(excludes=("outputs.maps",), why="needs a single spectrum")
 
 
 @dataclass(frozen=True)
@@ -64,13 +67,14 @@ class SpectrumFile:
         None, Quantity("arcsec", metavar="A"), "Width of the source at half maximum (arcsec); needs --beam", option="--size",
         panel=PANEL,
     )  # fmt: skip
-    baseline: int | None = declared(None, Whole(0), "Subtract a baseline of this order", panel=PANEL)
-    row: int | None = declared(None, Whole(), "Number of the spectrum in a table, from 1", panel=PANEL)
+    baseline: int | None = declared(None, Whole(0), "Subtract a baseline of this order", panel=PANEL, rule=SINGLE)
+    row: int | None = declared(None, Whole(), "Number of the spectrum in a table, from 1", panel=PANEL, rule=SINGLE)
     pixel: tuple[float, ...] | None = declared(
         None,
         Numbers(counts=(2,), example="32,40", metavar="X,Y"),
         "Pixel of the spectrum in a cube, from 1",
         panel=PANEL,
+        rule=SINGLE,
     )
 
     @property

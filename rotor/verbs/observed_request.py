@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
-from rotor.requests.field import changed_fields, declared, declared_fields, identical, part
+from rotor.requests.field import Rule, changed_fields, declared, declared_fields, identical, part
 from rotor.requests.readers import INFINITE, NameList, Quantity, Text, Whole
 from rotor.spectra.emission_request import LayerInput, WindowInput
-from rotor.verbs.observed_file import PANEL, SeveralInput, SpectrumFile, padded, species_of
+from rotor.verbs.observed_file import PANEL, SINGLE, SeveralInput, SpectrumFile, padded, species_of
 from rotor.verbs.verb import Note
 
 if TYPE_CHECKING:
@@ -27,6 +27,8 @@ FREE = {
 }
 
 
+OF_FIT = Rule(("fit",), why="belongs to a fit")
+SINGLE_FIT = Rule(("fit",), SINGLE.excludes, "belongs to a fit of a single spectrum")
 FIT_OPTIONS = ("free", "shared", "sample", "calibration", "reject")
 
 
@@ -49,20 +51,27 @@ class ObservedRequest:
         None, Text(metavar="FILE"), "Local catalogue with the species that SOURCE names", panel=PANEL
     )
     free: tuple[str, ...] = declared(
-        (), NameList(tuple(FREE)), "Fitted parameters: column, excitation, velocity, width, size", panel=PANEL
+        (),
+        NameList(tuple(FREE)),
+        "Fitted parameters: column, excitation, velocity, width, size",
+        panel=PANEL,
+        rule=OF_FIT,
     )
     shared: tuple[str, ...] = declared(
-        (), NameList(tuple(FREE)), "Parameters with one value for all species: velocity,width", panel=PANEL
+        (), NameList(tuple(FREE)), "Parameters with one value for all species: velocity,width", panel=PANEL, rule=OF_FIT
     )
-    calibration: float = declared(0.0, Quantity(least=0, most=1), "Relative error of the intensity scale", panel=PANEL)
+    calibration: float = declared(
+        0.0, Quantity(least=0, most=1), "Relative error of the intensity scale", panel=PANEL, rule=OF_FIT
+    )
     reject: float | None = declared(
-        None, Quantity(), "Fit near lines only, without channels X standard deviations above the model", panel=PANEL
-    )
+        None, Quantity(), "Fit near lines only, without channels X standard deviations above the model", panel=PANEL,
+        rule=SINGLE_FIT,
+    )  # fmt: skip
     mask: str | None = declared(
         None, Text(metavar="FILE"), "Pixels of --maps: FITS, nonzero where fitted; by default those above 5 standard deviations",
-        panel=PANEL,
+        panel=PANEL, rule=Rule(("outputs.maps",), why="belongs to maps of a cube"),
     )  # fmt: skip
-    sample: int = declared(0, Whole(0), "Steps of emcee after the fit (extra sampling)", panel=PANEL)
+    sample: int = declared(0, Whole(1), "Steps of emcee after the fit (extra sampling)", panel=PANEL, rule=SINGLE_FIT)
     spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())
     column_per_cm2: tuple[float, ...] | None = layer_field("column_per_cm2")
     excitation_k: tuple[float, ...] | None = layer_field("excitation_k")
@@ -83,9 +92,6 @@ class ObservedRequest:
     def __post_init__(self) -> None:
         if self.over is not None and self.fit is not None:
             raise ValueError("--over, --fit: both name a spectrum; give one of them (a fit also shows the model)")
-        if self.fit is None:
-            for field in changed_fields(self, FIT_OPTIONS):
-                raise ValueError(f"{field.flag}: belongs to a fit; expected with --fit FILE")
         if self.over is None and self.fit is None:
             typed = [*changed_fields(self.spectrum), *changed_fields(self, ("catalogue", "mask"))]
             what = typed[0].flag if typed else "--maps, --diagram, --corner, --workers"

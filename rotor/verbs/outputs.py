@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
-from rotor.requests.field import OUTPUT, REQUIRED, Field
+from rotor.requests.field import OUTPUT, OUTPUTS, REQUIRED, Field, Rule
 from rotor.requests.fill import Entries
 from rotor.requests.readers import Names, Text
 
@@ -61,7 +61,7 @@ class Output:
 
     name: of the option, and of the key in [outputs]. write: by default writes the table in the format of the suffix.
     of: returns the written table if it is not that of the verb. grows: written during the calculation. many: repeatable.
-    scene: whether scenes have it too. required: whether the verb exists to write this file.
+    scene: whether scenes have it too. required: whether the verb exists to write this file. rule: as of a field.
     """
 
     name: str
@@ -75,6 +75,7 @@ class Output:
     many: bool = False
     scene: bool = True
     required: bool = False
+    rule: Rule | None = None
 
     @property
     def flag(self) -> str:
@@ -83,10 +84,12 @@ class Output:
 
     @property
     def field(self) -> Field:
-        """The option as a field."""
+        """The option, and the key of a scene, as a field."""
         reader = Names("FILE") if self.many else Text(metavar="FILE")
-        default = REQUIRED if self.required else None
-        return Field(reader, self.help, option=self.flag, name=self.name, panel=OUTPUT, common=True, default=default)
+        return Field(
+            reader, self.help, f"{OUTPUTS}{self.name}", self.flag, common=True, example=[self.example] if self.many else self.example,
+            panel=OUTPUT, default=REQUIRED if self.required else () if self.many else None, rule=self.rule,
+        )  # fmt: skip
 
 
 def tables(what: str, stem: str) -> tuple[Output, Output]:
@@ -104,6 +107,6 @@ def draw_answer(answer: Any, path: Path, report: Report, **options: Any) -> None
     write_picture(answer, path, report.command, **report.picture_options, **options)
 
 
-def picture(help: str, example: str = "", draw: Writer = draw_answer) -> Output:
+def picture(help: str, example: str = "", draw: Writer = draw_answer, rule: Rule | None = None) -> Output:
     """Output for the picture of an answer."""
-    return Output("plot", PICTURES, f"{help} (.png, .pdf, .svg)", draw, example)
+    return Output("plot", PICTURES, f"{help} (.png, .pdf, .svg)", draw, example, rule=rule)

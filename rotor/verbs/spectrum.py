@@ -12,7 +12,7 @@ from rotor.frozen import dataclass
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part
-from rotor.requests.field import OBSERVABLES, OUTPUT, changed_fields, declared
+from rotor.requests.field import OBSERVABLES, OUTPUT, Rule, changed_fields, declared
 from rotor.requests.fill import Entries, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
@@ -69,7 +69,7 @@ class SpectrumShown(Shown):
     tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag", panel=OUTPUT)
     hitran_id: tuple[int, int] | None = declared(
         None, Custom(_hitran_numbers, metavar="M:I"), "HITRAN's numbers of molecule and isotopologue, such as 5:1",
-        panel=OUTPUT,
+        panel=OUTPUT, rule=Rule(("outputs.hitran",)),
     )  # fmt: skip
 
 
@@ -116,16 +116,10 @@ def adapt(request: SpectrumRequest, outputs: Mapping[str, Any], entries: Entries
 
 def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumShown) -> None:
     """Refuse files whose inputs are missing, and inputs whose files are missing, before anything is computed."""
-    if ("hitran" in outputs) != (shown.hitran_id is not None):
-        raise ValueError(
-            "--hitran and --hitran-id: give both; the second has HITRAN's number of the molecule, such as 5 or 5:1 of CO"
-        )
     if "hitran" in outputs and request.temperature_k != HITRAN_K:
         raise ValueError("--hitran: its intensities are at 296 K; leave --temperature out, or give 296")
     if "egy" in outputs and not isinstance(request, int_files.PredictedRequest):
         raise ValueError("--egy: expected with an .int file; levels of anything else are written by rotor levels --egy")
-    if "loomis_wood" in outputs and shown.over is None:
-        raise ValueError("--loomis-wood: its rows are pieces of a spectrum; give one with --over")
     if shown.over is not None:
         from rotor.formats.peak_files import read_peaks
 
@@ -305,7 +299,12 @@ VERB = Verb(
             "cat", (".cat", ".cat.gz"), "Write a catalogue of 80 columns (.cat, .cat.gz)", write_catalogue, "lines.cat"
         ),
         Output(
-            "hitran", (".hitran",), "Write HITRAN records of 160 characters; with --hitran-id", write_table, scene=False
+            "hitran",
+            (".hitran",),
+            "Write HITRAN records of 160 characters; with --hitran-id",
+            write_table,
+            scene=False,
+            rule=Rule(("hitran_id",), why="HITRAN's number of the molecule, such as 5 or 5:1 of CO, is not known"),
         ),
         Output(
             "exomol",
@@ -337,6 +336,7 @@ VERB = Verb(
             "With --over: draw the peaks about each line, series by series (.png, .pdf, .svg)",
             draw_loomis_wood,
             scene=False,
+            rule=Rule(("over",), why="its rows are pieces of a spectrum"),
         ),
     ),
     subject=MoleculeOrFile(POLARIZABILITY, lambda top, reading, entries: with_some_dipole(top, reading)),

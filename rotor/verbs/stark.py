@@ -13,7 +13,6 @@ from rotor.quantum.effects.stark import StarkAnswer, StarkRequest, answer_stark
 from rotor.reports import top_facts
 from rotor.reports.field_maps import SHOWN, accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
 from rotor.reports.screen import Part, Table, record_table
-from rotor.requests.field import changed_fields
 from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.table import counted
@@ -39,17 +38,6 @@ Examples:
   rotor stark indole --field 0:50kV/cm --temperature 1 --mixture indole_1k.csv --deflection mu_eff.csv"""
 
 
-_LINES = frozenset({"lines", "lobes", "coefficients"})
-_POPULATED = frozenset({"lines", "lobes", "spectrum", "mixture"})
-# files that each field of a sample changes
-OUTPUTS_OF_SAMPLE = {
-    "light": frozenset({"lines", "lobes", "spectrum"}),
-    "line": _LINES,
-    **dict.fromkeys(("temperature_k", "populations"), _POPULATED),
-    **dict.fromkeys(("linewidth_mhz", "range_mhz", "spread"), frozenset({"spectrum"})),
-}
-
-
 @dataclass(frozen=True)
 class StarkShown(FieldSample, Shown):
     """Sample for lines, spectra and mixtures, and display options of `stark`."""
@@ -59,16 +47,6 @@ def prepare(top: Top, reading: Reading, entries: Entries) -> Top:
     """The top with its dipole and, for laser light, its polarizability."""
     top = with_some_dipole(top, reading)
     return with_known_polarizability(top, reading) if entries.values.get("conditions.intensity") else top
-
-
-def check(request: StarkRequest, outputs: Mapping[str, Any], shown: StarkShown) -> None:
-    """Refuse a picture of a single field, and inputs that no requested file depends on."""
-    refuse_picture_of_one_field(request.fields_kv_per_cm, outputs)
-    for field in changed_fields(shown, OUTPUTS_OF_SAMPLE):
-        files = OUTPUTS_OF_SAMPLE[field.name]
-        if not files & set(outputs):
-            names = " or ".join(f"--{file}" for file in sorted(files))
-            raise ValueError(f"{field.option}: does not change the map itself; expected with {names}")
 
 
 def _further(name: str, what: str) -> Output:
@@ -174,7 +152,7 @@ VERB = Verb(
     drawn="kV/cm",
     scaled=False,
     workers="blocks of states",
-    check=check,
+    check=lambda request, outputs, shown: refuse_picture_of_one_field(request.fields_kv_per_cm, outputs),
     sound=False,
     numerics="rotor.quantum.fields.numerics:STARK",
     accuracy="of the energies",

@@ -12,6 +12,7 @@ from rotor.formats import write
 from rotor.reports import top_facts
 from rotor.reports.progress import progress_bar
 from rotor.reports.screen import Part, Table, record_table, table_records
+from rotor.requests.field import Rule
 from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
 from rotor.verbs.outputs import Output, Report, picture
@@ -98,8 +99,6 @@ def _classical_facts(gas: ClassicalTorsion) -> list[tuple[str, str]]:
 
 def write_motion(answer: TorsionAnswer, path: Path, report: Report) -> None:
     """Write the classical gas against time."""
-    if answer.classical is None:
-        raise ValueError("classical_csv: expected with a classical gas: give its temperature, such as --classical 300K")
     write(answer.classical, path, settings=dict(report.provenance))
 
 
@@ -171,7 +170,8 @@ VERB = Verb(
         Output("csv", (".csv",), "Write the levels as CSV", example="levels.csv"),
         Output("thermo_csv", (".csv",), "Write the thermodynamic functions of all methods as CSV", example="thermo.csv",
                of=lambda answer: answer.functions),
-        Output("classical_csv", (".csv",), "Write the classical gas against time as CSV", write_motion, "gas.csv"),
+        Output("classical_csv", (".csv",), "Write the classical gas against time as CSV", write_motion, "gas.csv",
+               rule=Rule(("observables.classical",), why="a classical gas has a temperature, such as 300K")),
         picture("Draw potential, levels and wave functions", "torsion.png"),
     ),
     subject=OneMolecule(

@@ -10,6 +10,7 @@ from rotor.classical.driven import DrivenAnswer, DrivenRequest, answer_driven
 from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
+from rotor.requests.field import Rule
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
@@ -24,6 +25,7 @@ SHOWN = 11  # rows of the motion in the report
 SMALL = 1e-4  # largest component of a column below which numbers are printed with digits instead of decimals
 _ATTITUDE = "qw", "qx", "qy", "qz"
 FEW_TIMES = 10_000  # plain Python takes half a second for them, as long as loading the compiler
+FREE = Rule(excludes=("effects",), why="needs a free motion (a table shows any)")  # of pictures
 EXAMPLES = """\b
 Examples:
   rotor tumble water --plot water.png --gif water.gif
@@ -46,10 +48,7 @@ def is_short(request: TumbleRequest | DrivenRequest) -> bool:
 
 
 def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Path, ...]], shown: Any) -> None:
-    """Refuse pictures of a motion under effects, and a film without two times or without its program."""
-    for name in ("plot", "gif"):
-        if name in outputs and not isinstance(request, TumbleRequest):
-            raise ValueError(f"--{name}: needs a free motion; leave it out with --effect (--csv writes the motion)")
+    """Refuse a film without two times or without its program."""
     if "gif" not in outputs:
         return
     from rotor.plots.animation import check_film
@@ -65,8 +64,7 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
 
 def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
     """Draw the polhodes."""
-    if not isinstance(answer, TumbleAnswer):
-        raise ValueError("outputs.plot: needs a free motion; leave it out")
+    assert isinstance(answer, TumbleAnswer)  # a declared rule of the file
     draw_answer(answer, path, report, title=_picture_title(answer.request))
 
 
@@ -74,8 +72,7 @@ def film(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> Non
     """Write the animation."""
     from rotor.plots.animation import animate
 
-    if not isinstance(answer, TumbleAnswer):
-        raise ValueError("outputs.gif: needs a free motion; leave it out")
+    assert isinstance(answer, TumbleAnswer)
     request, units = answer.request, answer.request.units
     animate(
         answer.motion, answer.table.times / units.time_factor, path, atoms=_atoms(request), axis_names=request.axes,
@@ -269,8 +266,8 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the motion", "tumble"),
-        picture("Draw the polhodes", "tumble.png", draw),
-        Output("gif", (".gif", ".mp4"), "Animate the motion (.gif; .mp4 with ffmpeg)", film, "tumble.gif"),
+        picture("Draw the polhodes", "tumble.png", draw, FREE),
+        Output("gif", (".gif", ".mp4"), "Animate the motion (.gif; .mp4 with ffmpeg)", film, "tumble.gif", rule=FREE),
     ),
     subject=TurningBody(
         (*DIPOLE, *POLARIZABILITY, "spin_weights", *NUCLEI, *STATES, "internal_rotation", *REFINEMENT, "symmetry_tolerance"),

@@ -246,6 +246,11 @@ class Verb:
         return {**self.subject.fields, **all_fields(self.request), **all_fields(self.shown)}
 
     @cached_property
+    def named(self) -> tuple[Field, ...]:
+        """The inputs and the files, as errors name them."""
+        return (*self.fields.values(), *(output.field for output in self.outputs))
+
+    @cached_property
     def options(self) -> dict[str, Field]:
         """The inputs with options on the command line."""
         inputs = {**self.subject.options, **all_fields(self.request), **all_fields(self.shown)}
@@ -296,7 +301,7 @@ class Verb:
             {name: value for name, value in entries.values.items() if name not in self.subject.fields}, entries.style
         )
         check_early(self.request, early)
-        with naming(self.fields.values(), entries.style):
+        with naming(self.named, entries.style):
             subject = self.subject.read(entries, place, self)
             with called(self.request, entries.style):
                 if self.build is not None:

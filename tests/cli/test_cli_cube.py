@@ -147,7 +147,7 @@ def test_mistakes_are_one_line(call, folder, options, rule):
 def test_maps_need_a_fit(call, folder):
     code, _, err = call("emission", "CO", "--maps", str(folder / "m.fits"))
     assert (code, len(err.splitlines())) == (2, 1)
-    assert "expected with --over or --fit" in err
+    assert "--maps: belongs to a cube; expected with --fit" in err
 
 
 def test_rotational_diagram_of_a_pixel(call, folder):

@@ -306,6 +306,38 @@ def test_an_error_names_fields_in_the_style_of_the_user(style, text):
     assert str(error.value) == text
 
 
+@pytest.mark.parametrize(
+    ("style", "given", "text"),
+    [
+        ("option", ("a.light",), "--light: changes a file alone; expected with --lines"),
+        ("option", ("a.light", "outputs.lines"), ""),
+        ("key", ("a.light",), ""),  # a scene may hold settings that nothing uses
+        ("name", ("a.light",), ""),  # Python writes files afterwards
+        ("option", ("outputs.lines", "a.dark", "a.deep"), "--lines: expected without --dark"),
+        ("key", ("outputs.lines", "a.dark"), "outputs.lines: expected without a.dark"),
+        ("option", ("a.dark",), "--dark: expected with --deep"),
+        ("name", ("a.dark",), "dark: expected with deep"),
+    ],
+)
+def test_rules_of_fields_and_files(style, given, text):
+    from rotor.requests.field import Field, Rule
+    from rotor.requests.fill import refuse_misfits
+    from rotor.verbs.outputs import Output
+
+    fields = (
+        Field(Text(), "", "a.light", name="light", rule=Rule(("outputs.lines",), why="changes a file alone")),
+        Field(Text(), "", "a.dark", name="dark", rule=Rule(("a.deep",))),
+        Field(Text(), "", "a.deep", name="deep"),
+        Output("lines", (".csv",), "", rule=Rule(excludes=("a.dark",))).field,
+    )
+    try:
+        refuse_misfits(fields, given, style)
+    except ValueError as error:
+        assert str(error) == text
+    else:
+        assert not text
+
+
 def test_changed_fields_are_those_that_differ_from_their_defaults():
     from rotor.requests.field import changed_fields
     from rotor.verbs.cat import CatRequest

@@ -22,18 +22,21 @@ FILE, COUNT = Text(metavar="FILE"), Text(metavar="N")
 SCENE_HELP = "Write down the scene, which 'rotor run' gives again (.toml)"
 
 
-def inputs_of(verb: Verb) -> list[Field]:
-    """Every option of a verb as a field: inputs and files; those of a tool are few, and --help shows all."""
-    fields = [*verb.parameters.values(), *(each.field for each in (*verb.extras, *verb.all_outputs))]
+def options_of(verb: Verb) -> dict[str, Field]:
+    """Every option of a verb, by identity of the input or name of the file; those of a tool are few, and --help shows all."""
+    fields = verb.parameters | {extra.option: extra.field for extra in verb.extras}
+    fields |= {output.name: output.field for output in verb.all_outputs}
     if verb.has_json:
-        fields.append(Field(FILE, JSON_HELP, name="json", panel=OUTPUT, common=True))
+        fields["json"] = Field(FILE, JSON_HELP, name="json", panel=OUTPUT, common=True)
     if verb.has_scenes:
-        fields.append(Field(FILE, SCENE_HELP, name="save_scene", panel=OUTPUT))
+        fields["save_scene"] = Field(FILE, SCENE_HELP, name="save_scene", panel=OUTPUT)
     if any(output.name == "plot" for output in verb.outputs):
-        fields += [field for name, field in picture_fields().items() if name not in _left_out(verb)]
+        fields |= {name: field for name, field in picture_fields().items() if name not in _left_out(verb)}
     if verb.spread:
-        fields.append(Field(COUNT, f"Processes over which {verb.spread} are spread", name="workers", panel=NUMERICS))
-    return fields if verb.has_scenes else [replace(field, common=True) for field in fields]
+        fields["workers"] = Field(
+            COUNT, f"Processes over which {verb.spread} are spread", name="workers", panel=NUMERICS
+        )
+    return fields if verb.has_scenes else {name: replace(field, common=True) for name, field in fields.items()}
 
 
 def _left_out(verb: Verb) -> set[str]:
@@ -44,25 +47,29 @@ def _left_out(verb: Verb) -> set[str]:
 
 def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]], None]) -> Callable[..., None]:
     """A function for typer with one parameter for each option of a verb; run: is given the texts by identity."""
-    by_name = {re.sub(r"\W", "_", field.flag.strip("-").lower()) + "_": field for field in inputs_of(verb)}
+    options = options_of(verb)
+    identities = {re.sub(r"\W", "_", field.flag.strip("-").lower()) + "_": name for name, field in options.items()}
 
     def call(context: typer.Context, help_all: bool = False, **typed: Any) -> None:
         texts = {}
         for name, value in typed.items():
             if value is not None and value != [] and value != ():
-                field, several = by_name[name], tuple(value) if isinstance(value, list | tuple) else (value,)
+                field, several = (
+                    options[identities[name]],
+                    tuple(value) if isinstance(value, list | tuple) else (value,),
+                )
                 if any(isinstance(text, str) and not text.strip() for text in several):
                     raise ValueError(
                         f"{field.flag}: the text given is empty; expected one that is not, or leave it out"
                     )
                 if len(several) > 1 and not field.reader.many:
                     raise ValueError(f"{field.flag}: given more than once; it has one value")
-                texts[field.identity] = several if field.reader.many else several[0]
+                texts[identities[name]] = several if field.reader.many else several[0]
         run(verb, context, texts)
 
     defaults: dict[str, tuple[Any, Any]] = {"context": (inspect.Parameter.empty, typer.Context)}
-    defaults |= {name: _parameter_of(field) for name, field in by_name.items()}
-    if not all(field.common for field in by_name.values()):
+    defaults |= {name: _parameter_of(options[identity]) for name, identity in identities.items()}
+    if not all(field.common for field in options.values()):
         show = typer.Option(False, "--help-all", is_eager=True, callback=_show_all, help="Show all options.")
         defaults["help_all"] = show, bool
     parameters = [

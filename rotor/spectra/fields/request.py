@@ -11,7 +11,7 @@ import numpy as np
 
 from rotor.checks import require_choice
 from rotor.quantum.effects.stark import StarkRequest
-from rotor.requests.field import CONDITIONS, OBSERVABLES, check_fields, declared
+from rotor.requests.field import CONDITIONS, OBSERVABLES, Rule, check_fields, declared
 from rotor.requests.readers import Custom, Quantity, Range, Text
 from rotor.spectra.fields.light import LightText, light_components
 from rotor.table import Table
@@ -51,6 +51,11 @@ def _read_line(line: Any) -> tuple[str, str]:
     return parts[0], parts[1]
 
 
+def _files(*names: str) -> Rule:
+    """Rule of an input that these files alone use."""
+    return Rule(tuple(f"outputs.{name}" for name in names), why="does not change the map itself")
+
+
 @dataclass(frozen=True, kw_only=True)
 class FieldSample:
     """The sample of lines, spectra and mixtures in fields; fields are checked when the request is made.
@@ -64,15 +69,15 @@ class FieldSample:
     light: LightText = declared(
         "parallel", Custom(_read_light, metavar="NAME"),
         "Polarization for --lines: parallel, perpendicular, isotropic, the angle with the field (degrees), or X,Y,Z", option="--light",
-        panel=CONDITIONS,
+        panel=CONDITIONS, rule=_files("lines", "lobes", "spectrum"),
     )  # fmt: skip
     temperature_k: float = declared(
         300.0, Quantity("K", above=0, metavar="T"), "Temperature for --lines, --spectrum, --mixture (K)", option="--temperature",
-        panel=CONDITIONS, common=True,
+        panel=CONDITIONS, common=True, rule=_files("lines", "lobes", "mixture", "spectrum"),
     )  # fmt: skip
     populations: str = declared(
         "equilibrium", Text(POPULATIONS, "NAME"), "Equilibrium in the field, or adiabatic: those of the free molecule, as in a beam",
-        option="--populations", panel=CONDITIONS,
+        option="--populations", panel=CONDITIONS, rule=_files("lines", "lobes", "mixture", "spectrum"),
     )  # fmt: skip
     line: tuple[str, str] | None = declared(
         None,
@@ -80,10 +85,11 @@ class FieldSample:
         "Only lines between these two free levels, such as '1 - 0'",
         option="--line",
         panel=OBSERVABLES,
+        rule=_files("coefficients", "lines", "lobes"),
     )
     linewidth_mhz: float = declared(
         1.0, Quantity("MHz", above=0, metavar="W"), "Full width at half maximum of the lines of --spectrum (MHz)", option="--linewidth",
-        panel=OBSERVABLES,
+        panel=OBSERVABLES, rule=_files("spectrum"),
     )  # fmt: skip
     range_mhz: tuple[float, float] | None = declared(
         None,
@@ -91,10 +97,11 @@ class FieldSample:
         "Frequency range of --spectrum (MHz); by default that of the lines",
         option="--range",
         panel=OBSERVABLES,
+        rule=_files("spectrum"),
     )
     spread: float = declared(
         0.0, Quantity(least=0, below=0.25), "Standard deviation of the field over the sample for --spectrum, as a fraction",
-        option="--spread", panel=CONDITIONS,
+        option="--spread", panel=CONDITIONS, rule=_files("spectrum"),
     )  # fmt: skip
 
     def __post_init__(self) -> None:

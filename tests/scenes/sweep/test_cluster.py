@@ -40,7 +40,7 @@ def test_processes_and_a_cluster_exclude_each_other(call, folder):
     write_scene(SWEEP, "s.toml")
     code, _, err = call("run", "s.toml", "--dask", "tcp://localhost:1", "--workers", "2")
     assert code == 2
-    assert "--workers and --dask: give one of them" in err
+    assert "--workers: the cluster has its own workers; expected without --dask" in err
 
 
 @pytest.fixture
@@ -193,4 +193,4 @@ def test_certificates_that_are_not_there(call, folder):
         assert code == 2
         assert said in err
     code, _, err = call("run", "s.toml", "--dask-tls", "a,b,c")
-    assert (code, "goes with --dask" in err) == (2, True)
+    assert (code, "--dask-tls: expected with --dask" in err) == (2, True)
