@@ -20,6 +20,7 @@ from rotor.reports.screen import Part, Table, evenly, json_with_rows
 from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, Rule, declared
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
+from rotor.verbs.outputs import Report
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import Work
 
@@ -112,10 +113,10 @@ class SceneRun:
         files = [str(path) for path in self.result.files]
         return self.result.verb.json(self.result.answer, {**content, "files": files})
 
-    def parts(self, content: Mapping[str, Any]) -> Iterator[Part | None]:
+    def parts(self, report: Report) -> Iterator[Part | None]:
         """The title of the scene and the report of its verb, then files and seconds of the run."""
         result = self.result
-        parts = [*result.verb.show(result.answer, replace(result.report, content=content))]
+        parts = [*result.verb.show(result.answer, replace(result.report, content=report.content))]
         if title := result.scene.title:
             heading = parts.pop(0) if parts and isinstance(parts[0], str) else ""
             yield f"{title}\n{heading}".rstrip()
@@ -123,7 +124,7 @@ class SceneRun:
         files = ", ".join(map(str, result.files)) or "none: [outputs] names none"
         yield [("files", files), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)]
         if self.options.errors:
-            yield from error_parts(content)
+            yield from error_parts(report.content)
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ class SweepRun:
         """The facts and all points."""
         return json_with_rows(self.result, "points", {**content, "files": list(self.result.files)})
 
-    def parts(self, content: Mapping[str, Any]) -> list[Part | None]:
+    def parts(self, report: Report) -> list[Part | None]:
         """A table of points."""
         return [_sampled_rows(self.result)]
 
@@ -304,7 +305,7 @@ VERB = Tool(
     notes=lambda answer: answer.notes,
     failure=lambda answer: answer.failure,
     text=lambda answer, content: answer.json(content),
-    show=lambda answer, report: answer.parts(report.content),
+    show=lambda answer, report: answer.parts(report),
     lists_files=True,
     stepwise=True,
 )

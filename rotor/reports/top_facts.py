@@ -36,11 +36,12 @@ def error_facts(errors: Mapping[str, Any] | None) -> list[tuple[str, str]]:
     return [("errors", f"{name.removeprefix('errors ')}: {text}")]
 
 
-def model_facts(content: Mapping[str, Any], with_spins: str) -> list[tuple[str, str]]:
+def model_facts(report: Any) -> list[tuple[str, str]]:
     """Errors, effects in the model and effects left out (largest first), from `rotor.quantum.estimates.limits.limit_facts`.
 
     Of a motion without a Hamiltonian: errors, and what its content states as left out.
     """
+    content = report.content
     if "limits" not in content:
         return [*error_facts(content.get("errors")), *left_out_facts(content.get("left_out", ()))]
     from rotor.quantum.estimates.beyond import Limit
@@ -54,7 +55,7 @@ def model_facts(content: Mapping[str, Any], with_spins: str) -> list[tuple[str, 
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
     larger, others = larger_items(content["limits"], lambda limit: limit["size_mhz"], lambda limit: str(limit["name"]))
-    limits = [with_command(Limit(**limit).sentence, with_spins) for limit in larger]
+    limits = [with_command(Limit(**limit).sentence, report.with_spins) for limit in larger]
     limits += [others] if others else []
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
@@ -67,12 +68,12 @@ def top_parts(
 ) -> Iterator[Part | None]:
     """Parts of a report on a top: heading, facts, further parts; then sources of the named tables, errors and what is left out.
 
-    report: a `rotor.verbs.verb.Report`. title: heading, by default that of the top.
+    report: a `rotor.verbs.outputs.Report`. title: heading, by default that of the top.
     """
     yield title or heading(top)
     yield facts
     yield from parts
-    yield [*source_facts(top, tables, report.sources), *model_facts(report.content, report.with_spins)]
+    yield [*source_facts(top, tables, report.sources), *model_facts(report)]
 
 
 def with_command(sentence: str, with_spins: str) -> str:

@@ -143,13 +143,18 @@ def read_accuracy(stated: Stated, numerics: Numerics, entries: Entries = Entries
     [0.001, 0.001]
     >>> [read_accuracy(text, Numerics({"": Goal("Q")})).value for text in ("0.1 %", 0.02)]
     [0.001, 0.02]
+    >>> gas = Numerics({unit: Goal() for unit in ("K", "%", "")})
+    >>> [read_accuracy(text, gas).unit for text in ("1 K", "0.1 %", "0.02")]
+    ['K', '%', '']
     """
     if stated is None:
         return None
     total = isinstance(stated, Mapping)
     plain = stated["total"] if isinstance(stated, Mapping) else stated
     goals, text = numerics.goals, str(plain).strip()
-    unit, percent = _unit_of(text, numerics, entries), text.endswith("%")
+    percent, bare = text.endswith("%"), _NUMBER.fullmatch(text) and ("" in goals or not numerics.bare)
+    unit = numerics.percent(entries) if percent else "" if bare else next(iter(goals))
+    unit = next(iter(goals)) if percent and unit not in goals else unit
     if unit not in goals:
         units = ", or ".join(f"{unit} of the {goal.of}" for unit, goal in goals.items())
         raise ValueError(f"accuracy: {plain!r}: expected a unit: {units}")
@@ -160,21 +165,6 @@ def read_accuracy(stated: Stated, numerics: Numerics, entries: Entries = Entries
     if not number > 0.0:
         raise ValueError(f"accuracy: {plain!r}: expected more than 0")
     return Accuracy(0.01 * number if percent and not unit else number, unit, total, numerics)
-
-
-def _unit_of(text: str, numerics: Numerics, entries: Entries) -> str:
-    """The unit of an accuracy.
-
-    >>> from rotor.requests.numerics import Goal
-    >>> gas = Numerics({unit: Goal() for unit in ("K", "%", "")})
-    >>> [_unit_of(text, gas, Entries()) for text in ("1 K", "0.1 %", "0.02")]
-    ['K', '%', '']
-    """
-    first = next(iter(numerics.goals))
-    if text.endswith("%"):
-        unit = numerics.percent(entries)
-        return unit if unit in numerics.goals else first
-    return "" if _NUMBER.fullmatch(text) and ("" in numerics.goals or not numerics.bare) else first
 
 
 def _with_error(budget: ErrorBudget, choice: Choice) -> ErrorBudget:

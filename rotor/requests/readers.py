@@ -159,8 +159,10 @@ class Quantity(Reader):
             raise ValueError(f"{text}: expected {self._rule()}")
         if (self.least is not None and value < self.least) or (self.most is not None and value > self.most):
             raise ValueError(f"{text}: expected {self._rule()}")
-        if self.unit == "K":
-            check_temperature(value, text)
+        if self.unit == "K" and value > MOST_KELVIN:
+            raise ValueError(f"{text!r}: expected a temperature up to {MOST_KELVIN:g} K; no molecule lasts beyond")
+        if self.unit == "K" and 0 < value < LEAST_KELVIN:  # 0 is left to the bounds of the field
+            raise ValueError(f"{text!r}: expected a temperature of {LEAST_KELVIN:g} K or more")
 
     def _rule(self) -> str:
         unit = f" {self.unit}" if self.unit else ""
@@ -187,14 +189,6 @@ class Quantity(Reader):
         return f"{value:g} {self.unit}".rstrip()
 
 
-def check_temperature(value: float, text: str) -> None:
-    """ValueError for a temperature outside the range of molecular gases; 0 is left to the bounds of the field."""
-    if value > MOST_KELVIN:
-        raise ValueError(f"{text!r}: expected a temperature up to {MOST_KELVIN:g} K; no molecule lasts beyond")
-    if 0 < value < LEAST_KELVIN:
-        raise ValueError(f"{text!r}: expected a temperature of {LEAST_KELVIN:g} K or more")
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Grid(Listed):
     """Numbers in a unit, from start:stop:count, a text with commas, or a list. points: the count if the text gives none."""
@@ -210,7 +204,10 @@ class Grid(Listed):
     def read(self, raw: Any) -> tuple[float, ...]:
         """The numbers."""
         if isinstance(raw, str):
-            values = self._read_text(raw)
+            count = raw.rpartition(":")[2].strip()
+            if raw.count(":") == 2 and count.isdecimal() and (len(count) > 18 or int(count) > self.most_points):
+                raise ValueError(f"{raw!r}: at most {self.most_points} numbers; ask for fewer")
+            values = tuple(parse_grid(raw, self.unit, self.points).tolist())
         elif isinstance(raw, int | float) and not isinstance(raw, bool):
             values = (float(raw),)
         else:
@@ -225,12 +222,6 @@ class Grid(Listed):
                 rule = str(error).partition(": ")[2]
                 raise ValueError(f"{raw!r:.60}: {rule}" if isinstance(raw, str) else str(error)) from None
         return values
-
-    def _read_text(self, text: str) -> tuple[float, ...]:
-        count = text.rpartition(":")[2].strip()
-        if text.count(":") == 2 and count.isdecimal() and (len(count) > 18 or int(count) > self.most_points):
-            raise ValueError(f"{text!r}: at most {self.most_points} numbers; ask for fewer")
-        return tuple(parse_grid(text, self.unit, self.points).tolist())
 
     def show(self, value: Any) -> str:
         """Count, first and last number."""

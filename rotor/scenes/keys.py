@@ -136,7 +136,13 @@ def checked_table(keys: Keys, values: Any, place: str) -> dict[str, Any]:
     table = {}
     for key, field in keys.items():
         if (value := values.get(key)) is not None:
-            value = checked_value(field, value, f"{place}.{key}" if place else key)
+            where = f"{place}.{key}" if place else key
+            reader = field.reader
+            value = (
+                _chosen(reader, value, where)
+                if isinstance(reader, Choices)
+                else _typed(value, value_kinds(field), where)
+            )
             if value != shown_default(field):
                 table[key] = value
         elif field.default is REQUIRED:
@@ -144,17 +150,15 @@ def checked_table(keys: Keys, values: Any, place: str) -> dict[str, Any]:
     return table
 
 
-def checked_value(field: Field, value: Any, place: str) -> Any:
-    """The value of a key; ValueError, with its place, for a value of a wrong type."""
-    if not isinstance(field.reader, Choices):
-        return _typed(value, value_kinds(field), place)
-    if not isinstance(value, list | tuple):
-        raise _wrong_type(place, value, (list,))
-    return [_chosen(field.reader, item, f"{place}[{number}]") for number, item in enumerate(value)]
+def _chosen(choices: Choices, values: Any, place: str) -> list[dict[str, Any]]:
+    """A list whose tables are of several kinds."""
+    if not isinstance(values, list | tuple):
+        raise _wrong_type(place, values, (list,))
+    return [_chosen_table(choices, item, f"{place}[{number}]") for number, item in enumerate(values)]
 
 
-def _chosen(choices: Choices, item: Any, place: str) -> dict[str, Any]:
-    """A table of a list whose tables are of several kinds."""
+def _chosen_table(choices: Choices, item: Any, place: str) -> dict[str, Any]:
+    """A table of such a list."""
     kinds, word = choices.load(), choices.word
     kind = item.get(word) if isinstance(item, Mapping) else None
     if isinstance(item, Mapping) and kind is None:
