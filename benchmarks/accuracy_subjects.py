@@ -13,8 +13,7 @@ import numpy as np
 from rotor.classical.integrators import splitting
 from rotor.plots.work_precision import Panel, Point
 from rotor.requests.knob import Measure, Setting, Sweep
-from rotor.scenes.accuracy_panels import points_of
-from rotor.scenes.accuracy_sweep import in_rounds, knobs_of, sweep, timed, without_scatter
+from rotor.scenes.accuracy_sweep import in_rounds, knobs_of, points_of, sweep, timed, without_scatter
 from rotor.scenes.scene import (
     FluidScene,
     GasScene,

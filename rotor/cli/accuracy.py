@@ -79,7 +79,7 @@ def answer(request: AccuracyRequest, work: Work) -> AccuracyAnswer:
 def draw(answer: AccuracyAnswer, path: Path, report: Report) -> None:
     """Error against time, one panel for each knob."""
     from rotor.plots.work_precision import plot_work_precision
-    from rotor.scenes.accuracy_panels import panels_of
+    from rotor.scenes.accuracy_sweep import panels_of
 
     facts = {name: report.content[name] for name in ("command", "scene", "references")}
     title = answer.scene.title or f"Accuracy and time: {answer.scene.kind}"

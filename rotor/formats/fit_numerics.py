@@ -13,7 +13,7 @@ from rotor.quantum.estimates.left_out import neglected_in_levels
 from rotor.quantum.estimates.plans import effect_texts
 from rotor.requests.knob import DECADES, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, LeftOut, timed, traced
+from rotor.requests.plan import Cost, Growth, LeftOut, traced
 
 if TYPE_CHECKING:
     from rotor.formats.fit_request import FitRequest
@@ -23,10 +23,7 @@ ITERATIONS = (1, 2, 3, 4, 6, 10)
 TOLERANCES = (1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 FINEST_TOLERANCE = 1e-12
 # of the calibration; of fits whose start is near (tests/scenes/test_scene_fit.py)
-SHORT_ITERATIONS, USUAL_ITERATIONS = (
-    1,
-    6,
-)
+SHORT_ITERATIONS, USUAL_ITERATIONS = (1, 3), 6
 
 
 def with_options(request: Any, **changes: Any) -> Any:
@@ -81,10 +78,8 @@ def fit_cost(request: Any) -> Cost:
     def limited(iterations: int) -> Any:
         return answer_fit(with_options(request, most_iterations=min(iterations, request.options.most_iterations)))
 
-    least = timed(lambda: limited(SHORT_ITERATIONS))
-    step = max(timed(lambda: limited(SHORT_ITERATIONS + 2)) - least, 0.0) / 2
-    seconds = least + step * (USUAL_ITERATIONS - SHORT_ITERATIONS)
-    return Cost(seconds, traced(lambda: limited(SHORT_ITERATIONS))[1])
+    seconds = Growth(limited, USUAL_ITERATIONS, SHORT_ITERATIONS).seconds
+    return Cost(seconds, traced(lambda: limited(1))[1])
 
 
 def describe_fit(request: Any, _: Any) -> dict[str, Any]:

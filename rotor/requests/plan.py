@@ -19,11 +19,10 @@ LONG_SEARCH = 10.0  # seconds; a shorter search is repeated, since its first run
 T = TypeVar("T")
 MOST_LEFT_OUT = 4  # lines of what a calculation leaves out
 SMALL = 0.1  # of the largest effect: smaller ones are named without a line of their own
-# shortest call that is extrapolated, and growth factor of the size until it takes so long
 ENOUGH_SECONDS, LARGER = (
     0.05,
     3,
-)
+)  # shortest call that is extrapolated, and growth of the size until a call takes so long
 
 
 @dataclass(frozen=True)
@@ -111,12 +110,15 @@ class Growth:
     @property
     def seconds(self) -> float:
         """Processor time (s)."""
-        return self.extrapolated(timed, self.work)
+        first, _, taken = self._short_calls
+        return self._extrapolated(taken, lambda: timed(partial(self.call, first)), self.work)
 
     @property
     def memory_mb(self) -> float:
         """Peak memory."""
-        return self.extrapolated(lambda call: traced(call)[1], self.memory)
+        first, second, _ = self._short_calls
+        most = traced(partial(self.call, second))[1]
+        return self._extrapolated(most, lambda: traced(partial(self.call, first))[1], self.memory)
 
     @property
     def cost(self) -> Cost:
@@ -124,20 +126,19 @@ class Growth:
         return Cost(self.seconds, self.memory_mb)
 
     @cached_property
-    def enough(self) -> tuple[int, int]:
-        """Sizes of the two short calls, grown until the second takes long enough: short calls are dominated by constant parts."""
-        first, second = self.sizes
-        while second < self.size and timed(partial(self.call, second)) < ENOUGH_SECONDS:
-            first, second = LARGER * first, min(LARGER * second, self.size)
-        return min(first, self.size), min(second, self.size)
+    def _short_calls(self) -> tuple[int, int, float]:
+        """Sizes of the two short calls, grown until the second takes long enough, and its time: constant parts dominate shorter ones."""
+        first, second = (min(size, self.size) for size in self.sizes)
+        while (taken := timed(partial(self.call, second))) < ENOUGH_SECONDS and second < self.size:
+            first, second = min(LARGER * first, self.size), min(LARGER * second, self.size)
+        return first, second, taken
 
-    def extrapolated(self, measure: Callable[[Callable[[], Any]], float], work: Callable[[int], float]) -> float:
-        """Cost of the call at `size` by a measure such as `timed`."""
-        first, second = self.enough
-        most = measure(partial(self.call, second))
+    def _extrapolated(self, most: float, measure_first: Callable[[], float], work: Callable[[int], float]) -> float:
+        """Cost of the call at `size` from that of the second short call and, unless that is all, of the first."""
+        first, second, _ = self._short_calls
         if second == self.size:
             return most
-        rate = max(most - measure(partial(self.call, first)), 0.0) / max(work(second) - work(first), 1e-300)
+        rate = max(most - measure_first(), 0.0) / max(work(second) - work(first), 1e-300)
         return most + rate * (work(self.size) - work(second))
 
 

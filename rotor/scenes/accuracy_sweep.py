@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ from rotor.requests.knob import Setting, Sweep, Sweeps, knobs_of_fields
 from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import Scene
 from rotor.table import Table
+
+if TYPE_CHECKING:
+    from rotor.plots.work_precision import Panel, Point
 
 Progress = Callable[[str, str], object]
 SHORT_SECONDS, ROUNDS = 1.0, 5  # shorter settings are timed in this many rounds
@@ -91,6 +94,33 @@ class WorkPrecision(Table):
         for row in self.rows:
             by_knob.setdefault((row.knob, row.error_of, row.unit), []).append(row)
         return by_knob
+
+
+def panels_of(table: WorkPrecision) -> list[Panel]:
+    """One panel of a picture for each knob and error, titled in words; orders of one splitting share a panel.
+
+    >>> from rotor.scenes.scene import LevelsScene
+    >>> [(panel.title, panel.of) for panel in panels_of(work_precision(LevelsScene(molecule="CO")))]
+    [('order of centrifugal distortion', 'energy of a level (MHz)')]
+    """
+    from rotor.plots.work_precision import Panel
+
+    grouped: dict[tuple[str, str], dict[str, list[Point]]] = {}
+    for (knob, error_of, unit), rows in table.curves().items():
+        name, _, variant = knob.partition(", ")
+        label = f"{error_of} ({unit})" if unit else error_of
+        grouped.setdefault((name, label), {})[variant or name] = points_of(rows)
+    return [
+        Panel(table.titles.get(name, name), label, curves, joined=name not in table.methods)
+        for (name, label), curves in grouped.items()
+    ]
+
+
+def points_of(rows: list[Row]) -> list[Point]:
+    """The settings of one knob as points of a picture."""
+    from rotor.plots.work_precision import Point
+
+    return [Point(row.setting, row.seconds, row.error, row.own) for row in rows]
 
 
 def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:

@@ -126,7 +126,7 @@ DRAG = ("--effect", "linear drag coefficients=1,1,1")
         ((*BODY, *DRAG, "--times", "0:1:3", "--order", "4"), "--order: belongs to a splitting; give --step too"),
         ((*BODY, *DRAG, "--times", "0:1:3", "--tolerance", "2"), "--tolerance"),
         ((*BODY, *DRAG, "--times", "0:1:3", "--attitude", "1,1,0,0"), "--attitude: (1.0, 1.0, 0.0, 0.0): expected a unit quaternion"),
-        ((*BODY, *DRAG, "--times", "0:1:3", "--plot", "a.png"), "--plot: needs a free motion (a table shows any); expected without --effect"),
+        ((*BODY, *DRAG, "--times", "0:1:3", "--plot", "a.png"), "motion (a table shows any); expected without --effect"),
         (("tumble", "water", *DRAG, "--times", "0:1:3"), "--effect: acts on a body; give --moments or --body"),
         (("tumble", "--moments", "1,2,3", *DRAG, "--times", "0:1:3"), "--omega: expected with --moments"),
         ((*BODY, "--step", "0.1"), "--step: belongs to a motion under effects"),

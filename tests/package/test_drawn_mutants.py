@@ -347,17 +347,20 @@ def test_an_array_is_the_same_as_an_array_alone():
 # Costs
 
 
-def test_a_cost_proportional_to_the_work_is_extrapolated_exactly():
+def test_a_cost_proportional_to_the_work_is_extrapolated_exactly(monkeypatch):
     """t = 10 + 3 n from n = 4 and 8 gives 310 at n = 100; a call that is no larger is measured itself."""
 
     def taken(cost, size):
         """What a clock would say of a call; the short calls are long enough."""
-        growth = Growth(cost, size, (4, 8))
-        growth.__dict__["enough"] = (min(4, size), min(8, size))
-        return growth.extrapolated(lambda call: call(), float)
+        calls.clear()
+        return Growth(lambda n: calls.append(n) or cost(n), size, (4, 8)).seconds
+
+    calls = []
+    monkeypatch.setattr("rotor.requests.plan.timed", lambda call: call())
 
     measured = taken(lambda n: 10.0 + 3.0 * n, 100)
     assert measured == pytest.approx(310.0, rel=1e-14)  # round-off of three operations
+    assert calls == [8, 4]  # no call is timed twice
     assert taken(lambda n: 10.0 + 3.0 * n, 6) == 28.0
     falling = taken(lambda n: 10.0 - n, 100)
     assert falling == 2.0  # noise of a clock: no cost falls with the work

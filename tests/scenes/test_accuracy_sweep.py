@@ -17,8 +17,7 @@ from rotor.requests.fill import Entries
 from rotor.requests.knob import Choice, Knob, Measure, Setting, Sweep
 from rotor.requests.numerics import Goal, Numerics
 from rotor.scenes import accuracy_sweep
-from rotor.scenes.accuracy_panels import panels_of
-from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, sweep, work_precision
+from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, panels_of, sweep, work_precision
 from rotor.scenes.scene import (
     AlignScene,
     EmissionScene,
