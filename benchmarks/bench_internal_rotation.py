@@ -24,7 +24,7 @@ from rotor.fitting.parameters import parameters
 from rotor.fitting.search import FitOptions
 from rotor.fitting.top_constants import TopConstants
 from rotor.formats.belgi import read_belgi_levels
-from rotor.quantum.internal_rotation.labels import counted_k
+from rotor.quantum.internal_rotation.labels import counted_ka_kc
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.truncation import truncation_mhz
 from rotor.tops.internal_rotation import InternalRotationConstants
@@ -50,7 +50,7 @@ def belgi(folder: Path) -> tuple[int, float]:
         for sigma in (0, 1):
             ours = ram.blocks(sigma, 6).solve(ram.coefficients, 3)
             quanta = ours.quanta
-            k = counted_k(quanta["j"], quanta["vt"], ours.energies) if sigma == 0 else quanta["k"]
+            k = counted_ka_kc(quanta["j"], quanta["vt"], ours.energies)[0] if sigma == 0 else quanta["k"]
             names = np.column_stack([quanta["j"], quanta["vt"], k])
             theirs = np.column_stack([listed.j, listed.vt, listed.k, listed.energy_cm])[listed.species == sigma]
             a = names[order := np.lexsort([ours.energies, *names.T])], ours.energies[order]

@@ -2,10 +2,10 @@
 
 A *space* is a set of sectors, each with a total angular momentum and energies, and tensor operators by reduced matrix elements between
 sectors. The eigenfunctions of linear blocks make a space (`contracted`); a space times a spin is a space again, with (Edmonds, Angular
-Momentum in Quantum Mechanics, 1957, eqs. 7.1.5, 7.1.6)
+Momentum in Quantum Mechanics, 1957, eq. 7.1.5)
 
-    ⟨(a b)F|A^k·B^k|(a' b')F⟩ = (-1)^(a'+b+F) {F b a; k a' b'} ⟨a‖A‖a'⟩⟨b‖B‖b'⟩,
     ⟨(a b)F‖[A^k1 × B^k2]^k‖(a' b')F'⟩ = √((2F+1)(2F'+1)(2k+1)) {a a' k1; b b' k2; F F' k} ⟨a‖A‖a'⟩⟨b‖B‖b'⟩,
+    ⟨F|A^k·B^k|F⟩ = (-1)^k √((2k+1)/(2F+1)) ⟨F‖[A^k × B^k]^0‖F⟩,
 
 and in a field along z (eq. 5.4.1) ⟨F M|T^k_0|F' M⟩ = (-1)^(F-M) (F k F'; -M 0 M) ⟨F‖T^k‖F'⟩. Coupled terms and fields make linear blocks
 again, so that fits, fields and further spins need nothing else.
@@ -14,7 +14,7 @@ again, so that fits, fields and further spins need nothing else.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, NamedTuple
@@ -29,7 +29,7 @@ from rotor.quantum.connected import connected_parts
 from rotor.quantum.one_to_one import match_names
 from rotor.quantum.solvers.hermitian import eigenstates
 from rotor.quantum.spins.coupling import reduced_spin
-from rotor.quantum.wigner import nine_j, six_j
+from rotor.quantum.wigner import nine_j
 
 Pair = tuple[int, int]  # row and column of sectors
 
@@ -196,7 +196,13 @@ def coupled(
                 sectors.append(Sector(total, energies, {"factors": (i, j)}))
     terms = {}
     for name, (left, right) in scalars.items():
-        terms[name] = _scalar(first, second, first.tensors[left], second.tensors[right], rows)
+        a_tensor, b_tensor = first.tensors[left], second.tensors[right]
+        root = (-1.0) ** a_tensor.rank * np.sqrt(2.0 * a_tensor.rank + 1)
+        terms[name] = {
+            (row, column): entry._replace(factor=root / np.sqrt(sectors[row].twice_j + 1.0) * entry.factor)
+            for (row, column), entry in _product(first, second, a_tensor, b_tensor, 0, rows).items()
+            if column <= row
+        }
     tensors = {}
     for name, (first_name, other, rank) in carried.items():
         left_tensor = first.tensors[first_name] if first_name else first.unit
@@ -205,61 +211,25 @@ def coupled(
     return CoupledSpace(tuple(sectors), terms, tensors)
 
 
-def _pairs(
-    first: Tensor, second: Tensor, rows: Mapping[Pair, Mapping[int, int]]
-) -> Iterable[tuple[Pair, Pair, NDArray[Any], NDArray[Any]]]:
-    """(bra sectors, ket sectors, A, B) of all products of blocks of two tensors."""
-    for (a, c), left in first.blocks.items():
-        for (b, d), right in second.blocks.items():
-            if (a, b) in rows and (c, d) in rows:
-                yield (a, b), (c, d), left, right
-
-
-def _scalar(
-    first: Space, second: Space, left: Tensor, right: Tensor, rows: Mapping[Pair, Mapping[int, int]]
-) -> dict[Pair, Entry]:
-    """A·B in the coupled functions (Edmonds 7.1.6), the lower triangle of sectors."""
-    found = []
-    for bra, ket, a, b in _pairs(left, right, rows):
-        j = [first.sectors[bra[0]].twice_j, second.sectors[bra[1]].twice_j,
-             first.sectors[ket[0]].twice_j, second.sectors[ket[1]].twice_j]  # fmt: skip
-        for total, row in rows[bra].items():
-            column = rows[ket].get(total)
-            if column is not None and column <= row:
-                numbers = total, j[1], j[0], 2 * left.rank, j[2], j[3], (j[2] + j[1] + total) // 2
-                found.append(((row, column), numbers, a, b))
-    return _entries(found, lambda twice: six_j(*(twice[:, :6].T / 2)) * np.where(twice[:, 6] % 2, -1.0, 1.0))
-
-
 def _product(
     first: Space, second: Space, left: Tensor, right: Tensor, rank: int, rows: Mapping[Pair, Mapping[int, int]]
 ) -> dict[Pair, Entry]:
-    """[A × B]^k in the coupled functions (Edmonds 7.1.5)."""
-    found = []
-    for bra, ket, a, b in _pairs(left, right, rows):
-        j = [first.sectors[bra[0]].twice_j, first.sectors[ket[0]].twice_j,
-             second.sectors[bra[1]].twice_j, second.sectors[ket[1]].twice_j]  # fmt: skip
-        for total, row in rows[bra].items():
-            for other, column in rows[ket].items():
-                if abs(total - other) <= 2 * rank <= total + other:
-                    numbers = [j[0], j[1], 2 * left.rank], [j[2], j[3], 2 * right.rank], [total, other, 2 * rank]
-                    found.append(((row, column), numbers, a, b))
-
-    def symbols(twice: Ints) -> Floats:
-        roots = np.sqrt((twice[:, 2, 0] + 1.0) * (twice[:, 2, 1] + 1) * (2 * rank + 1))
-        return np.asarray(roots * nine_j(twice / 2))
-
-    return _entries(found, symbols)
-
-
-def _entries(
-    found: Sequence[tuple[Pair, Any, NDArray[Any], NDArray[Any]]], symbols: Callable[[Ints], Floats]
-) -> dict[Pair, Entry]:
-    """Entries at places from doubled quantum numbers and A and B; those with a symbol of 0 are left out."""
-    if not found:
+    """[A × B]^k in the coupled functions (Edmonds 7.1.5), without elements whose symbol is 0."""
+    places, numbers, factors = list[Pair](), list[Any](), list[tuple[NDArray[Any], NDArray[Any]]]()
+    for ((a, c), in_first), ((b, d), in_second) in product(left.blocks.items(), right.blocks.items()):
+        j = first.sectors[a].twice_j, first.sectors[c].twice_j
+        other_j = second.sectors[b].twice_j, second.sectors[d].twice_j
+        for (total, row), (other, column) in product(rows[a, b].items(), rows[c, d].items()):
+            if abs(total - other) <= 2 * rank <= total + other:
+                places.append((row, column))
+                numbers.append(([*j, 2 * left.rank], [*other_j, 2 * right.rank], [total, other, 2 * rank]))
+                factors.append((in_first, in_second))
+    if not places:
         return {}
-    values = symbols(np.array([numbers for _, numbers, _, _ in found])).tolist()
-    return {place: Entry(value, a, b) for (place, _, a, b), value in zip(found, values, strict=True) if value}
+    twice = np.array(numbers)
+    roots = np.sqrt((twice[:, 2, 0] + 1.0) * (twice[:, 2, 1] + 1) * (2 * rank + 1))
+    values = (roots * nine_j(twice / 2)).tolist()
+    return {place: Entry(value, *both) for place, value, both in zip(places, values, factors, strict=True) if value}
 
 
 def _solved_parts(

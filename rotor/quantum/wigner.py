@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from math import isfinite, prod
+from math import prod
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,13 +81,13 @@ def nine_j(rows: ArrayLike) -> Floats:
     if table.shape[-2:] != (3, 3):
         raise ValueError(f"a 9j symbol has rows (..., 3, 3), found the shape {table.shape}")
     (a, b, c), (d, e, f), (g, h, i) = (tuple(table[..., row, column] for column in range(3)) for row in range(3))
-    least, most = np.min(np.abs(a - i), initial=np.inf), np.max(a + i, initial=-np.inf)
-
+    _refuse_negative(_doubled(*table.reshape(-1, 9).T))
+    least = np.max(np.abs([a - i, d - h, b - f]), axis=0)
+    terms = np.min([a + i, d + h, b + f], axis=0) - least
     total = np.zeros(table.shape[:-2])
-    for doubled in range(round(2 * least), round(2 * most) + 1) if isfinite(least) else ():
-        x = doubled / 2
+    for x in (least + step for step in range(int(terms.max(initial=-1)) + 1)):  # beyond the last term symbols are 0
         term = six_j(a, d, g, h, i, x) * six_j(b, e, h, d, x, f) * six_j(c, f, i, x, a, b)
-        total += (-1) ** doubled * (doubled + 1) * term
+        total += np.where(2 * x % 2, -1.0, 1.0) * (2 * x + 1) * term
     return np.asarray(total)
 
 
