@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from rotor.arrays import Floats, Workspace
 from rotor.quantum.spins.blocks import Plan
 from rotor.quantum.spins.many_f import (
+    Between,
     Coefficients,
     Frame,
     Group,
@@ -53,7 +54,7 @@ def _matrices_of_group(
         shape = len(places), group.columns, height, group.columns, height
         whole = space.array("whole", *shape)
         each = (between(group, group, places, 0, *operator, frame, (height, height)) for operator in acting)
-        write_between(chain.from_iterable(each), whole)
+        write_between(_lower(group, chain.from_iterable(each)), whole)
         energies = np.zeros(shape[:3])
         for rotation in group.rotations:
             of_kind = frame.energies_mhz[rotation.kind][frame.rows_of(group.twice_rows[run], rotation), :height]
@@ -68,3 +69,9 @@ def _matrices_of_group(
             diagonal = np.arange(functions.shape[1])
             matrices[:, diagonal, diagonal] += energies[at[:, None], columns, states]
             yield places[at].tolist(), matrices
+
+
+def _lower(group: Group, elements: Iterable[Between]) -> Iterator[Between]:
+    """The elements of lower triangles, if the functions of all blocks are in the order of the columns; else all elements."""
+    in_order = all((np.diff(columns) >= 0).all() for columns, _ in group.functions.values())
+    return (each for each in elements if not in_order or each.left.columns.start >= each.right.columns.start)

@@ -289,12 +289,6 @@ class Between(NamedTuple):
     elements: Floats
     coefficients: Floats
 
-    def product(self) -> Floats:
-        """c(F) ⟨r'‖X‖r⟩ (blocks, columns' · states', columns · states)."""
-        (count, rows, columns), (_, up, low) = self.elements.shape, self.coefficients.shape
-        out = self.elements[:, None, :, None, :] * self.coefficients[:, :, None, :, None]
-        return out.reshape(count, up * rows, low * columns)
-
 
 def between(
     up: Group, low: Group, chosen: Ints, step: int, tables: Tables, coefficients: Coefficients, frame: Frame,
@@ -318,13 +312,16 @@ def between(
 def write_between(all_elements: Iterable[Between], out: Floats) -> None:
     """Write sums of elements to an array (blocks, columns', states', columns, states)."""
     out.fill(0.0)
-    written = set[tuple[int, int]]()
-    for left, right, elements, coefficients in all_elements:
-        _, rows, columns = elements.shape
+    by_columns: dict[tuple[int, int], list[Between]] = {}
+    for each in all_elements:
+        by_columns.setdefault((each.left.columns.start, each.right.columns.start), []).append(each)
+    for terms in by_columns.values():
+        left, right, elements, coefficients = terms[0]
+        (count, rows, columns), (_, up, low) = elements.shape, coefficients.shape
         target = out[:, left.columns, :rows, right.columns, :columns]
-        factors = elements[:, None, :, None, :], coefficients[:, :, None, :, None]
-        if (place := (left.columns.start, right.columns.start)) in written:
-            target += np.multiply(*factors)
-        else:
-            np.multiply(*factors, out=target)
-            written.add(place)
+        if len(terms) == 1:
+            np.multiply(elements[:, None, :, None, :], coefficients[:, :, None, :, None], out=target)
+        else:  # Σ c X as a product of matrices
+            c = np.stack([term.coefficients for term in terms], axis=-1).reshape(count, up * low, len(terms))
+            x = np.stack([term.elements for term in terms], axis=1).reshape(count, len(terms), rows * columns)
+            target[...] = np.matmul(c, x).reshape(count, up, low, rows, columns).transpose(0, 1, 3, 2, 4)

@@ -9,7 +9,7 @@ see `coupling.moment_coefficients`, which has the coefficients of magnetic momen
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import product
 from typing import NamedTuple
@@ -22,6 +22,7 @@ from rotor.quantum.levels import Connections, SolvedBlock
 from rotor.quantum.spins.blocks import Shared
 from rotor.quantum.spins.contraction import tensors_of_stacks
 from rotor.quantum.spins.many_f import (
+    Between,
     Coefficients,
     Frame,
     Group,
@@ -40,6 +41,10 @@ from rotor.quantum.tensors import Tensors, rank_of
 _LIKE, _SMALL, _MOST = 1.5, 24, 1 << 20
 _LARGE = 20_000  # elements of a block whose columns are multiplied one kind after another
 _IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that lie side by side: 32 MB
+
+
+Operator = Callable[[slice, int, Floats], Floats]
+"""An operator times vectors: a run of its blocks, most states', and vectors (blocks, columns, states, n)."""
 
 
 class Acting(NamedTuple):
@@ -135,12 +140,12 @@ def amplitudes_of_groups(
     shared = blocks[0].spins.shared
     frame: Frame = shared.cache["frame"]
     groups = groups_of_blocks(blocks, levels)
-    space = Workspace()
+    spaces = [Workspace() for _ in moments.sums]
     rises_of_k = range(-moments.rank, moments.rank + 1) if shared.axial else range(1)
     for rise, rise_of_k, (place, low) in product(range(0, 2 * moments.rank + 1, 2), rises_of_k, enumerate(groups)):
         if rise or both_orders or rise_of_k >= 0:
             for up in groups if rise or both_orders or rise_of_k else groups[place:]:
-                yield from _between(up, low, rise, rise + 2 * frame.count * rise_of_k, moments, shared, space)
+                yield from _between(up, low, rise, rise + 2 * frame.count * rise_of_k, moments, shared, spaces)
 
 
 def connections_of(blocks: Sequence[SolvedBlock], moments: Moments) -> Connections:
@@ -184,9 +189,9 @@ def _states_of_group(blocks: list[SolvedBlock], twice_rows: list[int], levels: i
 
 def _between(
     up: GroupStates, low: GroupStates, rise: int, step: int, moments: Moments, shared: Shared,
-    space: Workspace,
+    spaces: Sequence[Workspace],
 ) -> Iterator[Rows]:  # fmt: skip
-    """Elements between two groups, whose doubled F differ by `rise` and doubled rows by `step`."""
+    """Elements between two groups, whose doubled F differ by `rise` and doubled rows by `step`; spaces: for each sum of moments."""
     frame: Frame = shared.cache["frame"]
     chosen = [row for row in low.places if row + step in up.places]
     chosen = [row for row in chosen if 2 * low.blocks[low.places[row]].spins.twice_f + rise >= 2 * moments.rank]
@@ -202,14 +207,21 @@ def _between(
         return
     lefts = np.array([up.places[row + step] for row in chosen])
     rights = np.array([low.places[row] for row in chosen])
-    for run in runs_of_similar_size(low.sizes[rights].tolist(), _LIKE, _SMALL, _MOST):
-        bra, ket, in_group = up.vectors(lefts[run]), low.vectors(rights[run]), low.in_group[rights[run]]
-        each = [
-            _elements(up.group, low.group, in_group, step, terms, frame, bra, ket, space) for terms in sums if terms
+    states = int(up.heights[lefts].max()), int(low.heights[rights].max())
+    at_once = max(1, _MOST // (up.group.columns * states[0] * low.group.columns * states[1]))
+    for first in range(0, len(chosen), at_once):
+        left, right = lefts[first : first + at_once], rights[first : first + at_once]
+        operators = [
+            _operator(up.group, low.group, low.in_group[right], step, terms, frame, states, space)
+            for terms, space in zip(sums, spaces, strict=True)
+            if terms
         ]
-        amplitudes = each[0] if len(each) == 1 else np.sqrt(sum(elements**2 for elements in each))
-        up_rows, low_rows = up.rows[lefts[run], : bra.shape[3]], low.rows[rights[run], : ket.shape[3]]
-        yield Rows(up_rows, low_rows, amplitudes, up is low and not step)
+        for run in runs_of_similar_size(low.sizes[right].tolist(), _LIKE, _SMALL, _MOST):
+            bra, ket = up.vectors(left[run]), low.vectors(right[run])
+            each = [_between_states(bra, operator(run, bra.shape[2], ket)) for operator in operators]
+            amplitudes = each[0] if len(each) == 1 else np.sqrt(sum(elements**2 for elements in each))
+            up_rows, low_rows = up.rows[left[run], : bra.shape[3]], low.rows[right[run], : ket.shape[3]]
+            yield Rows(up_rows, low_rows, amplitudes, up is low and not step)
 
 
 def _coefficients(scheme: Scheme, frame: Frame, acting: Acting, rise: int) -> Coefficients:
@@ -220,25 +232,42 @@ def _coefficients(scheme: Scheme, frame: Frame, acting: Acting, rise: int) -> Co
     return lambda twice_f: partial(column_tensors, *arguments, twice_f)
 
 
-def _elements(
+def _operator(
     up: Group, low: Group, chosen: Ints, step: int, terms: Sequence[tuple[Tables, Coefficients]], frame: Frame,
-    bra: Floats, ket: Floats, space: Workspace,
-) -> Floats:  # fmt: skip
-    """Σ V' c ⟨r'‖X‖r⟩ V of operators between blocks of two groups, (blocks, n_up, n_low)."""
-    states = bra.shape[2], ket.shape[2]
+    states: tuple[int, int], space: Workspace,
+) -> Operator:  # fmt: skip
+    """Σ c ⟨r'‖X‖r⟩ of the terms between blocks `chosen` of a group and those of another; states: most states' and states."""
     acting = [each for term in terms for each in between(up, low, chosen, step, *term, frame, states)]
-    functions_up, functions_low = bra.shape[1] * states[0], ket.shape[1] * states[1]
-    if functions_up * functions_low < _LARGE:
-        whole = space.array("whole", len(bra), *bra.shape[1:3], *ket.shape[1:3])
-        write_between(acting, whole)
-        moved = np.matmul(whole.reshape(-1, functions_up, functions_low), ket.reshape(len(ket), functions_low, -1))
-    else:  # most columns are not connected
-        moved = space.array("moved", *bra.shape[:3], ket.shape[3])
-        moved.fill(0.0)
-        for each in acting:
-            (_, rows, columns), (left, right) = each.elements.shape, (each.left.columns, each.right.columns)
-            of_right = ket[:, right, :columns].reshape(len(ket), -1, ket.shape[3])
-            added = np.matmul(each.product(), of_right)
-            moved[:, left, :rows] += added.reshape(len(ket), -1, rows, ket.shape[3])
-        moved = moved.reshape(len(ket), functions_up, -1)
-    return np.asarray(np.matmul(bra.reshape(len(bra), functions_up, -1).transpose(0, 2, 1), moved))
+    if up.columns * states[0] * low.columns * states[1] >= _LARGE:  # most columns are not connected
+        return partial(_moved, acting, up.columns, space)
+    whole = space.array("whole", len(chosen), up.columns, states[0], low.columns, states[1])
+    write_between(acting, whole)
+    return partial(_moved_by_matrices, whole)
+
+
+def _moved_by_matrices(whole: Floats, run: slice, height: int, ket: Floats) -> Floats:
+    """An operator, matrices (blocks, columns', states', columns, states), times vectors of a run of blocks."""
+    count, columns, states, n_low = ket.shape
+    matrices = whole[run, :, :height, :, :states].reshape(count, -1, columns * states)
+    return np.matmul(matrices, ket.reshape(count, columns * states, n_low)).reshape(count, -1, height, n_low)
+
+
+def _moved(acting: Sequence[Between], columns: int, space: Workspace, run: slice, height: int, ket: Floats) -> Floats:
+    """An operator times vectors of a run of blocks, one kind of columns after another: first the rotation, then the spins."""
+    count, _, _, n_low = ket.shape
+    moved = space.array("moved", count, columns, height, n_low)
+    moved.fill(0.0)
+    for left, right, elements, coefficients in acting:
+        rotation = elements[run, :height, : ket.shape[2]]
+        _, rows, states = rotation.shape
+        of_right = np.matmul(rotation[:, None], ket[:, right.columns, :states])
+        added = np.matmul(coefficients[run], of_right.reshape(count, -1, rows * n_low))
+        moved[:, left.columns, :rows] += added.reshape(count, -1, rows, n_low)
+    return moved
+
+
+def _between_states(bra: Floats, moved: Floats) -> Floats:
+    """V' times moved vectors, (blocks, n_up, n_low), both (blocks, columns, states, n)."""
+    count, columns, states, n_up = bra.shape
+    transposed = bra.reshape(count, columns * states, n_up).transpose(0, 2, 1)
+    return np.asarray(np.matmul(transposed, moved.reshape(count, columns * states, -1)))

@@ -20,6 +20,8 @@ from rotor.quantum.spins.parts import labels_by_shares, names_of_parts, over_fun
 from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import Exist
 
+_LARGE = 100  # functions of blocks that are solved as their matrices are made, without those of other groups
+
 
 def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) -> list[SolvedBlock]:
     """Solve the blocks of all doubled F in which a level exists (`levels.levels_of_f`): by F, then by the lowest member of each family."""
@@ -85,14 +87,21 @@ def _states(plan: Plan, members: Members, grouped: Sequence[tuple[Group, list[in
     kinds = _kinds(plan, members)
     alike: dict[tuple[int, ...], list[tuple[list[int], Floats]]] = {}
     for numbers, matrices in hamiltonians(plan, grouped, kinds, zeros):
-        alike.setdefault(kinds[numbers[0]], []).append((numbers, matrices))
+        kind = kinds[numbers[0]]
+        if kind[0] > _LARGE:
+            yield _solved(numbers, matrices, kind[2], zeros)
+        else:
+            alike.setdefault(kind, []).append((numbers, matrices))
     for (_, _, repeats), pieces in alike.items():
         numbers = [number for piece, _ in pieces for number in piece]
-        matrices = end_to_end([matrices for _, matrices in pieces])
-        if repeats > 1:
-            yield States(numbers, *_state_by_state(matrices, repeats, zeros[numbers]))
-        else:
-            yield diagonalised(numbers, matrices, zeros[numbers])
+        yield _solved(numbers, end_to_end([matrices for _, matrices in pieces]), repeats, zeros)
+
+
+def _solved(numbers: list[int], matrices: Floats, repeats: int, zeros: Floats) -> States:
+    """The states of blocks of one kind (`_kinds`) from their matrices."""
+    if repeats > 1:
+        return States(numbers, *_state_by_state(matrices, repeats, zeros[numbers]))
+    return diagonalised(numbers, matrices, zeros[numbers])
 
 
 def _kinds(plan: Plan, members: Members) -> list[tuple[int, int, int]]:
