@@ -43,8 +43,8 @@ _LARGE = 20_000  # elements of a block whose columns are multiplied one kind aft
 _IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that lie side by side: 32 MB
 
 
-Operator = Callable[[slice, int, Floats], Floats]
-"""An operator times vectors: a run of its blocks, most states', and vectors (blocks, columns, states, n)."""
+Operator = Callable[[slice, Floats, Floats], Floats]
+"""Elements V' X V (blocks, n', n) of a run of its blocks between vectors (blocks, columns, states, n)."""
 
 
 class Acting(NamedTuple):
@@ -218,7 +218,7 @@ def _between(
         ]
         for run in runs_of_similar_size(low.sizes[right].tolist(), _LIKE, _SMALL, _MOST):
             bra, ket = up.vectors(left[run]), low.vectors(right[run])
-            each = [_between_states(bra, operator(run, bra.shape[2], ket)) for operator in operators]
+            each = [operator(run, bra, ket) for operator in operators]
             amplitudes = each[0] if len(each) == 1 else np.sqrt(sum(elements**2 for elements in each))
             up_rows, low_rows = up.rows[left[run], : bra.shape[3]], low.rows[right[run], : ket.shape[3]]
             yield Rows(up_rows, low_rows, amplitudes, up is low and not step)
@@ -239,35 +239,30 @@ def _operator(
     """Σ c ⟨r'‖X‖r⟩ of the terms between blocks `chosen` of a group and those of another; states: most states' and states."""
     acting = [each for term in terms for each in between(up, low, chosen, step, *term, frame, states)]
     if up.columns * states[0] * low.columns * states[1] >= _LARGE:  # most columns are not connected
-        return partial(_moved, acting, up.columns, space)
+        return partial(_by_columns, acting, space)
     whole = space.array("whole", len(chosen), up.columns, states[0], low.columns, states[1])
     write_between(acting, whole)
-    return partial(_moved_by_matrices, whole)
+    return partial(_by_matrices, whole)
 
 
-def _moved_by_matrices(whole: Floats, run: slice, height: int, ket: Floats) -> Floats:
-    """An operator, matrices (blocks, columns', states', columns, states), times vectors of a run of blocks."""
-    count, columns, states, n_low = ket.shape
-    matrices = whole[run, :, :height, :, :states].reshape(count, -1, columns * states)
-    return np.matmul(matrices, ket.reshape(count, columns * states, n_low)).reshape(count, -1, height, n_low)
+def _by_matrices(whole: Floats, run: slice, bra: Floats, ket: Floats) -> Floats:
+    """V' X V of matrices (blocks, columns', states', columns, states)."""
+    matrices = whole[run, :, : bra.shape[2], :, : ket.shape[2]]
+    up, low = (vectors.reshape(len(vectors), -1, vectors.shape[3]) for vectors in (bra, ket))
+    moved = np.matmul(matrices.reshape(len(up), up.shape[1], low.shape[1]), low)
+    return np.asarray(np.matmul(up.transpose(0, 2, 1), moved))
 
 
-def _moved(acting: Sequence[Between], columns: int, space: Workspace, run: slice, height: int, ket: Floats) -> Floats:
-    """An operator times vectors of a run of blocks, one kind of columns after another: first the rotation, then the spins."""
-    count, _, _, n_low = ket.shape
+def _by_columns(acting: Sequence[Between], space: Workspace, run: slice, bra: Floats, ket: Floats) -> Floats:
+    """V' X V, one kind of columns after another: X of the rotation times vectors, then coefficients, then V'."""
+    (count, columns, height, _), (_, _, most, n_low) = bra.shape, ket.shape
     moved = space.array("moved", count, columns, height, n_low)
     moved.fill(0.0)
     for left, right, elements, coefficients in acting:
-        rotation = elements[run, :height, : ket.shape[2]]
+        rotation = elements[run, :height, :most]
         _, rows, states = rotation.shape
         of_right = np.matmul(rotation[:, None], ket[:, right.columns, :states])
         added = np.matmul(coefficients[run], of_right.reshape(count, -1, rows * n_low))
         moved[:, left.columns, :rows] += added.reshape(count, -1, rows, n_low)
-    return moved
-
-
-def _between_states(bra: Floats, moved: Floats) -> Floats:
-    """V' times moved vectors, (blocks, n_up, n_low), both (blocks, columns, states, n)."""
-    count, columns, states, n_up = bra.shape
-    transposed = bra.reshape(count, columns * states, n_up).transpose(0, 2, 1)
-    return np.asarray(np.matmul(transposed, moved.reshape(count, columns * states, -1)))
+    in_blocks = bra.any(axis=(0, 3))
+    return np.asarray(np.matmul(bra[:, in_blocks].transpose(0, 2, 1), moved[:, in_blocks]))
