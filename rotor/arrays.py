@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -94,24 +93,16 @@ def runs_of_similar_size(
     >>> [(run.start, run.stop) for run in runs_of_similar_size([1, 3, 4, 9, 10, 11], 1.5, small=4, most=200)]
     [(0, 3), (3, 5), (5, 6)]
     """
-    if len(sizes) and not costs:
-        largest = max(sizes)
-        if largest <= max(ratio * min(sizes), small) and len(sizes) * largest * largest <= most:
-            yield slice(0, len(sizes))
-            return
-    start, place, least, largest, cost = 0, 0, math.inf, 0, 0
-    for (size, matrix_cost), alike in groupby(zip(sizes, costs or (size * size for size in sizes), strict=True)):
-        stop = place + sum(1 for _ in alike)
-        while place < stop:
-            least, largest, cost = min(least, size), max(largest, size), max(cost, matrix_cost)
-            fitting = stop - start if math.isinf(most) or not cost else max(int(most // cost), 1)
-            if largest <= max(ratio * least, small) and start + fitting > place:
-                place = min(stop, start + fitting)
-            else:
-                yield slice(start, place)
-                start, least, largest, cost = place, size, size, matrix_cost
-    if place:
-        yield slice(start, place)
+    start, least, largest, cost = 0, math.inf, 0, 0
+    for place, (size, cost_of_size) in enumerate(zip(sizes, costs or [size * size for size in sizes], strict=True)):
+        least, largest = (size if size < least else least), (size if size > largest else largest)
+        cost = cost_of_size if cost_of_size > cost else cost
+        fits = (largest <= ratio * least or largest <= small) and (place + 1 - start) * cost <= most
+        if not fits and place > start:
+            yield slice(start, place)
+            start, least, largest, cost = place, size, size, cost_of_size
+    if len(sizes):
+        yield slice(start, len(sizes))
 
 
 def numbers_in_runs(counts: Ints, firsts: Ints | int = 0) -> tuple[Ints, Ints]:

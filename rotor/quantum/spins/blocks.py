@@ -117,15 +117,22 @@ class Members:
     def alike(self, numbers: Sequence[int]) -> tuple[Ints, Ints]:
         """Names (blocks, levels, columns) and sizes (blocks, sub-blocks) of blocks that have as many of both."""
         blocks: Ints = np.array(numbers, dtype=np.int64)
-        tables = ((self.names, self.levels), (self.sizes, self.sub_blocks))
-        names, sizes = (
-            table[(np.cumsum(counts) - counts)[blocks, None] + np.arange(counts[blocks[0]])] for table, counts in tables
-        )
-        return names, sizes
+        names = self.names[self.first_levels[blocks, None] + np.arange(self.levels[blocks[0]])]
+        return names, self.sizes[self._first_sub_blocks[blocks, None] + np.arange(self.sub_blocks[blocks[0]])]
+
+    @cached_property
+    def first_levels(self) -> Ints:
+        """The number of the first level of each block."""
+        return np.asarray(np.cumsum(self.levels) - self.levels)
+
+    @cached_property
+    def _first_sub_blocks(self) -> Ints:
+        """The number of the first sub-block of each block."""
+        return np.asarray(np.cumsum(self.sub_blocks) - self.sub_blocks)
 
     def existing(self, exist: Exist) -> Members:
         """The blocks in which a level exists."""
-        exists = np.logical_or.reduceat(exist(self.names), np.cumsum(self.levels) - self.levels)
+        exists = np.logical_or.reduceat(exist(self.names), self.first_levels)
         names, sizes = (np.repeat(exists, counts) for counts in (self.levels, self.sub_blocks))
         columns = self.levels[exists], self.sub_blocks[exists], self.allowed
         parts = self.parts.chosen(np.flatnonzero(exists))

@@ -32,8 +32,8 @@ Layout = tuple[tuple[NPattern, int], ...]
 Places = slice | Ints
 
 # ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
-_LIKE, _SMALL, _MOST = 1.5, 24, 1 << 21
-# rows of one K beyond those of the highest N or F, so that no operator of rank 2 reaches those of the next K
+_LIKE, _SMALL, _MOST = 1.5, 64, 1 << 21
+# rows of one K beyond those of the highest N, so that no operator of rank 2 reaches those of the next K
 _SPARE = 5
 
 
@@ -96,8 +96,9 @@ class Frame:
     The doubled row of a block is 2F plus twice the rows of lower K: half the sum of this and 2(N - F), from the lowest N on, is the row of
     a rotational block.
 
-    twice_f: doubled F. lowest: lowest N. count: rows of each K, one for each N and some to spare. kinds, rows, k, sizes: of rotational
-    blocks by number: their kinds, rows in tables, K of axial functions and numbers of states. energies_mhz: (rows, states) by kind.
+    twice_f: doubled F. lowest: lowest N of the tables, below 0 where a pattern of the lowest F needs such an N. count: rows of each K, one
+    for each N and some to spare. kinds, rows, k, sizes: of rotational blocks by number: their kinds, rows in tables, K of axial functions
+    and numbers of states. energies_mhz: (rows, states) by kind.
     patterns: by F, numbers of its patterns in `pattern_tables.PatternTable`. n_patterns: 2(N - F) and class of each pattern.
     """
 
@@ -122,13 +123,11 @@ class Frame:
         return consecutive((twice_f - self.twice_f[0]) // 2)
 
     def rows_of(self, twice_rows: Ints, rotation: RotationColumns) -> Places:
-        """Rows of tables that columns have in blocks of these doubled rows; arbitrary where N is beyond the table."""
-        last = len(self.energies_mhz[rotation.kind]) - 1
-        least = (int(twice_rows[0]) + rotation.rise) // 2 - self.lowest
-        most = (int(twice_rows[-1]) + rotation.rise) // 2 - self.lowest
-        if most - least == len(twice_rows) - 1 and least >= 0 and most <= last:  # they rise
+        """Rows of tables that columns have in blocks of these doubled rows, which rise; empty rows where no such N is solved."""
+        least, most = ((int(row) + rotation.rise) // 2 - self.lowest for row in (twice_rows[0], twice_rows[-1]))
+        if most - least == len(twice_rows) - 1:
             return slice(least, most + 1)
-        return np.clip((twice_rows + rotation.rise) // 2 - self.lowest, 0, last)
+        return (twice_rows + rotation.rise) // 2 - self.lowest
 
 
 def consecutive(places: Ints) -> Places:
@@ -140,9 +139,11 @@ def consecutive(places: Ints) -> Places:
 
 def frame_of(stacks: Sequence[Stack], table: PatternTable) -> Frame:
     """The frame of all F of a table, rising without gaps, and all rotational blocks."""
-    lowest, highest = min(int(stack.n.min()) for stack in stacks), max(int(stack.n.max()) for stack in stacks)
     total, twice_f = sum(len(stack.numbers) for stack in stacks), list(table.places)
-    count = max(highest - lowest, (twice_f[-1] - twice_f[0]) // 2) + _SPARE
+    rises = table.distances[:, 0].tolist()
+    lowest = min((twice_f[0] + min(rises)) // 2, *(int(stack.n.min()) for stack in stacks))
+    highest = max((twice_f[-1] + max(rises)) // 2, *(int(stack.n.max()) for stack in stacks))
+    count = highest - lowest + _SPARE
     kinds, k, sizes, rows = np.zeros((4, total), dtype=np.int64)
     most = dict[int, int]()
     for stack in stacks:
@@ -301,12 +302,13 @@ def between(
     coefficients_of_f = coefficients(low.twice_f[chosen])
     twice_rows = low.twice_rows[chosen]
     for right in low.rotations:
-        keys = ((left, (left.kind, right.kind, (step + left.rise - right.rise) // 2)) for left in up.rotations)
-        acting = [(left, tables[key]) for left, key in keys if key in tables]
-        places = frame.rows_of(twice_rows, right) if acting else slice(0)
-        for left, table in acting:
-            of_columns = coefficients_of_f(left.patterns, right.patterns)
-            yield Between(left, right, table[places, : states[0], : states[1]], of_columns)
+        places: Places | None = None
+        for left in up.rotations:
+            table = tables.get((left.kind, right.kind, (step + left.rise - right.rise) // 2))
+            if table is not None:
+                places = frame.rows_of(twice_rows, right) if places is None else places
+                of_columns = coefficients_of_f(left.patterns, right.patterns)
+                yield Between(left, right, table[places, : states[0], : states[1]], of_columns)
 
 
 def write_between(all_elements: Iterable[Between], out: Floats) -> None:

@@ -41,7 +41,7 @@ def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) 
         grouped = groups_of(members.twice_f, members.parts, frame)
         solutions = _states(plan, members, grouped)
     groups = groups_by_number(grouped)
-    twice_f, starts = members.twice_f.tolist(), (np.cumsum(members.levels) - members.levels).tolist()
+    twice_f, starts = members.twice_f.tolist(), members.first_levels.tolist()
     out: list[SolvedBlock] = [None] * len(twice_f)  # type: ignore[list-item]
     for states in solutions:
         for i, energies, vectors, labels, mixing in _named(states, members):
