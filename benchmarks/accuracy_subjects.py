@@ -22,8 +22,8 @@ from rotor.scenes.scene import (
     SpectrumScene,
     StarkScene,
     ThermoScene,
+    read_scene,
 )
-from rotor.scenes.scene_file import read_scene
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from rotor.scenes.run import run_scene, scene_calculation
-from rotor.scenes.scene_file import parse_scene
+from rotor.scenes.scene import parse_scene
 from rotor.verbs.verb import verb_of
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -32,8 +32,8 @@ from rotor.scenes.scene import (
     StarkScene,
     ThermoScene,
     ZeemanScene,
+    read_scene,
 )
-from rotor.scenes.scene_file import read_scene
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER, RESULTS = ROOT / "examples" / "scenes", ROOT / "benchmarks" / "results" / "plans.json"

@@ -23,8 +23,7 @@ from pathlib import Path
 
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, work_precision
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import Scene
-from rotor.scenes.scene_file import read_scene
+from rotor.scenes.scene import Scene, read_scene
 from rotor.thermodynamics.gas_numerics import quantile
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from rotor.requests.budget import ErrorBudget as ErrorBudget
     from rotor.scenes.plan import plan_of as plan_of
     from rotor.scenes.run import run_scene as run_scene
-    from rotor.scenes.scene_file import read_scene as read_scene
-    from rotor.scenes.scene_file import write_scene as write_scene
+    from rotor.scenes.scene import read_scene as read_scene
+    from rotor.scenes.scene import write_scene as write_scene
     from rotor.scenes.sweep import run_sweep as run_sweep
     from rotor.spectra.lines import Lines as Lines
     from rotor.spectra.spectrum import Spectrum as Spectrum
@@ -73,12 +73,12 @@ _MODULES = {
     "plot": "rotor.plots.show",
     "plan_of": "rotor.scenes.plan",
     "read": "rotor.formats",
-    "read_scene": "rotor.scenes.scene_file",
+    "read_scene": "rotor.scenes.scene",
     "run_scene": "rotor.scenes.run",
     "run_sweep": "rotor.scenes.sweep",
     "view": "rotor.viewer.widget",
     "write": "rotor.formats",
-    "write_scene": "rotor.scenes.scene_file",
+    "write_scene": "rotor.scenes.scene",
 }
 
 __all__ = [*sorted([*_MODULES, *VERBS]), "__version__", "api"]

@@ -56,7 +56,7 @@ class AccuracyAnswer:
 def answer(request: AccuracyRequest, work: Work) -> AccuracyAnswer:
     """The complete table; an interrupt prints the knobs swept so far before it ends the command."""
     from rotor.scenes.accuracy_sweep import work_precision
-    from rotor.scenes.scene_file import read_scene
+    from rotor.scenes.scene import read_scene
 
     scene, folder = read_scene(request.scene), Path(request.scene).parent
     so_far: list[WorkPrecision] = []

@@ -46,7 +46,7 @@ class PlanAnswer:
 
 def answer(request: PlanRequest, work: Work) -> PlanAnswer:
     """The plan of the scene."""
-    from rotor.scenes.scene_file import read_scene
+    from rotor.scenes.scene import read_scene
 
     scene = read_scene(request.scene)
     return PlanAnswer(request.scene, scene, scene.plan(folder=Path(request.scene).parent))

@@ -160,7 +160,7 @@ class SweepRun:
 def answer(options: Options, _: Work) -> SceneRun | SweepRun:
     """Run a scene, or the points of its sweep that are not done."""
     from rotor.scenes.outputs import refuse_outside
-    from rotor.scenes.scene_file import read_scene
+    from rotor.scenes.scene import read_scene
     from rotor.scenes.sweep import is_sweep
 
     if not Path(options.out).is_dir():

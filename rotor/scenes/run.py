@@ -12,8 +12,7 @@ from rotor.formats.atomic_write import resolved
 from rotor.requests.fill import Entries, flattened, nested
 from rotor.scenes.keys import keyed
 from rotor.scenes.outputs import Where, checked_paths, paths_of
-from rotor.scenes.scene import SCHEMA, Scene, SceneResult, scene_of
-from rotor.scenes.scene_file import scene_text
+from rotor.scenes.scene import SCHEMA, Scene, SceneResult, scene_of, scene_text
 from rotor.temporary import locked_file
 from rotor.verbs.calculation import Calculation, Outcome
 from rotor.verbs.verb import Work, verb_of

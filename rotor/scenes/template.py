@@ -7,8 +7,7 @@ from typing import Any
 
 from rotor.requests.field import Field
 from rotor.scenes.keys import Keys, about, declared_keys, inner_tables, is_list, shown_default, tables_of
-from rotor.scenes.scene import SCHEMA
-from rotor.scenes.scene_file import toml_value
+from rotor.scenes.scene import SCHEMA, toml_value
 from rotor.verbs.verb import SCENE_VERBS, Verb, verb_of
 
 TAGS = {

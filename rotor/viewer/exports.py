@@ -84,8 +84,7 @@ def _toml(model: Model, lines: Mapping[int, Line], stem: str) -> str:
 
 def _scene(model: Model, lines: Mapping[int, Line], stem: str) -> str:
     """The scene of the fit, which reads the exported STEM.csv and STEM.toml beside it."""
-    from rotor.scenes.scene import scene_of
-    from rotor.scenes.scene_file import scene_text
+    from rotor.scenes.scene import scene_of, scene_text
 
     content = {
         "schema": 1,

@@ -13,7 +13,7 @@ from places import ORACLES
 
 import rotor
 from rotor.classical.motion_steps import count_first_steps, expected_steps, first_share
-from rotor.scenes.scene_file import parse_scene
+from rotor.scenes.scene import parse_scene
 
 TUMBLE = """schema = 1
 kind = "tumble"

@@ -13,8 +13,7 @@ import pytest
 
 from rotor.reports import progress
 from rotor.reports.progress import elapsed_time, progress_bar
-from rotor.scenes.scene import LevelsScene
-from rotor.scenes.scene_file import write_scene
+from rotor.scenes.scene import LevelsScene, write_scene
 
 
 class Terminal(io.StringIO):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene_file import parse_scene
+from rotor.scenes.scene import parse_scene
 from rotor.verbs import long_lists
 
 CONSTANTS = "A=8572 B=3640 C=2790 MHz"

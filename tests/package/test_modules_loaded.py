@@ -61,7 +61,7 @@ LINES_OF_CO = (
     "frequency_mhz,error_mhz,j_upper,j_lower\n115271.2018,0.0005,1,0\n230538.0,0.0005,2,1\n345795.9899,0.0005,3,2\n"
 )
 WAYS = {
-    "Python": "from rotor.scenes.scene_file import read_scene\nread_scene('s.toml').run()",
+    "Python": "from rotor.scenes.scene import read_scene\nread_scene('s.toml').run()",
     "command": "from rotor import cli\nassert cli.run(['run', 's.toml']) == 0",
 }
 

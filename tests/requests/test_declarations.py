@@ -24,7 +24,7 @@ from rotor.requests.field import all_fields
 from rotor.requests.fill import Entries, read_fields, written_fields
 from rotor.requests.readers import Grid, Names, Numbers, Pairs, Quantity, Range, Text, Whole
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene_file import parse_scene, scene_text
+from rotor.scenes.scene import parse_scene, scene_text
 from rotor.scenes.template import template
 from rotor.verbs.verb import SCENE_VERBS, verb_of
 

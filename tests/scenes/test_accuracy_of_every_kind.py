@@ -5,7 +5,7 @@ import json
 import pytest
 
 from rotor.scenes.run import scene_calculation
-from rotor.scenes.scene_file import parse_scene
+from rotor.scenes.scene import parse_scene
 
 LINES_OF_CO = (
     "frequency_mhz,error_mhz,j_upper,j_lower\n115271.2018,0.0005,1,0\n230538.0,0.0005,2,1\n345795.9899,0.0005,3,2\n"

@@ -30,8 +30,8 @@ from rotor.scenes.scene import (
     StarkScene,
     ThermoScene,
     TumbleScene,
+    write_scene,
 )
-from rotor.scenes.scene_file import write_scene
 from rotor.verbs.names import SCENE_VERBS
 from rotor.verbs.verb import verb_of
 

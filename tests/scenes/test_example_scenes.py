@@ -12,8 +12,7 @@ from scipy.special import ellipk, fresnel
 
 import rotor
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import SceneResult
-from rotor.scenes.scene_file import read_scene
+from rotor.scenes.scene import SceneResult, read_scene
 from rotor.scenes.sweep import SweepResult, run_sweep
 
 FOLDER = PROJECT / "examples" / "scenes"

@@ -26,8 +26,7 @@ from rotor.quantum.estimates.left_out import stray_field
 from rotor.quantum.solve import solve_levels
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import scene_calculation
-from rotor.scenes.scene import FluidScene, LevelsScene, SpectrumScene
-from rotor.scenes.scene_file import read_scene
+from rotor.scenes.scene import FluidScene, LevelsScene, SpectrumScene, read_scene
 from rotor.spectra.widths import pressure_width
 
 SCENES = PROJECT / "examples" / "scenes"

@@ -31,8 +31,8 @@ from rotor.scenes.scene import (
     StarkScene,
     ThermoScene,
     TumbleScene,
+    write_scene,
 )
-from rotor.scenes.scene_file import write_scene
 from rotor.spectra.numerics import line_error
 from rotor.thermodynamics.classical_gas import answer_gas
 from rotor.tops.top import Top

@@ -15,8 +15,16 @@ from hypothesis import strategies as st
 from rotor.requests.field import Field
 from rotor.requests.readers import Whole
 from rotor.scenes.keys import checked_table, tables_of
-from rotor.scenes.scene import AlignScene, LevelsScene, SpectrumScene, StarkScene
-from rotor.scenes.scene_file import parse_scene, read_scene, scene_text, write_scene
+from rotor.scenes.scene import (
+    AlignScene,
+    LevelsScene,
+    SpectrumScene,
+    StarkScene,
+    parse_scene,
+    read_scene,
+    scene_text,
+    write_scene,
+)
 from rotor.scenes.schema import json_schema, table_schema
 from rotor.scenes.sweep.points import points
 from rotor.scenes.template import template
@@ -171,7 +179,7 @@ def test_the_word_for_none_is_a_value_of_any_type():
 
 def test_nothing_heavy_is_loaded_by_a_scene_alone():
     code = (
-        "import sys\nfrom rotor.scenes.scene_file import parse_scene\n"
+        "import sys\nfrom rotor.scenes.scene import parse_scene\n"
         f"parse_scene({HEAD!r})\n"
         "print(sorted(m for m in sys.modules if '.' not in m))"
     )

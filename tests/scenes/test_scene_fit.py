@@ -12,8 +12,7 @@ from places import ORACLES
 from rotor.scenes.accuracy_sweep import work_precision
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import EmissionScene, FitScene
-from rotor.scenes.scene_file import parse_scene, read_scene, write_scene
+from rotor.scenes.scene import EmissionScene, FitScene, parse_scene, read_scene, write_scene
 from rotor.verbs.calculation import NoResultError
 
 DATA = ORACLES / "fits"

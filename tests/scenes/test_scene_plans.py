@@ -18,8 +18,7 @@ from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import LevelsScene
-from rotor.scenes.scene_file import parse_scene, read_scene
+from rotor.scenes.scene import LevelsScene, parse_scene, read_scene
 from rotor.spectra.numerics import allowed_lines
 from rotor.spectra.spectrum import Spectrum
 from rotor.spectra.widths import doppler

@@ -27,8 +27,10 @@ from rotor.scenes.scene import (
     StarkScene,
     TumbleScene,
     ZeemanScene,
+    parse_scene,
+    read_scene,
+    write_scene,
 )
-from rotor.scenes.scene_file import parse_scene, read_scene, write_scene
 from rotor.scenes.sweep import points, run_sweep
 from rotor.verbs.verb import verb_of
 

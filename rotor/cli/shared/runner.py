@@ -188,7 +188,7 @@ def scene_writer(outcome: Outcome, typed: Mapping[str, Any]) -> Any:
     def write(path: Path) -> None:
         """The scene as text."""
         from rotor.scenes.run import saved_scene
-        from rotor.scenes.scene_file import write_scene
+        from rotor.scenes.scene import write_scene
 
         write_scene(saved_scene(outcome, Path(typed["save_scene"]).parent, outputs), path)
 

@@ -16,8 +16,7 @@ from rotor.checks import NoAnswerError
 from rotor.formats.atomic_write import FULL
 from rotor.frozen import dataclass
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import Scene, SceneResult
-from rotor.scenes.scene_file import scene_text
+from rotor.scenes.scene import Scene, SceneResult, scene_text
 from rotor.scenes.sweep.combined import KEY_LENGTH, CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
 from rotor.scenes.sweep.points import Point, check_first, points

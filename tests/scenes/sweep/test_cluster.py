@@ -14,8 +14,7 @@ import pytest
 
 from rotor.scenes.cluster import dask_executor, tls_security
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import LevelsScene, StarkScene
-from rotor.scenes.scene_file import write_scene
+from rotor.scenes.scene import LevelsScene, StarkScene, write_scene
 from rotor.scenes.sweep import run_sweep
 
 SWEEP = LevelsScene(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rotor.scenes.scene_file import parse_scene
+from rotor.scenes.scene import parse_scene
 from rotor.scenes.sweep import run_sweep
 from rotor.verbs.names import SCENE_VERBS
 

@@ -20,8 +20,7 @@ import pytest
 
 import rotor
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import LevelsScene, SpectrumScene
-from rotor.scenes.scene_file import parse_scene, write_scene
+from rotor.scenes.scene import LevelsScene, SpectrumScene, parse_scene, write_scene
 from rotor.scenes.sweep import points, run_sweep
 from rotor.scenes.sweep.combined import CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
@@ -566,7 +565,7 @@ def loaded_by(job):
 if __name__ == "__main__":
     from rotor.scenes.worker_processes import start_ahead, worker_processes
     start_ahead(open("s.toml").read())
-    from rotor.scenes.scene_file import read_scene
+    from rotor.scenes.scene import read_scene
     from rotor.scenes.sweep.points import points
     from rotor.scenes.sweep.run import Job
     (point,) = points(read_scene("s.toml"))
