@@ -240,7 +240,7 @@ def _usage_text(error: Exception, arguments: list[str]) -> str:
     if extra == text:
         return text
     for option, number, unit in zip(arguments, arguments[1:], arguments[2:], strict=False):
-        if option.startswith("--") and number[-1:].isdigit() and extra.strip("()").split()[0] == unit:
+        if option.startswith("--") and number[-1:].isdigit() and extra.strip("()").split()[:1] == [unit]:
             return f"{option} {number} {unit}: a number and its unit are one word or stand in quotes: {option} '{number} {unit}'"
     return f"{extra.strip('()')}: more than the command takes; an option begins with --, --help shows what there is"
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, record_table
+from rotor.requests.fill import NamedError
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
@@ -23,7 +24,7 @@ def accuracy_fact(content: Mapping[str, Any]) -> tuple[str, str]:
 def refuse_picture_of_one_field(fields: Sequence[float], outputs: Collection[str]) -> None:
     """Refuse a picture of a single field."""
     if "plot" in outputs and len(fields) < 2:
-        raise ValueError("--plot: a picture of a map needs two fields or more; give --field a range")
+        raise NamedError("{outputs.plot}: a picture of a map needs two fields or more; give {conditions.field} a range")
 
 
 def table_of_states(states: FieldMap, unit: str, columns: Mapping[str, Callable[[Any], str]]) -> Table:

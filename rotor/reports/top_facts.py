@@ -55,7 +55,7 @@ def model_facts(report: Any) -> list[tuple[str, str]]:
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
     larger, others = larger_items(content["limits"], lambda limit: limit["size_mhz"], lambda limit: str(limit["name"]))
-    limits = [with_command(Limit(**limit).sentence, report.with_spins) for limit in larger]
+    limits = [Limit(**limit).sentence(report.with_spins) for limit in larger]
     limits += [others] if others else []
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
@@ -74,13 +74,6 @@ def top_parts(
     yield facts
     yield from parts
     yield [*source_facts(top, tables, report.sources), *model_facts(report)]
-
-
-def with_command(sentence: str, with_spins: str) -> str:
-    """Complete a sentence on neglected spins with the command that adds them."""
-    from rotor.quantum.estimates.beyond import COMPUTE
-
-    return sentence.replace(COMPUTE, with_spins)
 
 
 def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:

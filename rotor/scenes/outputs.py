@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from rotor.formats.atomic_write import check_target
 from rotor.scenes.scene import Scene, within
+from rotor.verbs.outputs import Files
 from rotor.verbs.verb import verb_of
 
 Where = str | os.PathLike[str]
@@ -30,28 +30,14 @@ def paths_of(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
     return {name: tuple(Path(within(out, text)) for text in texts) for name, texts in names_of(scene).items()}
 
 
-def checked_paths(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
-    """The files that a scene writes.
-
-    Raises ValueError for a wrong suffix, a missing folder, and one file for two outputs.
-    """
-    targets, suffixes = paths_of(scene, out), suffixes_of(scene.kind)
-    for name, paths in targets.items():
+def files_of(scene: Scene, out: Where) -> Files:
+    """The files that a scene writes; ValueError for a wrong suffix, a missing folder, and one file for two outputs."""
+    files = Files(growing={output.name for output in verb_of(scene.kind).outputs if output.grows})
+    suffixes = suffixes_of(scene.kind)
+    for name, paths in paths_of(scene, out).items():
         for path in paths:
-            check_path(name, path, suffixes[name])
-    resolved = [path.resolve() for paths in targets.values() for path in paths]
-    for path in resolved:
-        if resolved.count(path) > 1:
-            raise ValueError(f"outputs: {path.name}: two outputs write this file; give another name")
-    return targets
-
-
-def check_path(name: str, path: Path, suffixes: tuple[str, ...]) -> None:
-    """Raise ValueError, with the name of the output, for a file that cannot be written."""
-    try:
-        check_target(path, suffixes)
-    except ValueError as error:
-        raise ValueError(f"outputs.{name}: {error}") from None
+            files.add(name, f"outputs.{name}:", path, suffixes[name])
+    return files
 
 
 def refuse_outside(scene: Scene, out: Where) -> None:

@@ -10,7 +10,7 @@ from rotor.requests.accuracy import Accuracy
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, timed, whole_cost
-from rotor.scenes.outputs import Where, checked_paths
+from rotor.scenes.outputs import Where, files_of
 from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import Scene
 from rotor.verbs.calculation import Calculation, NoResultError
@@ -49,7 +49,7 @@ def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
     """
     if scene.sweep:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
-    checked_paths(scene, out)
+    files_of(scene, out)
     calculation = scene_calculation(scene, folder)
     with calculation.verb.naming("key"):
         plan, choice = _plan(calculation)

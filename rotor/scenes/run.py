@@ -8,12 +8,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from rotor.formats.atomic_write import resolved
 from rotor.requests.fill import Entries, flattened, nested
 from rotor.scenes.keys import keyed
-from rotor.scenes.outputs import Where, checked_paths, paths_of
+from rotor.scenes.outputs import Where, files_of, paths_of
 from rotor.scenes.scene import SCHEMA, Scene, SceneResult, scene_of, scene_text
-from rotor.temporary import locked_file
 from rotor.verbs.calculation import Calculation, Outcome
 from rotor.verbs.verb import Work, verb_of
 
@@ -55,13 +53,13 @@ def run_scene(
     """
     if scene.sweep:
         raise ValueError("sweep: this scene has several points; run_sweep runs them")
-    files = tuple(path for paths in checked_paths(scene, out).values() for path in paths)
+    files = files_of(scene, out)
     with ExitStack() as stack:
-        for path in sorted(set(map(resolved, files))):
-            stack.enter_context(locked_file(path))
+        files.lock(stack)
         outcome = scene_calculation(scene, folder, out).run(executor)
-        _write(outcome)
-    return SceneResult.extending(outcome, scene=scene, files=files)
+        files.write({"json": lambda path: outcome.write_table(outcome.table, path), **outcome.writers})
+    paths = tuple(path for paths in files.paths.values() for path in paths)
+    return SceneResult.extending(outcome, scene=scene, files=paths)
 
 
 def scene_calculation(scene: Scene, folder: Where = ".", out: Where = ".") -> Calculation:
@@ -87,14 +85,3 @@ def saved_scene(outcome: Outcome, folder: Path, outputs: Mapping[str, Any]) -> S
         if field.table == "outputs" and entries.has(field):
             flat[key] = field.write(field.read(entries.of(field), entries.style))
     return scene_of({"schema": SCHEMA, "kind": verb.name, **nested(flat)})
-
-
-def _write(outcome: Outcome) -> None:
-    """Write all files of a scene together, except those written during the calculation; without files, nothing is prepared."""
-    files = outcome.calculation.work.files
-    growing = {output.name for output in outcome.verb.outputs if output.grows}
-    if pending := files.keys() - growing:
-        from rotor.formats.atomic_write import write_together
-
-        writers = {"json": lambda path: outcome.write_table(outcome.table, path), **outcome.writers}
-        write_together({path: writers[name] for name in files if name in pending for path in files[name]})

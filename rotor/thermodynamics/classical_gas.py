@@ -128,7 +128,7 @@ class GasAnswer(TextOf):
             size for size in model_sizes(top, j, effects) if size.present and size.name == "centrifugal distortion"
         ]
         distortion = [f"{size.name}: {size.size_mhz:.2g} MHz of a level at J = {j}" for size in sizes]
-        seen = [limit.sentence for limit in model_limits(top, j, effects) if limit.name not in SPIN_LIMITS]
+        seen = [limit.sentence() for limit in model_limits(top, j, effects) if limit.name not in SPIN_LIMITS]
         return [f"collisions; vibrations; {quantum}", *distortion, *seen]
 
     @cached_property

@@ -15,7 +15,7 @@ from rotor.checks import NoAnswerError
 from rotor.frozen import dataclass
 from rotor.reports.screen import plain
 from rotor.requests.field import OUTPUTS
-from rotor.requests.fill import Entries, refuse_misfits
+from rotor.requests.fill import Entries, naming, refuse_misfits
 from rotor.table import Table
 from rotor.verbs.outputs import Output, Report
 from rotor.verbs.verb import Place, Subject, Verb, Work
@@ -60,8 +60,9 @@ class Calculation:
             raise ValueError(f"{missing} is missing; --help shows what the command takes")
         if verb.adapt is not None:
             request = verb.adapt(request, work.files, self.entries)
-        if verb.check is not None and self.entries.style == "option":
-            verb.check(request, work.files, work.shown)
+        if verb.check is not None and self.entries.style != "name":
+            with naming(verb.named, self.entries.style):
+                verb.check(request, work.files, work.shown)
         return request, subject
 
     @property

@@ -10,7 +10,7 @@ from rotor.frozen import dataclass
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.sources import short_source
-from rotor.reports.top_facts import error_facts, hyperfine_lines, left_out_facts, with_command
+from rotor.reports.top_facts import error_facts, hyperfine_lines, left_out_facts
 from rotor.requests.field import OUTPUT, REQUIRED, Field, all_fields, declared, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT
@@ -240,7 +240,7 @@ def _limits(answer: EmissionAnswer, with_spins: str) -> list[tuple[str, str]]:
         largest.sort(key=lambda pair: -(pair[1].size_mhz or 0.0))
     shown = largest if len(largest) < MOST_LEFT_OUT else largest[: MOST_LEFT_OUT - 2]
     sentences = ["departures from one excitation temperature; structure of the source in the beam"]
-    sentences += [f"{name}: {with_command(limit.sentence, with_spins)}" for name, limit in shown]
+    sentences += [f"{name}: {limit.sentence(with_spins)}" for name, limit in shown]
     if others := [f"{name}: {limit.name}" for name, limit in largest[len(shown) :]]:
         sentences.append(f"smaller or not estimated: {', '.join(others)}")
     return left_out_facts(sentences)

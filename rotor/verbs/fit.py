@@ -24,6 +24,7 @@ from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, Rule, declared
+from rotor.requests.fill import NamedError
 from rotor.requests.readers import Flag, NameList, Text, Whole
 from rotor.table import Table as Columns
 from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
@@ -140,7 +141,7 @@ def check(request: FitRequest, outputs: Mapping[str, tuple[Path, ...]], shown: F
     lines = Path(request.files.source).with_suffix(".lin").resolve()
     for name, paths in outputs.items():
         if lines.exists() and any(path.resolve() == lines for path in paths):
-            raise ValueError(f"--{name.replace('_', '-')}: {paths[0]} is an input; give another name")
+            raise NamedError(f"{{outputs.{name}}}: {paths[0]} is an input; give another name")
 
 
 def withheld(answer: FitAnswer, names: Sequence[str]) -> dict[str, str]:

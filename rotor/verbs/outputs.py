@@ -1,8 +1,9 @@
-"""Files of a verb, and the data of its report."""
+"""Files of a verb, written together or not at all, and the data of its report."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,7 @@ from rotor.frozen import dataclass
 from rotor.requests.field import OUTPUT, OUTPUTS, REQUIRED, Field, Rule
 from rotor.requests.fill import Entries
 from rotor.requests.readers import Names, Text
+from rotor.temporary import locked_file
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -90,6 +92,70 @@ class Output:
             reader, self.help, f"{OUTPUTS}{self.name}", self.flag, common=True, example=[self.example] if self.many else self.example,
             panel=OUTPUT, default=REQUIRED if self.required else () if self.many else None, rule=self.rule,
         )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Files:
+    """Requested files by the name of the output: checked before the work, written together after it.
+
+    called: how errors name them. growing: outputs that are written during the work. on_screen: outputs that go to standard output.
+    """
+
+    paths: dict[str, tuple[Path, ...]] = field(default_factory=dict)
+    called: dict[str, str] = field(default_factory=dict)
+    growing: set[str] = field(default_factory=set)
+    on_screen: set[str] = field(default_factory=set)
+
+    @property
+    def names(self) -> list[str]:
+        """The paths as texts; those of growing files first."""
+        ordered = sorted(self.paths, key=lambda name: name not in self.growing)
+        return [str(path) for name in ordered for path in self.paths[name]]
+
+    @property
+    def pending(self) -> list[str]:
+        """The outputs that are written after the work."""
+        return [name for name in self.paths if name not in self.growing]
+
+    def add(self, name: str, called: str, path: str | Path, suffixes: Sequence[str]) -> None:
+        """Add a file; ValueError for a suffix that the output does not write, and for a folder that is missing or closed."""
+        from rotor.formats.atomic_write import check_target, resolved
+
+        target = Path(path)
+        try:
+            end = check_target(target, suffixes)
+        except ValueError as error:
+            raise ValueError(f"{called} {error}") from None
+        if any(end == resolved(other) for others in self.paths.values() for other in others):
+            raise ValueError(f"{called} {path}: another output writes the same file")
+        self.paths[name] = (*self.paths.get(name, ()), target)
+        self.called[name] = called
+
+    def lock(self, stack: ExitStack) -> None:
+        """Keep other processes from writing the files until the stack is closed."""
+        from rotor.formats.atomic_write import resolved
+
+        for path in sorted(resolved(path) for paths in self.paths.values() for path in paths):
+            stack.enter_context(locked_file(path))
+
+    def write(self, writers: Mapping[str, Callable[[Path], object]], *, leave_out: bool = False) -> list[str]:
+        """Write all files that do not grow into folders beside their places, then rename them: all appear, or none.
+
+        leave_out: whether files whose format cannot hold the result are left out; the reasons are returned.
+        """
+        if not self.pending:  # nothing is loaded
+            return []
+        from rotor.formats.atomic_write import write_together
+
+        names = {path: name for name in self.pending for path in self.paths[name]}
+        by_path = {path: writers[name] for path, name in names.items()}
+        left_out = write_together(
+            by_path, called=lambda path: f"{self.called[names[path]]} {path}", leave_out=leave_out
+        )
+        return [
+            f"{self.called[names[path]].rstrip(':')}: {path} is not written: {error}"
+            for path, error in left_out.items()
+        ]
 
 
 def tables(what: str, stem: str) -> tuple[Output, Output]:

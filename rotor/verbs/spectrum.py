@@ -13,7 +13,7 @@ from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part
 from rotor.requests.field import OBSERVABLES, OUTPUT, Rule, changed_fields, declared
-from rotor.requests.fill import Entries, read_fields, read_instance
+from rotor.requests.fill import Entries, NamedError, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.verbs import int_files
@@ -108,10 +108,21 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> SpectrumRequest:
 
 
 def adapt(request: SpectrumRequest, outputs: Mapping[str, Any], entries: Entries) -> SpectrumRequest:
-    """Use HITRAN's temperature for HITRAN records if none is given."""
+    """Use HITRAN's temperature for HITRAN records if none is given; refuse a profile that a command does not show."""
+    if (
+        entries.style == "option"
+        and _is_shaped(request)
+        and not (request.layer or {"profile_csv", "plot"} & outputs.keys())
+    ):
+        raise ValueError(f"a {request.profile or 'gaussian'} profile needs a file; add --plot or --profile-csv")
     if "hitran" in outputs and entries.values.get("conditions.temperature") is None:
         return replace(request, temperature_k=HITRAN_K)
     return request
+
+
+def _is_shaped(request: SpectrumRequest) -> bool:
+    """Whether lines have a given profile or width."""
+    return request.profile not in (None, "sticks") or request.fwhm_mhz is not None
 
 
 def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumShown) -> None:
@@ -124,14 +135,10 @@ def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumS
         from rotor.formats.peak_files import read_peaks
 
         read_peaks(shown.over)  # raises errors in the file before anything is computed
-    shaped = request.profile not in (None, "sticks") or request.fwhm_mhz is not None
-    if "profile_csv" in outputs and not (shaped or request.layer):
-        raise ValueError(
-            "--profile-csv: sticks have no profile; give --fwhm or --profile gaussian, lorentzian or voigt"
+    if "profile_csv" in outputs and not (_is_shaped(request) or request.layer):
+        raise NamedError(
+            "{outputs.profile_csv}: sticks have no profile; give {fwhm_mhz} or {profile} gaussian, lorentzian or voigt"
         )
-    if shaped and not (request.layer or {"profile_csv", "plot"} & outputs.keys()):
-        what = request.profile or "gaussian"
-        raise ValueError(f"a {what} profile needs a file; add --plot or --profile-csv")
     if not isinstance(request, int_files.PredictedRequest):
         refuse_long_json(request, outputs, shown.resolution)
 

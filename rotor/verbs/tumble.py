@@ -11,6 +11,7 @@ from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import Rule
+from rotor.requests.fill import NamedError
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
@@ -57,9 +58,11 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
     try:
         check_film(path)
     except ValueError as error:
-        raise ValueError(f"--gif: {error}") from None
+        raise NamedError(f"{{outputs.gif}}: {error}") from None
     if times is not None and min(times) == max(times):
-        raise ValueError(f"--gif {path}: a film needs at least two different times; give more --times")
+        raise NamedError(
+            f"{{outputs.gif}} {path}: a film needs at least two different times; give more {{conditions.times}}"
+        )
 
 
 def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:

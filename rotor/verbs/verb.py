@@ -163,7 +163,7 @@ class Verb:
     request: a dataclass of declared fields. subject: kind of the subject. shown: dataclass of display options.
     extras: options that set several fields; read_extras: reads them together.
     build: makes the request if its fields alone do not. adapt: changes the request for the requested files.
-    check: refuses a request that does not fit these files.
+    check: refuses a request that does not fit the files of a command or a scene.
     answer: computes a request. table: of an answer, by default its `table`; rows: its key in the JSON.
     records: rows of the JSON if not the table.
     results: a few numbers of an answer with rows, by name with units, for the table of a sweep.

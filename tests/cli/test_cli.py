@@ -393,7 +393,7 @@ MISTAKES = {
     "wrong suffix": ("spectrum water --cat a.txt", "must end in .cat"),
     "no folder to write in": ("spectrum water --csv no/a.csv", "there is no folder no"),
     "folder to write": ("spectrum water --csv sub.csv", "is a folder"),
-    "two files of one name": ("spectrum water --csv a.csv --profile-csv ./a.csv --fwhm 1", "another option writes the same file"),
+    "two files of one name": ("spectrum water --csv a.csv --profile-csv ./a.csv --fwhm 1", "another output writes the same file"),
     "tag too long": ("spectrum water --tag 1234567", "--tag"),
     "negative count": ("spectrum water --top -1", "--top"),
     "unknown option": ("spectrum water --colour red", "--colour"),

@@ -208,7 +208,7 @@ BAD = [
     (SpectrumScene(molecule="CO", observables={"min_lgint": "all"}), "observables.min_lgint: 'all'"),
     (SpectrumScene(molecule="CO", outputs={"csv": "a.txt"}), "outputs.csv: a.txt: the name must end in .csv"),
     (SpectrumScene(molecule="CO", outputs={"csv": "x/a.csv"}), "there is no folder"),
-    (SpectrumScene(molecule="CO", outputs={"csv": "a.csv", "profile_csv": "a.csv"}), "two outputs write this file"),
+    (SpectrumScene(molecule="CO", outputs={"csv": "a.csv", "profile_csv": "a.csv"}), "another output writes the same file"),
     (LevelsScene(molecule="water", observables={"jmax": -1}), "observables.jmax: -1"),
     (LevelsScene(molecule="nonesuch"), "molecule.source: 'nonesuch' is no file here"),
     (TumbleScene(), "molecule, body: give one of them"),

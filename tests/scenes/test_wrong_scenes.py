@@ -34,6 +34,16 @@ WRONG = {
     "an effect that is none": (BODY + DRAG.replace("drag", "drg"), "effects[0].effect: 'linear drg' is none; the nearest is"),
     "two coefficients of three": (BODY + DRAG.replace("0.1, 0.1,", "0.1,") + TIMES, "effects[0]: linear drag has 3 coefficients"),
     "effects without times": (BODY + DRAG, "conditions.times: expected with effects"),
+    "a film of a driven body": (BODY + DRAG + TIMES + '[outputs]\ngif = "a.gif"', "outputs.gif: needs a free motion (a table shows any); "
+        "expected without effects"),
+    "a classical gas without a temperature": ('schema = 1\nkind = "torsion"\nmolecule = "C2H6"\n[observables]\nbond = "1-2"\n[outputs]\n'
+        'classical_csv = "a.csv"', "outputs.classical_csv: a classical gas has a temperature, such as 300K; expected with observables.cl"),
+    "a picture of one field": (STARK + '[conditions]\nfield = "5 kV/cm"\n[outputs]\nplot = "a.png"', "outputs.plot: a picture of a map "
+        "needs two fields or more; give conditions.field a range"),
+    "a film of one time": (OCS.replace("align", "tumble") + '[conditions]\ntimes = [1.0]\n[outputs]\ngif = "a.gif"',
+        "outputs.gif a.gif: a film needs at least two different times; give more conditions.times"),
+    "a profile of sticks": (SPECTRUM + '[outputs]\nprofile_csv = "a.csv"', "outputs.profile_csv: sticks have no profile; give "
+        "observables.fwhm or observables.profile"),
     "times to and fro": (BODY + DRAG + "[conditions]\ntimes = [0.0, -2.0, 5.0]", "conditions.times: expected times that all"),
     "moments below 0": (BODY.replace("[1.0,", "[-1.0,"), "body.moments: principal moments must be finite"),
     "no pulse": (OCS, "the key 'pulses' is missing"),

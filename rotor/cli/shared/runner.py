@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.checks import NoAnswerError
 from rotor.cli.shared import process
-from rotor.cli.shared.output import Files, at_end, deliver, note
+from rotor.cli.shared.output import HELD, at_end, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_settings, picture_style
 from rotor.reports.screen import show_parts
 from rotor.requests.fill import Entries
 from rotor.verbs.calculation import Calculation, Outcome, answering
 from rotor.verbs.molecule import is_file
-from rotor.verbs.outputs import Report
+from rotor.verbs.outputs import Files, Report
 from rotor.verbs.verb import Verb, Work
 
 if TYPE_CHECKING:
@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
     """Carry out a verb. typed: texts of the options by identity."""
     verb = verb.verb_for(typed.keys())
-    inputs = {name: value for name, value in typed.items() if name not in places_of(verb)}
-    extras = {name: value for name, value in inputs.items() if name not in verb.fields}
-    values = {name: value for name, value in inputs.items() if name not in extras}
-    entries = Entries({**fields_of_extras(verb, extras, inputs.keys()), **values}, "option")
+    no_inputs = places_of(verb)
+    inputs = {name: value for name, value in typed.items() if name not in no_inputs}
+    values = {name: value for name, value in inputs.items() if name in verb.fields}
+    entries = Entries({**fields_of_extras(verb, inputs), **values}, "option")
     places = with_files(verb, {name: value for name, value in typed.items() if name not in inputs})
     shown = verb.read_shown(entries)
     with as_typed(verb, places):
@@ -119,13 +119,13 @@ def withhold(verb: Verb, answer: Any, files: Files) -> None:
         note(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not written: {reason}")
 
 
-def fields_of_extras(verb: Verb, typed: Mapping[str, Any], names: Collection[str]) -> dict[str, Any]:
-    """Values by identity from the typed options that set several fields. names: of all typed options."""
+def fields_of_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
+    """Values by identity from the typed options that set several fields."""
     values: dict[str, Any] = {}
     for extra in verb.extras:
         if extra.option not in typed or extra.read is None:
             continue
-        if double := next((other for other in extra.instead_of if other in names), None):
+        if double := next((other for other in extra.instead_of if other in typed), None):
             raise ValueError(f"{extra.option} and {verb.fields[double].flag}: give one of them")
         try:
             values |= extra.read(typed[extra.option])
@@ -141,8 +141,13 @@ def files_of_options(verb: Verb, typed: Mapping[str, Any]) -> Files:
         paths = typed.get(output.name, ())
         for path in paths if isinstance(paths, tuple) else (paths,):
             files.add(output.name, output.flag, path, output.suffixes)
-    files.add("save_scene", "--save-scene", typed.get("save_scene"), (".toml",))
-    files.add_json(typed.get("json"))
+    if "save_scene" in typed:
+        files.add("save_scene", "--save-scene", typed["save_scene"], (".toml",))
+    if typed.get("json") == "-":
+        files.on_screen.add("json")
+    elif "json" in typed:
+        files.add("json", "--json", typed["json"], (".json",))
+    files.lock(HELD)
     return files
 
 
@@ -153,14 +158,14 @@ def refuse_overwriting(files: Files, typed: Mapping[str, Any]) -> None:
     for name, paths in files.paths.items():
         for path in paths:
             if os.path.realpath(path) in inputs:
-                raise ValueError(f"{files.flags[name]} {path}: is an input of this command; give another name")
+                raise ValueError(f"{files.called[name]} {path}: is an input of this command; give another name")
 
 
 def refuse_nothing_to_draw(verb: Verb, answer: Any, files: Files) -> None:
     """Raise NoAnswerError for a picture or profile without content."""
     drawn = [name for name in ("plot", "profile_csv") if name in files.paths]
     if drawn and (reason := verb.nothing(answer)):
-        raise NoAnswerError(f"{files.flags[drawn[0]]}: {reason}")
+        raise NoAnswerError(f"{files.called[drawn[0]]}: {reason}")
 
 
 def working(verb: Verb, workers: Any) -> Any:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 FACTORS = {"linear": 0.3, "other": 3.0, "higher": 1.0}  # c
-COMPUTE = "its constants are known, add the effects of spins"  # the command line replaces this by its option
+COMPUTE = "its constants are known, add the effects of spins"  # reports replace this by the option
 OF_CHI = 0.5  # largest shift relative to χ: χ/2 for J = 1 with I = 1, χ/4 for higher J
 
 
@@ -37,12 +37,11 @@ class Limit:
     at_most: bool = False
     levels: str = ""
 
-    @property
-    def sentence(self) -> str:
-        """Name, size and consequence, as reports print them."""
+    def sentence(self, with_spins: str = COMPUTE) -> str:
+        """Name, size and consequence, as reports print them. with_spins: how the effects of spins are added."""
         estimate = "not estimated" if self.size_mhz is None else f"about {two_digits(self.size_mhz)} MHz"
         size = f"at most {estimate}" if self.at_most else estimate
-        return f"{self.name}: {size}; {self.text}"
+        return f"{self.name}: {size}; {self.text.replace(COMPUTE, with_spins)}"
 
 
 def next_order(top: Top, j: int, effects: Sequence[QuantumEffect]) -> Limit | None:

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rotor.frozen import dataclass
-from rotor.scenes.outputs import check_path, checked_paths, suffixes_of
+from rotor.scenes.outputs import files_of, suffixes_of
 from rotor.scenes.scene import SCHEMA, Scene, scene_of
 from rotor.scenes.sweep.molecule_list import is_list, list_entries
 
@@ -251,9 +251,9 @@ def put(content: dict[str, Any], name: str, value: Any) -> None:
 def check_first(points: Points, out: str | os.PathLike[str]) -> None:
     """Check what all points have in common: swept names, and folders and suffixes of the outputs."""
     first = next(iter(points))
-    checked_paths(first.scene, out)
+    files = files_of(first.scene, out)
     for name, text in points.combined.items():
-        check_path(name, Path(out) / text, (f".{name}",))
+        files.add(name, f"outputs.{name}:", Path(out) / text, (f".{name}",))
 
 
 def cell(value: Any) -> Any:

@@ -207,9 +207,9 @@ def slow(path):
     print("writing", flush=True)
     time.sleep(60)
 import rotor.verbs.spectrum as spectrum
-from rotor.cli.shared.output import Files
+from rotor.verbs.outputs import Files
 write = Files.write
-Files.write = lambda self, writers: write(self, dict.fromkeys(writers, slow))
+Files.write = lambda self, writers, **how: write(self, dict.fromkeys(writers, slow), **how)
 sys.argv = ["rotor", "spectrum", "CO", "--csv", "x.csv"]
 from rotor.cli import main
 main()

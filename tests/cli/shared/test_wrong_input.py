@@ -9,8 +9,8 @@ import pytest
 from places import ORACLES
 
 from rotor.cli import folded
-from rotor.cli.shared.output import Files
 from rotor.cli.shared.runner import refuse_overwriting
+from rotor.verbs.outputs import Files
 
 CASE = ORACLES / "ocs"
 LINES = "j_upper,j_lower,frequency_mhz,error_mhz\n1,0,{},0.01\n"
@@ -95,6 +95,7 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
             ["fit", "nan.csv", "--start", "OCS", "--free", "B"],
             "nan.csv, line 1 of the table: frequency_mhz reads 'nan'",
         ),
+        (["tumble", "--moments", "1,2,3", " ", " "], "more than the command takes"),
         (["cat", "a.cat", "--as-spcat"], "--as-spcat: expected with --compare and an .int file"),
         (["plan", "hot.toml"], "conditions.temperature: '1e300 K': expected a temperature up to 1e+06 K"),
         (["run", "s.toml", "--workers", "100000"], "--workers: 100000: expected a whole number from 1 to 256"),
