@@ -105,7 +105,7 @@ def test_command_with_pictures(call: Call, folder: Path) -> None:
     for name in ("o.png", "l.png"):
         assert Path(name).read_bytes().startswith(b"\x89PNG")
     code, _, error = call(*arguments, "--loomis-wood", "l.png")
-    assert (code, "give one with --over" in error) == (2, True)
+    assert (code, "its rows are pieces of a spectrum; expected with --over" in error) == (2, True)
     code, _, error = call(*arguments, "--over", "none.csv")
     assert (code, "no such file" in error) == (2, True)
     Path("far.csv").write_text("200000,1\n300000,2\n")
