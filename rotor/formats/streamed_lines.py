@@ -33,7 +33,7 @@ from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.scheme import scheme_of
 from rotor.spectra.intensity import intensity_cut, jmax_for_cut, require_cut
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
-from rotor.spectra.transitions import all_transitions
+from rotor.spectra.transitions import all_transitions, transition_count
 from rotor.temporary import locked_file
 from rotor.thermodynamics import PartitionFunction
 from rotor.thermodynamics.trusted_levels import are_trusted
@@ -304,13 +304,6 @@ def sorted_lines(
     return SortedLines(merged, count, len(missing), before, plan, record, memory_mb)
 
 
-def transition_count(top: Top, jmax: int, twice_spins: Sequence[int] = ()) -> float:
-    """Approximate number of transitions up to a J before any cut, without further states; each F joins all N that spins reach."""
-    components = sum(1 for mu in top.dipole_abc_debye or () if mu)
-    count = 0.5 * components * (jmax + 1) ** 3 if top.kind == "asymmetric" else components * (jmax + 1.0) ** 2
-    return count * _functions(twice_spins) ** 2
-
-
 def _functions(twice_spins: Sequence[int]) -> int:
     """Number of functions of spins of these doubled sizes."""
     return math.prod(twice + 1 for twice in twice_spins)
@@ -334,7 +327,7 @@ def _plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, 
         raise ValueError(f"J max = {jmax}: expected 1 or more, J = 0 alone has no line")
     effects = start.levels.effects
     twice_spins = scheme_of(top, effects).twice
-    if (count := transition_count(top, jmax, twice_spins)) > MOST_TRANSITIONS:
+    if (count := transition_count(top, jmax, _functions(twice_spins))) > MOST_TRANSITIONS:
         raise ValueError(
             f"J max {jmax}: about {count:.0e} transitions before the cut, more than {MOST_TRANSITIONS:.0e}; lower J max, or leave "
             "it out: it then follows from min_lgint"

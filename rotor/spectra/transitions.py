@@ -25,6 +25,7 @@ from rotor.tops.operators import FIGURE_AXIS
 
 if TYPE_CHECKING:
     from rotor.quantum.spins.many_f_lines import Rows as ManyF
+    from rotor.tops.top import Top
 
 EVERYTHING = (0.0, float("inf"))
 LONG_LIST = 30_000_000  # lines above which the compiled loop is used: loading it takes 0.6 s, the plain loop 20 ns more per line
@@ -48,6 +49,13 @@ class Transitions:
     strength_debye2: Floats
     upper: Indices
     lower: Indices
+
+
+def transition_count(top: Top, jmax: int, spin_functions: int = 1) -> float:
+    """Approximate number of transitions up to a J before any cut, without further states; each F joins all N that spins reach."""
+    components = sum(1 for mu in top.dipole_abc_debye or () if mu)
+    count = 0.5 * components * (jmax + 1) ** 3 if top.kind == "asymmetric" else components * (jmax + 1.0) ** 2
+    return count * spin_functions**2
 
 
 def all_transitions(

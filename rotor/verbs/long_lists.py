@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.frozen import dataclass
 from rotor.reports.progress import progress_bar
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
+from rotor.spectra.transitions import transition_count
 
 if TYPE_CHECKING:
     from rotor.formats.streamed_lines import SortedLines
@@ -64,19 +66,24 @@ def is_long(request: SpectrumRequest, files: Mapping[str, Any], resolution: floa
         or files.keys() - STREAMED - SMALL
     ):
         return False
-    if request.top.internal_rotation is not None and _twice_spins(request):  # spins beside rotors have no ranges of F
+    if (
+        request.top.internal_rotation is not None and _spin_functions(request) > 1
+    ):  # spins beside rotors have no ranges of F
         return False
     if any(path.suffix == ".gz" for path in _streamed(files)) or request.top.dipole_abc_debye is None:
         return False
-    from rotor.formats.streamed_lines import transition_count
-
-    return transition_count(request.top, _highest_j(request), _twice_spins(request)) > TRANSITIONS
+    return _count(request) > TRANSITIONS
 
 
-def _twice_spins(request: SpectrumRequest) -> tuple[int, ...]:
-    from rotor.quantum.spins.scheme import scheme_of
+def _count(request: SpectrumRequest) -> float:
+    """Approximate number of transitions before the cut."""
+    return transition_count(request.top, _highest_j(request), _spin_functions(request))
 
-    return scheme_of(request.top, request.effects).twice
+
+def _spin_functions(request: SpectrumRequest) -> int:
+    """Number of functions of all spins."""
+    twice = {spin.name: spin.twice for effect in request.effects for spin in effect.spins(request.top)}
+    return math.prod(size + 1 for size in twice.values())
 
 
 def _streamed(files: Mapping[str, tuple[Path, ...]]) -> list[Path]:
@@ -86,13 +93,9 @@ def _streamed(files: Mapping[str, tuple[Path, ...]]) -> list[Path]:
 def refuse_long_json(request: SpectrumRequest, files: Mapping[str, Any], resolution: float | None) -> None:
     """Refuse JSON of a list on disk without range and cut, before any work."""
     if "json" in files and request.min_lgint is None and is_long(request, files, resolution):
-        from rotor.formats.streamed_lines import transition_count
-
         first, last = request.range_mhz
         if first <= 0 and last == float("inf"):
-            raise ValueError(
-                _no_json(f"some {transition_count(request.top, _highest_j(request), _twice_spins(request)):.0e}")
-            )
+            raise ValueError(_no_json(f"some {_count(request):.0e}"))
 
 
 def _no_json(count: str) -> str:
