@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import field, replace
 from functools import cached_property, partial
 
 from rotor.formats.spcat import wavenumbers
 from rotor.formats.spcat.block_numbers import numbered_blocks
 from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, group_lines, group_transitions
+from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format, quanta_format
 from rotor.formats.spcat.hamiltonian.labels import UNDIAGONALIZED_NOTE
 from rotor.formats.spcat.hamiltonian.states import file_states
@@ -41,15 +42,20 @@ class Prediction:
     catalogue: as the program would list it, in cm⁻¹ where FLAGS says so, E″ from the Hamiltonian's zero, degeneracies with the
     weights as the file has them. lines: the same lines before K doublets were parted, E″ from the lowest level.
     q: the partition function used, as a file counts it: unreduced weights, energies from the Hamiltonian's zero.
-    request: line 2 of the .int file. notes: what the program would have passed over in silence. listing: what makes `levels`.
+    request: line 2 of the .int file. noting, listing: what makes `notes` and `levels`.
     """
 
     catalogue: Catalogue
     lines: Lines
     q: float
     request: Request
-    notes: tuple[str, ...]
+    noting: Callable[[], Iterable[str]] = field(repr=False)
     listing: Callable[[], LevelList] = field(repr=False)
+
+    @cached_property
+    def notes(self) -> tuple[str, ...]:
+        """What the program would have passed over in silence; computed at first use, since the effect of KNMAX takes other levels."""
+        return tuple(self.noting())
 
     @cached_property
     def levels(self) -> LevelList:
@@ -97,8 +103,8 @@ def predict(
     if as_spcat and request.qrot < 1:
         request = replace(request, qrot=1.0)
         intensities = replace(intensities, request=request)
-    predicted = _predicted(parameters, intensities, as_spcat, full_basis)
-    return replace(predicted, notes=(*predicted.notes, *further))
+    noting = partial(_notes, parameters, intensities, as_spcat, full_basis, further)
+    return _predicted(parameters, intensities, as_spcat, full_basis, noting)
 
 
 def _refuse_limits(request: Request) -> None:
@@ -114,44 +120,59 @@ def _refuse_limits(request: Request) -> None:
         raise ValueError(f"TEMP = {request.temperature_k:g}: a temperature is above 0 K")
 
 
-def _predicted(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool, full_basis: bool) -> Prediction:
-    """The prediction of files in MHz, without the notes on line 2 of the .int file."""
-    request, diag = intensities.request, parameters.options[0].diag
+def _predicted(
+    parameters: ParameterFile,
+    intensities: IntensityFile,
+    as_spcat: bool,
+    full_basis: bool,
+    noting: Callable[[list[Group]], Iterable[str]],
+) -> Prediction:
+    """The prediction of files in MHz. noting: the notes, from the groups that have levels."""
+    request = intensities.request
     groups = groups_to_solve(parameters, intensities, as_spcat, full_basis)
     form = quanta_format(parameters, groups)
     solved = solved_groups(parameters, groups, request, form)
-    notes = file_notes(parameters, intensities, as_spcat) + _notes_without_diagonalization(solved)
     listed = [group_lines(*each, group_transitions(each.group, each.levels, request), form, request) for each in solved]
     pieces = [(lines, form.qnfmt(each.group.spins)) for lines, each in zip(listed, solved, strict=True)]
 
     present = [each.group for each in solved]
     linear = all(state.linear for group in present for state in group.states)
-    if any(state.is_cut for group in present for state in group.states):
-        notes += basis_notes(present, groups_to_solve(parameters, intensities, as_spcat, True), request)
-    highest = highest_n(parameters, request)
-    notes += falling_diagonal_notes(present, diag, highest)
-    if full_basis:
-        notes += full_basis_notes(file_states(parameters), highest)
     without_vectors = [each._replace(levels=replace(each.levels, blocks=())) for each in solved]
     return Prediction(
         as_catalogue(pieces, form, request.tag, linear=linear),
         joined_lines(parameters, solved, [lines.transitions for lines in listed], form, request),
         request.qrot,
         request,
-        tuple(notes),
+        partial(noting, present),
         partial(_listed_levels, parameters, without_vectors, form),
     )
+
+
+def _notes(
+    parameters: ParameterFile,
+    intensities: IntensityFile,
+    as_spcat: bool,
+    full_basis: bool,
+    further: Iterable[str],
+    groups: list[Group],
+) -> Iterator[str]:
+    """The notes on the files and on their groups that have levels, then further ones."""
+    yield from file_notes(parameters, intensities, as_spcat)
+    if any(group.diag < 0 and not group.is_diagonal for group in groups):
+        yield UNDIAGONALIZED_NOTE
+    if any(state.is_cut for group in groups for state in group.states):
+        whole = groups_to_solve(parameters, intensities, as_spcat, True)
+        yield from basis_notes(groups, whole, intensities.request)
+    highest = highest_n(parameters, intensities.request)
+    yield from falling_diagonal_notes(groups, parameters.options[0].diag, highest)
+    if full_basis:
+        yield from full_basis_notes(file_states(parameters), highest)
+    yield from further
 
 
 def _listed_levels(parameters: ParameterFile, solved: list[SolvedGroup], form: Format) -> LevelList:
     """The levels as SPCAT lists them, with its block numbers and places."""
     return as_level_list(solved, form, numbered_blocks(parameters, [each.group for each in solved]))
-
-
-def _notes_without_diagonalization(solved: list[SolvedGroup]) -> list[str]:
-    """The note on DIAG below 0, if any group has elements off the diagonal."""
-    groups = [each.group for each in solved]
-    return [UNDIAGONALIZED_NOTE] if any(group.diag < 0 and not group.is_diagonal for group in groups) else []
 
 
 def _not_written(request: Request) -> list[str]:
