@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
@@ -32,7 +32,8 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     no_inputs = places_of(verb)
     inputs = {name: value for name, value in typed.items() if name not in no_inputs}
     values = {name: value for name, value in inputs.items() if name in verb.fields}
-    entries = Entries({**fields_of_extras(verb, inputs), **values}, "option")
+    extras = {name: value for name, value in inputs.items() if name not in values}
+    entries = Entries({**fields_of_extras(verb, extras, values.keys()), **values}, "option")
     places = with_files(verb, {name: value for name, value in typed.items() if name not in inputs})
     shown = verb.read_shown(entries)
     with as_typed(verb, places):
@@ -119,13 +120,13 @@ def withhold(verb: Verb, answer: Any, files: Files) -> None:
         note(f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} not written: {reason}")
 
 
-def fields_of_extras(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
-    """Values by identity from the typed options that set several fields."""
+def fields_of_extras(verb: Verb, typed: Mapping[str, Any], others: Collection[str]) -> dict[str, Any]:
+    """Values by identity from the typed options that set several fields. others: identities of the other inputs."""
     values: dict[str, Any] = {}
     for extra in verb.extras:
         if extra.option not in typed or extra.read is None:
             continue
-        if double := next((other for other in extra.instead_of if other in typed), None):
+        if double := next((other for other in extra.instead_of if other in others), None):
             raise ValueError(f"{extra.option} and {verb.fields[double].flag}: give one of them")
         try:
             values |= extra.read(typed[extra.option])
