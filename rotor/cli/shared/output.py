@@ -6,9 +6,12 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rotor.checks import NoAnswerError
-from rotor.verbs.outputs import Files
+
+if TYPE_CHECKING:  # the command line starts without numpy
+    from rotor.verbs.outputs import Files
 
 HELD = ExitStack()  # locks of the files that the command will write
 
