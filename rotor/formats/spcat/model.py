@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from rotor.formats.spcat.hamiltonian.code_table import state_digits
-from rotor.formats.spcat.hamiltonian.codes import NO_NAME, PLURAL_NOT_YET, is_linear
+from rotor.formats.spcat.hamiltonian.codes import NO_NAME, PLURAL_NOT_YET, is_linear, is_oblate
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import Options
 from rotor.tops.constants import Constants
@@ -78,7 +78,7 @@ def option_line(constants: Constants, weights: SpinWeights, kmax: int) -> Option
     does not rise with K. Raises ValueError for weights that an option line cannot express.
     """
     kind = constants.kind
-    oblate = kind == "oblate" or constants.representation == "IIIl"
+    oblate = is_oblate(constants)
     letter = "l" if kind == "linear" else (constants.reduction or "A").lower() if kind == "asymmetric" else "s"
     iax, plus, minus, ewt = _coded_weights(weights, oblate)
     return Options(

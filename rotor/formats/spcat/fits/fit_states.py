@@ -144,11 +144,9 @@ def _with_labels(
         first = " ".join(map(str, labels[here[int(np.argmax(total < 0))]].tolist()))
         raise MissingLevelsError(f"there is no level {first}: F or J is below 0", here[total < 0])
     twice = 2 * total - sum(group.spins) % 2  # F is listed rounded up: doubled, less the half
-    if group.diag < 0:
-        return _assign_functions(group, form, labels, here, twice, names, values)
-    if _direct(group, form):
+    if group.diag >= 0 and _direct(group, form):
         return _assign_without_spins(group, form, labels, here, names, values)
-    find = _assign_with_spins if group.spins else _assign_in_blocks
+    find = _assign_with_spins if group.diag >= 0 and group.spins else _assign_in_blocks
     return find(group, form, labels, here, twice, names, values)
 
 
@@ -224,33 +222,27 @@ def _parameter_columns(group: Group, names: Sequence[str], values: Floats) -> tu
 def _assign_in_blocks(
     group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
 ) -> list[AssignedLevels]:
-    """Blocks of the labels at the places `here` with these doubled J, for states without spins."""
+    """Blocks of the labels at the places `here` with these doubled J, for states without spins.
+
+    Where DIAG is below 0 each level is one function, with spins or without, and its energy linear in the parameters.
+    """
     levels = levels_in_blocks(group, distinct(twice).tolist())
+    if group.diag < 0 and group.spins:
+        levels = group.named(levels)
     rows = _label_rows(group, levels, form, labels[here])
     has_level = rows >= 0
     if not has_level.any():
         return []
     parameters = tuple(group.effect.parameters(group.top))
     columns, start = _parameter_columns(group, names, values)
+    if group.diag < 0:
+        slopes = level_derivatives(group.top, levels, parameters, rows[has_level])
+        return [AssignedLevels(here[has_level], columns, ClosedForm(parameters, slopes))]
     functions = _label_functions(group, levels) if group.effect.pairs else None
     named = functions is None and "kc" in levels.quanta
     naming = naming_by(group.diag, group.oblate, group.diagonal(levels.jmax)) if named else None
     blocks = unit_levels(group.top, levels, rows[has_level], parameters, start, functions, naming)
     return [AssignedLevels(here[has_level], columns, blocks)]
-
-
-def _assign_functions(
-    group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
-) -> list[AssignedLevels]:
-    """Labels at the places `here` with these doubled F, where DIAG is below 0: each level is one function."""
-    levels = levels_in_blocks(group, distinct(twice).tolist())
-    levels = group.named(levels) if group.spins else levels
-    rows = _label_rows(group, levels, form, labels[here])
-    has_level = rows >= 0
-    columns, _ = _parameter_columns(group, names, values)
-    parameters = tuple(group.effect.parameters(group.top))
-    slopes = level_derivatives(group.top, levels, parameters, rows[has_level])
-    return [AssignedLevels(here[has_level], columns, ClosedForm(parameters, slopes))]
 
 
 def _label_functions(group: Group, levels: Levels) -> Functions:

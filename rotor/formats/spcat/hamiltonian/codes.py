@@ -35,6 +35,11 @@ def basis_axes(oblate: bool) -> str:
     return AXES["IIIl" if oblate else "Ir"]
 
 
+def is_oblate(constants: Constants) -> bool:
+    """Whether c is the axis z of the basis."""
+    return constants.kind == "oblate" or constants.representation == "IIIl"
+
+
 class Named(NamedTuple):
     """A constant's name in one vocabulary, its code, and the sign with which it enters the file."""
 

@@ -31,7 +31,7 @@ from rotor.formats.spcat.hamiltonian.code_table import (
     square_typ,
     typ_across,
 )
-from rotor.formats.spcat.hamiltonian.codes import AXES, basis_axes, code_factors
+from rotor.formats.spcat.hamiltonian.codes import AXES, basis_axes, code_factors, is_oblate
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.spin_effect import ParameterName, parse_name
 from rotor.quantum.effects.spin_rotation import SpinRotation
@@ -56,11 +56,6 @@ def constant_codes(constants: TopConstants) -> Codes:
             f"constants in representation {constants.representation}: SPFIT's files have Ir and IIIl alone; convert them first"
         )
     return _rotational_codes(constants) | _interaction_codes(constants)
-
-
-def is_oblate(constants: Constants) -> bool:
-    """Whether c is the axis z of the basis."""
-    return constants.kind == "oblate" or constants.representation == "IIIl"
 
 
 def _scheme(constants: TopConstants) -> Scheme | None:
