@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -48,37 +49,30 @@ class Product(NamedTuple):
 def are_whole(blocks: Iterable[SolvedBlock]) -> bool:
     """Whether blocks have all their K and all their states."""
     return all(
-        b.basis.first_k == (b.basis.first_k % 2 or 1 - b.basis.sign)  # 0 of E+, 2 of E-, 1 of O+ and O-
-        and b.vectors.shape[1] == b.basis.size == (b.basis.j - b.basis.first_k) // 2 + 1
-        for b in blocks
+        first_k == (first_k % 2 or 1 - sign)  # 0 of E+, 2 of E-, 1 of O+ and O-
+        and states == size == (j - first_k) // 2 + 1
+        for (j, _, first_k, sign, size), states in ((block.basis, block.vectors.shape[1]) for block in blocks)
     )
 
 
 def stacks_by_j(blocks: Iterable[SolvedBlock]) -> Iterator[tuple[int, dict[int, ParityStates]]]:
     """Each J, rising, with its stacks by their parity. The blocks must be whole and in the order of J."""
-    blocks_of_j: list[SolvedBlock] = []
-    for block in blocks:
-        if blocks_of_j and blocks_of_j[0].basis.j != block.basis.j:
-            yield blocks_of_j[0].basis.j, _stacked(blocks_of_j)
-            blocks_of_j = []
-        blocks_of_j.append(block)
-    if blocks_of_j:
-        yield blocks_of_j[0].basis.j, _stacked(blocks_of_j)
-
-
-def _stacked(blocks: list[SolvedBlock]) -> dict[int, ParityStates]:
-    chosen = ((parity, [b for b in blocks if b.basis.first_k % 2 == parity]) for parity in (0, 1))
-    return {parity: _stack(members, members[0].basis.j, parity) for parity, members in chosen if members}
+    for j, blocks_of_j in groupby(blocks, key=lambda block: block.basis.j):
+        of_parity: dict[int, list[SolvedBlock]] = {}
+        for block in blocks_of_j:
+            of_parity.setdefault(block.basis.first_k % 2, []).append(block)
+        yield j, {parity: _stack(of_parity[parity], j, parity) for parity in sorted(of_parity)}
 
 
 def _stack(blocks: list[SolvedBlock], j: int, parity: int) -> ParityStates:
-    columns = np.empty(((j - parity) // 2 + 1, sum(block.basis.size for block in blocks)))
+    columns = np.empty(((j - parity) // 2 + 1, sum(len(block.energies_mhz) for block in blocks)))
     by_sign, at = {}, 0
     for block in blocks:
-        here = slice(at, at + block.basis.size)
-        columns[block.basis.first_k // 2 :, here] = block.vectors
-        columns[: block.basis.first_k // 2, here] = 0.0
-        by_sign[block.basis.sign] = block, here
+        (_, _, first_k, sign, size) = block.basis
+        here = slice(at, at + size)
+        columns[first_k // 2 :, here] = block.vectors
+        columns[: first_k // 2, here] = 0.0
+        by_sign[sign] = block, here
         at = here.stop
     return ParityStates(j, parity, columns, by_sign)
 

@@ -51,9 +51,10 @@ def strong_lines(
     memory = _Memory(len(levels))
     below: dict[int, ParityStates] = {}
     before = -2
-    lower = {block.basis.j for block in blocks if counts[block.start]}
+    all_j = [block.basis.j for block in blocks]
+    lower = {j for j, block in zip(all_j, blocks, strict=True) if counts[block.start]}
     near = lower.union(*({j - 1, j + 1} for j in lower))
-    for j, stacks in stacks_by_j([block for block in blocks if block.basis.j in near]):
+    for j, stacks in stacks_by_j([block for j, block in zip(all_j, blocks, strict=True) if j in near]):
         by_upper: dict[int, tuple[SolvedBlock, list[Product]]] = {}
         for lows in (below, stacks) if before == j - 1 else (stacks,):
             for up, product in vector.products(stacks, lows):
