@@ -156,7 +156,7 @@ def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnsw
 def spfit_request(par: str, lin: str | None = None) -> FitRequest:
     """The request of a .par file and its lines; the file states free parameters and starting values. Raises ValueError as `read_fit`."""
     inputs = read_fit(par, lin)
-    title = " ".join(inputs.file.title.split()) or Path(par).stem
+    title = inputs.file.title or Path(par).stem
     files = FitFiles(par, lin)
     return FitRequest(
         inputs.lines,

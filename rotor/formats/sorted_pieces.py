@@ -1,21 +1,24 @@
-"""Pieces of a long list on disk: the folder of a list, and the sort of its pieces by DuckDB into one Parquet file."""
+"""Pieces of a long list on disk: the folder of a list, and the sort of its pieces by DuckDB into ranges of frequency."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.formats.atomic_write import atomic_path, open_atomic
+from rotor.formats.atomic_write import open_atomic, unfinished_folder
 from rotor.formats.tables import quoted, run
 
 if TYPE_CHECKING:
     from duckdb import DuckDBPyConnection
 
 _MANIFEST = "manifest.json"
+SORTED_LINES = 20_000_000  # lines that are sorted at once
 
 
 def open_folder(folder: Path, record: Mapping[str, Any]) -> None:
@@ -45,17 +48,34 @@ def _first_difference(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
     return f"{keys[0]} was {before.get(keys[0])}, is {now[keys[0]]}" if keys else "its settings differ"
 
 
-def sort_pieces(pieces: list[Path], target: Path, record: Mapping[str, Any], folder: Path, memory_mb: int) -> None:
-    """DuckDB's external merge sort: what exceeds its memory goes to files in `folder`."""
-    with engine_in(folder, memory_mb) as engine, atomic_path(target) as unfinished:
-        files = ", ".join(quoted(str(piece)) for piece in pieces)
-        text = quoted(json.dumps(record, ensure_ascii=False))
-        run(
-            engine,
-            f"COPY (SELECT * FROM read_parquet([{files}]) ORDER BY frequency_mhz) TO {quoted(str(unfinished))} "
-            f"(FORMAT parquet, KV_METADATA {{provenance: {text}}})",
-            target,
+def sort_pieces(
+    pieces: list[Path], target: Path, folder: Path, memory_mb: int, progress: Callable[[int, int], object]
+) -> None:
+    """Write the lines of all pieces into files of a folder, each a range of frequencies: the names rise with the frequency.
+
+    DuckDB's external sort needs memory that grows with the number of rows: 367 million did not fit into 0.5 GB.
+    """
+    with engine_in(folder, memory_mb) as engine, unfinished_folder(folder) as unfinished:
+        (unfinished / "sorted").mkdir()
+        lines = f"read_parquet({listed(pieces)})"
+        ranges = math.ceil(row_count(engine, pieces) / SORTED_LINES) or 1
+        shares = [n / ranges for n in range(1, ranges)]
+        row = (
+            engine.execute(f"SELECT approx_quantile(frequency_mhz, {shares}) FROM {lines}").fetchone()
+            if shares
+            else None
         )
+        bounds = [-math.inf, *(row[0] if row else []), math.inf]
+        for number, (first, last) in enumerate(pairwise(bounds)):
+            within = f"frequency_mhz >= '{first}'::DOUBLE AND frequency_mhz < '{last}'::DOUBLE"
+            file = unfinished / "sorted" / f"{number:04d}.parquet"
+            run(
+                engine,
+                f"COPY (SELECT * FROM {lines} WHERE {within} ORDER BY frequency_mhz) TO {quoted(str(file))} (FORMAT parquet)",
+                file,
+            )
+            progress(number + 1, ranges)
+        (unfinished / "sorted").rename(target)
 
 
 @contextmanager
@@ -70,8 +90,13 @@ def engine_in(folder: Path, memory_mb: int) -> Iterator[DuckDBPyConnection]:
         yield engine
 
 
-def row_count(engine: DuckDBPyConnection, path: Path) -> int:
-    """How many rows a Parquet file has."""
-    row = engine.execute(f"SELECT count(*) FROM read_parquet({quoted(str(path))})").fetchone()
+def listed(files: Sequence[Path]) -> str:
+    """A list of files in SQL."""
+    return f"[{', '.join(quoted(str(file)) for file in files)}]"
+
+
+def row_count(engine: DuckDBPyConnection, files: Sequence[Path]) -> int:
+    """How many rows Parquet files have."""
+    row = engine.execute(f"SELECT count(*) FROM read_parquet({listed(files)})").fetchone()
     assert row is not None  # a count always has one row
     return int(row[0])

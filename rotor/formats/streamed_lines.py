@@ -1,4 +1,4 @@
-"""Line lists larger than memory: pieces on disk, sorted by DuckDB into one Parquet or .cat file; interrupted runs can resume.
+"""Line lists larger than memory: pieces on disk, sorted by DuckDB, written as one .parquet, .csv or .cat file; interrupted runs can resume.
 
 A piece contains the transitions whose lower J lies in its range; with spins, whose lower F does, since they mix N but not F. Each is
 written atomically, so that a killed run leaves only complete pieces; the next run with the same settings makes the others.
@@ -6,6 +6,7 @@ written atomically, so that a killed run leaves only complete pieces; the next r
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import shutil
@@ -22,7 +23,7 @@ from rotor.arrays import Ints
 from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.line_tables import as_printed
 from rotor.formats.provenance import write_beside
-from rotor.formats.sorted_pieces import engine_in, open_folder, row_count, sort_pieces
+from rotor.formats.sorted_pieces import engine_in, listed, open_folder, row_count, sort_pieces
 from rotor.formats.spcat.text.cat import format_lines
 from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.tables import copy_columns, quoted, run
@@ -60,9 +61,9 @@ class StreamedList:
 
 @dataclass(frozen=True)
 class SortedLines:
-    """A list that is sorted on disk in a Parquet file, to be written in other formats."""
+    """A list that is sorted on disk in Parquet files of rising frequency, to be written in other formats."""
 
-    file: Path
+    files: tuple[Path, ...]
     count: int
     pieces_computed: int
     pieces_reused: int
@@ -72,33 +73,34 @@ class SortedLines:
 
     def write(self, target: Path, tag: int = 0, progress: Callable[[int, int], object] | None = None) -> None:
         """Write the list as .parquet, .csv or .cat by the suffix of the name. progress: of the lines of a .cat."""
-        if target.suffix.lower() == ".parquet":
-            with atomic_path(target) as unfinished:
-                shutil.copyfile(self.file, unfinished)
-            return
-        if target.suffix.lower() == ".csv":
+        suffix = target.suffix.lower()
+        if suffix in (".parquet", ".csv"):
+            text = quoted(json.dumps(self.record, ensure_ascii=False))
+            form = "csv, HEADER" if suffix == ".csv" else f"parquet, KV_METADATA {{provenance: {text}}}"
             with atomic_path(target) as unfinished, engine_in(self.plan.folder, self.memory_mb) as engine:
-                text = f"COPY (SELECT * FROM read_parquet({quoted(str(self.file))})) TO {quoted(str(unfinished))} (FORMAT csv, HEADER)"
-                run(engine, text, target)
-            write_beside(target, dict(self.record) | {"lines": self.count})
+                run(engine, f"COPY (SELECT * FROM {self._lines}) TO {quoted(str(unfinished))} (FORMAT {form})", target)
+            if suffix == ".csv":
+                write_beside(target, dict(self.record) | {"lines": self.count})
             return
         count = 0
         with open_atomic(target) as handle:
-            for part in _catalogues(self.plan, self.file, tag, self.memory_mb):
+            for part in _catalogues(self.plan, self.files, tag, self.memory_mb):
                 handle.write(format_lines(part))
                 count += len(part)
                 if progress is not None:
                     progress(count, self.count)
         write_beside(target, dict(self.record) | {"lines": count})
 
+    @property
+    def _lines(self) -> str:
+        return f"read_parquet({listed(self.files)})"
+
     def strongest_cut(self, count: int) -> tuple[float | None, int]:
         """The lgint that `count` lines exceed, and their highest J; None if the list has no more lines."""
-        from rotor.formats.tables import quoted
-
         n = "n" if self.plan.twice_spins else "j"
         with engine_in(self.plan.folder, self.memory_mb) as engine:
             rows = engine.execute(
-                f"SELECT lgint, greatest({n}_upper, {n}_lower) FROM read_parquet({quoted(str(self.file))}) WHERE lgint IS NOT NULL "
+                f"SELECT lgint, greatest({n}_upper, {n}_lower) FROM {self._lines} WHERE lgint IS NOT NULL "
                 f"ORDER BY lgint DESC LIMIT {count}"
             ).fetchall()
         return (rows[-1][0] if len(rows) == count else None), max((j for _, j in rows), default=1)
@@ -106,12 +108,8 @@ class SortedLines:
     @property
     def span_mhz(self) -> tuple[float, float]:
         """The lowest and the highest frequency."""
-        from rotor.formats.tables import quoted
-
         with engine_in(self.plan.folder, self.memory_mb) as engine:
-            row = engine.execute(
-                f"SELECT min(frequency_mhz), max(frequency_mhz) FROM read_parquet({quoted(str(self.file))})"
-            ).fetchone()
+            row = engine.execute(f"SELECT min(frequency_mhz), max(frequency_mhz) FROM {self._lines}").fetchone()
         assert row is not None  # an aggregate always has one row
         return row[0], row[1]
 
@@ -287,21 +285,28 @@ def sorted_lines(
     record = _provenance(plan, ranges) | {"errors_from": start.errors_from}
     open_folder(plan.folder, record)
 
-    merged = plan.folder / "sorted.parquet"
+    merged = plan.folder / "sorted"
     missing = [] if merged.exists() else [r for r in ranges if not plan.piece(*r).exists()]
     jobs = ([plan] * len(missing), *zip(*missing, strict=True)) if missing else ([], [], [])
     before = len(ranges) - len(missing)
-    for done, _ in enumerate((executor.map if executor else map)(_make_piece, *jobs), before + 1):
+
+    def advance(done: int, total: int) -> None:
         if progress is not None:
-            progress(done, len(ranges))
-    pieces = sorted(plan.folder.glob("[fj]*-*.parquet"))
+            progress(done, total)
+
+    for done, _ in enumerate((executor.map if executor else map)(_make_piece, *jobs), before + 1):
+        advance(done, len(ranges))
+    pieces = sorted(plan.folder.glob("*.parquet"))
     if not merged.exists():
-        sort_pieces(pieces, merged, record, plan.folder, memory_mb)
+        sort_pieces(
+            pieces, merged, plan.folder, memory_mb, lambda done, more: advance(len(ranges) + done, len(ranges) + more)
+        )
     for piece in pieces:
         piece.unlink()
+    files = tuple(sorted(merged.iterdir()))
     with engine_in(plan.folder, memory_mb) as engine:
-        count = row_count(engine, merged)
-    return SortedLines(merged, count, len(missing), before, plan, record, memory_mb)
+        count = row_count(engine, files)
+    return SortedLines(files, count, len(missing), before, plan, record, memory_mb)
 
 
 def _functions(twice_spins: Sequence[int]) -> int:
@@ -408,7 +413,7 @@ def _make_piece(plan: _Plan, first: int, last: int) -> None:
         plan.range_mhz,
         plan.partition,
     )
-    rows = np.arange(len(lines))
+    lines, rows = lines.sorted(), np.arange(len(lines))  # ranges of frequency are in few of the parts
     parts = [rows[start : start + _BATCH] for start in range(0, len(rows), _BATCH)] or [rows]
     for number, part in reversed(list(enumerate(parts))):  # the piece is complete with its first part
         with atomic_path(plan.piece(first, last, number)) as unfinished:
@@ -437,16 +442,18 @@ def _quanta(lines: Lines) -> dict[str, Any]:
     return {name: column.astype(np.int16) for name, column in columns.items()}
 
 
-def _catalogues(plan: _Plan, merged: Path, tag: int, memory_mb: int) -> Iterator[Catalogue]:
+def _catalogues(plan: _Plan, files: Sequence[Path], tag: int, memory_mb: int) -> Iterator[Catalogue]:
     """The sorted lines as catalogues of some hundred thousand; lines of zero strength have no logarithm."""
     names = plan.quanta_names
     with engine_in(plan.folder, memory_mb) as engine:
-        for start in range(0, row_count(engine, merged), _BATCH):
-            part = engine.execute(
-                f"SELECT * FROM read_parquet({quoted(str(merged))}, file_row_number = true) WHERE lgint IS NOT NULL "
-                f"AND file_row_number >= {start} AND file_row_number < {start + _BATCH}"
-            ).fetchnumpy()
-            (upper, qnfmt), (lower, _) = (
-                as_printed({name: part[f"{name}_{side}"] for name in names}, plan.halves) for side in ("upper", "lower")
-            )
-            yield predicted_catalogue(part, upper, lower, qnfmt, tag, linear=plan.top.kind == "linear")
+        for file in files:
+            for start in range(0, row_count(engine, [file]), _BATCH):
+                part = engine.execute(
+                    f"SELECT * FROM read_parquet({quoted(str(file))}, file_row_number = true) WHERE lgint IS NOT NULL "
+                    f"AND file_row_number >= {start} AND file_row_number < {start + _BATCH}"
+                ).fetchnumpy()
+                (upper, qnfmt), (lower, _) = (
+                    as_printed({name: part[f"{name}_{side}"] for name in names}, plan.halves)
+                    for side in ("upper", "lower")
+                )
+                yield predicted_catalogue(part, upper, lower, qnfmt, tag, linear=plan.top.kind == "linear")

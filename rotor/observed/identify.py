@@ -37,6 +37,7 @@ _VISIBLE = 3.0
 _RIVAL = 0.7  # smallest gain of a rival outside the model, relative to the evidence of a species
 _RIVALS = 3
 _GUARD = 4.0  # standard deviations above the model; a channel further above has less weight
+_AWAY = 5.0  # largest change of a velocity, and largest width, in widths of the lines
 _SHARED = 0.3  # smallest brightness of a species in a channel that it contributes to, in standard deviations
 
 
@@ -349,9 +350,22 @@ class _Search:
         noisy = replace(self.spectrum, noise=self.guarded(self.model_k(components)))
         shared = () if alone else ("velocity_km_s", "fwhm_km_s")
         free = ("column_per_cm2", "excitation_k", "velocity_km_s", "fwhm_km_s")
-        return fit_source(
+        fit = fit_source(
             noisy, components, self.sight, FitChoices(free=free, shared=shared, most_iterations=iterations)
         )
+        if not any(self._ran_away(component) for component in fit.components):
+            return fit
+        start = self.bank.start[0]
+        back = [
+            replace(component, velocity_km_s=start.velocity_km_s, fwhm_km_s=start.fwhm_km_s) for component in components
+        ]
+        return fit_source(noisy, back, self.sight, FitChoices(free=free[:2], most_iterations=iterations))
+
+    def _ran_away(self, component: Component) -> bool:
+        """Whether velocity or width are far from those of the lines, as where a band is fitted to a forest of other lines."""
+        start = self.bank.start[0]
+        moved = abs(component.velocity_km_s - start.velocity_km_s)
+        return max(moved, component.fwhm_km_s) > _AWAY * start.fwhm_km_s
 
     def pruned(self) -> tuple[SourceFit | None, Floats]:
         """The last fit without unnecessary species, and the evidence of the remaining species."""
@@ -376,7 +390,10 @@ class _Search:
             rest = [component for i, component in enumerate(fit.components) if i != k and i not in near]
             left = fit.spectrum.intensity - self.model_k(rest) if rest else fit.spectrum.intensity
             out[k] = self._misfit(fit, left, [fit.components[i] for i in near]) - fit.chi_squared
-        return out / _local_scatter(fit, shines)
+        rises = (alone > _VISIBLE * fit.noise).any(
+            axis=1
+        )  # a species without a visible line may take any column density
+        return np.where(rises, out / _local_scatter(fit, shines), 0.0)
 
     def _misfit(self, fit: SourceFit, left: Floats, near: list[Component]) -> float:
         """χ² of the residuals after these species are fitted again."""

@@ -31,7 +31,7 @@ def implausible(top: Top) -> tuple[str, ...]:
     """
     notes = []
     defect, largest = top.inertial_defect_u_angstrom2, top.moments_u_angstrom2[2]
-    if math.isfinite(defect) and defect > LARGEST_DEFECT * largest:
+    if defect > LARGEST_DEFECT * largest:
         notes.append(
             f"1/C is larger than 1/A + 1/B: I_c - I_a - I_b = {defect:.3g} u Å², {100 * defect / largest:.2g} % of I_c; no rigid body has "
             "that, and vibration gives a few per cent at most: check the constants and their units"

@@ -125,11 +125,16 @@ def _axes_table(content: Mapping[str, Any]) -> Table:
     columns = ["axis", "I (u Å²)", "P (u Å²)"] + (["x", "y", "z"] if frame else [])
     rows = []
     for i, axis in enumerate("abc"):
-        numbers = [f"{moments[i]:.6f}", f"{planar[i] + 0.0:.6f}"]
-        rows.append([axis, *numbers, *([f"{x + 0.0:.6f}" for x in frame["axes"][i]] if frame else [])])
+        numbers = [f"{moments[i]:.6f}", _fixed(planar[i])]
+        rows.append([axis, *numbers, *([_fixed(x) for x in frame["axes"][i]] if frame else [])])
     if frame:
-        rows.append(["centre of mass (Å)", "", "", *(f"{x + 0.0:.6f}" for x in frame["centre_angstrom"])])
+        rows.append(["centre of mass (Å)", "", "", *(_fixed(x) for x in frame["centre_angstrom"])])
     return Table("", columns, rows, frozenset({"axis"}))
+
+
+def _fixed(number: float) -> str:
+    """Six decimals, without the sign of a number that rounds to 0."""
+    return f"{round(number, 6) + 0.0:.6f}"
 
 
 def _nuclei_table(top: Top, content: Mapping[str, Any]) -> Table | None:
@@ -188,7 +193,7 @@ def _conformers_table(records: Sequence[Mapping[str, Any]], top: Top) -> Table |
         constants = [
             known_digits(x, relative * x) if x < float("inf") else "-" for x in conformer["rotational_constants_mhz"]
         ]
-        dipole = [f"{mu + 0.0:.2f}" for mu in conformer["dipole_abc_debye"] or ()] or ["-"] * 3
+        dipole = [f"{round(mu, 2) + 0.0:.2f}" for mu in conformer["dipole_abc_debye"] or ()] or ["-"] * 3
         rows.append([str(number), f"{conformer['energy_kj_per_mol']:.2f}", *constants, *dipole])
     return Table("", columns, rows)
 

@@ -215,6 +215,10 @@ def test_every_kind_of_pulse(call, options):
         (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--temperature", "-1"), "--temperature: -1"),
         (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--polarization", "up"), "--polarization: 'up'"),
         (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--state", "1"), "--state: '1'"),
+        (
+            ("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--state", "j=0,m=0", "--temperature", "10"),
+            "--temperature and --state: give one of them",
+        ),
         (("align", "OCS", "--pulse", "1e13 W/cm2, 1 ps", "--observable", "cosine"), "observable 'cosine'"),
         (("align", "CCl4", "--pulse", "1e13 W/cm2, 1 ps"), "spherical top"),
         (
@@ -252,6 +256,27 @@ def test_wrong_input_is_one_line_and_code_2(call, arguments, message):
     assert message in err
     assert len(err.strip().splitlines()) == 1
     assert not [path for path in Path().iterdir() if path.suffix in (".png", ".csv", ".json")]
+
+
+def test_a_temperature_beside_a_level_is_that_of_the_classical_gas(call):
+    """A level has no temperature; the classical gas beside it has one, and a note says which is which."""
+    given = (
+        "align",
+        "OCS",
+        "--pulse",
+        "1e12 W/cm2, 1 ps",
+        "--state",
+        "j=0",
+        "--temperature",
+        "10",
+        "--until",
+        "8 ps",
+    )
+    code, _, err = call(*given, "--points", "3", "--classical", "200")
+    assert (code, err) == (
+        0,
+        "note: the classical gas is at the temperature of --temperature, not in the level of --state\n",
+    )
 
 
 def test_pieces_are_counted_in_order():

@@ -11,6 +11,7 @@ import time
 
 import pytest
 
+from rotor.cli.shared.workers import working
 from rotor.reports import progress
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.scenes.scene import LevelsScene, write_scene
@@ -64,6 +65,18 @@ def test_a_pipe_shows_nothing(monkeypatch):
         advance(1, 2)
         time.sleep(0.1)
     assert stream.getvalue() == ""
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_the_blocks_of_a_map_are_counted_on_a_terminal(monkeypatch, workers):
+    """In this process and in others: a map of minutes showed nothing where it was made by workers."""
+    monkeypatch.setenv("TERM", "xterm")
+    terminal = on_terminal(monkeypatch)
+    with working(workers, "blocks") as executor:
+        assert list(executor.map(abs, [-1, 2, -3])) == [1, 2, 3]
+        time.sleep(0.3)  # s; the bar is drawn anew ten times a second
+    assert "3/3" in terminal.getvalue()
+    assert "blocks" in terminal.getvalue()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")

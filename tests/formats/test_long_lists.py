@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -233,6 +234,52 @@ def test_a_piece_of_many_lines_is_written_in_parts(call, folder, monkeypatch, sh
     assert sorted(Path("a.cat").read_text().splitlines()) == sorted(Path("b.cat").read_text().splitlines())
 
 
+def test_a_bar_shows_pieces_and_the_lines_that_are_written(call, folder, monkeypatch, short):
+    shown = []
+
+    @contextmanager
+    def bar(what, _):
+        yield lambda done, total: shown.append((what, done, total))
+
+    monkeypatch.setattr(long_lists, "_bar", bar)
+    assert call(*TYPED, "--cat", "a.cat")[0] == 0
+    assert ("pieces", 1, 1) in shown
+    assert shown[-1] == ("lines in a.cat", len(Path("a.cat").read_text().splitlines()), shown[-1][2])
+
+
+@pytest.mark.parametrize("form", ["cat", "parquet", "csv"])
+def test_a_list_is_sorted_in_ranges_of_frequency(call, folder, monkeypatch, short, form):
+    """DuckDB's sort of 367 million lines at once ended in an OutOfMemoryException."""
+    import duckdb
+
+    from rotor.formats import sorted_pieces
+
+    sizes, true = [], sorted_pieces.run
+    with monkeypatch.context() as patch:
+        patch.setattr(sorted_pieces, "SORTED_LINES", 1000)
+        patch.setattr(
+            sorted_pieces,
+            "run",
+            lambda engine, text, file: (
+                true(engine, text, file),
+                sizes.append(sorted_pieces.row_count(engine, [file])),
+            ),
+        )
+        assert call(*TYPED, f"--{form}", f"a.{form}")[0] == 0
+    assert len(sizes) > 10
+    assert max(sizes) < 2000  # of approximate quantiles
+    assert _in_memory(call, monkeypatch, *TYPED, f"--{form}", f"b.{form}")[0] == 0
+    if form == "cat":
+        streamed, whole = (Path(f"{name}.cat").read_text().splitlines() for name in "ab")
+        assert sorted(streamed) == sorted(whole)
+        assert [float(line[:13]) for line in streamed] == sorted(float(line[:13]) for line in whole)
+        return
+    streamed, whole = (
+        duckdb.sql(f"SELECT frequency_mhz FROM '{name}.{form}'").fetchnumpy()["frequency_mhz"] for name in "ab"
+    )
+    np.testing.assert_allclose(streamed, whole, rtol=1e-9)
+
+
 def test_a_list_that_is_sorted_is_not_made_again(call, folder, monkeypatch, short):
     """Interrupted while a file is written: no piece is solved again, and the pieces take no room beside the sorted list."""
     from rotor.formats import streamed_lines
@@ -243,7 +290,7 @@ def test_a_list_that_is_sorted_is_not_made_again(call, folder, monkeypatch, shor
     with monkeypatch.context() as patch:
         patch.setattr(streamed_lines, "format_lines", stop)
         assert call(*TYPED, "--cat", "a.cat")[0] == 130
-    assert {path.name for path in Path("a.cat.pieces").iterdir()} == {"manifest.json", "sorted.parquet"}
+    assert {path.name for path in Path("a.cat.pieces").iterdir()} == {"manifest.json", "sorted"}
     with monkeypatch.context() as patch:
         patch.setattr(streamed_lines, "_make_piece", lambda *_: pytest.fail("solved again"))
         assert call(*TYPED, "--cat", "a.cat")[0] == 0

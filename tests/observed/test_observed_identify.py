@@ -65,3 +65,17 @@ def test_candidates_outside_the_range_are_refused(case: tuple) -> None:
     far = artificial("far", np.random.default_rng(1), 5e5, 6e5)
     with pytest.raises(ValueError, match="none of 1 candidates"):
         identify(spectrum, [far])
+
+
+@pytest.mark.parametrize("seed", [6, 8])  # 6 ran away
+def test_a_forest_of_other_species_is_no_line_of_a_candidate(seed: int) -> None:
+    """One band of 4746 km/s at -1956 km/s, with none of its lines seen, was the species that a spectrum needed."""
+    rng = np.random.default_rng(seed)
+    forest = artificial("forest", rng, 230e3, 230.6e3, 60)
+    candidates = [artificial(f"s{i}", rng, 230e3, 230.6e3, 2) for i in range(3)]
+    spectrum = injected([Component(forest, 3e17, 100.0, -7.0, 3.0)], GRID, 0.05, rng)
+    found = identify(spectrum, candidates, choices=IdentifyChoices(velocity_km_s=-7.0, fwhm_km_s=3.0))
+    for evidence in found.species:
+        assert evidence.expected > 0
+        assert abs(evidence.component.velocity_km_s + 7.0) < 15.0
+        assert evidence.component.fwhm_km_s < 15.0

@@ -14,6 +14,7 @@ from rotor.classical.gas.ensembles import thermal_ensemble
 from rotor.classical.lyapunov import Flow, lyapunov_exponents
 from rotor.fitting.publication import suitable_unit, value_text
 from rotor.formats.spcat.hamiltonian.labels import Functions, _by_k2
+from rotor.plots.raman import picture as raman_picture
 from rotor.plots.show import write_picture
 from rotor.plots.view import View
 from rotor.quantum.wang import wang_matrix
@@ -69,6 +70,8 @@ def test_a_linear_gas_moves_and_an_atom_does_not_turn():
     assert np.einsum("ni,ni->n", axis, after) == pytest.approx(np.cos(angle), abs=1e-12)
     atoms = thermal_ensemble((0.0, 0.0, 0.0), 1.0, 5, rng=rng, mass=1.0)
     assert np.array_equal(atoms.moved(0.7).attitude, atoms.attitude)
+    assert rods.kinetic.total == 100  # two rotations each
+    assert rods.kinetic.total == rods.moved(0.7).kinetic.total
 
 
 def rotor_axis(attitude):
@@ -206,6 +209,7 @@ def test_the_provenance_of_raman_lines():
 
 def test_a_raman_picture_has_the_title_and_the_facts_that_are_given(folder):
     lines = raman_lines(rotor.read("N2"), temperature_k=77.0)
+    assert raman_picture(lines, title="own title").figure.axes[0].get_title(loc="left") == "own title"
     write_picture(lines, "a.svg", title="own title", provenance={"command": "rotor raman N2"})
     text = (folder / "a.svg").read_text()
     assert "own title" in text

@@ -756,3 +756,12 @@ def test_a_method_with_too_few_moments_leaves_the_others(call, folder):
     (folder / "held.toml").write_text(text + "[coordinates]\nCO = [1, 2]\n[held]\nCS = [2, 3]\n")
     code, out, err = call("structure", "held.toml", "--method", "rm1")
     assert code == 0, err
+
+
+def test_an_atom_next_to_the_figure_axis_is_on_it():
+    """0.0005 Angstrom off the axis is no distance that moments determine: the coordinate across it is 0."""
+    from rotor.structures.substitution import _directions
+
+    assert _directions("prolate", np.array([-1.2, 3e-4, -4e-4])).tolist() == [[-1, 0, 0], [0, 0, 0], [0, 0, 0]]
+    off = _directions("oblate", np.array([0.3, -0.4, 1.0]))
+    np.testing.assert_allclose(off, [[0, 0, 1], [0.6, -0.8, 0], [0, 0, 0]], atol=1e-15)

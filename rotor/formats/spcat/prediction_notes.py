@@ -23,6 +23,8 @@ from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile, npar_notes
 
+SAME_MHZ = 1e-6  # round-off of energies
+
 
 def file_notes(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes that follow from the files without their levels."""
@@ -100,9 +102,12 @@ def _cut_note(group: Group, whole: list[Group], request: Request) -> str:
     )
     limits = ", ".join(_k_limits(state) for state in group.states if state.is_cut)
     angular = f"F = {twice_f}/2" if half else f"{'F' if group.spins else 'J'} = {twice_f // 2}"
-    moved = (
-        f"the others lie up to {shift:.3g} MHz from where the whole basis has them" if count else "no other is there"
-    )
+    if not count:
+        moved = "no other is there"
+    elif shift < SAME_MHZ:
+        moved = "the others lie where the whole basis has them"
+    else:
+        moved = f"the others lie up to {shift:.3g} MHz from where the whole basis has them"
     return (
         f"{limits}: as the file says, other K are left out of the basis; at {angular} these are {total - count} of {total} levels, and "
         f"{moved}; --full-basis has every K"

@@ -300,7 +300,7 @@ class StarkRequest:
     )
     direction: tuple[float, float, float] = declared(
         Z, Custom(read_direction, list, "ANGLE", list[float]), "Angle of the field with the light of the laser (degrees); M is mixed then",
-        "conditions.direction", option="--tilt", example=[0.0, 0.0, 1.0],
+        "conditions.direction", option="--tilt", typed="0 degrees", example=[0.0, 0.0, 1.0],
     )  # fmt: skip
     jmax: int | None = basis_field(30)
     tolerance_mhz: float = tolerance_field(1e-4, "1e-4 MHz")

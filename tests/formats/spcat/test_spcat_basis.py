@@ -88,7 +88,7 @@ def test_k_is_l_of_a_linear_molecule():
     file, request = read_par(LINEAR), read_int((REQUEST % 6).replace(b"3 0.4\n", b""))
     listed = predict(file, request)
     assert sorted(np.abs(listed.catalogue.quanta_upper[:, 1]).tolist()) == [0] * 6 + [1] * 10
-    assert "at J = 6 these are 10 of 13 levels, and the others lie up to 0 MHz" in listed.notes[0]
+    assert "at J = 6 these are 10 of 13 levels, and the others lie where the whole basis" in listed.notes[0]
     assert np.abs(predict(file, request, full_basis=True).catalogue.quanta_upper[:, 1]).max() == 5  # of R(5): K to 5
     one_l = read_par(LINEAR.replace(b"l -1 1 0 1", b"l -1 1 1 1"))
     for lifted in (False, True):  # l is a quantum number of this state

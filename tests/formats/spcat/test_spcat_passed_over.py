@@ -33,6 +33,8 @@ def test_a_parameter_of_a_state_that_does_not_exist_is_left_out():
     assert SAID in prediction.notes
     assert prediction.catalogue.frequency_mhz.tolist() == without.catalogue.frequency_mhz.tolist()
     assert without.notes == ()
+    zero = predict(read_par(TWO.replace(b"1122 -1.5", b"1122 0.0")), read_int(REQUEST))
+    assert zero.notes == ()  # nothing is left out
 
 
 def test_of_one_state_too():

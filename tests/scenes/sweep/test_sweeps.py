@@ -177,6 +177,9 @@ def test_a_record_whose_last_line_was_cut_off_goes_on(folder):
     Path("r").write_text(whole[:-20])
     assert run_sweep(scene, record="r").computed == 1
     assert run_sweep(scene, record="r").computed == 0
+    shown = []
+    run_sweep(scene, record="r", progress=lambda done, total: shown.append((done, total)))
+    assert shown == [(1, 2), (2, 2)]  # finished points count, too
 
 
 # Workers

@@ -188,8 +188,8 @@ def as_read(thing: Any, read: Callable[[Line], Any]) -> str:
 
 
 def read_title(line: Line) -> str:
-    """The title in the first line of a file."""
-    return line.body.removeprefix("\ufeff").strip()
+    """The title in the first line of a file; programs write a date far to the right."""
+    return " ".join(line.body.removeprefix("\ufeff").split())
 
 
 def title_text(title: str, stored: str) -> str:
