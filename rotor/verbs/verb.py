@@ -97,11 +97,6 @@ class Shown(ErrorsShown):
     sources: bool = declared(False, Flag(), "Print the sources of the numbers in full")
 
 
-def no_notes(answer: Any) -> Iterable[str]:
-    """No remarks."""
-    return ()
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Extra:
     """An option that sets several fields: `--j 2:5` for jmin and jmax.
@@ -194,7 +189,7 @@ class Verb:
     table: Callable[[Any], Table] = lambda answer: answer.table
     shown: type = Shown
     content: Callable[[Any, Any], Mapping[str, Any]] = lambda answer, shown: {}
-    notes: Callable[[Any], Iterable[str]] = no_notes
+    notes: Callable[[Any], Iterable[str]] = lambda answer: ()
     nothing: Callable[[Any], str] = lambda answer: ""
     drawn: str | None = ""
     spectral: bool = False
