@@ -137,7 +137,7 @@ def write_hitran_lines(lines: Lines, path: str | os.PathLike[str], settings: Set
 
     if "molecule" not in settings:
         raise ValueError(
-            f'{path}: HITRAN\'s records begin with its number of the molecule; give settings={{"molecule": 5}} (5 is CO)'
+            f'{os.path.basename(path)}: HITRAN\'s records begin with its number of the molecule; give settings={{"molecule": 5}} (5 is CO)'
         )
     options = {key: settings[key] for key in ("molecule", "isotopologue", "abundance") if key in settings}
     write_hitran(hitran_lines(lines, **options), path)

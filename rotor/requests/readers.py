@@ -269,7 +269,7 @@ class Numbers(Listed):
         if isinstance(raw, str):
             values = tuple(parse_grid(raw, self.unit).tolist()) if ":" not in raw else ()
         else:
-            values = tuple(map(float, raw))
+            values = tuple(map(float, [raw] if isinstance(raw, int | float) else raw))
         if (self.counts and len(values) not in self.counts) or not values or not all(map(math.isfinite, values)):
             words = {1: "one", 3: "three"}
             count = " or ".join(words.get(n, str(n)) for n in self.counts)

@@ -151,6 +151,7 @@ def write_levels(answer: SpectrumAnswer, path: Path, report: Report) -> None:
 
 
 def _prediction(answer: SpectrumAnswer) -> Prediction:
-    assert isinstance(answer.request, PredictedRequest)
+    if not isinstance(answer.request, PredictedRequest):
+        raise ValueError("an .egy of a spectrum is that of an .int file; rotor.levels writes levels of anything else")
     prediction: Prediction = answer.request.prediction
     return prediction

@@ -81,6 +81,12 @@ def test_wrong_arguments_are_named():
         rotor.levels()
 
 
+def test_one_number_is_a_list_of_one():
+    """TypeError before: 'float' object is not iterable."""
+    given, typed = (rotor.zeeman("OCS", fields_tesla=(0.0, 1.0), g=g).table.energy_mhz for g in (-0.03, "-0.03"))
+    assert given.tolist() == typed.tolist()
+
+
 def test_a_result_has_tables_files_pictures_and_its_scene(folder):
     spectrum = rotor.spectrum("CO", temperature_k=20, jmax=5)
     assert spectrum.to_pandas()["frequency_mhz"].tolist() == spectrum.table.frequency_mhz.tolist()
@@ -92,6 +98,14 @@ def test_a_result_has_tables_files_pictures_and_its_scene(folder):
     assert "rotor.spectrum" in json.dumps(rotor.read("co.cat").provenance) or (folder / "co.cat").stat().st_size
     with pytest.raises(ValueError, match="spectrum writes files that end in"):
         spectrum.write("co.docx")
+    with pytest.raises(
+        ValueError, match=r"rotor\.levels writes levels of anything else"
+    ):  # an AssertionError without words before
+        spectrum.write("co.egy")
+    with pytest.raises(
+        ValueError, match=r"^co\.hitran: HITRAN's records begin"
+    ):  # named a folder of unfinished files before
+        spectrum.write("co.hitran")
     again = rotor.run_scene(spectrum.scene())
     assert np.array_equal(again.table.frequency_mhz, spectrum.table.frequency_mhz)
     assert list(spectrum.plan().counts.values()) == [5]
