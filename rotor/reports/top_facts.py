@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Facts, Part
 from rotor.reports.sources import source_facts
-from rotor.tops.facts import estimated_errors_mhz, is_estimated_dipole, known_digits, top_formula
+from rotor.tops.facts import top_formula
+from rotor.tops.uncertain_numbers import known_digits
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -108,7 +109,7 @@ def heading(top: Top) -> str:
 
 def constants_text(top: Top) -> str:
     """A, B, C in MHz, their estimated error, and the number of distortion constants."""
-    constants, errors = top.constants, estimated_errors_mhz(top)
+    constants, errors = top.constants, top.estimated_errors_mhz
     rigid = [name for name in constants.values if name in "ABC"]
     text = ", ".join(f"{name} {known_digits(constants[name], errors.get(name), 10)}" for name in rigid) + " MHz"
     if errors:
@@ -141,7 +142,7 @@ def vector_text(vector: Sequence[float] | None, names: Sequence[str] = ("μa", "
 def dipole_text(top: Top) -> str:
     """The dipole of a top; an estimated dipole has one decimal, since its error is 0.2 D."""
     vector = top.dipole_abc_debye
-    if vector is None or not is_estimated_dipole(top):
+    if vector is None or not top.has_estimated_dipole:
         return vector_text(vector)
     return vector_text([round(x, 1) for x in vector]) + " (estimated)"
 

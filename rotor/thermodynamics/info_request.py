@@ -19,7 +19,7 @@ from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.table import Table
 from rotor.thermodynamics.partition_table import partition_table
 from rotor.tops.constants_budget import constants_budget
-from rotor.tops.facts import estimated_errors_mhz, top_facts
+from rotor.tops.facts import top_facts
 from rotor.tops.top import Top
 
 TEMPERATURES_K = (
@@ -92,7 +92,7 @@ def abc_columns(top: Top) -> dict[str, float]:
     >>> columns["a_mhz"], columns["a_error_mhz"], columns["b_error_mhz"]
     (9000.0, 0.3, nan)
     """
-    estimated = estimated_errors_mhz(top)
+    estimated = top.estimated_errors_mhz
     errors = {**estimated, **top.constants.uncertainties}
     columns = {}
     for name, value in zip("ABC", top.rotational_constants_mhz, strict=True):

@@ -51,3 +51,11 @@ def dipole_vector(vector: ArrayLike | None) -> Vector | None:
     if values.shape != (3,) or not np.isfinite(values).all():
         raise ValueError(f"a dipole is three finite numbers (μa, μb, μc) in debye, not {values.tolist()}")
     return float(values[0]), float(values[1]), float(values[2])
+
+
+def dipole_line(vector: Vector | None, estimated: bool) -> str:
+    """A dipole in D; an estimated one has one decimal, since its error is 0.2 D."""
+    if vector is None:
+        return "not known"
+    decimals, source = (1, " (estimated)") if estimated else (10, "")
+    return ", ".join(f"{round(mu, decimals) + 0.0:.5g}" for mu in vector) + f" D{source}"

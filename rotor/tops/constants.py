@@ -24,7 +24,7 @@ from rotor.tops.kind_of_constants import (
     vocabulary,
 )
 from rotor.tops.operators import Powers, published_name, spelled_powers, spelled_term
-from rotor.tops.uncertain_numbers import parse_named, write_number
+from rotor.tops.uncertain_numbers import known_digits, parse_named, write_number
 from rotor.units import parse_quantity
 
 # letters that look alike: U+0394 and U+2206, φ and ϕ
@@ -120,9 +120,25 @@ class Constants:
         return hash((self.kind, self.reduction, self.representation, frozenset(self.values.items())))
 
     def __repr__(self) -> str:
-        from rotor.tops.facts import constants_line
+        return f"Constants({self.line({})})"
 
-        return f"Constants({constants_line(self, {})})"
+    def line(self, estimated: Mapping[str, float]) -> str:
+        """Kind, A, B, C in MHz with the digits that estimated errors leave, and the number of distortion constants."""
+        form = ", ".join(filter(None, (self.reduction and f"{self.reduction}-reduction", self.representation)))
+        rigid = [name for name in self.values if name in RIGID]
+        text = ", ".join(f"{name} {known_digits(self.values[name], estimated.get(name), 10)}" for name in rigid)
+        more = len(self.values) - len(rigid)
+        rest = f", {more} of distortion" if more else ""
+        return f"{self.kind}: {text} MHz{rest}{f' ({form})' if form else ''}"
+
+    def html_table(self, estimated: Mapping[str, float]) -> str:
+        """Names, values and errors as a table in HTML; an estimated error leaves fewer digits."""
+        rows = "<tr><th></th><th>MHz</th><th>±</th></tr>"
+        for name, value in self.values.items():
+            guess, error = estimated.get(name), self.uncertainties.get(name)
+            text = f"about {known_digits(guess, guess)}" if guess else "" if error is None else f"{error:.2g}"
+            rows += f"<tr><td>{name}</td><td>{known_digits(value, guess)}</td><td>{text}</td></tr>"
+        return f"<table>{rows}</table>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _rebuilt, (self._settings(), dict(self.values))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
-from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.top import Top
 
 RIGID = ("A", "B", "C")
@@ -38,7 +37,7 @@ def _rigid(top: Top) -> list[str]:
 
 def _estimated(tops: Sequence[Top]) -> ErrorTerm:
     """Estimated error of constants from a geometry, or scaled from another isotopologue."""
-    errors = {top: max(estimated_errors_mhz(top).values(), default=0.0) for top in tops}
+    errors = {top: max(top.estimated_errors_mhz.values(), default=0.0) for top in tops}
     top, error = max(errors.items(), key=lambda pair: pair[1], default=(None, 0.0))
     if top is None or not error:
         return ErrorTerm(0.0, "constants that define the Hamiltonian")
@@ -50,7 +49,7 @@ def _estimated(tops: Sequence[Top]) -> ErrorTerm:
 
 def _measured(tops: Sequence[Top]) -> ErrorTerm:
     """Largest standard deviation of A, B and C."""
-    measured = [(top, name) for top in tops for name in _rigid(top) if name not in estimated_errors_mhz(top)]
+    measured = [(top, name) for top in tops for name in _rigid(top) if name not in top.estimated_errors_mhz]
     errors = [top.constants.uncertainties.get(name) for top, name in measured]
     if not errors or None in errors:
         return ErrorTerm(None, "no uncertainties of the constants are known")

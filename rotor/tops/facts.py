@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rotor.units import MHZ_PER_CM
 
 if TYPE_CHECKING:
-    from rotor.tops.constants import Constants
     from rotor.tops.kind import KindOfTop
     from rotor.tops.top import Top
 
@@ -38,7 +35,7 @@ def top_facts(top: Top) -> dict[str, Any]:
         "near_displacement_angstrom": near.displacement_angstrom if near else None,
         "constants_mhz": dict(constants.values),
         "uncertainties_mhz": dict(constants.uncertainties),
-        "estimated_errors_mhz": estimated_errors_mhz(top),
+        "estimated_errors_mhz": top.estimated_errors_mhz,
         "reduction": constants.reduction,
         "representation": constants.representation,
         "rotational_constants_mhz": abc,
@@ -61,66 +58,6 @@ def top_facts(top: Top) -> dict[str, Any]:
         "source": top.source or None,
         "notes": list(top.notes),
     }
-
-
-def estimated_errors_mhz(top: Top) -> dict[str, float]:
-    """Estimated errors (MHz) of A, B, C by name if not measured: from a geometry, or from scaling of another isotopologue.
-
-    >>> from rotor.molecules.molecule import Molecule
-    >>> from rotor.tops.top import Top
-    >>> co = Molecule(("C", "O"), [[0, 0, 0], [0, 0, 1.13]], source="a guess", uncertainty=0.01)
-    >>> {name: round(error) for name, error in estimated_errors_mhz(Top.from_molecule(co)).items()}
-    {'B': 577}
-    """
-    constants, molecule = top.constants, top.molecule
-    from_geometry = molecule is not None and top.source == molecule.source
-    relative = molecule.uncertainty if from_geometry and molecule is not None else top.scaling_error
-    if not relative:
-        return {}
-    return {
-        name: relative * constants[name] for name in "ABC" if name in constants.values.keys() - constants.uncertainties
-    }
-
-
-def known_digits(value: float, error: float | None, digits: int = 12) -> str:
-    """Number rounded to two uncertain digits of its error; with `digits` digits if no error is estimated.
-
-    >>> known_digits(6011.70626348, 72.0), known_digits(6011.70626348, 0.6), known_digits(6011.70626348, None)
-    ('6012', '6011.71', '6011.70626348')
-    """
-    if not error:
-        return f"{value:.{digits}g}"
-    decimals = 1 - math.floor(math.log10(error))
-    return f"{round(value, decimals):.{max(decimals, 0)}f}"
-
-
-def is_estimated_dipole(top: Top) -> bool:
-    """Whether the dipole is estimated, with an error of 0.2 D."""
-    return top.dipole_source.startswith("estimate")
-
-
-def short_text(top: Top) -> str:
-    """Name, kind, A, B, C and dipole in one line, with the digits that estimated errors leave."""
-    constants, errors, dipole = top.constants, estimated_errors_mhz(top), top.dipole_abc_debye
-    names = [", ".join(dict.fromkeys(filter(None, (top.name, top_formula(top)))))] if top.name or top.molecule else []
-    if dipole is None:
-        moment = "not known"
-    else:
-        decimals, about = (1, " (estimated)") if is_estimated_dipole(top) else (10, "")
-        moment = ", ".join(f"{round(mu, decimals) + 0.0:.5g}" for mu in dipole) + f" D{about}"
-    return f"{', '.join([*names, constants_line(constants, errors)])}; dipole {moment}"
-
-
-def constants_line(constants: Constants, errors: Mapping[str, float]) -> str:
-    """Kind, A, B, C in MHz with the digits that estimated errors leave, and the number of distortion constants."""
-    form = ", ".join(
-        filter(None, (constants.reduction and f"{constants.reduction}-reduction", constants.representation))
-    )
-    rigid = [name for name in constants.values if name in "ABC"]
-    text = ", ".join(f"{name} {known_digits(constants[name], errors.get(name), 10)}" for name in rigid)
-    more = len(constants.values) - len(rigid)
-    rest = f", {more} of distortion" if more else ""
-    return f"{constants.kind}: {text} MHz{rest}{f' ({form})' if form else ''}"
 
 
 _FROM_CONSTANTS = (

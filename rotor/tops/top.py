@@ -25,7 +25,7 @@ from rotor.tops.allowed import (
     refuse_forbidden_dipole,
     refuse_forbidden_polarizability,
 )
-from rotor.tops.components import Tensor, dipole_vector, in_frame, symmetric_tensor, tensor_in_frame
+from rotor.tops.components import Tensor, dipole_line, dipole_vector, in_frame, symmetric_tensor, tensor_in_frame
 from rotor.tops.constants import Constants
 from rotor.tops.covariance import Covariance
 from rotor.tops.internal_rotation import InternalRotationConstants
@@ -122,25 +122,27 @@ class Top:
         return hash(self.constants)
 
     def __repr__(self) -> str:
-        from rotor.tops.facts import short_text
-
-        return f"Top({short_text(self)})"
+        names = dict.fromkeys(filter(None, (self.name, self.molecule.formula if self.molecule else "")))
+        dipole = dipole_line(self.dipole_abc_debye, self.has_estimated_dipole)
+        return f"Top({', '.join([*names, self.constants.line(self.estimated_errors_mhz)])}; dipole {dipole})"
 
     def _repr_html_(self) -> str:
         """The constants with their errors, for notebooks."""
         import html
 
-        from rotor.tops.facts import estimated_errors_mhz, known_digits
+        return f"<p>{html.escape(repr(self))}</p>{self.constants.html_table(self.estimated_errors_mhz)}"
 
-        measured, estimated = self.constants.uncertainties, estimated_errors_mhz(self)
-        rows = ""
-        for name, value in self.constants.values.items():
-            error = f"{measured[name]:.2g}" if name in measured else ""
-            if name in estimated:
-                error = f"about {known_digits(estimated[name], estimated[name])}"
-            rows += f"<tr><td>{name}</td><td>{known_digits(value, estimated.get(name))}</td><td>{error}</td></tr>"
-        head = "<tr><th></th><th>MHz</th><th>±</th></tr>"
-        return f"<p>{html.escape(repr(self))}</p><table>{head}{rows}</table>"
+    @property
+    def estimated_errors_mhz(self) -> dict[str, float]:
+        """Estimated errors of A, B, C by name if not measured: from a geometry, or from scaling of another isotopologue."""
+        guess, names = self.molecule, self.constants.values.keys() - self.constants.uncertainties
+        relative = guess.uncertainty if guess and self.source == guess.source else self.scaling_error
+        return {name: relative * self.constants[name] for name in "ABC" if name in names} if relative else {}
+
+    @property
+    def has_estimated_dipole(self) -> bool:
+        """Whether the dipole is estimated, with an error of 0.2 D."""
+        return self.dipole_source.startswith("estimate")
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -5,6 +5,7 @@ Decimal arithmetic throughout: a number written in any unit reads back as the sa
 
 from __future__ import annotations
 
+import math
 import re
 from decimal import Decimal, localcontext
 
@@ -109,3 +110,15 @@ def write_number(value: float, spread: float | None, unit: str) -> str:
 
 def _reads_back(number: Decimal, step: Decimal, factor: Decimal, expected: float) -> bool:
     return float(number.quantize(step) * factor) == expected
+
+
+def known_digits(value: float, error: float | None, digits: int = 12) -> str:
+    """Number rounded to two uncertain digits of its error; with `digits` digits if no error is estimated.
+
+    >>> known_digits(6011.70626348, 72.0), known_digits(6011.70626348, 0.6), known_digits(6011.70626348, None)
+    ('6012', '6011.71', '6011.70626348')
+    """
+    if not error:
+        return f"{value:.{digits}g}"
+    decimals = 1 - math.floor(math.log10(error))
+    return f"{round(value, decimals):.{max(decimals, 0)}f}"

@@ -11,8 +11,8 @@ from rotor.reports.progress import sum_progress
 from rotor.reports.screen import Part, Table, record_table
 from rotor.requests.fill import Entries, read_fields
 from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_info
-from rotor.tops.facts import estimated_errors_mhz, known_digits
 from rotor.tops.top import Top
+from rotor.tops.uncertain_numbers import known_digits
 from rotor.units import MHZ_PER_CM
 from rotor.verbs.molecule import POLARIZABILITY
 from rotor.verbs.outputs import Report, tables
@@ -101,7 +101,7 @@ def _margin_text(margin: float) -> str:
 
 
 def _constants_table(top: Top) -> Table:
-    stated, estimated = top.constants.uncertainties, estimated_errors_mhz(top)
+    stated, estimated = top.constants.uncertainties, top.estimated_errors_mhz
     rows = []
     for name, mhz in top.constants.values.items():
         guess = estimated.get(name)

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from rotor.formats.molecules.isotopologue_request import IsotopologuesAnswer, IsotopologuesRequest, answer_isotopologues
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
-from rotor.tops.facts import estimated_errors_mhz, is_estimated_dipole, known_digits
 from rotor.tops.isotopes.isotopologues import Isotopologue
 from rotor.tops.top import Top
+from rotor.tops.uncertain_numbers import known_digits
 from rotor.verbs.molecule import POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Report, tables
 from rotor.verbs.subjects import OneMolecule
@@ -55,7 +55,7 @@ def _table(parent: Top, family: tuple[Isotopologue, ...]) -> Table:
 
 def _rigid_texts(top: Top) -> list[str]:
     """A, B, C rounded to their estimated error, and that error in per cent."""
-    errors = estimated_errors_mhz(top)
+    errors = top.estimated_errors_mhz
     if not errors:
         return [f"{x:.3f}" if x < float("inf") else "-" for x in top.rotational_constants_mhz] + [""]
     name = next(iter(errors))
@@ -67,7 +67,7 @@ def _rigid_texts(top: Top) -> list[str]:
 def _row(isotopologue: Isotopologue) -> list[str]:
     top = isotopologue.top
     weights = ", ".join(f"{name} {weight}" for name, weight in top.spin_weights.to_mapping().items())
-    dipole, decimals = top.dipole_abc_debye, 1 if is_estimated_dipole(top) else 4
+    dipole, decimals = top.dipole_abc_debye, 1 if top.has_estimated_dipole else 4
     return [
         isotopologue.label,
         f"{isotopologue.abundance:.3e}",

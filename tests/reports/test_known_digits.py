@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import rotor
-from rotor.tops.facts import estimated_errors_mhz, known_digits
+from rotor.tops.uncertain_numbers import known_digits
 
 
 @pytest.mark.parametrize(
@@ -54,8 +54,8 @@ def test_isotopologues_have_the_error_of_scaling(call):
     assert (heavy[7], heavy[10]) == ("825440", "0.02")
     assert (light[7], light[10]) == ("705900", "0.8")
     top = rotor.read("water", isotopes="O=18O")
-    assert estimated_errors_mhz(top)["B"] == pytest.approx(2e-4 * top.constants["B"], rel=1e-12)
-    assert estimated_errors_mhz(rotor.read("water")) == {}
+    assert top.estimated_errors_mhz["B"] == pytest.approx(2e-4 * top.constants["B"], rel=1e-12)
+    assert rotor.read("water").estimated_errors_mhz == {}
     assert "scaled from those of another isotopologue, good to about 0.8 %" in " ".join(
         call("info", "water", "--isotope", "2=2H")[1].split()
     )

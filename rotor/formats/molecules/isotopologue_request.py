@@ -16,7 +16,6 @@ from rotor.requests.fill import renaming
 from rotor.requests.readers import Names, Quantity
 from rotor.table import Table
 from rotor.tops.constants_budget import constants_budget
-from rotor.tops.facts import estimated_errors_mhz
 from rotor.tops.isotopes.isotopologues import Isotopologue, isotopologue, isotopologues, single_substitutions
 from rotor.tops.top import Top
 
@@ -158,7 +157,7 @@ def record(isotopologue: Isotopologue) -> dict[str, Any]:
         "kind": top.kind,
         "point_group": symmetry.point_group if symmetry else None,
         "constants_mhz": dict(top.constants.values),
-        "estimated_errors_mhz": estimated_errors_mhz(top),
+        "estimated_errors_mhz": top.estimated_errors_mhz,
         "reduction": top.constants.reduction,
         "representation": top.constants.representation,
         "rotational_constants_mhz": top.rotational_constants_mhz,
