@@ -265,6 +265,7 @@ def range_without_unit(entries: Entries) -> str:
 
 def _from_source(reading: Reading) -> Top:
     from rotor.formats import read
+    from rotor.molecules.readers.sdf_entries import LIST_SUFFIXES
     from rotor.tops.top import Top
 
     inputs = reading.inputs
@@ -273,9 +274,10 @@ def _from_source(reading: Reading) -> Top:
     source = reading.path(inputs.source) if isinstance(inputs.source, str) else inputs.source
     if source == "-" and reading.style == "key":
         raise ValueError(f"{reading.named('source')}: '-': a scene cannot read standard input; give a file")
-    if isinstance(source, str) and source.lower().endswith(".csv") and is_file(source):
+    if isinstance(source, str) and source.lower().endswith(LIST_SUFFIXES) and is_file(source):
+        kind = "a CSV file" if source.lower().endswith(".csv") else "a file of SMILES"
         raise ValueError(
-            f"{source}: a CSV file is a list of molecules, not a single one: write it into a scene, "
+            f"{source}: {kind} is a list of molecules, not a single one: write it into a scene, "
             f"molecule = \"{Path(source).name}\", and start that with 'rotor run'; 'rotor new info' prints a scene"
         )
     read_top = partial(read, source, isotopes=",".join(inputs.isotopes) or None)

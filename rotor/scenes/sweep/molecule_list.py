@@ -1,4 +1,4 @@
-"""Lists of molecules: an SDF file with several, or a CSV file with a column of SMILES or names."""
+"""Lists of molecules: an SDF file with several, a CSV file with a column of SMILES or names, or a file of SMILES (.smi)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from rotor.frozen import dataclass
-from rotor.molecules.readers.sdf_entries import SDF_SUFFIXES, entry_names
+from rotor.molecules.readers.sdf_entries import LIST_SUFFIXES, SDF_SUFFIXES, entry_names
 from rotor.scenes.scene import within
 
 SMILES_COLUMNS, MOLECULE_COLUMNS, NAME_COLUMNS = ("smiles",), ("molecule", "source", "name"), ("name", "id", "title")
@@ -22,21 +22,21 @@ class Entry:
 
 
 def is_list(source: str, folder: str | os.PathLike[str]) -> bool:
-    """Whether a source is a list of molecules: a CSV file, or an SDF file of two or more."""
+    """Whether a source is a list of molecules: a CSV or SMILES file, or an SDF file of two or more."""
     suffix, path = Path(source).suffix.lower(), within(folder, source)
-    if suffix not in (*SDF_SUFFIXES, ".csv") or not os.path.isfile(path):
+    if suffix not in (*SDF_SUFFIXES, *LIST_SUFFIXES) or not os.path.isfile(path):
         return False
-    return suffix == ".csv" or len(entry_names(Path(path))) > 1
+    return suffix in LIST_SUFFIXES or len(entry_names(Path(path))) > 1
 
 
 def list_entries(source: str, folder: str | os.PathLike[str]) -> list[Entry]:
     """The molecules named in a file of a folder.
 
-    Raises ValueError for a CSV file without a column of molecules or without rows.
+    Raises ValueError for a CSV file without a column of molecules, and for a list without molecules.
     """
     path = Path(within(folder, source))
-    if path.suffix.lower() == ".csv":
-        return _csv_entries(path)
+    if path.suffix.lower() in LIST_SUFFIXES:
+        return _csv_entries(path) if path.suffix.lower() == ".csv" else _smiles_entries(path)
     names = entry_names(path)
     return [Entry(f"{source}#{n}", name or f"{path.stem}_{n}") for n, name in enumerate(names, 1)]
 
@@ -66,6 +66,19 @@ def _csv_entries(path: Path) -> list[Entry]:
             source = f"SMILES:{source}"
         out.append(Entry(source, name or source.removeprefix("SMILES:")))
     return out
+
+
+def _smiles_entries(path: Path) -> list[Entry]:
+    """Lines of a SMILES and a name, with or without a heading."""
+    try:
+        lines = [line.split(maxsplit=1) for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip()]
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path}: a list of SMILES is UTF-8 text: {error}") from None
+    if lines and lines[0][0].lower() in SMILES_COLUMNS:
+        lines = lines[1:]
+    if not lines:
+        raise ValueError(f"{path}: no molecules; expected lines of a SMILES and a name")
+    return [Entry(f"SMILES:{words[0]}", words[-1].strip()) for words in lines]
 
 
 def _column(heads: list[str], names: tuple[str, ...]) -> int | None:

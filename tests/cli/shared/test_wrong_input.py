@@ -65,6 +65,7 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["spectrum", "CO", "HCN"], "error: HCN: more than the command takes"),
         (["spectrum", "CO", "--temperature", "5", "K", "--jmax", "3"], "stand in quotes: --temperature '5 K'"),
         (["structure"], "FAMILY is missing"),
+        (["levels", "A=9 B=3 C=2.5 GHz"], "is no file: constants go to --constants"),
         (["spectrum", "empty.int"], "empty.var: 0 lines"),
         (["spectrum", "CO", "--temperature", "1e300"], "expected a temperature up to 1e+06 K"),
         (["gas", "CO", "--temperature", "1e-300"], "expected a temperature of 1e-09 K or more"),
@@ -143,6 +144,8 @@ def test_a_list_where_a_single_molecule_is_needed(call, folder):
     assert err.startswith("error: list.csv: a CSV file is a list of molecules")
     assert 'molecule = "list.csv"' in err
     assert "rotor run" in err
+    (folder / "list.smi").write_text("C=O a\n", encoding="utf-8")
+    assert "error: list.smi: a file of SMILES is a list of molecules" in call("info", "list.smi")[2]
 
 
 FAMILY = 'name = "OCS"\n[[isotopologue]]\nconstants = "B=6081.492 MHz"\n[[isotopologue]]\nisotopes = "S=34S"\nconstants = "B=5932.8 MHz"\n'

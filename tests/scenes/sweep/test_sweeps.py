@@ -297,6 +297,16 @@ def test_a_csv_of_smiles_or_names_is_a_sweep_over_them(folder):
     assert result.columns["molecule"].tolist() == ["OCS", "OCS", "CO", "CO", "HCl", "HCl"]
 
 
+def test_a_file_of_smiles_is_a_sweep_over_them(folder):
+    for text in ("C=O formaldehyde\n\n[C-]#[O+]\n", "SMILES Name\nC=O\tformaldehyde\n[C-]#[O+]"):
+        Path("a.smi").write_text(text)
+        molecules = [(p.values["molecule"], p.content["molecule"]) for p in points(levels(molecule="a.smi"))]
+        assert molecules == [("formaldehyde", "SMILES:C=O"), ("[C-]#[O+]", "SMILES:[C-]#[O+]")]
+    Path("b.smi").write_text("SMILES\n")
+    with pytest.raises(ValueError, match=r"b.smi: no molecules; expected lines of a SMILES and a name"):
+        points(levels(molecule="b.smi"))
+
+
 def test_names_that_become_equal_in_files_get_a_number(folder):
     scene = levels(sweep={"molecule": ["SMILES:C=O", "SMILES:C#O", "SMILES:C-O"]}, outputs={"csv": "{molecule}.csv"})
     assert [p.content["outputs"]["csv"] for p in points(scene)] == [
