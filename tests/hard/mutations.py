@@ -186,7 +186,7 @@ MUTATIONS = (
     ),
     Mutation(
         22, "rotor/quantum/fields/field_map.py",
-        "    block, fields, vectors = states.block, request.fields, states.vectors\n",
+        "    block, fields = states.block, request.fields\n",
         "    block, fields, vectors, energies = states.block, request.fields, states.vectors.copy(), states.energies.copy()\n" + BY_OVERLAP,
         "tests/hard/test_safeguards.py::test_labels_are_ranks_whatever_the_grid",
     ),

@@ -299,7 +299,8 @@ class StarkRequest:
         0.0, Quantity("W/cm2", metavar="I"), "Of a laser along Z, far from resonance (W/cm2)", "conditions.intensity"
     )
     direction: tuple[float, float, float] = declared(
-        Z, Custom(read_direction, list, "ANGLE", list[float]), "Angle of the field with the light of the laser (degrees); M is mixed then",
+        Z, Custom(read_direction, list, "ANGLE", list[float] | float | str),
+        "Angle of the field with the light of the laser (degrees); M is mixed then",
         "conditions.direction", option="--tilt", typed="0 degrees", example=[0.0, 0.0, 1.0],
     )  # fmt: skip
     jmax: int | None = basis_field(30)
