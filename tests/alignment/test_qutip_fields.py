@@ -152,6 +152,7 @@ def test_a_classical_kick_turns_by_its_torque():
     assert np.abs(computed - exact).max() < 1e-2  # four standard errors of 20,000 bodies
 
 
+@pytest.mark.slow
 def test_an_asymmetric_gas_moves_with_the_same_core():
     top = Top.from_constants("A=5669.126 B=750.414293 C=662.636162 MHz").with_polarizability(
         np.diag([21.5, 15.3, 10.2]), "test"

@@ -159,7 +159,7 @@ def hyperfine_lines(top, nmax, error_mhz=0.002, noise=None, vt=(0, 1)):
 
 
 @pytest.mark.parametrize("frame", ["RAM", "PAM"])
-@pytest.mark.parametrize("second", ["", "chi_aa(35Cl)=-57 chi_ab(35Cl)=20 "])
+@pytest.mark.parametrize("second", ["", pytest.param("chi_aa(35Cl)=-57 chi_ab(35Cl)=20 ", marks=pytest.mark.slow)])
 def test_derivatives_with_spins_are_those_of_finite_differences(frame, second):
     top = turning_top(frame, 0, SPINS.replace("MHz", second + "MHz"))
     constants = TopConstants(top, hyperfine=True)

@@ -23,7 +23,7 @@ def test_a_killed_server_leaves_the_whole_session(tmp_path, moments):
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
-@pytest.mark.parametrize("moments", [5, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("moments", [2, pytest.param(50, marks=pytest.mark.slow)])
 def test_a_closed_or_crashed_page_loses_nothing(tmp_path, moments):
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (extra test)")
     with playwright.sync_playwright() as started:

@@ -258,6 +258,7 @@ def test_both_gauche_wells_of_butane_are_alike():
     assert wells[1] == pytest.approx(wells[2], rel=1e-9)  # of a series without odd terms
 
 
+@pytest.mark.slow
 def test_a_peptide_bond_turns_instead_of_bending(monkeypatch):
     """N-methylacetamide: 20 kcal/mol, and every angle of the turn; with one dihedral angle fixed alone nitrogen bends and snaps over."""
     rotation = bond_rotation(read_molecule("SMILES:CNC(C)=O"), "2-3")
