@@ -58,6 +58,7 @@ QUANTA = {
 # columns of a predicted list that a fit has no use for
 PREDICTED = ("lgint", "energy_lower_cm", "g_upper", "einstein_a_per_s", "strength_debye2", "intensity_cm_per_molecule")
 _YES, _NO = ("yes", "true", "1"), ("no", "false", "0", "")
+MOST_QUANTUM = 99_999  # a quantum number of a table; levels have far smaller ones
 _FREQUENCY = {"frequency_mhz": 1.0, "frequency_ghz": 1e3, "wavenumber_cm": MHZ_PER_CM}
 _WIDTH = {"width_mhz": 1.0, "width_khz": 1e-3}
 _FIELD = {"field_kv_per_cm": 1.0, "field_v_per_cm": 1e-3}
@@ -384,7 +385,16 @@ def _whole(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
     value = _real(path, line, name, row)
     if not float(value).is_integer():
         raise ValueError(f"{path}, line {line} of the table: {name} = {value:g}; expected a whole number")
-    return int(value)
+    return _bounded(path, line, name, int(value))
+
+
+def _bounded(path: object, line: int, name: str, value: int) -> int:
+    """A quantum number within bounds."""
+    if abs(value) > MOST_QUANTUM:
+        raise ValueError(
+            f"{path}, line {line} of the table: {name} = {value:.0e}; expected a number up to {MOST_QUANTUM}"
+        )
+    return value
 
 
 def _half(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
@@ -392,14 +402,14 @@ def _half(path: object, line: int, name: str, row: Mapping[str, str]) -> int:
     text = (row.get(name) or "").strip()
     number, slash, two = text.partition("/")
     if number.isdigit() and int(number) % 2 and (two == "2" or not slash):
-        return int(number)
+        return _bounded(path, line, name, int(number))
     value = _real(path, line, name, row) if not slash else math.nan
     if not (2 * value) % 2 == 1:
         raise ValueError(
             f"{path}, line {line} of the table: {name} reads {text!r}; expected a half-integer: 5/2, 2.5, or twice its "
             "value, 5"
         )
-    return int(2 * value)
+    return _bounded(path, line, name, int(2 * value))
 
 
 def _blends(texts: Sequence[str]) -> list[int]:

@@ -101,9 +101,11 @@ class Whole(Reader):
         """The number."""
         value = raw
         if isinstance(raw, str):
+            if not re.fullmatch(r"\s*[+-]?[0-9]+\s*", raw):  # int() takes 1_000 and digits of other scripts, too
+                raise ValueError(f"{raw!r:.60}: expected a whole number")
             try:
                 value = int(raw)
-            except ValueError:
+            except ValueError:  # of thousands of digits
                 raise ValueError(f"{raw!r:.60}: expected a whole number") from None
         if isinstance(value, bool) or not hasattr(value, "__index__"):
             raise ValueError(f"{raw!r}: expected a whole number")

@@ -287,6 +287,7 @@ def line_list(
     untrusted: bool = False,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
     executor: Executor | None = None,
+    most_lines: float = math.inf,
 ) -> Lines:
     """Electric-dipole lines of a top: all transitions that the selection rules allow, within the given limits.
 
@@ -309,9 +310,8 @@ def line_list(
     vibrations : VibrationalStates, optional
         States or fundamentals whose factor at this temperature multiplies Q instead.
     covariance : Covariance, optional
-        Of the constants, for the errors of frequencies. The default is the stated uncertainties, uncorrelated; fitted uncertainties
-        whose correlations are unknown (as in the library) are not used, since without correlations the errors would be many times
-        too large.
+        Of the constants, for the errors of frequencies. The default is the stated uncertainties, uncorrelated; fitted ones whose
+        correlations are unknown (as in the library) are not used: the errors would be many times too large.
     sort : bool, optional
         Whether to sort by frequency; False leaves the lines in the order of computation.
     untrusted : bool, optional
@@ -319,8 +319,8 @@ def line_list(
         default these are left out and counted.
     effects : sequence of QuantumEffect, optional
         The Hamiltonian.
-    executor : Executor, optional
-        Shares the work over J.
+    executor, most_lines : Executor, float, optional
+        Shares the work over J. With a cut: TooManyLinesError as soon as more lines are above it.
 
     Returns
     -------
@@ -360,15 +360,16 @@ def line_list(
 
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
     trusted = np.ones(len(levels), dtype=np.bool_) if untrusted else are_trusted(top, levels)
-    # without a level the ground is infinite and nothing is cut
-    ground = float(levels.energy_mhz[trusted & (levels.weight > 0)].min(initial=math.inf))
+    ground = float(levels.energy_mhz[trusted & (levels.weight > 0)].min(initial=math.inf))  # inf without levels: no cut
     cut = intensity_cut(levels, temperature_k, stated.q, least, ground) if stated and math.isfinite(ground) else None
     others = [moment for effect in levels.effects for moment in effect.other_moments(top)]
-    transitions = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others)
+    transitions = all_transitions(
+        levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others, most_lines
+    )
     inside = None if trusted.all() else trusted[transitions.upper] & trusted[transitions.lower]
     lines = Lines(
         top=top,
-        # a weight of 0 leaves a level in the table without lines
+        # weight 0: a level of the table without lines
         levels=levels if inside is None else replace(levels, weight=np.where(trusted, levels.weight, 0)),
         frequency_mhz=transitions.frequency_mhz,
         strength_debye2=transitions.strength_debye2,

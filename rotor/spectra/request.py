@@ -361,8 +361,10 @@ def _expected_q(lines: Lines) -> tuple[float, bool] | None:
     return functions * first * sums, True
 
 
-def answer_spectrum(request: SpectrumRequest, executor: Executor | None = None) -> SpectrumAnswer:
-    """The lines of a request. executor: shares the work over J.
+def answer_spectrum(
+    request: SpectrumRequest, executor: Executor | None = None, most_lines: float = math.inf
+) -> SpectrumAnswer:
+    """The lines of a request. executor: shares the work over J. most_lines: with a cut, TooManyLinesError beyond them.
 
     Raises ValueError if no answer is reached, as for a partition function that does not converge.
 
@@ -388,5 +390,6 @@ def answer_spectrum(request: SpectrumRequest, executor: Executor | None = None) 
         untrusted=request.untrusted,
         effects=request.effects,
         executor=executor,
+        most_lines=most_lines,
     )
     return SpectrumAnswer(request, lines)

@@ -5,6 +5,7 @@ All allowed lines are included except those that an `IntensityCut` or a frequenc
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -51,6 +52,10 @@ class Transitions:
     lower: Indices
 
 
+class TooManyLinesError(Exception):
+    """More lines are above a cut than were allowed."""
+
+
 def transition_count(top: Top, jmax: int, spin_functions: int = 1) -> float:
     """Approximate number of transitions up to a J before any cut, without further states; each F joins all N that spins reach."""
     components = sum(1 for mu in top.dipole_abc_debye or () if mu)
@@ -64,6 +69,7 @@ def all_transitions(
     range_mhz: tuple[float, float] = EVERYTHING,
     cut: IntensityCut | None = None,
     moments: Sequence[Moment] = (),
+    most_lines: float = math.inf,
 ) -> Transitions:
     """All allowed transitions between `levels` in the range and above the cut, unordered.
 
@@ -79,6 +85,8 @@ def all_transitions(
         Least intensity; by default no cut.
     moments : sequence of Moment, optional
         Moments other than dipoles, for levels with spins.
+    most_lines : float, optional
+        With a cut: TooManyLinesError as soon as more lines are above it.
 
     Returns
     -------
@@ -88,7 +96,8 @@ def all_transitions(
     dipoles = dipoles_abc if isinstance(dipoles_abc, Mapping) else {(0, 0): dipoles_abc}
     if levels.representation is None:
         return _joined(
-            [piece for states, mu in dipoles.items() for piece in _closed_form(levels, states, mu, range_mhz, cut)]
+            (piece for states, mu in dipoles.items() for piece in _closed_form(levels, states, mu, range_mhz, cut)),
+            most_lines,
         )
 
     blocks, incomplete = _existing_blocks(levels)
@@ -96,19 +105,20 @@ def all_transitions(
     if cut is not None and solved and len(solved) == len(blocks) and are_whole(solved) and not moments:
         vector = body_tensor(dipoles[0, 0], 1, levels.representation)
         strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
-        transitions = _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong)])
+        pieces = (_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong))
+        transitions = _joined(pieces, most_lines)
         return _rows(transitions, levels.weight[transitions.lower] > 0) if incomplete else transitions
     if (
         cut is not None
         and not moments
-        and (stacked := _many_f_transitions(levels, blocks, dipoles, range_mhz, cut)) is not None
+        and (stacked := _many_f_transitions(levels, blocks, dipoles, range_mhz, cut, most_lines)) is not None
     ):
         return _rows(stacked, levels.weight[stacked.lower] > 0) if incomplete else stacked
     pairs, between = _connections(levels, blocks, dipoles, moments)
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
         transitions = _all_lines(pairs, between)
     else:
-        transitions = _selected_lines(levels, pairs, between, range_mhz, cut)
+        transitions = _selected_lines(levels, pairs, between, range_mhz, cut, most_lines)
     return _rows(transitions, levels.weight[transitions.lower] > 0) if incomplete else transitions
 
 
@@ -148,14 +158,21 @@ def _rows(lines: Transitions, chosen: NDArray[np.bool_]) -> Transitions:
     return Transitions(lines.frequency_mhz[rows], lines.strength_debye2[rows], lines.upper[rows], lines.lower[rows])
 
 
-def _joined(pieces: list[Transitions]) -> Transitions:
-    if not pieces:
+def _joined(pieces: Iterable[Transitions], most_lines: float) -> Transitions:
+    """All pieces; TooManyLinesError as soon as they have more lines than allowed."""
+    parts, count = list[Transitions](), 0
+    for piece in pieces:
+        parts.append(piece)
+        count += len(piece.lower)
+        if count > most_lines:
+            raise TooManyLinesError(f"more than {most_lines:g} lines")
+    if not parts:
         return Transitions(np.zeros(0), np.zeros(0), np.zeros(0, np.int32), np.zeros(0, np.int32))
     return Transitions(
-        np.concatenate([p.frequency_mhz for p in pieces]),
-        np.concatenate([p.strength_debye2 for p in pieces]),
-        np.concatenate([p.upper for p in pieces]),
-        np.concatenate([p.lower for p in pieces]),
+        np.concatenate([p.frequency_mhz for p in parts]),
+        np.concatenate([p.strength_debye2 for p in parts]),
+        np.concatenate([p.upper for p in parts]),
+        np.concatenate([p.lower for p in parts]),
     )
 
 
@@ -206,7 +223,12 @@ def _fill_pair(
 
 
 def _selected_lines(
-    levels: Levels, pairs: list[Pair], between: Amplitudes, range_mhz: tuple[float, float], cut: IntensityCut | None
+    levels: Levels,
+    pairs: list[Pair],
+    between: Amplitudes,
+    range_mhz: tuple[float, float],
+    cut: IntensityCut | None,
+    most_lines: float,
 ) -> Transitions:
     """The lines of all pairs in a range and above a cut.
 
@@ -215,12 +237,13 @@ def _selected_lines(
     """
     needed = np.full(len(levels), -np.inf) if cut is None else cut.needed
     candidates = (_candidates(levels, up, lows, between(up, lows), needed, range_mhz) for up, lows in _by_upper(pairs))
-    return _joined([_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates)])
+    pieces = (_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates))
+    return _joined(pieces, most_lines)
 
 
 def _many_f_transitions(
     levels: Levels, blocks: list[SolvedBlock], dipoles: Mapping[tuple[int, int], Vector], range_mhz: tuple[float, float],
-    cut: IntensityCut,
+    cut: IntensityCut, most_lines: float,
 ) -> Transitions | None:  # fmt: skip
     """All transitions of levels with spins that were solved for many F together; None for other levels."""
     needed = cut.needed
@@ -232,7 +255,7 @@ def _many_f_transitions(
     groups = amplitudes_of_groups(blocks, tensor_moments(blocks[0].spins.shared, tensors), len(levels))
     energies, needed = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
     space = Workspace()
-    return _joined([_group_transitions(energies, needed, group, range_mhz, cut, space) for group in groups])
+    return _joined((_group_transitions(energies, needed, group, range_mhz, cut, space) for group in groups), most_lines)
 
 
 def _group_transitions(

@@ -203,3 +203,24 @@ def test_a_line_of_a_large_depth_has_an_error_of_its_brightness(call):
     left_out = json.loads(out)["errors"]["model"]
     assert "% of the depth split off" in left_out["from"]
     assert 0 < left_out["value"] < 1e-6
+
+
+@pytest.mark.parametrize("energy", ["5e11", "-5e11"])
+def test_a_state_far_from_zero_is_named(call, folder, energy):
+    """Intensities were nan, or the exponential ended in an OverflowError."""
+    Path("a.var").write_text(f"OCS\n 2 1 5 0 0 1e6 1 1\nl -1 1 0 0\n 100 6081.492 1e-3\n 0 {energy} 1e-3\n")
+    Path("a.int").write_text("OCS\n 0 60503 1028.6 0 3 -9 -9 99 300\n 1 0.71519\n")
+    code, _, err = call("spectrum", "a.int", "--csv", "x.csv")
+    assert code == 2
+    assert "error: the lowest level lies at" in err
+    assert "give states energies near zero" in err
+    assert not Path("x.csv").exists()
+
+
+def test_a_quantum_number_of_a_table_has_a_bound(call, folder):
+    head = "j_upper,j_lower,frequency_mhz,error_mhz\n"
+    for text in ("999999999999999999991", "-999999999999999999991", "1e30"):
+        Path("g.csv").write_text(f"{head}1,{text},12000,0.1\n")
+        code, _, err = call("fit", "g.csv", "--constants", "B=6 GHz", "--free", "B")
+        assert code == 2
+        assert "g.csv, line 1 of the table: j_lower = " in err

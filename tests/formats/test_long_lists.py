@@ -36,13 +36,13 @@ TYPED = (
 @pytest.fixture
 def short(monkeypatch):
     """Lists of more than a thousand transitions count as long."""
-    monkeypatch.setattr(long_lists, "TRANSITIONS", 1_000)
+    monkeypatch.setattr(long_lists, "LINES_IN_MEMORY", dict.fromkeys(long_lists.LINES_IN_MEMORY, 1_000))
     monkeypatch.setattr(long_lists, "STRONGEST", 50)
 
 
 def _in_memory(call, monkeypatch, *arguments):
     with monkeypatch.context() as patch:
-        patch.setattr(long_lists, "TRANSITIONS", 1e9)
+        patch.setattr(long_lists, "LINES_IN_MEMORY", dict.fromkeys(long_lists.LINES_IN_MEMORY, 1e9))
         return call(*arguments)
 
 
@@ -89,6 +89,20 @@ def test_a_long_list_is_written_as_csv(call, folder, monkeypatch, short):
     ]
 
 
+def test_few_lines_above_a_cut_are_made_in_memory(call, folder, monkeypatch, short):
+    """Some 1,400 of 14,000 transitions: as many lines as a list in memory may have, or one less."""
+    typed = [word if word != "none" else "-6" for word in TYPED]
+    lines = _in_memory(call, monkeypatch, *typed, "--cat", "a.cat")[1].split("lines ")[1].split(",")[0].strip()
+    made = []
+    monkeypatch.setattr(long_lists, "_sorted", lambda *job, true=long_lists._sorted: made.append(1) or true(*job))
+    for most, disk in ((int(lines), 0), (int(lines) - 1, 1)):
+        monkeypatch.setattr(long_lists, "LINES_IN_MEMORY", dict.fromkeys(long_lists.LINES_IN_MEMORY, most))
+        monkeypatch.setattr(long_lists, "BEFORE_CUT", 1000)
+        assert call(*typed, "--cat", f"{disk}.cat")[0] == 0
+        assert len(made) == disk
+        assert Path(f"{disk}.cat").read_bytes() == Path("a.cat").read_bytes()
+
+
 SPINS = {  # constants, spins, dipole, J max, cut
     "14N": (CONSTANTS, "chi_aa(14N)=-40 chi_bb(14N)=20", "1.2,1.9,0.4", 9, "none"),
     "14N, chi_ab": (CONSTANTS, "chi_aa(14N)=-40 chi_bb(14N)=20 chi_ab(14N)=900", "1.2,1.9,0", 8, "-9"),
@@ -108,7 +122,7 @@ def test_a_long_list_with_spins_is_the_one_in_memory(call, folder, monkeypatch, 
     typed = ("spectrum", "--constants", constants, "--spin-constants", spins, "--dipole-abc", dipole, "--jmax", str(jmax),
              "--min-lgint", cut, "--q", "1e5", "--hyperfine")  # fmt: skip
     made, true = [], streamed_lines._make_piece
-    monkeypatch.setattr(long_lists, "TRANSITIONS", 100)
+    monkeypatch.setattr(long_lists, "LINES_IN_MEMORY", dict.fromkeys(long_lists.LINES_IN_MEMORY, 100))
     with monkeypatch.context() as patch:
         defaults = streamed_lines.sorted_lines.__kwdefaults__ | {"piece_lines": 300}
         patch.setattr(streamed_lines.sorted_lines, "__kwdefaults__", defaults)

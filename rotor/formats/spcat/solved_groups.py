@@ -27,6 +27,8 @@ from rotor.spectra.transitions import Transitions
 from rotor.thermodynamics import PartitionFunction
 from rotor.tops.top import Top
 
+MOST_EXPONENT = 700.0  # of a population in double precision
+
 
 def groups_to_solve(
     parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool, full_basis: bool
@@ -113,7 +115,12 @@ def joined_lines(
     starts = np.cumsum([0, *(len(each.levels) for each in solved[:-1])]).astype(np.int32)
     levels, spreads = _joined(solved, form), [each.spread for each in solved if each.spread is not None]
     t = request.temperature_k
-    above = math.exp(levels.ground_mhz / units.MHZ_PER_K / t)  # Q counts from zero, `Lines` from the lowest level
+    above = levels.ground_mhz / units.MHZ_PER_K / t  # Q counts from zero, `Lines` from the lowest level
+    if abs(above) > MOST_EXPONENT:
+        raise ValueError(
+            f"the lowest level lies at {levels.ground_mhz / units.MHZ_PER_CM:.3g} cm-1, and QROT counts energies from zero: its "
+            f"population at TEMP = {t:g} K is beyond the range of numbers; give states energies near zero"
+        )
     return Lines(
         top=_shown(parameters, solved[0].group),
         levels=levels,
@@ -124,7 +131,7 @@ def joined_lines(
         temperature_k=t,
         min_lgint=request.str0,
         range_mhz=request.range_mhz,
-        stated_partition=PartitionFunction(t, request.qrot * above, None, math.nan, "given"),
+        stated_partition=PartitionFunction(t, request.qrot * math.exp(above), None, math.nan, "given"),
         stated_spread=np.concatenate(spreads) if spreads else None,
     ).sorted()
 

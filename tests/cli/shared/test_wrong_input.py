@@ -65,6 +65,7 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["spectrum", "CO", "HCN"], "error: HCN: more than the command takes"),
         (["spectrum", "CO", "--temperature", "5", "K", "--jmax", "3"], "stand in quotes: --temperature '5 K'"),
         (["structure"], "FAMILY is missing"),
+        (["spectrum", "H2O", "--jmax", "1_000"], "--jmax: '1_000': expected a whole number"),
         (["levels", "A=9 B=3 C=2.5 GHz"], "is no file: constants go to --constants"),
         (["spectrum", "empty.int"], "empty.var: 0 lines"),
         (["spectrum", "CO", "--temperature", "1e300"], "expected a temperature up to 1e+06 K"),
