@@ -208,7 +208,9 @@ def _smallest_between(request: MapRequest, lowest: int, highest: int, executor: 
     if executor is not None:
         enough = each_block(request, highest, partial(_smallest_of_block, request, lowest, highest), executor)
         return max(enough, default=lowest)
-    for block in blocks_of_map(request, highest):
+    for block in reversed(
+        blocks_of_map(request, highest)
+    ):  # small blocks of large |M| show soonest that `highest` is too low
         lowest = _smallest_of_block(request, lowest, highest, block)
         if lowest > highest:
             break

@@ -104,7 +104,7 @@ class MapRequest:
         if (work := len(self.fields) * sum(float(size) ** 3 for size in sizes)) > MOST_WORK:
             raise ValueError(
                 f"states of J up to {self.j_highest} lie in blocks of up to {max(sizes):,} functions, which at {len(self.fields)} "
-                f"fields take some {work * SECONDS / 60:.2g} minutes (a map takes at most {MOST_WORK * SECONDS / 60:.2g}): {FEWER}"
+                f"fields take some {math.ceil(work * SECONDS / 60)} minutes (a map takes at most {MOST_WORK * SECONDS / 60:.0f}): {FEWER}"
             )
 
     @property

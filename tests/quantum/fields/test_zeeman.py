@@ -9,9 +9,9 @@ import pytest
 from field_matrices import contracted_vectors, rigid, states
 
 import rotor
-from rotor.quantum.effects.stark import StarkRequest, answer_stark
+from rotor.quantum.effects.stark import StarkRequest, answer_stark, stark_map
 from rotor.quantum.effects.zeeman import ZeemanRequest, answer_zeeman, magnetic_limits, zeeman_map
-from rotor.quantum.fields import map_request
+from rotor.quantum.fields import field_map, map_request
 from rotor.quantum.fields.operators import Magnet
 from rotor.quantum.fields.space import field_space
 from rotor.tops.magnetic import MagneticTensors, tensor_for
@@ -125,3 +125,14 @@ def test_a_map_of_too_large_blocks_is_refused(monkeypatch):
     monkeypatch.setattr(map_request, "MOST_WORK", 2e4)  # blocks with the J that the field calls for
     with pytest.raises(ValueError, match=r"states of J up to 2 lie in blocks of up to \d\d functions"):
         answer_stark(small)
+
+
+def test_a_map_that_takes_too_long_is_refused_early(monkeypatch):
+    """Small blocks of large |M| need the highest J; beginning with M = 0, J max was looked for in nearly all blocks before the refusal."""
+    top, searched, true = rotor.read("H2CO"), [], field_map._smallest_of_block
+    monkeypatch.setattr(field_map, "_smallest_of_block", lambda *job: searched.append(1) or true(*job))
+    with pytest.raises(
+        ValueError, match=r"in blocks of up to [\d,]+ functions, which at 2 fields take some \d+ minutes"
+    ):
+        stark_map(top, [0.0, 10.0], j_highest=34)
+    assert 0 < len(searched) < 30  # of 70
