@@ -92,9 +92,11 @@ def _meaning(word: str) -> Path | str:
             f"{word!r} is ambiguous: it is a path here and {what}; write '{os.path.join('.', word)}' for the path, "
             "or use another folder for the molecule"
         )
-    if not path.exists() and _CONSTANTS.match(word):
+    if path.exists():
+        return path
+    if _CONSTANTS.match(word):
         raise ValueError(f"{word!r} is no file: constants go to --constants, in Python to constants=")
-    if path.exists() or _looks_like_a_path(word):
+    if _looks_like_a_path(word):
         return path
     if library_path is None and word not in _g2_names():
         if _SMILES.fullmatch(word):
@@ -116,8 +118,6 @@ def _meaning(word: str) -> Path | str:
 
 
 _SMILES = re.compile(r"(?=.*[=#()\[\]])[A-Za-z0-9@+\-\[\]()=#]+")  # letters with a bond or a branch among them
-
-
 _CONSTANTS = re.compile(r"\s*[ABC]\s*=\s*[\d.]")
 
 

@@ -141,10 +141,8 @@ class _Plan:
 
     def piece(self, first: int, last: int, part: int = 0) -> Path:
         """The file of the lines with lower J (or number of the lower F) from `first` to `last`; of many lines that of a part."""
-        return (
-            self.folder
-            / f"{'f' if self.twice_spins else 'j'}{first:04d}-{last:04d}{f'.{part}' if part else ''}.parquet"
-        )
+        letter, number = "f" if self.twice_spins else "j", f".{part}" if part else ""
+        return self.folder / f"{letter}{first:04d}-{last:04d}{number}.parquet"
 
     @property
     def highest(self) -> int:
@@ -289,11 +287,7 @@ def sorted_lines(
     missing = [] if merged.exists() else [r for r in ranges if not plan.piece(*r).exists()]
     jobs = ([plan] * len(missing), *zip(*missing, strict=True)) if missing else ([], [], [])
     before = len(ranges) - len(missing)
-
-    def advance(done: int, total: int) -> None:
-        if progress is not None:
-            progress(done, total)
-
+    advance = progress or (lambda done, total: None)
     for done, _ in enumerate((executor.map if executor else map)(_make_piece, *jobs), before + 1):
         advance(done, len(ranges))
     pieces = sorted(plan.folder.glob("*.parquet"))

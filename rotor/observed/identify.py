@@ -390,10 +390,9 @@ class _Search:
             rest = [component for i, component in enumerate(fit.components) if i != k and i not in near]
             left = fit.spectrum.intensity - self.model_k(rest) if rest else fit.spectrum.intensity
             out[k] = self._misfit(fit, left, [fit.components[i] for i in near]) - fit.chi_squared
-        rises = (alone > _VISIBLE * fit.noise).any(
-            axis=1
-        )  # a species without a visible line may take any column density
-        return np.where(rises, out / _local_scatter(fit, shines), 0.0)
+        # a species without a visible line may take any column density
+        has_lines = (alone > _VISIBLE * fit.noise).any(axis=1)
+        return np.where(has_lines, out / _local_scatter(fit, shines), 0.0)
 
     def _misfit(self, fit: SourceFit, left: Floats, near: list[Component]) -> float:
         """χ² of the residuals after these species are fitted again."""

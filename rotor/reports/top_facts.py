@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Facts, Part
 from rotor.reports.sources import source_facts
+from rotor.tops.components import known_dipole
 from rotor.tops.facts import top_formula
-from rotor.tops.uncertain_numbers import known_digits
 
 if TYPE_CHECKING:
     from rotor.tops.constants import Constants
@@ -110,11 +110,9 @@ def heading(top: Top) -> str:
 def constants_text(top: Top) -> str:
     """A, B, C in MHz, their estimated error, and the number of distortion constants."""
     constants, errors = top.constants, top.estimated_errors_mhz
-    rigid = [name for name in constants.values if name in "ABC"]
-    text = ", ".join(f"{name} {known_digits(constants[name], errors.get(name), 10)}" for name in rigid) + " MHz"
+    text, more = constants.rigid_text(errors), constants.distortion_count
     if errors:
         text += f" (good to about {max(100 * errors[name] / constants[name] for name in errors):.2g} %)"
-    more = len(constants.values) - len(rigid)
     text += f", and {more} of distortion" if more else ", rigid"
     return text + (f" ({form_text(constants)})" if more and constants.reduction else "")
 
@@ -141,10 +139,8 @@ def vector_text(vector: Sequence[float] | None, names: Sequence[str] = ("μa", "
 
 def dipole_text(top: Top) -> str:
     """The dipole of a top; an estimated dipole has one decimal, since its error is 0.2 D."""
-    vector = top.dipole_abc_debye
-    if vector is None or not top.has_estimated_dipole:
-        return vector_text(vector)
-    return vector_text([round(x, 1) for x in vector]) + " (estimated)"
+    estimated = top.has_estimated_dipole and top.dipole_abc_debye is not None
+    return vector_text(known_dipole(top.dipole_abc_debye, estimated)) + (" (estimated)" if estimated else "")
 
 
 def tensor_text(top: Top) -> str:

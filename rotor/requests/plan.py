@@ -19,10 +19,8 @@ LONG_SEARCH = 10.0  # seconds; a shorter search is repeated, since its first run
 T = TypeVar("T")
 MOST_LEFT_OUT = 4  # lines of what a calculation leaves out
 SMALL = 0.1  # of the largest effect: smaller ones are named without a line of their own
-ENOUGH_SECONDS, LARGER = (
-    0.05,
-    3,
-)  # shortest call that is extrapolated, and growth of the size until a call takes so long
+ENOUGH_SECONDS = 0.05  # shortest call that is extrapolated
+LARGER = 3  # growth of the size until a call takes so long
 
 
 @dataclass(frozen=True)

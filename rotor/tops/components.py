@@ -53,9 +53,14 @@ def dipole_vector(vector: ArrayLike | None) -> Vector | None:
     return float(values[0]), float(values[1]), float(values[2])
 
 
+def known_dipole(vector: Vector | None, estimated: bool) -> Vector | None:
+    """A dipole as it is shown: an estimated one has one decimal, since its error is 0.2 D."""
+    return dipole_vector(np.round(vector, 1)) if vector is not None and estimated else vector
+
+
 def dipole_line(vector: Vector | None, estimated: bool) -> str:
-    """A dipole in D; an estimated one has one decimal, since its error is 0.2 D."""
-    if vector is None:
+    """A dipole in D."""
+    shown = known_dipole(vector, estimated)
+    if shown is None:
         return "not known"
-    decimals, source = (1, " (estimated)") if estimated else (10, "")
-    return ", ".join(f"{round(mu, decimals) + 0.0:.5g}" for mu in vector) + f" D{source}"
+    return ", ".join(f"{mu + 0.0:.5g}" for mu in shown) + (" D (estimated)" if estimated else " D")

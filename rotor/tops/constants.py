@@ -125,11 +125,20 @@ class Constants:
     def line(self, estimated: Mapping[str, float]) -> str:
         """Kind, A, B, C in MHz with the digits that estimated errors leave, and the number of distortion constants."""
         form = ", ".join(filter(None, (self.reduction and f"{self.reduction}-reduction", self.representation)))
+        rest = f", {self.distortion_count} of distortion" if self.distortion_count else ""
+        return f"{self.kind}: {self.rigid_text(estimated)}{rest}{f' ({form})' if form else ''}"
+
+    def rigid_text(self, estimated: Mapping[str, float]) -> str:
+        """A, B, C in MHz with the digits that estimated errors leave."""
         rigid = [name for name in self.values if name in RIGID]
-        text = ", ".join(f"{name} {known_digits(self.values[name], estimated.get(name), 10)}" for name in rigid)
-        more = len(self.values) - len(rigid)
-        rest = f", {more} of distortion" if more else ""
-        return f"{self.kind}: {text} MHz{rest}{f' ({form})' if form else ''}"
+        return (
+            ", ".join(f"{name} {known_digits(self.values[name], estimated.get(name), 10)}" for name in rigid) + " MHz"
+        )
+
+    @property
+    def distortion_count(self) -> int:
+        """Number of distortion constants."""
+        return len(self.values.keys() - RIGID)
 
     def html_table(self, estimated: Mapping[str, float]) -> str:
         """Names, values and errors as a table in HTML; an estimated error leaves fewer digits."""

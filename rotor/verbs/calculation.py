@@ -51,10 +51,9 @@ class Calculation:
     def inputs(self) -> tuple[Any, Subject]:
         """The request, checked as far as possible before the calculation, and its subject."""
         verb, work, entered = self.verb, self.work, self.entries.values
-        given = {name for name, value in entered.items() if value is not None} | {
-            f"{OUTPUTS}{name}" for name in work.files
-        }
-        refuse_misfits(verb.named, given, self.entries.style)
+        inputs = {name for name, value in entered.items() if value is not None}
+        files = {f"{OUTPUTS}{name}" for name in work.files}
+        refuse_misfits(verb.named, inputs | files, self.entries.style)
         request, subject = verb.read(self.entries, Place(self.folder, work.note))
         if missing := next((each.flag for each in verb.outputs if each.required and each.name not in work.files), ""):
             raise ValueError(f"{missing} is missing; --help shows what the command takes")

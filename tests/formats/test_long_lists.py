@@ -46,6 +46,19 @@ def _in_memory(call, monkeypatch, *arguments):
         return call(*arguments)
 
 
+def _recorded(patch, module, name, measure):
+    """A list with `measure` of the arguments of each call of a function of a module."""
+    seen, true = [], getattr(module, name)
+
+    def recording(*arguments):
+        result = true(*arguments)
+        seen.append(measure(*arguments))
+        return result
+
+    patch.setattr(module, name, recording)
+    return seen
+
+
 def test_a_long_list_is_the_same_in_every_format(call, folder, monkeypatch, short):
     code, out, err = call(*TYPED, "--cat", "a.cat", "--parquet", "a.parquet")
     assert (code, err) == (0, "")
@@ -93,8 +106,7 @@ def test_few_lines_above_a_cut_are_made_in_memory(call, folder, monkeypatch, sho
     """Some 1,400 of 14,000 transitions: as many lines as a list in memory may have, or one less."""
     typed = [word if word != "none" else "-6" for word in TYPED]
     lines = _in_memory(call, monkeypatch, *typed, "--cat", "a.cat")[1].split("lines ")[1].split(",")[0].strip()
-    made = []
-    monkeypatch.setattr(long_lists, "_sorted", lambda *job, true=long_lists._sorted: made.append(1) or true(*job))
+    made = _recorded(monkeypatch, long_lists, "_sorted", lambda *job: job)
     for most, disk in ((int(lines), 0), (int(lines) - 1, 1)):
         monkeypatch.setattr(long_lists, "LINES_IN_MEMORY", dict.fromkeys(long_lists.LINES_IN_MEMORY, most))
         monkeypatch.setattr(long_lists, "BEFORE_CUT", 1000)
@@ -121,12 +133,11 @@ def test_a_long_list_with_spins_is_the_one_in_memory(call, folder, monkeypatch, 
     constants, spins, dipole, jmax, cut = SPINS[name]
     typed = ("spectrum", "--constants", constants, "--spin-constants", spins, "--dipole-abc", dipole, "--jmax", str(jmax),
              "--min-lgint", cut, "--q", "1e5", "--hyperfine")  # fmt: skip
-    made, true = [], streamed_lines._make_piece
     monkeypatch.setattr(long_lists, "LINES_IN_MEMORY", dict.fromkeys(long_lists.LINES_IN_MEMORY, 100))
     with monkeypatch.context() as patch:
         defaults = streamed_lines.sorted_lines.__kwdefaults__ | {"piece_lines": 300}
         patch.setattr(streamed_lines.sorted_lines, "__kwdefaults__", defaults)
-        patch.setattr(streamed_lines, "_make_piece", lambda *job: (made.append(job[1:]), true(*job)))
+        made = _recorded(patch, streamed_lines, "_make_piece", lambda *job: job[1:])
         code, out, _ = call(*typed, "--cat", "a.cat")
     assert code == 0
     assert len(made) > 2
@@ -233,14 +244,9 @@ def test_a_piece_of_many_lines_is_written_in_parts(call, folder, monkeypatch, sh
     """One F of J = 300 has 3.6 million lines with one 14N, whose columns took 0.55 GB at once."""
     from rotor.formats import streamed_lines
 
-    sizes, true = [], streamed_lines.copy_columns
     with monkeypatch.context() as patch:
         patch.setattr(streamed_lines, "_BATCH", 300)
-        patch.setattr(
-            streamed_lines,
-            "copy_columns",
-            lambda columns, path, options: (sizes.append(len(columns["lgint"])), true(columns, path, options)),
-        )
+        sizes = _recorded(patch, streamed_lines, "copy_columns", lambda columns, *_: len(columns["lgint"]))
         assert call(*TYPED, "--cat", "a.cat")[0] == 0
     assert len(sizes) > 20
     assert max(sizes) == 300
@@ -268,17 +274,9 @@ def test_a_list_is_sorted_in_ranges_of_frequency(call, folder, monkeypatch, shor
 
     from rotor.formats import sorted_pieces
 
-    sizes, true = [], sorted_pieces.run
     with monkeypatch.context() as patch:
         patch.setattr(sorted_pieces, "SORTED_LINES", 1000)
-        patch.setattr(
-            sorted_pieces,
-            "run",
-            lambda engine, text, file: (
-                true(engine, text, file),
-                sizes.append(sorted_pieces.row_count(engine, [file])),
-            ),
-        )
+        sizes = _recorded(patch, sorted_pieces, "run", lambda engine, _, file: sorted_pieces.row_count(engine, [file]))
         assert call(*TYPED, f"--{form}", f"a.{form}")[0] == 0
     assert len(sizes) > 10
     assert max(sizes) < 2000  # of approximate quantiles
@@ -295,7 +293,7 @@ def test_a_list_is_sorted_in_ranges_of_frequency(call, folder, monkeypatch, shor
 
 
 def test_a_list_that_is_sorted_is_not_made_again(call, folder, monkeypatch, short):
-    """Interrupted while a file is written: no piece is solved again, and the pieces take no room beside the sorted list."""
+    """Interrupted while a file is written: no piece is solved again, and the pieces take no space on the disk beside the sorted list."""
     from rotor.formats import streamed_lines
 
     def stop(*_):

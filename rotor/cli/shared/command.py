@@ -51,13 +51,12 @@ def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]
     identities = {re.sub(r"\W", "_", field.flag.strip("-").lower()) + "_": name for name, field in options.items()}
 
     def call(context: typer.Context, help_all: bool = False, **typed: Any) -> None:
+        """Refuse empty texts and repeated single values, and run the verb with the others by identity."""
         texts = {}
         for name, value in typed.items():
             if value is not None and value != [] and value != ():
-                field, several = (
-                    options[identities[name]],
-                    tuple(value) if isinstance(value, list | tuple) else (value,),
-                )
+                field = options[identities[name]]
+                several = tuple(value) if isinstance(value, list | tuple) else (value,)
                 if any(isinstance(text, str) and not text.strip() for text in several):
                     raise ValueError(
                         f"{field.flag}: the text given is empty; expected one that is not, or leave it out"
