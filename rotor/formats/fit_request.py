@@ -201,7 +201,7 @@ def lines_request(
     name = lines if isinstance(lines, str) else read.source
     names = list(has.uncertainties) if free is None else list(free)
     if not names:
-        raise ValueError("free: name the constants to fit, such as A,B,C,DeltaJ; those of the start have no errors")
+        raise ValueError(f"free: name the constants to fit, such as A,B,C,DeltaJ; {_without_errors(start)}")
     try:
         begin = with_names(has, names)
     except ValueError as error:
@@ -225,6 +225,13 @@ def lines_request(
     return FitRequest(
         read, begin, fitted, FitOptions(), title, files, ties=tuple(ties), priors_mhz=priors, notes=tuple(notes)
     )
+
+
+def _without_errors(start: str | None) -> str:
+    """Why the start does not say which constants are free."""
+    if start is None or not start.lower().endswith(".par"):
+        return "those of the start have no errors"
+    return f"a start gives values alone, and the free parameters of {start} are fitted to its .lin by rotor fit {start}"
 
 
 def constants_for(lines: Any, top: Top, free: Sequence[str]) -> ConstantSet:

@@ -137,7 +137,7 @@ def _draw_direction(axes: Any, view: Any, path: Floats) -> None:
 def _mark_period(axes: Any, first: float, last: float, period: float) -> None:
     if last - first > period:
         axes.axvline(first + period, color="0.6", linewidth=0.8, linestyle="--", zorder=0)
-        axes.text(first + period, -1.0, " period", fontsize=9, color="0.4", ha="left", va="center")
+        axes.text(first + period, -1.24, " period", fontsize=9, color="0.4", ha="left", va="bottom")
 
 
 def _draw_right(axes: Any, moments: Floats, times: Floats, path: Floats, names: tuple[str, str, str]) -> None:
@@ -145,7 +145,7 @@ def _draw_right(axes: Any, moments: Floats, times: Floats, path: Floats, names: 
     for axis, name in enumerate(names):
         colour = (SMALL, MIDDLE, LARGE)[rank[axis]]
         axes.plot(times, path[:, axis], color=colour, linewidth=1.3, label=rf"$L_{{\mathrm{{{name}}}}}$")
-    axes.set(ylim=(-1.12, 1.12), yticks=(-1, -0.5, 0, 0.5, 1))
+    axes.set(ylim=(-1.28, 1.12), yticks=(-1, -0.5, 0, 0.5, 1))
     if times[-1] > times[0]:
         axes.set_xlim(times[0], times[-1])
     axes.grid(True, color="0.92", linewidth=0.6)

@@ -140,6 +140,8 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:
         raise NamedError(
             "{temperature_k} and {state}: give one of them; the molecules of one level have no temperature"
         )
+    if "m" in (values.get("state") or {}):
+        raise NamedError("{state}: a level has all M, and one |M| of it is given by {m}")
     if values.get("state") is not None and values.get("classical_molecules"):
         subject.note("the classical gas is at the temperature of --temperature, not in the level of --state")
     return AlignRequest(**subject.values, **values)

@@ -202,6 +202,10 @@ def test_every_kind_of_pulse(call, options):
     ("arguments", "message"),
     [
         (("align", "OCS"), "no pulse"),
+        (
+            ("align", "OCS", *SHORT[:2], "--state", "j=1,m=0"),
+            "--state: a level has all M, and one |M| of it is given by --m",
+        ),
         (("align", "OCS", "--pulse", "1e13 W/cm2"), "--pulse: '1e13 W/cm2': expected 2 to 3 numbers"),
         (("align", "OCS", "--pulse", "1e13 MHz, 1 ps"), "--pulse: peak: '1e13 MHz'"),
         (("align", "OCS", "--pulse", "1e13 W/cm2, 1 MHz"), "--pulse: fwhm: '1 MHz'"),

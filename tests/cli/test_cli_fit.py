@@ -133,6 +133,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
         (("co.par", "--free", "B"), "--free: a .par file states the free"),
         (("co.csv",), "either --start or --constants"),
         (("co.csv", "--constants", "B=57000 MHz"), "--free: name the constants to fit"),
+        (("co.csv", "--start", "co.par"), "the free parameters of co.par are fitted to its .lin by rotor fit co.par"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,"), "names parted by commas"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B,B"), "B is named twice"),
         (("co.csv", "--constants", "B=57000 MHz", "--free", "B", "--prior", "B"), "--prior 'B': name=error"),

@@ -190,6 +190,14 @@ def test_a_long_motion_is_cut_and_said_to_be():
     )  # a period to 1e-15, shown doubled
 
 
+def test_the_word_period_stands_below_the_curves():
+    right = polhode_figure(free_motion([0.6, 0.8, 1.0], [0.1, 2.0, 0.1]), [0.0, 40.0]).axes[1]
+    right.figure.canvas.draw()
+    (word,) = (text for text in right.texts if "period" in text.get_text())
+    box = word.get_window_extent().transformed(right.transData.inverted())
+    assert right.get_ylim()[0] < box.y0 < box.y1 < -1.0 < min(line.get_ydata().min() for line in right.lines[:3])
+
+
 def test_the_same_picture_is_the_same_file_and_has_provenance(tmp_path):
     motion = free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9])
     for suffix in ("png", "svg", "pdf"):
