@@ -18,6 +18,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -227,6 +229,20 @@ def bond_rotation(molecule: Molecule, bond: str) -> BondRotation:
                 "name a bond with atoms off its line on both sides"
             )
     return BondRotation(molecule, first, last, np.array(sorted(top)), np.array(sorted(frame)))
+
+
+def turning_bonds(molecule: Molecule) -> Iterator[str]:
+    """The bonds about which `bond_rotation` turns a group, by their atoms.
+
+    >>> import rotor
+    >>> list(turning_bonds(rotor.read("CH3CHO").molecule))
+    ['2-4 (C-C)']
+    """
+    for first, neighbours in enumerate(bonded_atoms(molecule)):
+        for last in neighbours[neighbours > first].tolist():
+            with suppress(ValueError):
+                bond_rotation(molecule, f"{first + 1}-{last + 1}")
+                yield f"{first + 1}-{last + 1} ({molecule.symbols[first]}-{molecule.symbols[last]})"
 
 
 def _numbers(molecule: Molecule, bond: str) -> tuple[int, int]:

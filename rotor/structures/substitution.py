@@ -19,7 +19,7 @@ from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.point_group import molecule_symmetry
 from rotor.structures.coordinates import Named, bonds_and_angles
 from rotor.structures.family import PLANAR_WITHIN_ANGSTROM, Family, Species
-from rotor.structures.kraitchman import PAIRS, Substituted, kraitchman
+from rotor.structures.kraitchman import PAIRS, SHAPES, Substituted, kraitchman
 
 ROUND_OFF = 1e-9  # component of a unit vector along an axis below which it is 0
 ON_AXIS_ANGSTROM = 1e-3  # distance from the figure axis of a symmetric top below which an atom is on it
@@ -151,6 +151,7 @@ def _substituted(family: Family, species: Species, atom: int, ours: Floats, pair
     )
     directions = _directions(family.top.kind, ours[atom])
     allowed = np.linalg.norm(directions @ _site_projector(family, ours, atom), axis=1) > 0.5  # 1 or 0 within round-off
+    allowed &= np.isin(np.arange(3), SHAPES[shape])
     directions = np.where(allowed[:, None], directions, 0.0)
     return SubstitutedAtom(atom + 1, species.name, solution, directions)
 

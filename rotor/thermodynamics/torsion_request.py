@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_positive, require_top
-from rotor.molecules.bond_rotation import BondRotation, bond_rotation
+from rotor.molecules.bond_rotation import BondRotation, bond_rotation, turning_bonds
 from rotor.molecules.bond_scan import MMFF, POINTS, BondScan
 from rotor.quantum.bond_torsion import BondTorsion
 from rotor.requests.budget import ErrorBudget, ErrorTerm
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from rotor.thermodynamics.classical_torsion import ClassicalTorsion
     from rotor.tops.top import Top
 
+MOST_BONDS = 6  # in an error
 TEMPERATURES_K = (50.0, 100.0, 200.0, 298.15, 400.0, 600.0, 800.0, 1000.0)
 SAME_WELLS = 0.05  # largest difference between the well probabilities of the two components of a tunnelling doublet
 SHARED = 0.75  # largest probability in one well for a component of a tunnelling doublet
@@ -104,7 +106,9 @@ class TorsionRequest:
         if self.top.molecule is None:
             raise ValueError("bond: constants alone have no bonds; give a molecule with its geometry")
         if not self.bond:
-            raise ValueError("bond: none is named; give two atom numbers, such as 1-2")
+            bonds = ", ".join(islice(turning_bonds(self.top.molecule), MOST_BONDS))
+            turn = f"groups turn about {bonds}" if bonds else "nothing turns about any bond of this molecule"
+            raise ValueError(f"bond: none is named; give two atom numbers, such as 1-2; {turn}")
         if not len(self.temperatures_k):
             raise ValueError("temperatures_k: expected at least one temperature")
         for temperature in self.temperatures_k:

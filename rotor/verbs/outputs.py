@@ -98,13 +98,14 @@ class Output:
 class Files:
     """Requested files by the name of the output: checked before the work, written together after it.
 
-    called: how errors name them. growing: outputs that are written during the work. on_screen: outputs that go to standard output.
+    called: how errors name them. growing: outputs that are written during the work. on_screen: the output that goes to standard output
+    in place of the report, if any.
     """
 
     paths: dict[str, tuple[Path, ...]] = field(default_factory=dict)
     called: dict[str, str] = field(default_factory=dict)
     growing: set[str] = field(default_factory=set)
-    on_screen: set[str] = field(default_factory=set)
+    on_screen: list[str] = field(default_factory=list)
 
     @property
     def names(self) -> list[str]:

@@ -249,3 +249,13 @@ def test_files_written_are_listed_after_the_report(call, folder):
     assert out.splitlines()[-1].split(maxsplit=1) == ["files", "a.csv, a.png, a.toml, a.json"]
     assert "files" not in call("levels", "OCS")[1].split()
     assert json.loads(call("levels", "OCS", "--csv", "a.csv", "--json", "-")[1])["files"] == ["a.csv"]
+
+
+def test_a_table_goes_to_standard_output(call, folder):
+    assert call("levels", "OCS", "--jmax", "3", "--csv", "a.csv")[0] == 0
+    code, out, _ = call("levels", "OCS", "--jmax", "3", "--csv", "-")
+    assert (code, out) == (0, (folder / "a.csv").read_text(encoding="utf-8"))
+    code, _, err = call("levels", "OCS", "--csv", "-", "--json", "-")
+    assert (code, err.rstrip()) == (2, "error: --csv - and --json -: one of them can go to standard output")
+    assert "--parquet -: the name must end in .parquet" in call("levels", "OCS", "--parquet", "-")[2]
+    assert "--csv -: the name must end in .csv" in call("fluid", "water", "--csv", "-")[2]  # written during the run

@@ -100,6 +100,7 @@ REFUSED = [
     (("spectrum", "water", "--q", "50 %"), "--q: '50 %': expected plain numbers here, without the unit '%'"),
     (("emission", "CO", *WINDOW, "--redshift", "50 %"), "--redshift: '50 %': expected plain numbers here"),
     (("zeeman", "HC3N", "--field", "1T", "--g", "50 %"), "--g: '50 %': expected plain numbers here"),
+    (("zeeman", "HC3N", "--field", "1T", "--g", "3620"), "g: 3620 is no g of the rotation"),
     (("isotopologues", "water", "--min-abundance", "1 K"), "--min-abundance: '1 K': expected plain numbers here"),
     (("accuracy", "s.toml", "--seconds", "20 V"), "--seconds: '20 V': unit 'V' is not a known unit"),
     (("tumble", "water", "--angular-momentum", "0,1,9 V"), "--angular-momentum: '0,1,9 V': unit 'V' is not a known unit"),

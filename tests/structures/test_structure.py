@@ -381,7 +381,9 @@ def test_impossible_families_are_refused(measured, message):
 
 
 def test_the_substitution_structure_of_ocs():
-    values = {value.name: value for value in substitution_structure(family(OCS, OCS_SPECIES)).values}
+    structure = substitution_structure(family(OCS, OCS_SPECIES))
+    assert all(atom.zero_by_symmetry == (False, True, True) for atom in structure.atoms)
+    values = {value.name: value for value in structure.values}
     assert values["r(O1-C2)"].value == pytest.approx(1.16054, abs=1e-5)  # digits as published
     assert values["r(C2-S3)"].value == pytest.approx(1.55967, abs=1e-5)
     assert 0.001 < values["r(O1-C2)"].error < 0.005  # Costain's rule

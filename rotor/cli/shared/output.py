@@ -34,17 +34,31 @@ def note(text: str) -> None:
 def deliver(
     files: Files, writers: Mapping[str, Callable[[Path], None]], json: Callable[[], str], show: Callable[[], None]
 ) -> None:
-    """Write all files, the JSON among them, then print the JSON if requested, else the report by `show`.
+    """Write all files, the JSON among them, then print the JSON or the table that goes to standard output, else the report by `show`.
 
     Raises NoAnswerError at the end for files whose format cannot hold the result.
     """
     left_out = files.write({**writers, "json": lambda path: write_text(path, json())}, leave_out=True)
-    if files.on_screen:
+    if not files.on_screen:
+        show()
+    elif files.on_screen == ["json"]:
         print(json(), end="")
     else:
-        show()
+        print_table(writers[files.on_screen[0]])
     if left_out:
         raise NoAnswerError("; ".join(left_out))
+
+
+def print_table(write: Callable[[Path], None]) -> None:
+    """Print what a function writes as CSV."""
+    from shutil import copyfileobj
+    from tempfile import TemporaryDirectory
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "table.csv")
+        write(path)
+        with path.open(encoding="utf-8", newline="") as lines:
+            copyfileobj(lines, sys.stdout)
 
 
 def write_text(path: Path, text: str) -> None:

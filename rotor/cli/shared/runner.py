@@ -140,14 +140,21 @@ def files_of_options(verb: Verb, typed: Mapping[str, Any]) -> Files:
     files = Files(growing={output.name for output in verb.outputs if output.grows})
     for output in verb.outputs:
         paths = typed.get(output.name, ())
+        if paths == "-" and ".csv" in output.suffixes and not output.grows:
+            files.on_screen.append(output.name)
+            continue
         for path in paths if isinstance(paths, tuple) else (paths,):
             files.add(output.name, output.flag, path, output.suffixes)
     if "save_scene" in typed:
         files.add("save_scene", "--save-scene", typed["save_scene"], (".toml",))
     if typed.get("json") == "-":
-        files.on_screen.add("json")
+        files.on_screen.append("json")
     elif "json" in typed:
         files.add("json", "--json", typed["json"], (".json",))
+    if len(files.on_screen) > 1:
+        raise ValueError(
+            f"{' and '.join(f'--{name} -' for name in files.on_screen)}: one of them can go to standard output"
+        )
     files.lock(HELD)
     return files
 

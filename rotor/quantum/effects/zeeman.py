@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 HIGHEST_TESLA = 1000.0
+MOST_G = 100.0  # of the rotation, in nuclear magnetons per ħ
 MAGNETIC = FieldKind(
     "T", "fields_tesla", "field_tesla", "moment_nuclear_magnetons", NUCLEAR_MAGNETON_MHZ_PER_T, HIGHEST_TESLA
 )
@@ -155,10 +156,16 @@ def magnetic_map_request(
 
 
 def checked_g(top: Top, g: ArrayLike) -> Floats:
-    """The g tensor (3, 3) along a, b, c; ValueError unless it is finite and fits the kind of top."""
+    """The g tensor (3, 3) along a, b, c; ValueError unless its elements are at most `MOST_G` and it fits the kind of top."""
     if top.kind == "spherical":
         raise ValueError("a spherical top has an isotropic g: E = E0 - g μ_N B M; no map is needed")
-    return _axial_tensor(top, g, "g")
+    tensor = _axial_tensor(top, g, "g")
+    if np.abs(tensor).max() > MOST_G:
+        raise ValueError(
+            f"g: {np.abs(tensor).max():g} is no g of the rotation, a moment in nuclear magnetons per ħ: nuclei that turn give Z/A, at most "
+            f"1, and electrons take from it or add to it; expected at most {MOST_G:g}"
+        )
+    return tensor
 
 
 def _axial_tensor(top: Top, values: ArrayLike, name: str) -> Floats:
