@@ -9,16 +9,20 @@ import gzip
 import os
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from itertools import chain
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import Floats, copy_rows
 from rotor.formats.atomic_write import atomic_path
 from rotor.formats.provenance import provenance_record, write_beside
-from rotor.formats.spcat.text.cat import format_lines, write_cat
+from rotor.formats.spcat.text.cat import Between, format_chunks, state_texts, write_cat
 from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.spcat.text.fields import BLANK
+from rotor.formats.spcat.text.rows import StateTexts
 from rotor.spectra.lines import Lines
 
 if TYPE_CHECKING:
@@ -29,9 +33,10 @@ if TYPE_CHECKING:
 MAX_QUANTA = 9  # the last digit of QNFMT counts them
 _BEFORE_SPINS = ("n", "j", "k", "ka", "kc", "v")
 _IN_A_CATALOGUE = (*_BEFORE_SPINS, "i_sym", "i_tot", *(f"f{i}" for i in range(1, 9)), "f")
-PIECE = 1 << 15  # lines of a long list that are converted into text at once
+PIECE = 1 << 14  # lines of a long list that are converted into text at once
 
 Settings = Mapping[str, Any]
+T = TypeVar("T")
 
 
 def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
@@ -40,9 +45,19 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
     Lines of zero strength have no logarithm and are left out; ERR is 0 where no uncertainty is known.
     Raises ValueError for a tag that has no place in its six digits, and for quantum numbers that the format has not.
     """
+    return _catalogue(*_with_logarithm(lines), tag)
+
+
+def _with_logarithm(lines: Lines) -> tuple[Lines, Floats]:
+    """The lines whose intensity has a logarithm, and it."""
     lgint = lines.lgint
     if not np.isfinite(lgint).all():
         lines, lgint = lines.where(np.isfinite(lgint)), lgint[np.isfinite(lgint)]
+    return lines, lgint
+
+
+def _catalogue(lines: Lines, lgint: Floats, tag: int) -> Catalogue:
+    """The lines with these intensities as a catalogue."""
     numbers = {
         "frequency_mhz": lines.frequency_mhz,
         "lgint": lgint,
@@ -53,7 +68,8 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
         numbers["error_mhz"] = np.nan_to_num(error, nan=0.0)
     quanta, qnfmt = as_printed(lines.levels.quanta, lines.levels.halves)
     linear = lines.levels.kind == "linear"
-    return predicted_catalogue(numbers, quanta[lines.upper], quanta[lines.lower], qnfmt, tag, linear=linear)
+    upper, lower = copy_rows(quanta, lines.upper), copy_rows(quanta, lines.lower)
+    return predicted_catalogue(numbers, upper, lower, qnfmt, tag, linear=linear)
 
 
 def as_printed(quanta: Mapping[str, NDArray[Any]], halves: Collection[str]) -> tuple[NDArray[np.int16], int]:
@@ -104,9 +120,12 @@ def _write_in_pieces(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
     from concurrent.futures import ThreadPoolExecutor
 
     _ = lines.partition, lines.spread  # made once, before the pieces ask for them
+    states = _state_texts(lines, tag) if len(lines.levels) < len(lines) else None
 
-    def text(start: int) -> bytes:
-        return format_lines(catalogue(lines.where(slice(start, start + PIECE)), tag))
+    def text(start: int) -> list[bytes]:
+        piece, lgint = _with_logarithm(lines.where(slice(start, start + PIECE)))
+        between = Between(states, piece.upper, piece.lower) if states else None
+        return list(format_chunks(_catalogue(piece, lgint, tag), between))
 
     opened = gzip.open if os.fspath(path).endswith(".gz") else open
     with (
@@ -114,12 +133,20 @@ def _write_in_pieces(lines: Lines, path: str | os.PathLike[str], tag: int) -> No
         opened(unfinished, "wb") as handle,
         ThreadPoolExecutor(os.cpu_count()) as pool,
     ):
-        handle.writelines(_in_order(pool, text, range(0, len(lines), PIECE)))
+        handle.writelines(chain.from_iterable(_in_order(pool, text, range(0, len(lines), PIECE))))
 
 
-def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], bytes], starts: Iterable[int]) -> Iterator[bytes]:
+def _state_texts(lines: Lines, tag: int) -> StateTexts:
+    """The texts of all levels, each as a line from itself to itself."""
+    rows = np.arange(len(lines.levels), dtype=np.int32)
+    zeros = np.zeros(len(rows))
+    each = replace(lines.where(slice(0)), frequency_mhz=zeros, strength_debye2=zeros, upper=rows, lower=rows)
+    return state_texts(_catalogue(each, zeros, tag))
+
+
+def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], T], starts: Iterable[int]) -> Iterator[T]:
     """make(start) for all starts, in order; the number of pending calls is limited to bound memory."""
-    under_way: deque[Future[bytes]] = deque()
+    under_way: deque[Future[T]] = deque()
     for start in starts:
         under_way.append(pool.submit(make, start))
         if len(under_way) > 2 * (os.cpu_count() or 1):

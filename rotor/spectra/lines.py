@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor import units
-from rotor.arrays import Floats, Ints, rising_order
+from rotor.arrays import Floats, Ints, hold_freed_memory, rising_order
 from rotor.checks import require_positive, require_whole
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect, dipoles_by_state
@@ -351,6 +351,7 @@ def line_list(
     if not first < last:
         raise ValueError(f"range_mhz: {first:g} to {last:g} MHz: expected a range that rises")
     dipole = _top_dipole(top)
+    hold_freed_memory()
     least = -math.inf if min_lgint is None else min_lgint  # no cut: log10 of 0
     stated = line_partition(top, temperature_k, q, vibrational_factor, vibrations, effects)
     if stated is None and (jmax is None or math.isfinite(least)):

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import Indices
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import load
 from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue, Layout
@@ -25,6 +26,7 @@ from rotor.formats.spcat.text.rows import (
     QUANTA,
     Columns,
     Mask,
+    StateTexts,
     Text,
     put_rows,
     take_rows,
@@ -33,6 +35,14 @@ from rotor.formats.spcat.text.rows import (
 _CHUNK = 1 << 14  # lines handled at once: about 1 MB of text, which fits a processor's cache
 _BOM = b"\xef\xbb\xbf"
 _BLANKS = b" \t\r\n\x1a"  # a line of these alone is blank; ^Z ended files under DOS
+
+
+class Between(NamedTuple):
+    """The states that lines are between, (n,) rows of their texts."""
+
+    states: StateTexts
+    upper: Indices
+    lower: Indices
 
 
 def _capped(columns: Columns, decimals: tuple[int, int, int, int]) -> Columns:
@@ -45,12 +55,16 @@ def _length(layout: Layout, width: int) -> int:
     return 80 if width == 6 else QUANTA + 4 * width
 
 
-def _plain_rows(text: Text, columns: Columns, layout: Layout) -> Mask:
+def _plain_rows(text: Text, columns: Columns, layout: Layout, between: Between | None = None) -> Mask:
     """Fill rows (n, full length and line end); true where a row is the line, nothing but blanks cut off its end."""
     width = columns.quanta_upper.shape[1]
     length = _length(layout, width)
     full = max(length, QUANTA + 4 * width)
-    plain = put_rows(text[:, :full], _capped(columns, layout.decimals), layout.decimals)
+    capped = _capped(columns, layout.decimals)
+    if between is None:
+        plain = put_rows(text[:, :full], capped, layout.decimals)
+    else:
+        plain = between.states.put_rows(text, capped, layout.decimals, between.upper, between.lower)
     plain &= (columns.qnfmt >= 0) & (np.maximum(columns.qnfmt % 10, 6) == width)
     if layout.decimals[0] == 4:
         plain &= columns.frequency_mhz < 99999999.0
@@ -110,19 +124,34 @@ def _within_format(record: Record, index: int) -> Record:
     return record._replace(quanta_upper=states[0][:width], quanta_lower=states[1][:width])
 
 
-def format_chunks(catalogue: Catalogue) -> Iterator[bytes]:
-    """The text of a catalogue in pieces of some thousand lines, for lists larger than memory should hold twice."""
+def state_texts(catalogue: Catalogue) -> StateTexts:
+    """The texts of states from a catalogue with a line from each state to itself."""
+    text = _empty_rows(catalogue, len(catalogue))
+    return StateTexts(text, _plain_rows(text, catalogue.rows(0, len(catalogue)), catalogue.layout))
+
+
+def _empty_rows(catalogue: Catalogue, count: int) -> Text:
     layout, width = catalogue.layout, catalogue.quanta_upper.shape[1]
     space = max(_length(layout, width), QUANTA + 4 * width) + len(layout.newline)
-    end = _length(layout, width) + len(layout.newline)
-    buffer = np.empty((min(_CHUNK, len(catalogue)), space), dtype=np.uint8)
+    return np.empty((count, space), dtype=np.uint8)
+
+
+def format_chunks(catalogue: Catalogue, between: Between | None = None) -> Iterator[bytes]:
+    """The text of a catalogue in pieces of some thousand lines, for lists larger than memory should hold twice.
+
+    between: the states of the lines, of which a list has few beside its lines.
+    """
+    layout = catalogue.layout
+    end = _length(layout, catalogue.quanta_upper.shape[1]) + len(layout.newline)
+    buffer = _empty_rows(catalogue, min(_CHUNK, len(catalogue)))
     spelled = np.fromiter(layout.spelling, dtype=np.int64, count=len(layout.spelling))
     yield layout.beginning
     for start in range(0, len(catalogue), _CHUNK):
         stop = min(start + _CHUNK, len(catalogue))
         rows = buffer[: stop - start]
         columns = catalogue.rows(start, stop)
-        plain = _plain_rows(rows, columns, layout)
+        here = between and between._replace(upper=between.upper[start:stop], lower=between.lower[start:stop])
+        plain = _plain_rows(rows, columns, layout, here)
         _wide_rows(rows, columns, layout, plain)
         plain[spelled[(spelled >= start) & (spelled < stop)] - start] = False
         yield from _with_odd_lines(catalogue, start, rows[:, :end], plain)

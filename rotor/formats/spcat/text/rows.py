@@ -9,7 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import Indices
 from rotor.formats.spcat.text.fields import BLANK, QUANTUM_RANGE, spell_degeneracy, spell_quantum
+from rotor.frozen import dataclass
 from rotor.geometry.error_free import halves
 
 Text = NDArray[np.uint8]
@@ -89,7 +91,7 @@ def _put_group(out: Text, table: Text, index: NDArray[np.int64]) -> None:
     """Rows of a table of characters into `out`; four or two characters go as one number."""
     kind = {4: np.uint32, 2: np.uint16}.get(out.shape[1])
     if kind is None:
-        out[:] = table[index]
+        out[:] = table.take(index, axis=0)
     else:
         out.view(kind)[:, 0] = table.view(kind)[:, 0][index]
 
@@ -106,15 +108,33 @@ def _put_natural(out: Text, magnitude: NDArray[np.int64]) -> Mask:
     return np.asarray(left == 0)
 
 
+@cache
+def _signed_table(size: int) -> Text:
+    """Texts of `size` characters, (2 · 10^size, size): numbers without a sign, then the same with a minus where it has a place."""
+    natural = _group_table(size, True)[10**size :]
+    signed = natural.copy()
+    _put_signs(signed, np.arange(10**size), np.arange(10 ** (size - 1)))
+    return np.concatenate([natural, signed])
+
+
+def _put_signs(out: Text, magnitude: NDArray[np.int64], rows: NDArray[np.int64]) -> Mask:
+    """A minus before the first digit of some rows; false where it has no place."""
+    place = out.shape[1] - 2 - np.searchsorted(_TENS, magnitude[rows], side="right")
+    out[rows[place >= 0], place[place >= 0]] = _MINUS
+    return np.asarray(place >= 0)
+
+
 def _put_signed(out: Text, magnitude: NDArray[np.int64], negative: Mask) -> Mask:
     """Whole numbers with their sign, right-justified; false where they need more columns than `out` has."""
+    if (size := out.shape[1]) <= 3:
+        fits = magnitude < np.where(negative, 10 ** (size - 1), 10**size)
+        _put_group(out, _signed_table(size), np.where(fits, magnitude + negative * 10**size, 0))
+        return np.asarray(fits)
     fits = _put_natural(out, magnitude)
     if not negative.any():
         return fits
     rows = np.flatnonzero(negative)
-    sign = out.shape[1] - 2 - np.searchsorted(_TENS, magnitude[rows], side="right")  # before the first digit
-    fits[rows] &= sign >= 0
-    out[rows[sign >= 0], sign[sign >= 0]] = _MINUS
+    fits[rows] &= _put_signs(out, magnitude, rows)
     return fits
 
 
@@ -185,6 +205,29 @@ def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -
             start += 2
     out[:, start:] = _BLANK
     return plain
+
+
+@dataclass(frozen=True, eq=False)
+class StateTexts:
+    """Lines of one state each, as characters: a line between two of them has the fields of both.
+
+    texts: (states, length), each with the state as upper and as lower one. plain: (states,) whether the numbers fit their fields.
+    """
+
+    texts: Text
+    plain: Mask
+
+    def put_rows(
+        self, out: Text, columns: Columns, decimals: tuple[int, int, int, int], upper: Indices, lower: Indices
+    ) -> Mask:
+        """`put_rows` for lines between the states `upper` and `lower`: only numbers of the line itself are converted."""
+        np.take(self.texts, lower, axis=0, out=out, mode="clip")
+        for field in (DEGENERACY, slice(QUANTA, QUANTA + 2 * columns.quanta_upper.shape[1])):
+            out[:, field] = self.texts[:, field].take(upper, axis=0)
+        plain = self.plain[upper] & self.plain[lower]
+        for field, values, places in zip((FREQUENCY, ERROR, LGINT), columns[:3], decimals, strict=False):
+            plain &= _put_field(out[:, field], values, partial(_put_decimal, decimals=places))
+        return np.asarray(plain)
 
 
 @cache

@@ -3,6 +3,7 @@
 import gzip
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -168,6 +169,27 @@ def test_long_lists_come_out_as_short_ones():
     assert format_lines(again) == text
     assert np.array_equal(again.quanta_upper, catalogue.quanta_upper)
     assert np.allclose(again.lgint, catalogue.lgint, rtol=0, atol=5.001e-3)  # below -99.9999 two decimals are left
+
+
+def test_lines_between_states_are_those_of_their_numbers():
+    """A list spells each state once, whatever fits its field or does not; lines are those of the catalogue alone."""
+    rng = np.random.default_rng(9)
+    states = random_catalogue(300, rng)
+    states = replace(states, tag=np.full(300, 18003), qnfmt=np.full(300, 304), quanta_lower=states.quanta_upper)
+    upper, lower = rng.integers(0, 300, (2, 20_000)).astype(np.int32)
+    lines = replace(
+        random_catalogue(20_000, rng),
+        dr=states.dr[lower],
+        energy_lower_cm=states.energy_lower_cm[lower],
+        g_upper=states.g_upper[upper],
+        tag=states.tag[lower],
+        qnfmt=states.qnfmt[lower],
+        quanta_upper=states.quanta_upper[upper],
+        quanta_lower=states.quanta_upper[lower],
+    )
+    texts = cat.state_texts(states)
+    assert 0 < texts.plain.sum() < 300  # both kinds are there
+    assert b"".join(cat.format_chunks(lines, cat.Between(texts, upper, lower))) == format_lines(lines)
 
 
 def test_numbers_too_wide_for_their_decimals():
