@@ -1,7 +1,7 @@
 """Interacting states: levels of all states v whose Wang blocks couplings connect.
 
 Of each J the Wang blocks of all states are the vertices of a graph, whose edges are the operators that connect two of them;
-every connected part is one matrix, real in functions with the factors of `j_operators.phase`, and is solved whole. A
+every connected part is one matrix, real in functions with the factors of `wang.basis.phase`, and is solved whole. A
 level is named after the function of one state and one Wang block, solved by itself, that it overlaps with; names are given one to
 one, so that the sum of all these overlaps is largest. The matrices are those of `basis.state_elements`, which fits and derivatives have
 too, with one parameter: H itself.
@@ -17,14 +17,12 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
-from rotor.quantum.basis.state_elements import StateElements, StateTerms, Summed
-from rotor.quantum.connected import connected_parts
+from rotor.quantum.basis.state_elements import Link, StateElements, StateTerms
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.levels import Levels, SolvedBlock, levels_of_blocks, placed
 from rotor.quantum.one_to_one import match_names
-from rotor.quantum.states import Coupling, OperatorOfJ
+from rotor.quantum.states import Coupling
 from rotor.quantum.wang.basis import Part, blocks_within, names_of, parts_of
-from rotor.quantum.wang.j_operators import JOperator
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
@@ -113,7 +111,8 @@ def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
         j: [(v, b) for v in sorted(model.states) for b in blocks_within(j, frame, limits.get(v))] for j in all_j
     }
     operators = [(v, 0, operators) for v, operators in model.states.items()]
-    terms = StateTerms.from_operators(model.states, operators, _links(model))
+    links = [(0, Link.from_couplings(couplings)) for couplings in _alike(model)]
+    terms = StateTerms.from_operators(model.states, operators, links)
     elements = StateElements(terms, 1, model.representation, vertices)
     by_j: dict[int, list[SolvedBlock]] = {}
     for j in sorted(all_j, reverse=True):
@@ -122,35 +121,26 @@ def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
         zero = float(here.mix[terms.first[0], 0])
         here.mix[list(terms.first.values())] -= zero
         by_j[j] = []
-        for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in here.links]):
-            block = here.block(members)
-            matrix = np.zeros((block.size, block.size))
-            matrix[block.rows, block.columns] = (block.factors @ block.mix).sum(axis=1)
+        for members in here.connected:
+            parts = parts_of([vertices[j][i] for i in members])
+            rows, columns, units, values = here.lower_triangle(members)
+            matrix = np.zeros((parts[-1].place.stop,) * 2)
+            np.add.at(matrix, (rows, columns), values * here.mix[units, 0])
             if not np.isfinite(matrix).all():
                 raise ValueError("a block of the Hamiltonian overflows: J max is too high for these constants")
             energies, vectors = np.linalg.eigh(matrix)  # reads the lower triangle
-            parts = parts_of([vertices[j][i] for i in members])
             labels, mixing = names_of_states(parts, matrix, vectors, model.representation)
             by_j[j].append(SolvedBlock(parts, energies + zero, vectors, labels=labels, mixing=mixing))
     return [block for j in all_j for block in by_j[j]]
 
 
-def _links(model: Model) -> list[tuple[int, Summed]]:
-    """The couplings of two states added up, with each by its name, of the parameter 0, H itself."""
-
-    def summed(couplings: list[tuple[float, Coupling]]) -> OperatorOfJ:
-        def operator(j: int, representation: str) -> JOperator:
-            first, *others = [value * coupling.operator(j, representation) for value, coupling in couplings]
-            for other in others:
-                first = first + other
-            return first
-
-        return operator
-
-    return [
-        (0, (*v, summed(pairs), [(coupling.name, coupling.operator) for _, coupling in pairs]))
-        for v, pairs in model.couplings.items()
-    ]
+def _alike(model: Model) -> list[list[tuple[float, Coupling]]]:
+    """The couplings with their values, those of the same states and factors together, whose sum is one operator."""
+    alike: dict[object, list[tuple[float, Coupling]]] = {}
+    for states, couplings in model.couplings.items():
+        for value, coupling in couplings:
+            alike.setdefault((states, coupling.factors), []).append((value, coupling))
+    return list(alike.values())
 
 
 def names_of_states(

@@ -19,9 +19,9 @@ from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.quantum.moments import Moment
+    from rotor.quantum.operators.algebra import Operator
     from rotor.quantum.spins.scheme import Spin, SpinTerm
-    from rotor.quantum.states import Coupling, OperatorOfJ, State
-    from rotor.quantum.wang.j_operators import JOperator
+    from rotor.quantum.states import Coupling, State
     from rotor.tops.top import Top
 
 
@@ -37,7 +37,7 @@ class QuantumEffect(ABC):
     A subclass gives its parameters and, for each of them, operators of one or more of these kinds:
 
     - `operators`: J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊, by their powers (p, q, n): the fast path, for any kind of top;
-    - `j_operator`: any other Hermitian operator of J, as a `rotor.quantum.wang.j_operators.JOperator`;
+    - `j_operator`: any other Hermitian operator of J, of the algebra in `rotor.quantum.operators`;
     - `spin_terms`: molecule-fixed tensors coupled to spins, with the `spins` they need;
     - `states`, `couplings` and `dipoles`: further vibrational or tunnelling states, and what connects them.
     """
@@ -58,8 +58,8 @@ class QuantumEffect(ABC):
         """∂H/∂c of parameters by powers (p, q, n), by name."""
         return {}
 
-    def j_operator(self, top: Top, name: str, j: int, representation: str) -> JOperator | None:
-        """∂H/∂c of the parameter `name` for one J in |J k⟩ of a representation; None where `operators` has all of it."""
+    def j_operator(self, top: Top, name: str, representation: str) -> Operator | None:
+        """∂H/∂c of the parameter `name` on |J K⟩ of a representation; None where `operators` has all of it."""
         return None
 
     def spins(self, top: Top) -> tuple[Spin, ...]:
@@ -74,8 +74,8 @@ class QuantumEffect(ABC):
         """States beyond the top's own (v = 0), with their numbers v."""
         return ()
 
-    def couplings(self, top: Top) -> tuple[Coupling, ...]:
-        """What connects states of different v."""
+    def couplings(self, top: Top, representation: str) -> tuple[Coupling, ...]:
+        """What connects states of different v, by operators on |J K⟩ of a representation."""
         return ()
 
     def conserved_sums(self, top: Top) -> frozenset[str]:
@@ -149,17 +149,7 @@ def couplings_of(top: Top, effects: Iterable[QuantumEffect], representation: str
 
     couplings: list[Coupling] = []
     for effect in effects:
-        couplings += effect.couplings(top)
-        for name in effect.parameters(top):
-            if effect.j_operator(top, name, 1, representation) is not None:
-                couplings.append(Coupling(name, 0, 0, _operator_of_parameter(effect, top, name)))
+        couplings += effect.couplings(top, representation)
+        named = ((name, effect.j_operator(top, name, representation)) for name in effect.parameters(top))
+        couplings += [Coupling(name, 0, 0, operator) for name, operator in named if operator is not None]
     return couplings
-
-
-def _operator_of_parameter(effect: QuantumEffect, top: Top, name: str) -> OperatorOfJ:
-    def operator(j: int, representation: str) -> JOperator:
-        matrix = effect.j_operator(top, name, j, representation)
-        assert matrix is not None
-        return matrix
-
-    return operator

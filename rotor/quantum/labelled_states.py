@@ -13,7 +13,6 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.basis.state_elements import StateElements, StateTerms, Vertex
-from rotor.quantum.connected import connected_parts
 from rotor.quantum.coupled_levels import names_of_functions, names_of_states
 from rotor.quantum.effect import QuantumEffect, k_limits_of
 from rotor.quantum.label_tracking import Follows, LabelledBlocks, NamedBlock, NamedFunctions, Naming, tracked_blocks
@@ -49,7 +48,7 @@ def labelled_states(
     for j, rows in sorted(rows_of_j.items(), reverse=True):
         here = elements.at(j)
         classes = {(int(v), "eo"[ka % 2] + "eo"[kc % 2]) for _, v, ka, kc in labels[rows].tolist()}
-        for members in connected_parts(len(vertices[j]), [(i, k) for i, k, _ in here.links]):
+        for members in here.connected:
             members_here = [vertices[j][i] for i in members]
             if {(v, block.species) for v, block in members_here} & classes:
                 blocks.append((here.block(members), named(members_here, representation)))

@@ -78,7 +78,7 @@ class SolvedBlock:
     states of coupled blocks v, Ka, Kc (n, 3); with spins v, Ka (K if axial), Kc and the doubled pattern N, J ... F, (n, 3 + pattern).
     mixing: (n,) squared overlaps with the functions that name them. moments: of a species, which has its own; components: 2 where its
     states σ and -σ coincide. spins: the functions of a block of one F (`spins.blocks.SpinFunctions`), which has no other parts. Functions
-    of a coupled block carry the factor of `j_operators.phase`, those of a Wang block without labels do not.
+    of a coupled block carry the factor of `wang.basis.phase`, those of a Wang block without labels do not.
     """
 
     parts: tuple[Any, ...]

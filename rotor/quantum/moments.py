@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 
 DEBYE_PER_BOHR_MAGNETON = 0.009274  # as SPCAT has it; 9.2740101e-3 by CODATA 2018
 
@@ -23,7 +23,7 @@ Vector = tuple[float, float, float]
 Matrix = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
 
-FactorOfK = Callable[[int, Floats, Floats], Floats]  # of J, K' and K''
+FactorOfK = Callable[[Ints, Ints, Ints], Floats]  # of J, K' and K''
 
 
 class Word(NamedTuple):

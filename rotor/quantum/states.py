@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from rotor.frozen import dataclass
-from rotor.quantum.wang.j_operators import JOperator
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.wang.basis import SpeciesFactors
 from rotor.tops.operators import Operators, added
 from rotor.tops.spins.spin_weights import SpinWeights
-
-OperatorOfJ = Callable[[int, str], JOperator]  # (J, representation) -> the operator in |J k⟩
 
 
 @dataclass(frozen=True)
@@ -34,11 +31,12 @@ class State:
 class Coupling:
     """What the parameter `name` of an effect multiplies: |bra⟩⟨ket| ⊗ O + Hermitian conjugate; O alone where bra is ket.
 
-    bra, ket: numbers v of states. operator: O of one J in |J k⟩ of a representation. An operator that time reversal changes
-    in sign (an odd power of J) has a factor i, which belongs to O.
+    bra, ket: numbers v of states. operator: O on |J K⟩ of a representation, which leaves J alone. An operator that time reversal changes
+    in sign (an odd power of J) has a factor i, which belongs to O. factors: what its elements between Wang blocks are multiplied with.
     """
 
     name: str
     bra: int
     ket: int
-    operator: OperatorOfJ
+    operator: Operator
+    factors: SpeciesFactors | None = None

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.wang.j_operators import JOperator, components
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.operators.rotation import components
 from rotor.tops.top import Top
 
 
@@ -26,7 +27,7 @@ class AxisPower(QuantumEffect):
     def size_mhz(self, top: Top, j: int) -> float:
         return abs(self.c_mhz) * float(j) ** 4
 
-    def j_operator(self, top: Top, name: str, j: int, representation: str) -> JOperator:
-        along = components(j, representation)
+    def j_operator(self, top: Top, name: str, representation: str) -> Operator:
+        along = components(representation)
         a, b, c = (n * along[axis] for n, axis in zip(self.axis_abc, "abc", strict=True))
         return (a + b + c) ** 4

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, CodedLine
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_of
 from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, line_moment, split_dipoles
 from rotor.formats.spcat.hamiltonian.file_effect import FileEffect
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l
@@ -291,7 +291,7 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     effect = FileEffect(usable, tuple(numbers), coupled, moments, limits, beside, first.ixx, pairs, axes, turned, apart)
     if pairs:  # raises for operators forbidden between l-doubled states, before levels are solved
         effect.spin_terms(_ANY_TOP)
-        effect.couplings(_ANY_TOP)
+        effect.couplings(_ANY_TOP, basis_of(axes))
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=coded.file.title)
     kmax = states[0].kmax if kind in ("prolate", "oblate") else ALL_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.spind < 0)
@@ -338,14 +338,14 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
         and states[0].linear
         and not oblate  # there its axis is not z
         and all(q == n == 0 for _, q, n in plain)
-        and not any(line.operator.by_j for line in lines)
+        and not any(line.operator.of_n for line in lines)
     ):
         return "linear"
     rotors = [line.operator.rotor for line in lines if line.operator.rotor is not None]
     axis = "c" if oblate else "a"
     good = all(n == 0 for _, _, n in plain) and all(is_axial(rotor, axis) for rotor in rotors)
     whole = alone and states[0].kmin == 0 and states[0].kmax > 0 and states[0].plus == states[0].minus
-    if symmetric and whole and good and states[0].equivalent < 3 and not any(line.operator.by_j for line in lines):
+    if symmetric and whole and good and states[0].equivalent < 3 and not any(line.operator.of_n for line in lines):
         return "oblate" if oblate else "prolate"
     return "asymmetric"
 

@@ -7,33 +7,31 @@ X^p and the factors of its parameters. Couplings of states, and operators of J t
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, distinct
+from rotor.quantum.basis.wang_functions import BetweenStates, WangElements, WangFunctions
+from rotor.quantum.connected import connected_parts
 from rotor.quantum.effect import QuantumEffect, couplings_of
 from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, numbered
-from rotor.quantum.states import OperatorOfJ, State
-from rotor.quantum.wang.basis import NOTHING, Part, WangBlock, parts_of
-from rotor.quantum.wang.j_operators import JOperator, between_blocks
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.states import Coupling, State
+from rotor.quantum.wang.basis import SpeciesFactors, WangBlock, parts_of
 from rotor.tops.operators import Operators, Powers
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-_TRIED_AT = 3  # J at which a pair of kinds of Wang blocks is tried
+_AT_ONCE = 4096  # functions of one state, of neighbouring J, whose links are evaluated together
 Vertex = tuple[int, WangBlock]
-Summed = tuple[
-    int, int, OperatorOfJ, Sequence[tuple[str, OperatorOfJ]]
-]  # states, the sum of operators, and each by its name
 
 
-class WangElements(NamedTuple):
+class UnitElements(NamedTuple):
     """Elements that are not zero: rows, columns, which unit matrix, values."""
 
     rows: Ints
@@ -42,14 +40,26 @@ class WangElements(NamedTuple):
     values: Floats
 
 
-class _Link(NamedTuple):
-    """An operator of J between two states or within one, the unit matrix that it makes, and what it is the sum of, by name."""
+class Link(NamedTuple):
+    """An operator between two states or within one, which makes a unit matrix, and the couplings that it is the sum of."""
 
-    unit: int
     bra: int
     ket: int
-    operator: OperatorOfJ
-    named: Sequence[tuple[str, OperatorOfJ]]
+    operator: Operator
+    factors: SpeciesFactors | None
+    couplings: Sequence[Coupling]
+
+    @classmethod
+    def from_couplings(cls, weighted: Sequence[tuple[float, Coupling]]) -> Link:
+        """The sum of couplings of the same states with the same factors, each times a number; ValueError for an operator that changes J."""
+        _, first = weighted[0]
+        for _, coupling in weighted:
+            if changed := {label for each in coupling.operator.shifts for label, _ in each.change} - {"K"}:
+                raise ValueError(
+                    f"{coupling.name}: the operator changes {', '.join(sorted(changed))}; within states it changes K alone"
+                )
+        total = Operator(tuple(each for value, coupling in weighted for each in (value * coupling.operator).shifts))
+        return cls(first.bra, first.ket, total, first.factors, [coupling for _, coupling in weighted])
 
 
 class StateTerms(NamedTuple):
@@ -66,7 +76,7 @@ class StateTerms(NamedTuple):
     columns: Ints
     p: Ints
     factors: Floats
-    links: tuple[_Link, ...]
+    links: tuple[Link, ...]
 
     @classmethod
     def from_effects(
@@ -79,12 +89,12 @@ class StateTerms(NamedTuple):
             (state.v, place[name], terms) for state in states for name, terms in state.terms.items() if name in place
         ]
         couplings = [c for c in couplings_of(top, effects, representation) if c.name in place]
-        links = [(place[c.name], (c.bra, c.ket, c.operator, [(c.name, c.operator)])) for c in couplings]
+        links = [(place[c.name], Link.from_couplings([(1.0, c)])) for c in couplings]
         return cls.from_operators([state.v for state in states], operators, links)
 
     @classmethod
     def from_operators(
-        cls, states: Iterable[int], operators: Sequence[tuple[int, int, Operators]], links: Sequence[tuple[int, Summed]]
+        cls, states: Iterable[int], operators: Sequence[tuple[int, int, Operators]], links: Sequence[tuple[int, Link]]
     ) -> StateTerms:
         """The terms of operators, each with its state and parameter, and of links, each with its parameter."""
         powers = ((0, 0), *sorted({(q, n) for _, _, terms in operators for _, q, n in terms} - {(0, 0)}))
@@ -98,8 +108,7 @@ class StateTerms(NamedTuple):
         rows += [(number, parameter, 0, 1.0) for number, (parameter, _) in zip(units, links, strict=True)]
         unit, column, p = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
         factors = np.array([row[3] for row in rows], dtype=float)
-        numbered_links = tuple(_Link(number, *link) for number, (_, link) in zip(units, links, strict=True))
-        return cls(powers, first, unit, column, p, factors, numbered_links)
+        return cls(powers, first, unit, column, p, factors, tuple(link for _, link in links))
 
     @property
     def linked(self) -> list[int]:
@@ -122,7 +131,7 @@ class StateTerms(NamedTuple):
         return out
 
 
-def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict[WangBlock, WangElements]:
+def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> dict[WangBlock, UnitElements]:
     """The unit matrices of one state, those of `powers`, over every Wang block: lower triangles."""
     if not blocks:
         return {}
@@ -144,81 +153,19 @@ def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> 
     out = {}
     for number, block in enumerate(rising):
         chosen = order[bounds[number] : bounds[number + 1]]
-        out[block] = WangElements(i[chosen] + distance[chosen], i[chosen], unit[chosen], value[chosen])
+        out[block] = UnitElements(i[chosen] + distance[chosen], i[chosen], unit[chosen], value[chosen])
     return out
 
 
-class _Joining:
-    """What links connect. Whether two kinds of Wang blocks, E±, O± of two states, are connected is found at the three highest J that have
-    both; these come first."""
+class LinkElements(NamedTuple):
+    """Elements of links between the vertices of one J or of several: numbers of the vertices, places in them, unit matrix, value."""
 
-    def __init__(self, links: Sequence[_Link], representation: str) -> None:
-        self._links, self._representation = links, representation
-        self._tried = defaultdict[tuple[int, int, int, int, int], int](int)
-        self._kinds: set[tuple[int, int, int, int, int]] = set()
-
-    def elements(self, vertices: Sequence[Vertex], j: int) -> list[tuple[int, int, WangElements]]:
-        """Elements between two vertices, those of the bra in rows, or within one, for every link; none for round-off of zero."""
-        linked = list[tuple[int, int, WangElements]]()
-        blocks_by_state: dict[int, list[tuple[int, WangBlock, int]]] = {}
-        for i, (v, block) in enumerate(vertices):
-            blocks_by_state.setdefault(v, []).append((i, block, 2 * (block.first_k % 2) + (block.sign > 0)))
-        for link in self._links:
-            operator = link.operator(j, self._representation)
-            least = NOTHING * max(
-                (float(np.abs(band).max(initial=0.0)) for band in operator.bands.values()), default=0.0
-            )
-            for i, up, kind_up in blocks_by_state.get(link.bra, ()):
-                for k, low, kind_low in blocks_by_state.get(link.ket, ()):
-                    kind = (link.unit, link.bra, kind_up, link.ket, kind_low)
-                    self._tried[kind] += 1
-                    if (self._tried[kind] <= _TRIED_AT or kind in self._kinds) and (
-                        elements := _linked(link, operator, (up, low), least, self._representation)
-                    ):
-                        self._kinds.add(kind)
-                        linked.append((i, k, elements))
-        return linked
-
-
-def _linked(
-    link: _Link, operator: JOperator, blocks: tuple[WangBlock, WangBlock], least: float, representation: str
-) -> WangElements | None:
-    """Elements between two Wang blocks; None where all are below `least`."""
-    up, low = blocks
-    between = between_blocks(up, low, operator)
-    size = np.abs(between)
-    if not size.max() > least:
-        return None
-    if np.abs(between.imag).max() > least:
-        _refuse_imaginary(link, up, low, representation)
-    rows, columns = np.nonzero(size)
-    return WangElements(rows, columns, np.full(len(rows), link.unit), between.real[rows, columns])
-
-
-def _refuse_imaginary(link: _Link, up: WangBlock, low: WangBlock, representation: str) -> None:
-    """ValueError with the name of the coupling, of those added up, that has an imaginary element."""
-    for name, operator in link.named:
-        between = between_blocks(up, low, operator(low.j, representation))
-        if np.abs(between.imag).max() > NOTHING * np.abs(between).max():
-            raise ValueError(
-                f"{name}: the operator is not invariant under time reversal; an odd power of J is Hermitian and allowed "
-                "between two states only, with the factor i"
-            )
-
-
-def _shifted(elements: WangElements, part: Part, first: int) -> WangElements:
-    """Of one state, where its part stands in a block."""
-    rows, columns, units, values = elements
-    return WangElements(rows + part.start, columns + part.start, units + first, values)
-
-
-def _between(elements: WangElements, up: Part, low: Part) -> WangElements:
-    """In the lower triangle of a block; of one state both elements of a pair are there, between two states the one alone."""
-    rows, columns = elements.rows + up.start, elements.columns + low.start
-    if up.v != low.v and up.start < low.start:
-        rows, columns = columns, rows
-    lower = rows >= columns
-    return WangElements(rows[lower], columns[lower], elements.units[lower], elements.values[lower])
+    up: Ints
+    low: Ints
+    rows: Ints
+    columns: Ints
+    units: Ints
+    values: Floats
 
 
 class StateElements:
@@ -229,34 +176,98 @@ class StateElements:
     ) -> None:
         """count: of the parameters."""
         self.terms, self._count = terms, count
-        self._vertices, self._joining = vertices, _Joining(self.terms.links, representation)
+        self._vertices, self._links = vertices, dict[int, LinkElements]()
         self._elements = wang_elements(
             {block for members in vertices.values() for _, block in members}, self.terms.powers
         )
 
     def at(self, j: int) -> ElementsOfJ:
-        """The elements of one J; the highest J come first."""
-        links = self._joining.elements(self._vertices[j], j)
-        return ElementsOfJ(self._vertices[j], links, self.terms.mix(j, self._count), self.terms.first, self._elements)
+        """The elements of one J. The links of lower J beside it are evaluated too, so that J should fall from call to call."""
+        if j not in self._links:
+            self._links = self._linked([i for i in sorted(self._vertices) if 0 <= (j - i) * (2 * j + 1) < _AT_ONCE])
+        mix = self.terms.mix(j, self._count)
+        return ElementsOfJ(self._vertices[j], self._links[j], mix, self.terms.first, self._elements)
+
+    def _linked(self, all_j: Sequence[int]) -> dict[int, LinkElements]:
+        """The elements of all links by J."""
+        members: dict[int, list[tuple[int, int, WangBlock]]] = {}
+        for j in all_j:
+            for number, (v, block) in enumerate(self._vertices[j]):
+                members.setdefault(v, []).append((j, number, block))
+        functions = {v: tuple(block for *_, block in blocks) for v, blocks in members.items()}
+        wang = {blocks: WangFunctions(blocks) for blocks in set(functions.values())}
+        between, pieces = dict[tuple[int, int], BetweenStates](), [np.zeros((6, 0), dtype=np.int64)]
+        values = [np.zeros(0)]
+        for unit, link in enumerate(self.terms.links, len(self.terms.first) * len(self.terms.powers)):
+            if link.bra not in members or link.ket not in members:
+                continue
+            up, low = wang[functions[link.bra]], wang[functions[link.ket]]
+            if (id(up), id(low)) not in between:
+                between[id(up), id(low)] = BetweenStates(up, low)
+            elements = _of_link(link, between[id(up), id(low)])
+            j_up, number_up = np.array([(j, number) for j, number, _ in members[link.bra]]).T
+            number_low = np.array([number for _, number, _ in members[link.ket]])
+            vertices = j_up[elements.up], number_up[elements.up], number_low[elements.low]
+            pieces.append(np.array([*vertices, elements.rows, elements.columns, np.full(len(elements.rows), unit)]))
+            values.append(elements.values)
+        whole, all_values = np.concatenate(pieces, axis=1), np.concatenate(values)
+        order = np.argsort(whole[0], kind="stable")
+        whole, all_values = whole[:, order], all_values[order]
+        first, last = (np.searchsorted(whole[0], all_j, side=side).tolist() for side in ("left", "right"))
+        return {
+            j: LinkElements(*(column[start:stop] for column in (*whole[1:], all_values)))
+            for j, start, stop in zip(all_j, first, last, strict=True)
+        }
+
+
+def _of_link(link: Link, between: BetweenStates) -> WangElements:
+    """Elements of a link; ValueError with the name of the coupling, of those added up, that has an imaginary one."""
+    elements, imaginary = between.elements(link.operator, link.factors)
+    for coupling in link.couplings if imaginary else ():
+        if between.elements(coupling.operator, coupling.factors)[1]:
+            raise ValueError(
+                f"{coupling.name}: the operator is not invariant under time reversal; an odd power of J is Hermitian and allowed "
+                "between two states only, with the factor i"
+            )
+    return elements
 
 
 class ElementsOfJ(NamedTuple):
-    """Elements between the Wang blocks of one J: links by numbers of vertices; mix (units, parameters)."""
+    """Elements between the Wang blocks of one J, its vertices; mix (units, parameters)."""
 
     vertices: Sequence[Vertex]
-    links: list[tuple[int, int, WangElements]]
+    links: LinkElements
     mix: Floats
     first: dict[int, int]
-    within: dict[WangBlock, WangElements]
+    within: dict[WangBlock, UnitElements]
+
+    @property
+    def connected(self) -> list[list[int]]:
+        """The vertices that links connect, each part in rising order."""
+        pairs = distinct(self.links.up * len(self.vertices) + self.links.low)
+        return connected_parts(len(self.vertices), zip(*np.divmod(pairs, len(self.vertices)), strict=True))
+
+    def lower_triangle(self, members: Sequence[int]) -> UnitElements:
+        """The elements of some vertices, one behind the other; of two places those add up that are the same."""
+        start, pieces = np.full(len(self.vertices), -1), list[UnitElements]()
+        for i, part in zip(members, parts_of([self.vertices[i] for i in members]), strict=True):
+            start[i] = part.start
+            rows, columns, units, values = self.within[part.basis]
+            pieces.append(UnitElements(rows + part.start, columns + part.start, units + self.first[part.v], values))
+        state = np.array([v for v, _ in self.vertices])
+        here = np.flatnonzero((start[self.links.up] >= 0) & (start[self.links.low] >= 0))
+        up, low, units = (column[here] for column in (self.links.up, self.links.low, self.links.units))
+        rows, columns = start[up] + self.links.rows[here], start[low] + self.links.columns[here]
+        turned = (state[up] != state[low]) & (rows < columns)  # of one state both elements of a pair are there
+        rows, columns = np.where(turned, columns, rows), np.where(turned, rows, columns)
+        lower = rows >= columns
+        pieces.append(UnitElements(rows[lower], columns[lower], units[lower], self.links.values[here][lower]))
+        return UnitElements(*(np.concatenate(column) for column in zip(*pieces, strict=True)))
 
     def block(self, members: Sequence[int]) -> LinearBlock:
         """The block of some vertices, one behind the other."""
-        parts = parts_of([self.vertices[i] for i in members])
-        place = dict(zip(members, parts, strict=True))
-        pieces = [_shifted(self.within[part.basis], part, self.first[part.v]) for part in parts]
-        pieces += [_between(link, place[i], place[k]) for i, k, link in self.links if i in place and k in place]
-        rows, columns, units, values = (np.concatenate(column) for column in zip(*pieces, strict=True))
-        size = parts[-1].place.stop
+        rows, columns, units, values = self.lower_triangle(members)
+        size = sum(self.vertices[i][1].size for i in members)
         places, position = numbered(rows * size + columns, size * size)
         used, column = numbered(units, len(self.mix))
         factors = np.zeros((len(places), len(used)))
@@ -286,12 +297,12 @@ def blocks_of_terms(
     members, by_j = [vertices_of(block) for block in blocks], dict[int, list[int]]()
     for number, vertices_of_block in enumerate(members):
         by_j.setdefault(vertices_of_block[0][1].j, []).append(number)
-    vertices = {j: [vertex for i in numbers for vertex in members[i]] for j, numbers in by_j.items()}
+    # a block may stand there several times, its vertices once
+    vertices = {j: list(dict.fromkeys(vertex for i in numbers for vertex in members[i])) for j, numbers in by_j.items()}
     elements = StateElements(terms, count, representation, vertices)
     out: dict[int, LinearBlock] = {}
     for j in sorted(by_j, reverse=True):
-        here, start = elements.at(j), 0
+        here, number_of = elements.at(j), {vertex: i for i, vertex in enumerate(vertices[j])}
         for number in by_j[j]:
-            stop = start + len(members[number])
-            out[number], start = here.block(range(start, stop)), stop
+            out[number] = here.block([number_of[vertex] for vertex in members[number]])
     return [out[number] for number in range(len(blocks))]

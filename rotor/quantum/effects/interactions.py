@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, ClassVar, Self
 
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.spin_effect import ParameterName, parse_name
+from rotor.quantum.effects.spin_effect import parse_name
 from rotor.quantum.effects.watson import operators_of_name
+from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
+from rotor.quantum.operators.rotation import components, ladders, with_powers
 from rotor.quantum.states import Coupling, State
-from rotor.quantum.wang.j_operators import JOperator, anticommutator, components, identity, j_z, lowering, raising
 from rotor.tops.operators import Operators
 from rotor.tops.spins.spin_weights import SpinWeights
 
@@ -51,7 +52,7 @@ class InteractingStates(QuantumEffect):
             if state_of_constant(name):
                 names[name] = float(value)
             else:
-                names[_coupling(name, parse_name(name)).name] = float(value)
+                names[_coupling(name, "Ir").name] = float(value)
         object.__setattr__(self, "values", MappingProxyType(names))
         moments = {(max(pair), min(pair)): tuple(vector) for pair, vector in self.moments.items()}
         object.__setattr__(self, "moments", MappingProxyType(moments))
@@ -75,9 +76,9 @@ class InteractingStates(QuantumEffect):
                 )
         return tuple(State(v, terms[v], self.weights.get(v)) for v in sorted(terms))
 
-    def couplings(self, top: Top) -> tuple[Coupling, ...]:
+    def couplings(self, top: Top, representation: str) -> tuple[Coupling, ...]:
         """The parameters between two states."""
-        return tuple(_coupling(name, parse_name(name)) for name in self.values if not state_of_constant(name))
+        return tuple(_coupling(name, representation) for name in self.values if not state_of_constant(name))
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
         """The dipoles by pairs of states."""
@@ -113,11 +114,12 @@ def state_of_constant(name: str) -> tuple[str, int] | None:
     return head.strip(), int(number)
 
 
-_ORDERS = {"pm2": 2, "pm4": 4, "pm6": 6}
+_ORDERS = {"pm2": 1, "pm4": 2, "pm6": 3}
 
 
-def _coupling(name: str, parts: ParameterName) -> Coupling:
+def _coupling(name: str, representation: str) -> Coupling:
     """The interaction of two states that a parameter multiplies."""
+    parts = parse_name(name)
     if parts.states is None or parts.states[0] == parts.states[1] or parts.spins or parts.ns:
         raise ValueError(f"{name}: an interaction connects two states, in square brackets, as in G_c[0,1]")
     kind, _, letters = parts.symbol.partition("_")
@@ -125,24 +127,13 @@ def _coupling(name: str, parts: ParameterName) -> Coupling:
     if letters not in letters_of_kind.get(kind, ()):
         spelled = ", ".join(f"{k}_{x}" if x else k for k, names in letters_of_kind.items() for x in names)
         raise ValueError(f"{name}: interactions between states are {spelled}")
-
-    def operator(j: int, representation: str) -> JOperator:
-        return with_powers(_plain(kind, letters, j, representation), parts)
-
+    operator = with_powers(_plain(kind, letters, representation), parts.n2, parts.nz2)
     return Coupling(parts.text, parts.states[0], parts.states[1], operator)
 
 
-def _plain(kind: str, letters: str, j: int, representation: str) -> JOperator:
+def _plain(kind: str, letters: str, representation: str) -> Operator:
     """The operator of an interaction without powers."""
     if kind == "W":
-        return identity(j) if not letters else raising(j) ** _ORDERS[letters] + lowering(j) ** _ORDERS[letters]
-    component = components(j, representation)
-    return 1j * component[letters] if kind == "G" else anticommutator(component[letters[0]], component[letters[1]])
-
-
-def with_powers(operator: JOperator, parts: ParameterName) -> JOperator:
-    """½{Jz^2q, O} J^2p."""
-    j = operator.j
-    if parts.nz2:
-        operator = 0.5 * anticommutator(j_z(j) ** (2 * parts.nz2), operator)
-    return (j * (j + 1.0)) ** parts.n2 * operator
+        return ladders(_ORDERS[letters]) if letters else UNIT
+    along = components(representation)
+    return 1j * along[letters] if kind == "G" else 2.0 * half_anticommutator(along[letters[0]], along[letters[1]])

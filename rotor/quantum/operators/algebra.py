@@ -5,12 +5,13 @@ and multiplies by a function of the labels that it acts on,
 
     O |a⟩ = Σ_s f_s(a) |a + d_s⟩,        O' O |a⟩ = Σ f'_s'(a + d_s) f_s(a) |a + d_s + d_s'⟩,
 
-so that sums, products, anticommutators and powers of operators are operators again, and no element is written twice.
+so that sums, products, anticommutators and powers of operators are operators again, and no element is written twice. In a product shifts
+by the same steps are one, whose factor is their sum.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -60,10 +61,21 @@ class Operator:
         return Operator(tuple(Shift(s.change, _scaled(number, s.factor)) for s in self.shifts))
 
     def __matmul__(self, first: Operator) -> Operator:
-        return Operator(tuple(s.after(t) for s in self.shifts for t in first.shifts))
+        return Operator(tuple(s.after(t) for s in self.merged().shifts for t in first.merged().shifts)).merged()
 
     def __pow__(self, power: int) -> Operator:
-        return reduce(lambda left, right: left @ right, [self] * power, UNIT)
+        return reduce(lambda left, right: left @ right, [self] * power) if power else UNIT
+
+    def merged(self) -> Operator:
+        """The same operator with one shift by any steps."""
+        factors: dict[Change, list[Factor]] = {}
+        for each in self.shifts:
+            factors.setdefault(each.change, []).append(each.factor)
+        return Operator(tuple(Shift(change, _sum(alike)) for change, alike in factors.items()))
+
+
+def _sum(factors: Sequence[Factor]) -> Factor:
+    return factors[0] if len(factors) == 1 else lambda labels: sum(factor(labels) for factor in factors)
 
 
 def _scaled(number: complex, factor: Factor) -> Factor:

@@ -1,21 +1,28 @@
 """Operators of the rotation on functions |J K⟩: powers of J, its components, and tensors fixed in the molecule.
 
-The operators R and L that raise and lower K have the real positive elements √(J(J+1) - K(K±1)). Components along the molecule obey
-[Jx, Jy] = -i Jz (CONVENTIONS.md), so that Jx = ½(R + L), Jy = ½i(R - L).
+The operators R and L that raise and lower K have the real positive elements √(J(J+1) - K(K±1)). Components along the right-handed frame
+x, y, z obey the anomalous commutators [Jx, Jy] = -i Jz (CONVENTIONS.md), so that Jx = ½(R + L), Jy = ½i(R - L)
+(P. R. Bunker and P. Jensen, Molecular Symmetry and Spectroscopy, 2nd ed., eqs. 10-46 and 10-47, with J_m± = Jx ± iJy, where
+J_m∓ raises and lowers k). In a left-handed representation the frame x, -y, z is right-handed, so that Jy changes its sign.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import reduce
+from collections.abc import Callable, Mapping
+from functools import cache, lru_cache, reduce
+from types import MappingProxyType
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from rotor.quantum.operators.algebra import Labels, Operator, Values, diagonal, half_anticommutator, shift
+from rotor.arrays import Ints
+from rotor.quantum.operators.algebra import UNIT, Factor, Labels, Operator, Shift, Values, diagonal, shift
 from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.wigner import three_j
-from rotor.tops.operators import Powers
+from rotor.tops.operators import Powers, axis_order
+
+Weight = Callable[[Ints, Ints, Ints, Ints], Values]  # of J', J, K' and K
 
 
 def j_squared(power: int = 1) -> Operator:
@@ -50,16 +57,89 @@ def j_y() -> Operator:
     return 0.5j * (ladder(1) - ladder(-1))
 
 
+@cache
+def components(representation: str) -> Mapping[str, Operator]:
+    """Ja, Jb, Jc on |J K⟩ of a representation.
+
+    >>> a, b, c = (components("IIIr")[axis] for axis in "abc")
+    >>> bool(abs(matrix_of_j(a @ b - b @ a + 1j * c, 2)).max() < 1e-15)
+    True
+    """
+    sense = -1.0 if representation.endswith("l") else 1.0
+    return MappingProxyType(dict(zip(axis_order(representation), (j_x(), sense * j_y(), j_z()), strict=True)))
+
+
+def weighted(operator: Operator, weight: Weight) -> Operator:
+    """The operator whose elements ⟨J'K'|O|J K⟩ are multiplied by weight(J', J, K', K)."""
+
+    def product(each: Shift) -> Factor:
+        steps = dict(each.change)
+
+        def factor(labels: Labels) -> Any:
+            j, k = labels["J"], labels["K"]
+            return weight(j + steps.get("J", 0), j, k + steps.get("K", 0), k) * each.factor(labels)
+
+        return factor
+
+    return Operator(tuple(Shift(each.change, product(each)) for each in operator.shifts))
+
+
+def with_powers(operator: Operator, p: int, q: int) -> Operator:
+    """J^2p ½{Jz^2q, O} of an operator O within J."""
+    if not p and not q:
+        return operator
+
+    def weight(m: Ints, j: Ints, above: Ints, below: Ints) -> Values:
+        axial = (above ** (2.0 * q) + below ** (2.0 * q)) / 2
+        return np.asarray((j * (j + 1.0)) ** p * axial)
+
+    return weighted(operator, weight)
+
+
+def ladders(n: int) -> Operator:
+    """J₊^2n + J₋^2n, 1 where n = 0."""
+    return ladder(2 * n) + ladder(-2 * n) if n else UNIT
+
+
 def powers(p: int, q: int, n: int) -> Operator:
     """J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊, J^2p Jz^2q where n = 0: the operator of a distortion constant."""
-    if n == 0:
-        return j_squared(p) @ j_z(2 * q)
-    return j_squared(p) @ half_anticommutator(j_z(2 * q), ladder(2 * n) + ladder(-2 * n))
+    return with_powers(ladders(n), p, q)
 
 
 def sum_of_powers(operators: Mapping[Powers, float]) -> Operator:
     """Σ c J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ over a table {(p, q, n): c}."""
     return reduce(lambda x, y: x + y, (c * powers(*pqn) for pqn, c in operators.items()), Operator())
+
+
+def matrix_of_j(operator: Operator, low: int, up: int | None = None) -> NDArray[np.complex128]:
+    """⟨J'K'|O|J K⟩ over all K' and K, both rising, from J = low to J' = up, by default the same.
+
+    >>> matrix_of_j(ladder(1), 1).real.round(3).tolist()
+    [[0.0, 0.0, 0.0], [1.414, 0.0, 0.0], [0.0, 1.414, 0.0]]
+    """
+    above, first = low if up is None else up, low - low % _BESIDE
+    k, here = np.arange(-low, low + 1), slice(low**2 - first**2, (low + 1) ** 2 - first**2)
+    out = np.zeros((2 * above + 1, 2 * low + 1), dtype=np.complex128)
+    for step, values in _bands(operator, first, above - low):
+        inside = np.flatnonzero(np.abs(k + step) <= above)
+        out[k[inside] + step + above, inside] = values[here][inside]
+    return out
+
+
+_BESIDE = 8  # J whose elements are evaluated together: calls cost more than elements
+
+
+@lru_cache(maxsize=512)
+def _bands(operator: Operator, first: int, rise: int) -> list[tuple[int, Values]]:
+    """The shifts to J + rise: steps of K, and factors over |J K⟩ of neighbouring J from `first` on, K rising in each."""
+    j = np.repeat(np.arange(first, first + _BESIDE), 2 * np.arange(first, first + _BESIDE) + 1)
+    labels = {"J": j, "K": np.arange(len(j)) + first**2 - j**2 - j}  # there are J² functions of lower J
+    shifts = [(dict(each.change), each.factor) for each in operator.merged().shifts]
+    return [
+        (steps.get("K", 0), np.broadcast_to(factor(labels), len(j)))
+        for steps, factor in shifts
+        if steps.get("J", 0) == rise
+    ]
 
 
 def body_tensor(components: ArrayLike) -> Operator:

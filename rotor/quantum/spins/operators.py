@@ -22,7 +22,7 @@ with the vector v_k = c_ij,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -30,9 +30,11 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.operators.rotation import matrix_of_j
 from rotor.quantum.symmetric_top_elements import coupling
 from rotor.quantum.tensors import BodyTensor, Complexes, block_elements, body_tensor, phase_exponent
-from rotor.quantum.wang.basis import WangBlock, character
+from rotor.quantum.wang.basis import SPECIES, SpeciesFactors, WangBlock
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
 from rotor.tops.operators import Operators, Powers
 
@@ -163,19 +165,19 @@ class CosinesWithN:
 class ByElements:
     """Any operator by its reduced elements over |N'k'⟩ and |N k⟩; for rank 0, plain elements within N.
 
-    matrix: returns (2N' + 1, 2N + 1) elements for N', N and the representation. odd: whether time reversal changes the sign after
-    contraction with spins; the elements then contain the factor i of the operator.
+    operator: on |N K⟩ of the representation of the calculation. odd: whether time reversal changes the sign after contraction with spins;
+    the elements then contain the factor i of the operator.
     """
 
     rank: int
-    matrix: Callable[[int, int, str], Complexes]
+    operator: Operator
     odd: bool = False
 
     def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
         """The real reduced matrix between two blocks, None where it is zero."""
         if not abs(up.j - low.j) <= self.rank <= up.j + low.j:
             return None
-        between = self.matrix(up.j, low.j, representation)
+        between = matrix_of_j(self.operator, low.j, up.j)
         reduced = (functions_of(up).conj().T @ between @ functions_of(low)).real
         return reduced if np.abs(reduced).max(initial=0.0) > _NOTHING * np.abs(between).max(initial=0.0) else None
 
@@ -203,40 +205,17 @@ def functions_of(basis: Basis) -> Complexes:
 
 
 @dataclass(frozen=True)
-class HalfTurned:
-    """C2g times an operator that changes sign under the half turn C2g about the axis g.
+class BySpecies:
+    """An operator whose elements are multiplied by a factor for each pair of species of Wang blocks.
 
-    It represents the operator in functions that θ C2g leaves unchanged, θ being time reversal. If θ changes the sign of the operator too,
-    the product is Hermitian within one state.
+    With the character of the bra under a half turn C2g it is C2g times an operator that changes sign under C2g, which represents the
+    operator in functions that θ C2g leaves unchanged, θ being time reversal. If θ changes the sign of the operator too, the product is
+    Hermitian within one state.
     """
 
-    operator: Cosines | CosinesWithN | ByElements
-    axis: str
-    odd = False
-
-    @property
-    def rank(self) -> int:
-        """Rank of the operator."""
-        return self.operator.rank
-
-    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
-        """The real reduced matrix between two blocks, None where it is zero."""
-        elements = self.operator.elements(up, low, representation)
-        assert isinstance(up, WangBlock)
-        return None if elements is None else character(up, self.axis) * elements
-
-
-@dataclass(frozen=True)
-class BetweenSpecies:
-    """An operator restricted to elements between pairs of Wang-block species."""
-
-    operator: Cosines | CosinesWithN | ByElements | HalfTurned
-    pairs: frozenset[tuple[str, str]]
-
-    @property
-    def odd(self) -> bool:
-        """Whether time reversal changes the sign of the operator."""
-        return self.operator.odd
+    operator: Cosines | CosinesWithN | ByElements | BySpecies
+    factors: SpeciesFactors
+    odd: bool
 
     @property
     def rank(self) -> int:
@@ -247,11 +226,13 @@ class BetweenSpecies:
         """The real reduced matrix between two blocks, None where it is zero."""
         assert isinstance(up, WangBlock)
         assert isinstance(low, WangBlock)
-        return self.operator.elements(up, low, representation) if (up.species, low.species) in self.pairs else None
+        factor = self.factors[SPECIES.index(up.species)][SPECIES.index(low.species)]
+        elements = self.operator.elements(up, low, representation) if factor else None
+        return None if elements is None else factor * elements
 
 
-Rotor = Scalar | Cosines | CosinesWithN | ByElements | HalfTurned | BetweenSpecies
-_ALONE = Scalar | ByElements | HalfTurned | BetweenSpecies  # operators that are not added to others
+Rotor = Scalar | Cosines | CosinesWithN | ByElements | BySpecies
+_ALONE = Scalar | ByElements | BySpecies  # operators that are not added to others
 
 
 @lru_cache(maxsize=256)
@@ -277,11 +258,9 @@ def is_axial(rotor: Rotor, axis: str) -> bool:
     >>> is_axial(Cosines(((1.0, 0, 0), (0, -0.5, 0), (0, 0, -0.5))), "a")
     True
     """
-    if isinstance(rotor, HalfTurned | BetweenSpecies):
-        return False
     if isinstance(rotor, Scalar):
         return all(n == 0 for (_, _, n), _ in rotor.operators)
-    if isinstance(rotor, ByElements):
+    if isinstance(rotor, ByElements | BySpecies):
         return False
     c = np.array(rotor.components, dtype=float)
     across = (1, 2) if axis == "a" else (0, 1)

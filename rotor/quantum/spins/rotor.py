@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.coupled_levels import names_of_functions
-from rotor.quantum.effect import k_limits_of
+from rotor.quantum.effect import couplings_of, k_limits_of
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.operators import EVERY_STATE, AxialState, Rotor, is_axial, summed
 from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
@@ -105,9 +105,9 @@ def _all_axial(top: Top, effects: tuple[QuantumEffect, ...], terms: Terms) -> bo
     channels = channels_of(terms, scheme)  # C_bb and C_cc are axial together where they are equal
     if not all(is_axial(piece.rotor, axis) for pieces in channels.values() for piece in pieces):
         return False
-    operators = (effect.j_operator(top, name, 1, "Ir") for effect in effects for name in effect.parameters(top))
-    coupled = any(effect.couplings(top) or (top.states is None and effect.states(top)) for effect in effects)
-    return not coupled and all(operator is None for operator in operators)
+    return not couplings_of(top, effects, "Ir") and not (
+        top.states is None and any(effect.states(top) for effect in effects)
+    )
 
 
 def _existing(v: Ints, k: Ints, exist: Exist, scheme: Scheme) -> NDArray[np.bool_]:

@@ -27,8 +27,7 @@ from rotor.quantum.spins.parts import PartColumns, SpinPart
 from rotor.quantum.spins.rotor import Exist
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
 from rotor.quantum.spins.threefold_rotor import wang_functions
-from rotor.quantum.wang.basis import Part
-from rotor.quantum.wang.j_operators import phase
+from rotor.quantum.wang.basis import Part, phase
 from rotor.tops.operators import axis_order
 
 _ZERO = 1e-12  # smaller elements, relative to the largest, are round-off of sums that cancel

@@ -1,6 +1,6 @@
 """Elements of moments that are products of direction cosines and components of N (`rotor.quantum.moments.Written`).
 
-Over |N k⟩ each factor is a matrix: N_i of `j_operators`, and the reduced elements of φ_pi of `tensors`. A word is their product, with
+Over |N k⟩ each factor is an operator: N_i and the reduced elements of φ_pi, of `operators.rotation`. A word is their product, with
 components of N to the left of φ taken at N' and those to the right at N. Molecule-fixed components of N commute with rotations in space, so
 the product is the reduced element of the word. Over Wang functions |J K s)) (`tensors`) a moment that is even under time reversal is i
 times a real matrix; an odd moment is real.
@@ -12,17 +12,17 @@ In the opposite direction, between the same two states, a moment acts as its Her
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import lru_cache, reduce
 
 import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.moments import Word, Written
+from rotor.quantum.operators.algebra import UNIT, Operator
+from rotor.quantum.operators.rotation import body_tensor, components, matrix_of_j, weighted
 from rotor.quantum.spins.operators import Basis, functions_of
-from rotor.quantum.symmetric_top_elements import symmetric_top_elements
 from rotor.quantum.tensors import Complexes, spherical_components
 from rotor.quantum.wang.basis import WangBlock
-from rotor.quantum.wang.j_operators import components
 
 
 def written_elements(
@@ -50,37 +50,28 @@ _NOTHING = 1e-13  # round-off of a product of a few numbers, relative to the lar
 @lru_cache(maxsize=512)
 def _matrix(moment: Written, up: int, low: int, representation: str) -> Complexes:
     """⟨N'k'‖M‖N k⟩ over all k' and k."""
-    total = np.zeros((2 * up + 1, 2 * low + 1), dtype=np.complex128)
+    return matrix_of_j(_operator(moment, representation), low, up)
+
+
+@lru_cache(maxsize=128)
+def _operator(moment: Written, representation: str) -> Operator:
+    """A moment as an operator."""
+    total = Operator()
     for word in moment.words:
-        total += word.factor * _word_elements(word, up, low, representation)
+        total = total + word.factor * _product(word, representation)
     if moment.commutator:
-        total *= (up * (up + 1.0) - low * (low + 1.0)) / 2
-    if moment.factor_of_k is not None:
-        k, above = np.arange(-low, low + 1.0), np.arange(-up, up + 1.0)
-        total *= moment.factor_of_k(low, above[:, None], k[None, :])
-    return total
+        total = weighted(total, lambda m, n, above, below: (m * (m + 1.0) - n * (n + 1.0)) / 2)
+    if (factor := moment.factor_of_k) is not None:
+        total = weighted(total, lambda m, n, above, below: factor(n, above, below))
+    return total.merged()
 
 
-def _word_elements(word: Word, up: int, low: int, representation: str) -> Complexes:
-    """Reduced elements of one word over all k' and k."""
-    if not word.cosine:
-        if up != low:
-            return np.zeros((2 * up + 1, 2 * low + 1), dtype=np.complex128)
-        return _product(word.left + word.right, low, representation)
-    between = _cosine(word.cosine, up, low, representation)
-    return _product(word.left, up, representation) @ between @ _product(word.right, low, representation)
-
-
-@lru_cache(maxsize=512)
-def _cosine(axis: str, up: int, low: int, representation: str) -> Complexes:
-    """Reduced elements of the direction cosine of one axis."""
-    along = [float(axis == letter) for letter in "abc"]
-    return symmetric_top_elements(up, low, spherical_components(along, 1, representation))
-
-
-@lru_cache(maxsize=512)
-def _product(letters: str, j: int, representation: str) -> Complexes:
-    """N_i N_j ... within one N; the unit matrix for no letters."""
-    if not letters:
-        return np.eye(2 * j + 1, dtype=np.complex128)
-    return np.asarray(components(j, representation)[letters[0]].matrix @ _product(letters[1:], j, representation))
+def _product(word: Word, representation: str) -> Operator:
+    """The product of components of N and a direction cosine."""
+    along = components(representation)
+    factors = [along[letter] for letter in word.left]
+    if word.cosine:
+        cosine = [float(word.cosine == letter) for letter in "abc"]
+        factors.append(body_tensor(spherical_components(cosine, 1, representation)))
+    factors += [along[letter] for letter in word.right]
+    return reduce(lambda left, right: left @ right, factors, UNIT)

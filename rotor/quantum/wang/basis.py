@@ -11,7 +11,7 @@ In any representation (-1)^Ka and (-1)^Kc are the characters under C2a and C2c, 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,8 +85,35 @@ def character(block: WangBlock, axis: str) -> int:
     >>> [character(WangBlock(1, "eo", 0, 1, 1), axis) for axis in "abc"]
     [1, -1, -1]
     """
-    under_a, under_c = (1 if parity == "e" else -1 for parity in block.species)
+    return _character(block.species, axis)
+
+
+def _character(species: str, axis: str) -> int:
+    under_a, under_c = (1 if parity == "e" else -1 for parity in species)
     return {"a": under_a, "b": under_a * under_c, "c": under_c}[axis]
+
+
+SPECIES = ("ee", "eo", "oe", "oo")
+SpeciesFactors = tuple[tuple[float, ...], ...]  # by the species of the bra and of the ket, in the order of SPECIES
+
+
+def factors_of_pairs(pairs: Collection[tuple[str, str]]) -> SpeciesFactors:
+    """1 for pairs of species of bra and ket, 0 for others."""
+    return tuple(tuple(float((up, low) in pairs) for low in SPECIES) for up in SPECIES)
+
+
+def half_turn(axis: str, sign: float = 1.0) -> SpeciesFactors:
+    """± the character of the bra under a half turn about a, b or c: what it multiplies an operator with from the left."""
+    return tuple((sign * _character(up, axis),) * len(SPECIES) for up in SPECIES)
+
+
+def phase(block: WangBlock) -> complex:
+    """The factor that makes a Wang function invariant under time reversal: 1, or i where s differs from (-1)^K.
+
+    Over functions with this factor all Hermitian operators that are even under time reversal are real (their matrix over |J k⟩ obeys
+    M(-k', -k) = (-1)^(k'-k) M(k', k)*).
+    """
+    return 1.0 if block.sign == (-1) ** block.first_k else 1j
 
 
 def wang_blocks(j: int, representation: str) -> list[WangBlock]:

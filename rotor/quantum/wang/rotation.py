@@ -10,7 +10,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled_levels import Model, coupled_levels, model_of
-from rotor.quantum.effect import QuantumEffect, k_limits_of
+from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock, levels_table, single_block
 from rotor.quantum.wang.basis import WangBlock, blocks_within, names_of
@@ -99,9 +99,7 @@ def _linear(
 ) -> Levels:
     """Linear tops: E = Σ c X^p. In blocks, each J is the Wang function of K = 0 in the representation Iʳ."""
     beyond = [powers for powers in operators if powers[1] or powers[2]]
-    with_axis = [
-        e.name or type(e).__name__ for e in effects if e.couplings(top) or e.states(top) or _has_j_operator(e, top)
-    ]
+    with_axis = [e.name or type(e).__name__ for e in effects if e.states(top) or couplings_of(top, [e], "Ir")]
     if beyond or with_axis:
         what = f"operator {beyond[0]} (powers p, q, n of J², Jz², J±²)" if beyond else f"effect {with_axis[0]}"
         raise ValueError(
@@ -114,11 +112,6 @@ def _linear(
     functions = [WangBlock(number, "eo" if number % 2 else "ee", 0, 1, 1) for number in j.tolist()]
     blocks = tuple(single_block(basis, energy[[i]], np.ones((1, 1)), i) for i, basis in enumerate(functions))
     return levels_table(top, effects, jmax, energy, {"j": j}, "Ir", blocks=blocks)
-
-
-def _has_j_operator(effect: QuantumEffect, top: Top) -> bool:
-    """Whether a parameter of an effect multiplies an operator other than powers of J."""
-    return any(effect.j_operator(top, name, 1, "Ir") is not None for name in effect.parameters(top))
 
 
 def _spherical(top: Top, effects: tuple[QuantumEffect, ...], operators: Operators, jmin: int, jmax: int) -> Levels:

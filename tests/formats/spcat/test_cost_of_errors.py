@@ -128,22 +128,22 @@ def test_derivatives_are_differences(name: str):
                 assert difference[alone] == pytest.approx(expected, abs=0.02 * size + 1e-8 / step)
 
 
-def test_an_operator_of_a_series_is_made_once_for_each_n(monkeypatch):
-    """Levels and their derivatives share the operators; the derivatives made all of them again, and took 2.3 times the prediction."""
-    from rotor.formats.spcat.hamiltonian import series
+def test_an_operator_of_a_series_is_evaluated_for_all_n_together(monkeypatch):
+    """Once for levels, once for their derivatives; the derivatives made it again for each N, and took 2.3 times the prediction."""
+    from rotor.quantum.basis.wang_functions import BetweenStates
 
     made = []
-    original = series.JOperator
+    original = BetweenStates.elements
 
-    def counted(j, bands):
-        made.append(j)
-        return original(j, bands)
+    def counted(self, operator, factors):
+        made.append(operator)
+        return original(self, operator, factors)
 
-    monkeypatch.setattr(series, "JOperator", counted)
+    monkeypatch.setattr(BetweenStates, "elements", counted)
     par, request = _files("euler_series")
     counts = []
     for error in (1e-37, 1e-3):
         made.clear()
         predict(replace(par, parameters=tuple(replace(p, error=error) for p in par.parameters), rest=""), request)
         counts.append(len(made))
-    assert counts[0] == counts[1] > 0
+    assert counts == [2, 2 + 2 * 7]  # the sum of the terms in each of two states; then each of the seven terms

@@ -201,13 +201,26 @@ def test_an_odd_power_of_j_is_refused_within_a_state():
     class Odd(AxisPower):
         name = ""
 
-        def j_operator(self, top, name, j, representation):
-            from rotor.quantum.wang.j_operators import components
+        def j_operator(self, top, name, representation):
+            from rotor.quantum.operators.rotation import components
 
-            return components(j, representation)["a"]
+            return components(representation)["a"]
 
     with pytest.raises(ValueError, match="not invariant under time reversal"):
         solve_levels(top_in(), 3, effects=(*SEMI_RIGID, Odd(1.0, TILTED)))
+
+
+def test_an_operator_that_changes_j_is_refused():
+    class Cosine(AxisPower):
+        name = ""
+
+        def j_operator(self, top, name, representation):
+            from rotor.quantum.operators.rotation import body_tensor
+
+            return body_tensor([0.0, 1.0, 0.0])
+
+    with pytest.raises(ValueError, match="c_axis: the operator changes J"):
+        solve_levels(top_in(), 3, effects=(*SEMI_RIGID, Cosine(1.0, TILTED)))
 
 
 def test_a_field_is_refused_where_levels_have_no_m():

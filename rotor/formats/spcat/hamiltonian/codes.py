@@ -35,6 +35,11 @@ def basis_axes(oblate: bool) -> str:
     return AXES["IIIl" if oblate else "Ir"]
 
 
+def basis_of(axes: str) -> str:
+    """The representation with these axes x, y, z."""
+    return "Ir" if axes == AXES["Ir"] else "IIIl"
+
+
 def is_oblate(constants: Constants) -> bool:
     """Whether c is the axis z of the basis."""
     return constants.kind == "oblate" or constants.representation == "IIIl"

@@ -9,41 +9,24 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from rotor.formats.spcat.hamiltonian.coded_file import CodedLine
-from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET
+from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, basis_of
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs, spin_terms_with_pairs
 from rotor.formats.spcat.hamiltonian.phases import half_turned
-from rotor.formats.spcat.hamiltonian.spin_operators import single_j_operator
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
-from rotor.quantum.spins.operators import EVERY_STATE, BetweenSpecies, ByElements, Cosines, CosinesWithN, HalfTurned
+from rotor.quantum.spins.operators import EVERY_STATE, ByElements, BySpecies, Cosines, CosinesWithN, Scalar
 from rotor.quantum.spins.scheme import SpinTerm
-from rotor.quantum.states import Coupling, OperatorOfJ, State
-from rotor.quantum.wang.basis import NOTHING, wang_blocks
-from rotor.quantum.wang.j_operators import JOperator, between_species
+from rotor.quantum.states import Coupling, State
+from rotor.quantum.wang.basis import SpeciesFactors, factors_of_pairs, wang_blocks
 from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 Vector = tuple[float, float, float]
-_STORED_TO = 100  # J; the operators of a higher J take too much memory together
-
-
-def _stored(operator_at: OperatorOfJ) -> OperatorOfJ:
-    """The operator, stored for each J up to `_STORED_TO` at its first use."""
-    stored: dict[tuple[int, str], JOperator] = {}
-
-    def operator(j: int, representation: str) -> JOperator:
-        if j > _STORED_TO:
-            return operator_at(j, representation)
-        if (j, representation) not in stored:
-            stored[j, representation] = operator_at(j, representation)
-        return stored[j, representation]
-
-    return operator
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,51 +95,28 @@ class FileEffect(QuantumEffect):
         """The states beyond the first."""
         return tuple(State(v, self._plain(v)) for v in range(1, len(self.numbers)))
 
-    def couplings(self, top: Top) -> tuple[Coupling, ...]:
+    def couplings(self, top: Top, representation: str) -> tuple[Coupling, ...]:
         """Interactions of states, and operators of one state that have no powers (p, q, n)."""
-        return self._couplings
-
-    @cached_property
-    def _couplings(self) -> tuple[Coupling, ...]:
-        """The couplings; levels and their derivatives share the operator of each J."""
-        couplings = []
+        couplings = list[Coupling]()
         for line, states in self._group_lines:
             operator = line.operator
             if operator.rotor is not None:
                 continue
             if self.pairs and states and not set(states).isdisjoint(v for pair in self.pairs for v in pair):
                 couplings += self._with_pairs(line, states)
-            elif operator.by_j is not None:
+            elif operator.of_n is not None or (states and states[0] != states[1]):
+                factors = half_turned(self.turned, operator.odd) if self._is_turned(line) else None
                 pairs = [states] if states else [(v, v) for v in range(len(self.numbers))]
-                operator_at = operator.by_j
-                if self._is_turned(line):
-                    operator_at = half_turned(operator_at, self.turned, operator.odd)
-                couplings += [Coupling(line.name, *pair, operator_at) for pair in pairs]
-            elif states and states[0] != states[1]:
-                assert operator.plain is not None
-                couplings.append(Coupling(line.name, *states, single_j_operator(operator.plain)))
-        restricted = (self._restricted(coupling) for coupling in couplings)
-        return tuple(replace(coupling, operator=_stored(coupling.operator)) for coupling in restricted)
+                couplings += [Coupling(line.name, *pair, operator.alone, factors) for pair in pairs]
+        return tuple(replace(each, factors=self._restricted(each)) for each in couplings)
 
-    def _restricted(self, coupling: Coupling) -> Coupling:
-        """A coupling without elements between levels of unequal weights."""
+    def _restricted(self, coupling: Coupling) -> SpeciesFactors | None:
+        """The factors of a coupling, 0 between levels of unequal weights."""
         pairs = self.apart.get((coupling.bra, coupling.ket))
         if pairs is None:
-            return coupling
-        operator_at = coupling.operator
-        whole = operator_at(_LOOKED_AT, self._representation)
-        part = between_species(whole, self._representation, pairs)
-        # round-off between species that the operator does not connect
-        if np.abs((whole - part).matrix).max() <= NOTHING * np.abs(whole.matrix).max():
-            return coupling
-        return replace(
-            coupling,
-            operator=lambda j, representation: between_species(operator_at(j, representation), representation, pairs),
-        )
-
-    @property
-    def _representation(self) -> str:
-        return "IIIl" if self.axes[2] == "c" else "Ir"
+            return coupling.factors
+        between = np.array(factors_of_pairs(pairs)) * (1.0 if coupling.factors is None else np.array(coupling.factors))
+        return tuple(map(tuple, between.tolist()))
 
     def _is_turned(self, line: CodedLine) -> bool:
         """Whether a half turn about the axis of the phases changes the sign of the operator of a line."""
@@ -167,11 +127,12 @@ class FileEffect(QuantumEffect):
         operator = line.operator
         if operator.plain is not None and states[0] == states[1]:
             return []  # listed with the operators of both components
-        operator_at = operator.by_j or single_j_operator(operator.plain or {})
-        if operator.odd and states[0] == states[1] and self.axes[2] == "c":
-            operator_at = _turned_round(operator_at)  # -i stands between states of an oblate basis, not within a pair
+        # -i stands between states of an oblate basis, not within a pair
+        sign = -1.0 if operator.odd and states[0] == states[1] and self.axes[2] == "c" else 1.0
         try:
-            return couplings_with_pairs(line.name, operator_at, operator.odd, states, line.reversed_, self.pairs)
+            return couplings_with_pairs(
+                line.name, sign * operator.alone, operator.odd, states, line.reversed_, self.pairs
+            )
         except ValueError as error:
             raise ValueError(f"parameter {line.parameter.code}: {error}") from None
 
@@ -187,13 +148,13 @@ class FileEffect(QuantumEffect):
             if o.rotor is not None:
                 names = tuple(self.coupled[place - 1].name for place in o.spins)
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
-                rotor, factor = o.rotor, 1.0
+                rotor = o.rotor
                 if self._is_turned(line):
                     assert isinstance(rotor, ByElements | Cosines | CosinesWithN)
-                    rotor, factor = HalfTurned(rotor, self.turned), 1.0 if o.odd else -1.0  # as `half_turned`
+                    rotor = BySpecies(rotor, half_turned(self.turned, o.odd), False)
                 elif o.odd and bra == ket:  # of an l-doubled pair, between its components
                     ket = next(pair.second if bra == pair.first else pair.first for pair in self.pairs if bra in pair)
-                term = SpinTerm(line.name, names, rotor, factor, o.n2, o.nz2, o.ns, bra, ket)
+                term = SpinTerm(line.name, names, rotor, 1.0, o.n2, o.nz2, o.ns, bra, ket)
                 for part in self._by_exchange(term, line.exchange):
                     terms += self._at_pairs(line, states, part)
         return tuple(self._restricted_term(term) for term in terms)
@@ -201,18 +162,15 @@ class FileEffect(QuantumEffect):
     def _restricted_term(self, term: SpinTerm) -> SpinTerm:
         """A spin term without elements between levels of unequal weights."""
         pairs, rotor = self.apart.get((term.bra, term.ket)), term.rotor
-        if pairs is None or not isinstance(rotor, ByElements | Cosines | CosinesWithN | HalfTurned):
+        if pairs is None or isinstance(rotor, Scalar):
             return term
-        representation = self._representation
-        blocks = wang_blocks(_LOOKED_AT, representation)
+        basis = basis_of(self.axes)
+        blocks = wang_blocks(_LOOKED_AT, basis)
         beyond = (
-            rotor.elements(up, low, representation)
-            for up in blocks
-            for low in blocks
-            if (up.species, low.species) not in pairs
+            rotor.elements(up, low, basis) for up in blocks for low in blocks if (up.species, low.species) not in pairs
         )
         forbidden = any(elements is not None and elements.any() for elements in beyond)
-        return replace(term, rotor=BetweenSpecies(rotor, pairs)) if forbidden else term
+        return replace(term, rotor=BySpecies(rotor, factors_of_pairs(pairs), rotor.odd)) if forbidden else term
 
     def _by_exchange(self, term: SpinTerm, exchange: int) -> list[SpinTerm]:
         """The part of a term that is even, or odd, under the exchange of the last two spins."""
@@ -261,8 +219,4 @@ class FileEffect(QuantumEffect):
         return 0.0
 
 
-_LOOKED_AT = 5  # J at which all elements of a file's operators exist
-
-
-def _turned_round(operator_at: OperatorOfJ) -> OperatorOfJ:
-    return lambda j, representation: -1.0 * operator_at(j, representation)
+_LOOKED_AT = 5  # N at which all elements of a file's operators exist

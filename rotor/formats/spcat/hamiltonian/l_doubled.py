@@ -32,10 +32,11 @@ from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.labels import Functions, places, renamed, wang_functions
 from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.operators.rotation import weighted
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor
 from rotor.quantum.spins.scheme import SpinTerm
-from rotor.quantum.states import Coupling, OperatorOfJ
-from rotor.quantum.wang.j_operators import JOperator
+from rotor.quantum.states import Coupling
 
 
 class Pair(NamedTuple):
@@ -132,27 +133,17 @@ def _within(odd: bool, pair: Pair | None) -> list[RealPart]:
     return [RealPart(x, x, 1.0), RealPart(y, y, 1.0)]
 
 
-def _scaled(operator_at: OperatorOfJ, factor: complex) -> OperatorOfJ:
-    """factor · O."""
-    return lambda j, representation: factor * operator_at(j, representation)
-
-
-def _turned(operator_at: OperatorOfJ, factor: complex) -> OperatorOfJ:
-    """factor (O↑ - O↓)."""
-
-    def operator(j: int, representation: str) -> JOperator:
-        bands = operator_at(j, representation).bands
-        return JOperator(j, {q: factor * np.sign(q) * band for q, band in bands.items() if q})
-
-    return operator
+def _rising_less_falling(operator: Operator) -> Operator:
+    """O↑ - O↓."""
+    return weighted(operator, lambda m, n, above, below: np.sign(above - below))
 
 
 def couplings_with_pairs(
-    name: str, operator_at: OperatorOfJ, odd: bool, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair]
+    name: str, operator: Operator, odd: bool, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair]
 ) -> list[Coupling]:
     """The couplings of `over_real_states` for an operator over |J k⟩, with a factor i if it is odd."""
     return [
-        Coupling(name, bra, ket, _turned(operator_at, 1j * factor) if turned else _scaled(operator_at, factor))
+        Coupling(name, bra, ket, 1j * factor * _rising_less_falling(operator) if turned else factor * operator)
         for bra, ket, factor, turned in over_real_states(states, odd, reversed_, pairs)
     ]
 

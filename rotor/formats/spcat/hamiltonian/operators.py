@@ -24,12 +24,12 @@ from dataclasses import replace
 
 from rotor.formats.spcat.hamiltonian.code_table import SPIN_ALONG_Z, Digits, Kind, square_typ
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
-from rotor.formats.spcat.hamiltonian.spin_operators import tensor_in_n, tensor_with_spins
+from rotor.formats.spcat.hamiltonian.spin_operators import tensor_operator, tensor_with_spins
 from rotor.frozen import dataclass
-from rotor.quantum.effects.interactions import with_powers
-from rotor.quantum.effects.spin_effect import ParameterName, matrix_of
+from rotor.quantum.effects.spin_effect import matrix_of
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.operators.rotation import sum_of_powers, with_powers
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
-from rotor.quantum.states import OperatorOfJ
 from rotor.tops.operators import Operators
 
 REFUSED = {
@@ -43,18 +43,23 @@ REFUSED = {
 class CodedOperator:
     """The operator of a code, without its states.
 
-    plain: powers (p, q, n) of a term without spins. by_j: operator by J of a term without spins and without such powers. rotor, spins: of a
+    plain: powers (p, q, n) of a term without spins. of_n: operator of a term without spins and without such powers. rotor, spins: of a
     spin term, with places of the spins from 1. odd: whether time reversal changes its sign.
     """
 
     plain: Operators | None = None
-    by_j: OperatorOfJ | None = None
+    of_n: Operator | None = None
     rotor: Rotor | None = None
     spins: tuple[int, ...] = ()
     odd: bool = False
     n2: int = 0
     nz2: int = 0
     ns: int = 0
+
+    @property
+    def alone(self) -> Operator:
+        """The operator of a term without spins."""
+        return self.of_n or sum_of_powers(self.plain or {})
 
 
 def code_operator(digits: Digits, axes: str) -> CodedOperator:
@@ -68,7 +73,8 @@ def code_operator(digits: Digits, axes: str) -> CodedOperator:
     if digits.has_spin:
         return _with_spins(digits, axes)
     if digits.kind is Kind.TENSOR:
-        return CodedOperator(by_j=_operator_by_j(digits, axes), odd=digits.tensor.odd)
+        tensor = with_powers(tensor_operator(digits.tensor, 0, axes), digits.nsq, digits.ksq)
+        return CodedOperator(of_n=tensor, odd=digits.tensor.odd)
     return CodedOperator(plain=_plain(digits, axes))
 
 
@@ -94,12 +100,6 @@ def _plain(d: Digits, axes: str) -> Operators:
         return {(p, q + 1, 0): 1.0}
     # Nx² and Ny² = ½(N² - Nz²) ± ¼(N₊² + N₋²)
     return {(p + 1, q, 0): 0.5, (p, q + 1, 0): -0.5, (p, q, 1): 0.25 if place == 0 else -0.25}
-
-
-def _operator_by_j(d: Digits, axes: str) -> OperatorOfJ:
-    """Operators by J with half anticommutators of the powers."""
-    powers, tensor = ParameterName("", d.nsq, d.ksq), tensor_in_n(d.tensor, axes)
-    return lambda j, representation: with_powers(tensor(j, representation), powers)
 
 
 def _with_spins(d: Digits, axes: str) -> CodedOperator:

@@ -28,8 +28,7 @@ from rotor.formats.spcat.hamiltonian.code_table import Digits
 from rotor.formats.spcat.hamiltonian.codes import PLURAL_NOT_YET
 from rotor.formats.spcat.text.par import Options
 from rotor.quantum.moments import Moment, Vector
-from rotor.quantum.states import OperatorOfJ
-from rotor.quantum.wang.j_operators import JOperator, half_turn
+from rotor.quantum.wang.basis import SpeciesFactors, half_turn
 
 AXES_OF_PHASE = {False: "cba", True: "abc"}  # axes of PHASE 1, 2, 4; the key is whether the basis is oblate
 
@@ -120,16 +119,12 @@ def turned_odd_axes(g: str) -> frozenset[str]:
     return frozenset("abc") - {g} if g else frozenset()
 
 
-def half_turned(operator_at: OperatorOfJ, axis: str, odd: bool) -> OperatorOfJ:
-    """Representation of an operator O that changes sign under C2g, in functions invariant under θ C2g.
+def half_turned(axis: str, odd: bool) -> SpeciesFactors:
+    """What represents an operator O that changes sign under C2g, in functions invariant under θ C2g, multiplied with O.
 
     For an odd O, passed as i O, it is i C2g O; for an even one, with a factor i between two states, i C2g i O = -C2g O.
     """
-
-    def operator(j: int, representation: str) -> JOperator:
-        return (1.0 if odd else -1.0) * (half_turn(j, representation, axis) @ operator_at(j, representation))
-
-    return operator
+    return half_turn(axis, 1.0 if odd else -1.0)
 
 
 def by_order(

@@ -21,23 +21,21 @@ alone is turned around by it and has the factor i, and the reverse.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import field, replace
 from math import pi
 
 import numpy as np
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Tensor
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator, code_operator
-from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied, single_j_operator
+from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied
 from rotor.formats.spcat.text.par import Options, Parameter
 from rotor.frozen import dataclass
-from rotor.quantum.states import OperatorOfJ
-from rotor.quantum.wang.j_operators import JOperator
-
-Factor = Callable[[int, int, Floats, Floats], Floats]  # function of N', N'', K' and K''
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.operators.rotation import Weight, ladders, weighted
 
 
 @dataclass(frozen=True)
@@ -124,7 +122,7 @@ def level_term(d: Digits, axes: str, sine: bool = False) -> CodedOperator:
     if d.ns:
         raise ValueError("a power of N·S of one K is read but not computed yet")
 
-    def factor_for_k(m: int, n: int, above: Floats, below: Floats) -> Floats:
+    def factor_for_k(m: Ints, n: Ints, above: Ints, below: Ints) -> Floats:
         chosen = (np.abs(above) == d.level_k) & (above == below)
         return np.asarray(chosen * (np.sign(above) if sine else 1.0))
 
@@ -138,11 +136,11 @@ def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float,
     return each * abs(up), each * abs(low)  # the size of ρ turns; unlike signs shift n by one half
 
 
-def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
+def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Weight:
     """Factor of a Fourier term."""
     up, low = angles_by_k(n, series, states)
 
-    def factor(m: int, n_low: int, above: Floats, below: Floats) -> Floats:
+    def factor(m: Ints, n_low: Ints, above: Ints, below: Ints) -> Floats:
         angle = up * above + low * below
         turned = np.where(np.minimum(abs(above), abs(below)) % 2 == 1, -1.0, 1.0) if series.g12 and n % 2 else 1.0
         return np.asarray(turned * (np.where(above == -below, 0.0, np.sin(angle)) if sine else np.cos(angle)))
@@ -150,7 +148,7 @@ def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
     return factor
 
 
-def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Factor:
+def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Weight:
     """Factor of an element in a Fourier term: a single K with NOFC; ½(K' + K'') for the sine of n = 0, as in the program.
 
     n: the harmonic. sine: sine or cosine. series: the constants of the file. states: the states of K' and of K''.
@@ -163,10 +161,10 @@ def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Fac
     return _fourier(n, sine, series, states)
 
 
-def _sampled(n: int, sine: bool) -> Factor:
+def _sampled(n: int, sine: bool) -> Weight:
     """Factor with NOFC, which selects a single K."""
 
-    def factor(m: int, n_low: int, above: Floats, below: Floats) -> Floats:
+    def factor(m: Ints, n_low: Ints, above: Ints, below: Ints) -> Floats:
         twice = above + below
         # the mean of both K, rounded up, is n
         return np.where((abs(twice) + 1) // 2 == n, np.sign(twice) if sine else 1.0, 0.0)
@@ -188,56 +186,32 @@ def _euler(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> Cod
     if base.plain is None:
         return _multiplied(base, _mean(d.nsq, ksq, (a, b), extra), False, axes)
     parts = [
-        _by_elements(single_j_operator({(0, 0, n): factor}), _mean(d.nsq + p, ksq + q, (a, b), extra), 1.0)
+        factor * weighted(ladders(n), _mean(d.nsq + p, ksq + q, (a, b), extra))
         for (p, q, n), factor in base.plain.items()
     ]
-    return replace(base, plain=None, by_j=_summed(parts))
+    return replace(base, plain=None, of_n=Operator(tuple(each for part in parts for each in part.shifts)))
 
 
-def _mean(n2: int, k2: int, constants: tuple[float, float], extra: bool) -> Factor:
+def _mean(n2: int, k2: int, constants: tuple[float, float], extra: bool) -> Weight:
     """½(f' + f'') with NSQ and KSQ, divided by D once more if `extra`; the mean over both functions keeps the element Hermitian."""
     a, b = constants
 
-    def f(n: int, k: Floats) -> Floats:
+    def f(n: Ints, k: Ints) -> Floats:
         square = n * (n + 1.0) - k**2
         below = 1 + a * k**2 + b * square
         return np.asarray((square / below) ** n2 * (k**2 / below) ** k2 / (below if extra else 1.0))
 
-    return lambda m, n, above, below: 0.5 * (f(m, above) + f(n, below))
+    return lambda m, n, above, below: np.asarray(0.5 * (f(m, above) + f(n, below)))
 
 
-def _summed(parts: Sequence[OperatorOfJ]) -> OperatorOfJ:
-    """Sum of operators."""
-
-    def operator(j: int, representation: str) -> JOperator:
-        whole = parts[0](j, representation)
-        for part in parts[1:]:
-            whole = whole + part(j, representation)
-        return whole
-
-    return operator
-
-
-def _multiplied(base: CodedOperator, factor: Factor, sine: bool, axes: str) -> CodedOperator:
+def _multiplied(base: CodedOperator, factor: Weight, sine: bool, axes: str) -> CodedOperator:
     """An operator times the factor of a series."""
     phase = imaginary(axes, sine)
     whole = 1.0 / phase if base.odd else phase
     if base.rotor is not None:
-        alike = multiplied(base.rotor, factor, whole, base.odd != sine)
+        alike = multiplied(base.rotor, factor, whole, base.odd != sine, axes)
         return replace(base, rotor=alike, odd=base.odd != sine)
-    operator_at = base.by_j or single_j_operator(base.plain or {})
-    return replace(base, plain=None, by_j=_by_elements(operator_at, factor, whole), odd=base.odd != sine)
-
-
-def _by_elements(operator_at: OperatorOfJ, factor: Factor, whole: complex) -> OperatorOfJ:
-    """An operator whose elements are multiplied by a factor."""
-
-    def operator(j: int, representation: str) -> JOperator:
-        k = np.arange(-j, j + 1.0)
-        bands = operator_at(j, representation).bands
-        return JOperator(j, {q: whole * factor(j, j, k + q, k) * band for q, band in bands.items()})
-
-    return operator
+    return replace(base, plain=None, of_n=whole * weighted(base.alone, factor), odd=base.odd != sine)
 
 
 def refuse_within_pairs(d: Digits, states: Sequence[int], doubled: frozenset[int]) -> None:

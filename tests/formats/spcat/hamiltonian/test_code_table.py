@@ -12,8 +12,9 @@ import rotor.formats.spcat
 from rotor.formats.spcat.hamiltonian.code_table import TABLE, Kind, axis_product, split_code
 from rotor.formats.spcat.hamiltonian.codes import AXES
 from rotor.formats.spcat.hamiltonian.operators import code_operator
-from rotor.formats.spcat.hamiltonian.spin_operators import single_j_operator
-from rotor.quantum.wang.j_operators import anticommutator, components, half_turn
+from rotor.quantum.operators.algebra import half_anticommutator
+from rotor.quantum.operators.rotation import components, matrix_of_j
+from rotor.quantum.wang.basis import character, wang_blocks
 
 J = 6
 
@@ -23,16 +24,28 @@ def test_every_typ_stands_in_one_row():
     assert rows == list(range(100))
 
 
+def half_turn(representation: str, axis: str) -> np.ndarray:
+    """C2 of one axis over |J k⟩: Σ |f⟩ character ⟨f| over all Wang functions f."""
+    turn = np.zeros((2 * J + 1, 2 * J + 1))
+    for block in wang_blocks(J, representation):
+        for k in block.k.tolist():
+            function = np.zeros(2 * J + 1)
+            function[J - k] = block.sign
+            function[J + k] = 1.0
+            turn += character(block, axis) * np.outer(function, function) / (function @ function)
+    return turn
+
+
 @pytest.mark.parametrize("representation", ["Ir", "IIIl"])
 @pytest.mark.parametrize("typ", [typ for typ in range(2, 80) if split_code(10_000 * typ).tensor.rank <= 2 * J])
 def test_symmetries_are_those_of_the_operators(typ: int, representation: str):
     """Half turns about a, b, c, time reversal (with the factor i of an odd operator) and the change of K, by elements over |J k>."""
     digits, oblate = split_code(10_000 * typ), representation == "IIIl"
     symmetry, operator = digits.symmetry(oblate), code_operator(digits, AXES[representation])
-    matrix = (operator.by_j or single_j_operator(operator.plain or {}))(J, representation).matrix
+    matrix = matrix_of_j(operator.alone, J)
     assert matrix.any()
     for axis in "abc":
-        turn = half_turn(J, representation, axis).matrix
+        turn = half_turn(representation, axis)
         turned = turn @ matrix @ np.linalg.inv(turn)
         sign = 1.0 if symmetry.axis in ("", axis) else -1.0
         np.testing.assert_allclose(turned, sign * matrix, atol=1e-12 * max(abs(matrix).max(), 1.0))
@@ -48,12 +61,11 @@ def test_symmetries_are_those_of_the_operators(typ: int, representation: str):
 @pytest.mark.parametrize(("typ", "axis"), [(20, "a"), (40, "b"), (60, "c")])
 def test_the_codes_of_na_nb_nc_are_those_of_the_manual(typ: int, axis: str):
     """With the factor i between states; Na, Nb, Nc are TYP 20, 40, 60, and the products of the two other axes follow each."""
-    of = components(J, "Ir")
+    of = components("Ir")
     first, second = (letter for letter in "abc" if letter != axis)
-    for code, matrix in ((typ, 1j * of[axis].matrix), (typ + 1, anticommutator(of[first], of[second]).matrix)):
+    for code, matrix in ((typ, 1j * of[axis]), (typ + 1, 2.0 * half_anticommutator(of[first], of[second]))):
         operator = code_operator(split_code(10_000 * code), AXES["Ir"])
-        assert operator.by_j is not None
-        np.testing.assert_allclose(operator.by_j(J, "Ir").matrix, matrix, atol=1e-12)
+        np.testing.assert_allclose(matrix_of_j(operator.alone, J), matrix_of_j(matrix, J), atol=1e-12)
 
 
 def test_axes_multiply_as_half_turns_do():

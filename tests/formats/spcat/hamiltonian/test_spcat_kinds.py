@@ -154,11 +154,12 @@ def test_operators_of_n_are_hermitian_and_obey_time_reversal():
     """All of TYP 12 to 79: Hermitian (with i where odd), and even ones real, odd ones imaginary, as J of the table of phases."""
     from rotor.formats.spcat.hamiltonian.code_table import split_code
     from rotor.formats.spcat.hamiltonian.codes import AXES
+    from rotor.quantum.operators.rotation import matrix_of_j
 
-    for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):
+    for axes in AXES.values():
         for typ in (*range(12, 18), *range(20, 28), *range(40, 48), *range(60, 68)):
             coded = code_operator(split_code(typ * 10000), axes)
-            matrix = coded.by_j(6, representation).matrix
+            matrix = matrix_of_j(coded.alone, 6)
             sign = -1 if coded.odd else 1
             np.testing.assert_allclose(matrix, sign * matrix.conj().T, atol=1e-9)  # i times a Hermitian operator
             k = np.arange(-6, 7)
@@ -170,17 +171,19 @@ def test_low_orders_are_cartesian_products():
     """TYP 21, 41, 61 are NbNc + NcNb, ...; 20, 40, 60 i times Na, Nb, Nc, -i in the oblate basis (as SPCAT's levels say)."""
     from rotor.formats.spcat.hamiltonian.code_table import split_code
     from rotor.formats.spcat.hamiltonian.codes import AXES
-    from rotor.quantum.wang.j_operators import anticommutator, components
+    from rotor.quantum.operators.algebra import half_anticommutator
+    from rotor.quantum.operators.rotation import components, matrix_of_j
 
     for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):
-        of = components(5, representation)
+        of = components(representation)
         for typ, axis in ((20, "a"), (40, "b"), (60, "c")):
             others = [of[x] for x in "abc" if x != axis]
-            pair = code_operator(split_code((typ + 1) * 10000), axes).by_j(5, representation)
-            np.testing.assert_allclose(pair.matrix, anticommutator(*others).matrix, atol=1e-12)  # sums of two products
-            alone = code_operator(split_code(typ * 10000), axes).by_j(5, representation)
+            pair = matrix_of_j(code_operator(split_code((typ + 1) * 10000), axes).alone, 5)
+            products = matrix_of_j(2.0 * half_anticommutator(*others), 5)
+            np.testing.assert_allclose(pair, products, atol=1e-12)  # sums of two products
+            alone = matrix_of_j(code_operator(split_code(typ * 10000), axes).alone, 5)
             factor = 1j if representation == "Ir" else -1j
-            np.testing.assert_allclose(alone.matrix, factor * of[axis].matrix, atol=1e-14)  # round-off
+            np.testing.assert_allclose(alone, factor * matrix_of_j(of[axis], 5), atol=1e-14)  # round-off
 
 
 def test_the_energy_of_one_k():
