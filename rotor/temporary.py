@@ -35,10 +35,9 @@ def locked_folder(parent: Path, prefix: str) -> Iterator[Path]:
 
 def _locked_folder(parent: Path, prefix: str) -> tuple[Path, int | None]:
     """The folder and its lock; repeated if another process removed the folder, as abandoned, before it was locked."""
-    import tempfile
-
     while True:
-        folder = Path(tempfile.mkdtemp(prefix=prefix, dir=parent))
+        folder = parent / f"{prefix}{os.urandom(8).hex()}"  # as tempfile.mkdtemp, which takes 2 ms to load
+        folder.mkdir(0o700)
         lock = _lock(folder)
         if folder.exists():
             return folder, lock

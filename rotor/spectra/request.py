@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 
 PROFILES = ("sticks", "gaussian", "lorentzian", "voigt")
 Q_TOO_SMALL, Q_TOO_LARGE = 0.9, 10.0  # ratio of a given Q to the sum, beyond which there is a note
+NOTE_ERROR = 1e-5  # relative error of the sum in such a note, which has four digits; the classical limit often serves
 NO_DIPOLE = "none: a rigid spherical top has no rotational lines"
 
 
@@ -342,14 +343,14 @@ def _expected_q(lines: Lines) -> tuple[float, bool] | None:
     state_effects = [effect for effect in effects if effect.states(top)]
     others = tuple(effect for effect in effects if effect not in state_effects and not effect.spins(top))
     if len(others) == len(effects):
-        return partition_function(top, kelvin, effects=effects).q, False
+        return partition_function(top, kelvin, NOTE_ERROR, effects).q, False
     from rotor.quantum.spins.scheme import scheme_of
 
     scheme = scheme_of(top, effects)
     if scheme.equivalent == 2:  # the weights of the rotation decide which functions exist
         return None
     bare = replace(top, states=None, spin_constants=None, level_table=None, symmetry_checked=False)
-    first, sums = partition_function(bare, kelvin, effects=others).q, 1.0
+    first, sums = partition_function(bare, kelvin, NOTE_ERROR, others).q, 1.0
     for effect in state_effects:
         values = effect.parameters(top)
         for state in effect.states(top):

@@ -1,5 +1,7 @@
 """Input that hardly any molecule has is taken with a note."""
 
+import sys
+
 import pytest
 from places import ORACLES
 
@@ -137,3 +139,11 @@ def test_no_note_where_the_sum_takes_minutes(monkeypatch):
     answer = answer_spectrum(SpectrumRequest(top, jmax=1, q=1.0, effects=effects_of(top, True), min_lgint=None))
     assert _expected_q(answer.lines) is None
     assert not [note for note in answer.notes if "Q = 1" in note]
+
+
+def test_the_note_on_q_takes_the_classical_limit_where_it_is_exact_enough(monkeypatch):
+    """Four digits: no levels beyond the ground state are solved, where a sum to six took 50 of 350 ms of a whole command."""
+    answer = answer_spectrum(SpectrumRequest(rotor.read("SO2"), jmax=2, q=1.0))
+    summed = rotor.thermodynamics.partition_function(answer.lines.top, 300.0).q
+    monkeypatch.setattr(sys.modules["rotor.thermodynamics.level_sums"], "_summed", None)
+    assert _expected_q(answer.lines) == (pytest.approx(summed, rel=1e-5), False)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Indices
-from rotor.formats.spcat.text.fields import BLANK, QUANTUM_RANGE, spell_degeneracy, spell_quantum
+from rotor.formats.spcat.text.fields import BLANK, QUANTUM_RANGE, spell_quantum
 from rotor.frozen import dataclass
 from rotor.geometry.error_free import halves
 
@@ -49,8 +49,10 @@ def quantum_table() -> Text:
 
 @cache
 def degeneracy_table() -> Text:
-    """Three characters for each degeneracy from 0 to 3599, (3600, 3)."""
-    return np.frombuffer("".join(map(spell_degeneracy, range(3600))).encode(), dtype=np.uint8).reshape(-1, 3)
+    """Three characters for each degeneracy from 0 to 3599, (3600, 3): the texts of `spell_degeneracy`."""
+    letters = np.repeat(np.arange(ord("A"), ord("Z") + 1, dtype=np.uint8), 100)[:, None]
+    beyond = np.hstack([letters, np.tile(_group_table(2, True)[:100], (26, 1))])
+    return np.concatenate([_group_table(3, True)[1000:], beyond])
 
 
 def round_decimal(values: NDArray[np.float64], decimals: int) -> tuple[NDArray[np.int64], Mask]:
