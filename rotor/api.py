@@ -134,12 +134,12 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.observed.fit import FitChoices as FitChoices
     from rotor.observed.fit import contributions as contributions
     from rotor.observed.fit import fit_source as fit_source
-    from rotor.observed.identify import IdentifyChoices as IdentifyChoices
     from rotor.observed.identify import identify as identify
     from rotor.observed.model import Component as Component
     from rotor.observed.model import Sight as Sight
     from rotor.observed.model import model as model
     from rotor.observed.partition import PartitionTable as PartitionTable
+    from rotor.observed.selection import IdentifyChoices as IdentifyChoices
     from rotor.observed.species import species_lines as species_lines
     from rotor.observed.species import strength_from_einstein as strength_from_einstein
     from rotor.observed.spectrum import observed_spectrum as observed_spectrum

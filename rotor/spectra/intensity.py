@@ -9,6 +9,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +20,8 @@ from rotor import units
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_whole
 from rotor.frozen import dataclass
+from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels
 
 if TYPE_CHECKING:
@@ -94,6 +98,28 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
     return j
 
 
+def highest_j(
+    top: Top,
+    dipole_abc: tuple[float, float, float],
+    temperature_k: float,
+    q: float,
+    cut: float,
+    jmax: int | None = None,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+) -> int:
+    """The J max of a line list: the given one, else `jmax_for_cut`.
+
+    A top with a table of energies has lines between its levels alone. Levels beyond both the table and the cut are not needed.
+    """
+    table = top.level_table
+    if jmax is None or table is None or tuple(effects) != SEMI_RIGID:
+        return jmax_for_cut(top, dipole_abc, temperature_k, q, cut) if jmax is None else jmax
+    last = int(table.quanta["j"].max())
+    with suppress(ValueError):  # a hot gas, whose lines reach far
+        return min(jmax, max(last, jmax_for_cut(top, dipole_abc, temperature_k, q, cut)))
+    return jmax
+
+
 def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float | None = None) -> Floats:
     """The fraction of molecules in each level, per component and M, including its spin weight.
 
@@ -137,12 +163,14 @@ def largest(values: Floats, count: int) -> Ints:
 class IntensityCut:
     """Weakest intensity that counts, with the temperature and populations behind it.
 
-    population: (levels,) intensity per MHz and D² of a line from each lower state, without the photon factor. kt_mhz: kT/h.
+    population: (levels,) intensity per MHz and D² of a line from each lower state, without the photon factor. kt_mhz: kT/h. most_lines:
+    TooManyLinesError as soon as more are above the cut.
     """
 
     population: Floats
     kt_mhz: float
     least: float
+    most_lines: float = math.inf
 
     @property
     def needed(self) -> Floats:
@@ -159,7 +187,12 @@ class IntensityCut:
 
 
 def intensity_cut(
-    levels: Levels, temperature_k: float, q: float, least_lgint: float, ground_mhz: float | None = None
+    levels: Levels,
+    temperature_k: float,
+    q: float,
+    least_lgint: float,
+    ground_mhz: float | None = None,
+    most_lines: float = math.inf,
 ) -> IntensityCut | None:
     """The cut at log10 intensity `least_lgint`.
 
@@ -175,6 +208,8 @@ def intensity_cut(
         log10 of the weakest intensity in nm² MHz.
     ground_mhz : float, optional
         As in `population`.
+    most_lines : float, optional
+        Above the cut.
 
     Returns
     -------
@@ -184,4 +219,4 @@ def intensity_cut(
     if math.isinf(least_lgint):
         return None  # no cut keeps every line
     scaled = LGINT_NM2_MHZ * population(levels, temperature_k, q, ground_mhz)
-    return IntensityCut(scaled, temperature_k * units.MHZ_PER_K, 10.0**least_lgint)
+    return IntensityCut(scaled, temperature_k * units.MHZ_PER_K, 10.0**least_lgint, most_lines)

@@ -40,8 +40,8 @@ from rotor.spectra.intensity import (
     EINSTEIN_PER_MHZ3,
     INTENSITY_NM2_MHZ,
     LGINT_NM2_MHZ,
+    highest_j,
     intensity_cut,
-    jmax_for_cut,
     largest,
     population,
     require_cut,
@@ -298,7 +298,7 @@ def line_list(
     temperature_k : float, optional
         Temperature for intensities.
     jmax : int, optional
-        Highest J; by default the J beyond which no line reaches `min_lgint`.
+        Highest J; by default the J beyond which no line reaches `min_lgint`. A table of energies may end before (`highest_j`).
     min_lgint : float or None, optional
         log10 of nm² MHz below which lines are left out; None keeps all lines.
     range_mhz : (float, float), optional
@@ -356,17 +356,15 @@ def line_list(
     stated = line_partition(top, temperature_k, q, vibrational_factor, vibrations, effects)
     if stated is None and (jmax is None or math.isfinite(least)):
         stated = partition_function(top, temperature_k, effects=effects)
-    if jmax is None:
-        jmax = jmax_for_cut(top, dipole, temperature_k, stated.q if stated else 1.0, least)
-
+    jmax = highest_j(top, dipole, temperature_k, stated.q if stated else 1.0, least, jmax, effects)
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
     trusted = np.ones(len(levels), dtype=np.bool_) if untrusted else are_trusted(top, levels)
     ground = float(levels.energy_mhz[trusted & (levels.weight > 0)].min(initial=math.inf))  # inf without levels: no cut
-    cut = intensity_cut(levels, temperature_k, stated.q, least, ground) if stated and math.isfinite(ground) else None
+    cut = None
+    if stated and math.isfinite(ground):
+        cut = intensity_cut(levels, temperature_k, stated.q, least, ground, most_lines)
     others = [moment for effect in levels.effects for moment in effect.other_moments(top)]
-    transitions = all_transitions(
-        levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others, most_lines
-    )
+    transitions = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others)
     inside = None if trusted.all() else trusted[transitions.upper] & trusted[transitions.lower]
     lines = Lines(
         top=top,

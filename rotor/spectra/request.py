@@ -272,7 +272,8 @@ class SpectrumAnswer(TextOf):
     def jmax_source(self) -> str:
         """Reason for the highest J."""
         if self.request.jmax is not None:
-            return "given"
+            cut_short = self.lines.top.level_table is not None and self.lines.jmax < self.request.jmax
+            return "the table of energies has no lines beyond it" if cut_short else "given"
         if self.request.min_lgint is None:
             return f"beyond it no line reaches an lgint of {USUAL_CUT:g}"
         return "beyond it no line reaches the cut"

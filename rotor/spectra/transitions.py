@@ -25,6 +25,7 @@ from rotor.spectra.strong_lines import strong_lines
 from rotor.tops.operators import FIGURE_AXIS
 
 if TYPE_CHECKING:
+    from rotor.quantum.effect import QuantumEffect
     from rotor.quantum.spins.many_f_lines import Rows as ManyF
     from rotor.tops.top import Top
 
@@ -56,11 +57,17 @@ class TooManyLinesError(Exception):
     """More lines are above a cut than were allowed."""
 
 
-def transition_count(top: Top, jmax: int, spin_functions: int = 1) -> float:
+def spin_functions(top: Top, effects: Sequence[QuantumEffect]) -> int:
+    """Number of functions of the spins of all effects."""
+    twice = {spin.name: spin.twice for effect in effects for spin in effect.spins(top)}
+    return math.prod(size + 1 for size in twice.values())
+
+
+def transition_count(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> float:
     """Approximate number of transitions up to a J before any cut, without further states; each F joins all N that spins reach."""
     components = sum(1 for mu in top.dipole_abc_debye or () if mu)
     count = 0.5 * components * (jmax + 1) ** 3 if top.kind == "asymmetric" else components * (jmax + 1.0) ** 2
-    return count * spin_functions**2
+    return count * spin_functions(top, effects) ** 2
 
 
 def all_transitions(
@@ -69,7 +76,6 @@ def all_transitions(
     range_mhz: tuple[float, float] = EVERYTHING,
     cut: IntensityCut | None = None,
     moments: Sequence[Moment] = (),
-    most_lines: float = math.inf,
 ) -> Transitions:
     """All allowed transitions between `levels` in the range and above the cut, unordered.
 
@@ -82,11 +88,9 @@ def all_transitions(
     range_mhz : (float, float), optional
         First and last frequency.
     cut : IntensityCut, optional
-        Least intensity; by default no cut.
+        Least intensity; by default no cut. TooManyLinesError for more lines than it allows.
     moments : sequence of Moment, optional
         Moments other than dipoles, for levels with spins.
-    most_lines : float, optional
-        With a cut: TooManyLinesError as soon as more lines are above it.
 
     Returns
     -------
@@ -96,8 +100,7 @@ def all_transitions(
     dipoles = dipoles_abc if isinstance(dipoles_abc, Mapping) else {(0, 0): dipoles_abc}
     if levels.representation is None:
         return _joined(
-            (piece for states, mu in dipoles.items() for piece in _closed_form(levels, states, mu, range_mhz, cut)),
-            most_lines,
+            (piece for states, mu in dipoles.items() for piece in _closed_form(levels, states, mu, range_mhz, cut)), cut
         )
 
     blocks, incomplete = _existing_blocks(levels)
@@ -106,19 +109,19 @@ def all_transitions(
         vector = body_tensor(dipoles[0, 0], 1, levels.representation)
         strong = strong_lines(levels, solved, vector, cut.needed, range_mhz[1])
         pieces = (_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(strong))
-        transitions = _joined(pieces, most_lines)
+        transitions = _joined(pieces, cut)
         return _rows(transitions, levels.weight[transitions.lower] > 0) if incomplete else transitions
     if (
         cut is not None
         and not moments
-        and (stacked := _many_f_transitions(levels, blocks, dipoles, range_mhz, cut, most_lines)) is not None
+        and (stacked := _many_f_transitions(levels, blocks, dipoles, range_mhz, cut)) is not None
     ):
         return _rows(stacked, levels.weight[stacked.lower] > 0) if incomplete else stacked
     pairs, between = _connections(levels, blocks, dipoles, moments)
     if cut is None and range_mhz == EVERYTHING and not any(up is low for up, low in pairs):
         transitions = _all_lines(pairs, between)
     else:
-        transitions = _selected_lines(levels, pairs, between, range_mhz, cut, most_lines)
+        transitions = _selected_lines(levels, pairs, between, range_mhz, cut)
     return _rows(transitions, levels.weight[transitions.lower] > 0) if incomplete else transitions
 
 
@@ -158,9 +161,9 @@ def _rows(lines: Transitions, chosen: NDArray[np.bool_]) -> Transitions:
     return Transitions(lines.frequency_mhz[rows], lines.strength_debye2[rows], lines.upper[rows], lines.lower[rows])
 
 
-def _joined(pieces: Iterable[Transitions], most_lines: float) -> Transitions:
-    """All pieces; TooManyLinesError as soon as they have more lines than allowed."""
-    parts, count = list[Transitions](), 0
+def _joined(pieces: Iterable[Transitions], cut: IntensityCut | None) -> Transitions:
+    """All pieces; TooManyLinesError as soon as they have more lines than the cut allows."""
+    parts, count, most_lines = list[Transitions](), 0, math.inf if cut is None else cut.most_lines
     for piece in pieces:
         parts.append(piece)
         count += len(piece.lower)
@@ -228,7 +231,6 @@ def _selected_lines(
     between: Amplitudes,
     range_mhz: tuple[float, float],
     cut: IntensityCut | None,
-    most_lines: float,
 ) -> Transitions:
     """The lines of all pairs in a range and above a cut.
 
@@ -238,12 +240,12 @@ def _selected_lines(
     needed = np.full(len(levels), -np.inf) if cut is None else cut.needed
     candidates = (_candidates(levels, up, lows, between(up, lows), needed, range_mhz) for up, lows in _by_upper(pairs))
     pieces = (_with_frequencies(levels, *batch, range_mhz, cut) for batch in _batches(candidates))
-    return _joined(pieces, most_lines)
+    return _joined(pieces, cut)
 
 
 def _many_f_transitions(
     levels: Levels, blocks: list[SolvedBlock], dipoles: Mapping[tuple[int, int], Vector], range_mhz: tuple[float, float],
-    cut: IntensityCut, most_lines: float,
+    cut: IntensityCut,
 ) -> Transitions | None:  # fmt: skip
     """All transitions of levels with spins that were solved for many F together; None for other levels."""
     needed = cut.needed
@@ -255,7 +257,7 @@ def _many_f_transitions(
     groups = amplitudes_of_groups(blocks, tensor_moments(blocks[0].spins.shared, tensors), len(levels))
     energies, needed = np.append(levels.energy_mhz, 0.0), np.append(needed, np.inf)
     space = Workspace()
-    return _joined((_group_transitions(energies, needed, group, range_mhz, cut, space) for group in groups), most_lines)
+    return _joined((_group_transitions(energies, needed, group, range_mhz, cut, space) for group in groups), cut)
 
 
 def _group_transitions(

@@ -92,7 +92,8 @@ class Identified:
 
 def answer(request: IdentifyRequest, work: Work) -> Identified:
     """The species, ranked by evidence."""
-    from rotor.observed.identify import IdentifyChoices, identify
+    from rotor.observed.identify import identify
+    from rotor.observed.selection import IdentifyChoices
 
     choices = IdentifyChoices(
         velocity_km_s=request.velocity_km_s,

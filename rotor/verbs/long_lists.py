@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.frozen import dataclass
 from rotor.reports.progress import progress_bar
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
-from rotor.spectra.transitions import TooManyLinesError, transition_count
+from rotor.spectra.transitions import TooManyLinesError, spin_functions, transition_count
 
 if TYPE_CHECKING:
     from rotor.formats.streamed_lines import SortedLines
@@ -68,7 +68,7 @@ def is_long(request: SpectrumRequest, files: Mapping[str, Any], resolution: floa
     ):
         return False
     if (
-        request.top.internal_rotation is not None and _spin_functions(request) > 1
+        request.top.internal_rotation is not None and spin_functions(request.top, request.effects) > 1
     ):  # spins beside rotors have no ranges of F
         return False
     if any(path.suffix == ".gz" for path in _streamed(files)) or request.top.dipole_abc_debye is None:
@@ -83,13 +83,7 @@ def _most_lines(files: Mapping[str, Any]) -> int:
 
 def _count(request: SpectrumRequest) -> float:
     """Approximate number of transitions before the cut."""
-    return transition_count(request.top, _highest_j(request), _spin_functions(request))
-
-
-def _spin_functions(request: SpectrumRequest) -> int:
-    """Number of functions of all spins."""
-    twice = {spin.name: spin.twice for effect in request.effects for spin in effect.spins(request.top)}
-    return math.prod(size + 1 for size in twice.values())
+    return transition_count(request.top, _highest_j(request), request.effects)
 
 
 def _streamed(files: Mapping[str, tuple[Path, ...]]) -> list[Path]:
@@ -113,14 +107,15 @@ def _no_json(count: str) -> str:
 
 def _highest_j(request: SpectrumRequest) -> int:
     """The requested highest J, or an estimate from the usual cut (with Q = 1e4 if Q is not known)."""
-    from rotor.spectra.intensity import USUAL_CUT, jmax_for_cut
+    from rotor.spectra.intensity import highest_j
 
-    dipole = request.top.dipole_abc_debye
-    if request.jmax is not None or dipole is None:
+    dipole, least = request.top.dipole_abc_debye, -math.inf if request.min_lgint is None else request.min_lgint
+    if dipole is None:
         return request.jmax or 0
-    least = USUAL_CUT if request.min_lgint is None else request.min_lgint
     try:
-        return jmax_for_cut(request.top, dipole, request.temperature_k, request.q or 1e4, least)
+        return highest_j(
+            request.top, dipole, request.temperature_k, request.q or 1e4, least, request.jmax, request.effects
+        )
     except ValueError:  # the line list raises it with the reason
         return 0
 

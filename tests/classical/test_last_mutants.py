@@ -15,9 +15,10 @@ from rotor.classical.integrators import lie_runge_kutta
 from rotor.classical.integrators.method import integrate
 from rotor.fitting.criteria import aicc, f_test
 from rotor.fluids.motion.bodies import _principal
-from rotor.observed.identify import IdentifyChoices, identify
+from rotor.observed.identify import identify
 from rotor.observed.model import Component
 from rotor.observed.partition import PartitionTable
+from rotor.observed.selection import IdentifyChoices
 from rotor.structures.kraitchman import _used_moments
 
 

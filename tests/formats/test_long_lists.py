@@ -137,7 +137,7 @@ def test_a_long_list_with_spins_is_the_one_in_memory(call, folder, monkeypatch, 
     with monkeypatch.context() as patch:
         defaults = streamed_lines.sorted_lines.__kwdefaults__ | {"piece_lines": 300}
         patch.setattr(streamed_lines.sorted_lines, "__kwdefaults__", defaults)
-        made = _recorded(patch, streamed_lines, "_make_piece", lambda *job: job[1:])
+        made = _recorded(patch, streamed_lines, "make_piece", lambda *job: job[1:])
         code, out, _ = call(*typed, "--cat", "a.cat")
     assert code == 0
     assert len(made) > 2
@@ -214,7 +214,7 @@ def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
     from rotor.formats import streamed_lines
 
     monkeypatch.setattr(streamed_lines, "PIECE_LINES", 2_000)
-    pieces, true = [], streamed_lines._make_piece
+    pieces, true = [], streamed_lines.make_piece
 
     def stopping(plan, first, last):
         if len(pieces) == 3:
@@ -223,7 +223,7 @@ def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
         true(plan, first, last)
 
     with monkeypatch.context() as patch:
-        patch.setattr(streamed_lines, "_make_piece", stopping)
+        patch.setattr(streamed_lines, "make_piece", stopping)
         patch.setattr(
             streamed_lines.sorted_lines,
             "__kwdefaults__",
@@ -233,7 +233,7 @@ def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
         assert Path("a.cat.pieces").is_dir()
         assert not Path("a.cat").exists()
         patch.setattr(
-            streamed_lines, "_make_piece", lambda plan, first, last: (pieces.append(first), true(plan, first, last))
+            streamed_lines, "make_piece", lambda plan, first, last: (pieces.append(first), true(plan, first, last))
         )
         assert call(*TYPED, "--cat", "a.cat")[0] == 0
     assert len(pieces) == len(set(pieces))  # no piece twice
@@ -242,11 +242,11 @@ def test_an_interrupted_list_goes_on(call, folder, monkeypatch, short):
 
 def test_a_piece_of_many_lines_is_written_in_parts(call, folder, monkeypatch, short):
     """One F of J = 300 has 3.6 million lines with one 14N, whose columns took 0.55 GB at once."""
-    from rotor.formats import streamed_lines
+    from rotor.formats import list_pieces
 
     with monkeypatch.context() as patch:
-        patch.setattr(streamed_lines, "_BATCH", 300)
-        sizes = _recorded(patch, streamed_lines, "copy_columns", lambda columns, *_: len(columns["lgint"]))
+        patch.setattr(list_pieces, "BATCH", 300)
+        sizes = _recorded(patch, list_pieces, "copy_columns", lambda columns, *_: len(columns["lgint"]))
         assert call(*TYPED, "--cat", "a.cat")[0] == 0
     assert len(sizes) > 20
     assert max(sizes) == 300
@@ -304,7 +304,7 @@ def test_a_list_that_is_sorted_is_not_made_again(call, folder, monkeypatch, shor
         assert call(*TYPED, "--cat", "a.cat")[0] == 130
     assert {path.name for path in Path("a.cat.pieces").iterdir()} == {"manifest.json", "sorted"}
     with monkeypatch.context() as patch:
-        patch.setattr(streamed_lines, "_make_piece", lambda *_: pytest.fail("solved again"))
+        patch.setattr(streamed_lines, "make_piece", lambda *_: pytest.fail("solved again"))
         assert call(*TYPED, "--cat", "a.cat")[0] == 0
     assert _in_memory(call, monkeypatch, *TYPED, "--cat", "b.cat")[0] == 0
     assert sorted(Path("a.cat").read_text().splitlines()) == sorted(Path("b.cat").read_text().splitlines())

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import rotor
 from rotor import units
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
@@ -211,3 +212,14 @@ def test_tables_have_every_column():
         "j_upper", "ka_upper", "kc_upper", "j_lower", "ka_lower", "kc_lower",
     ]  # fmt: skip
     assert lines.to_polars().shape == frame.shape
+
+
+def test_levels_beyond_a_table_of_energies_and_the_cut_are_not_solved():
+    """All lines join levels of the table; J up to 1000 took 100 s for the same list."""
+    top = rotor.read("water")
+    whole, beyond = line_list(top), line_list(top, jmax=1000)
+    assert beyond.jmax == whole.jmax
+    assert np.array_equal(beyond.frequency_mhz, whole.frequency_mhz)
+    assert beyond.untrusted == whole.untrusted
+    hot = line_list(top, temperature_k=1e5, jmax=25, q=1e6)  # the cut is beyond J = 600
+    assert hot.jmax == 25
