@@ -19,7 +19,8 @@ from rotor.quantum.estimates.limits import all_limits, limit_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, check_fields, declared
-from rotor.requests.knob import Knob, Measure
+from rotor.requests.knob import Estimate, Knob, Measure, Sought
+from rotor.requests.plan import Growth
 from rotor.requests.readers import Names, Pairs, Quantity, Whole
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
@@ -36,6 +37,9 @@ FARTHEST_PS = 1e9  # a phase of 2π 1 THz times this time has an error of 1e-6
 
 TOLERANCES = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7)
 FINEST_TOLERANCE = 1e-11
+LOOSEST_COSINE = 0.05
+LOOSER = (1e3, 1e2, 1e1, 1.0, 0.3, 0.1)  # tolerances of cosines that are tried, times the accuracy
+PILOT_TOLERANCE, PILOT_POINTS = 1e-3, 11  # at the finest, of a plan
 
 
 def cosine_error(trace: AlignmentTrace, reference: AlignmentTrace) -> float:
@@ -44,12 +48,36 @@ def cosine_error(trace: AlignmentTrace, reference: AlignmentTrace) -> float:
     return max(float(np.max(np.abs(cosines - true), initial=0.0)) for cosines, true in pairs)
 
 
+def _looser(sought: Sought) -> list[float]:
+    """The loosest tolerances first: the error is often a hundred times less than the tolerance, which bounds it."""
+    tolerances = [min(looser * sought.accuracy, LOOSEST_COSINE) for looser in LOOSER]
+    return [value for value in tolerances if value >= FINEST_TOLERANCE] or [FINEST_TOLERANCE]
+
+
+def _error_of_tolerance(_: Sought, request: AlignRequest, tolerance: float) -> Estimate:
+    """The error that a run of the quantum gas finds."""
+    trace = answer_align(replace(request, classical_molecules=0)).trace
+    return Estimate(trace.error_estimate, trace)
+
+
+def _coarser(request: AlignRequest, fineness: float) -> AlignRequest:
+    """A shorter request, of a fineness 1/tolerance."""
+    return replace(request, tolerance=1.0 / fineness, points=PILOT_POINTS)
+
+
 TOLERANCE = Knob(
     TOLERANCES, lambda request: max(1e-2 * min(*TOLERANCES, request.tolerance), FINEST_TOLERANCE),
     (Measure("cosine", "", lambda answer, reference: cosine_error(answer.trace, reference.trace)),), "a tolerance of {:g}",
-    FINEST_TOLERANCE,  # a given J max may be too small for a finer tolerance
-    change=lambda request, name, value: replace(request, jmax=None, **{name: value}),
+    # a given J max may be too small for a finer tolerance
+    swept=lambda request, value: replace(request, jmax=None, tolerance=value),
     prepare=lambda request: replace(request, classical_molecules=0),
+    tried=_looser, error=_error_of_tolerance,
+    cost=Growth(
+        (1.0 / PILOT_TOLERANCE,), lambda request: 1.0 / request.tolerance, _coarser,
+        prepare=lambda request: replace(request, classical_molecules=0),
+        work=lambda _, fineness: fineness**0.25,  # steps of a method of order 4
+        largest=lambda request: replace(request, tolerance=max(request.tolerance, PILOT_TOLERANCE)),
+    ),
 )  # fmt: skip
 
 

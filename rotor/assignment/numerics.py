@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
+from rotor.requests.knob import Knob
 from rotor.requests.numerics import Numerics
 from rotor.requests.plan import Cost
 
 MEMORY_MB = 150.0  # of a search
 
 
-def assign_cost(request: Any) -> Cost:
-    """The cost of a search, bounded by the seconds of the request."""
-    return Cost(float(min(request.seconds, 1.0 + request.species)), MEMORY_MB)
+SEARCH = Knob(
+    key="search",
+    fixed="seeded; how sure the answer is stands with it as a probability",
+    cost=lambda request, *_: Cost(float(min(request.seconds, 1.0 + request.species)), MEMORY_MB),
+)
 
 
-def describe_assign(request: Any, _: Any) -> dict[str, Any]:
+def describe_assign(request: Any, _: Cost) -> dict[str, Any]:
     """What a search for constants does."""
     peaks = request.peaks
     temperature = "not known, tried from 1 to 8 K" if request.temperature_k is None else f"{request.temperature_k:g} K"
@@ -35,8 +38,4 @@ def describe_assign(request: Any, _: Any) -> dict[str, Any]:
     }
 
 
-ASSIGN = Numerics(
-    remarks=lambda request: ("search: seeded; how sure the answer is stands with it as a probability",),
-    describe=describe_assign,
-    cost=assign_cost,
-)
+ASSIGN = Numerics(knobs=(SEARCH,), describe=describe_assign)

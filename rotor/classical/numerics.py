@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from rotor.classical import tolerance_search as search
 from rotor.classical.driven import answer_driven
-from rotor.classical.motion_steps import (
-    beginning,
-    count_first_steps,
-    expected_steps,
-    first_share,
-    is_compiled,
-    timed_steps,
-)
+from rotor.classical.motion_steps import beginning, expected_steps, is_compiled, timed_steps
 from rotor.classical.step_errors import MOST_CALLED, MOST_STEPS, apart
-from rotor.classical.tolerance_search import ORDER, tolerances
-from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
+from rotor.classical.tumble import TumbleAnswer, TumbleRequest
 from rotor.requests.budget import ROUNDING
 from rotor.requests.knob import NOTHING_CHEAPER, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, LeftOut, timed, traced, whole_cost
+from rotor.requests.plan import Cost, Growth, LeftOut
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
@@ -69,8 +62,30 @@ def _finest(request: Any) -> float:
     return float(min(FINEST_TOLERANCE, 1e-2 * request.tolerance))
 
 
+def _is_driven(request: Any) -> bool:
+    return not isinstance(request, TumbleRequest)
+
+
 def _with_tolerance(request: Any, _: str, tolerance: float) -> Any:
     return replace(request, step=None, tolerance=tolerance)
+
+
+class Counted(NamedTuple):
+    """A driven motion with its expected number of steps."""
+
+    request: DrivenRequest
+    steps: int
+
+
+def _first_steps(motion: Counted, steps: int) -> DrivenRequest:
+    """The first part of a motion, of so many steps."""
+    return motion.request if steps == motion.steps else beginning(motion.request, steps / motion.steps)
+
+
+def _short_steps(motion: Counted) -> tuple[int, int]:
+    """Steps of two parts: the first run in Python, the others compiled."""
+    first_steps, more = timed_steps(motion.request)
+    return first_steps, more * first_steps
 
 
 TOLERANCE = Knob(
@@ -78,12 +93,24 @@ TOLERANCE = Knob(
     _finest,
     (ATTITUDE,),
     "steps to {:g}",
-    change=_with_tolerance,
-    used=lambda request: not isinstance(request, TumbleRequest),
     key="numerics.tolerance",
+    change=_with_tolerance,
     value=lambda request: request.tolerance if request.step is None else None,
+    used=_is_driven,
     answer=answer_driven,
-    search=tolerances,
+    tried=search.TOLERANCES,
+    error=search.error_of_tolerance,
+    predicted=search.predicted_tolerance,
+    proportional=True,
+    coarsest=(search.TOLERANCES[0], "loosest"),
+    text="tolerance {:g} of a step",
+    instead=("numerics.step",),
+    cost=Growth(
+        _short_steps,
+        lambda motion: motion.steps,
+        _first_steps,
+        lambda request: Counted(request, expected_steps(request)),
+    ),
 )
 
 
@@ -94,10 +121,10 @@ def _splitting(order: int) -> Knob:
         _finest,
         (ATTITUDE,),
         "steps to {:g}",
-        change=lambda request, _, step: replace(request, step=step, order=order),
-        used=lambda request: not isinstance(request, TumbleRequest) and _refusal(request) is None,
         key=f"numerics.step, order {order}",
         title="length of a step",
+        change=lambda request, _, step: replace(request, step=step, order=order),
+        used=lambda request: _is_driven(request) and _refusal(request) is None,
         value=lambda request: request.step if request.order == order else None,
         reference=lambda request: _with_tolerance(request, "", _finest(request)),
         answer=answer_driven,
@@ -105,12 +132,12 @@ def _splitting(order: int) -> Knob:
     )
 
 
-def _remarks(request: Any) -> tuple[str, ...]:
-    """Why a free motion has no knob, or why the steps of a driven motion are not swept."""
-    if isinstance(request, TumbleRequest):
-        return (f"the free motion: {NOTHING_CHEAPER}; theta functions, round-off alone",)
-    refusal = _refusal(request)
-    return () if refusal is None else (f"numerics.step: {refusal}",)
+FREE = Knob(
+    key="the free motion",
+    fixed=f"{NOTHING_CHEAPER}; theta functions, round-off alone",
+    used=lambda request: isinstance(request, TumbleRequest),
+)
+UNSPLIT = Knob(key="numerics.step", fixed=lambda request: _refusal(request) or "", used=_is_driven)
 
 
 def step_error(request: Any, steps: int) -> LeftOut:
@@ -124,16 +151,9 @@ def step_error(request: Any, steps: int) -> LeftOut:
     return LeftOut(NAME, steps * request.tolerance, "rad", basis)
 
 
-def motion_cost(request: Any) -> Cost:
-    """The cost of a free or driven motion; of a driven one with its number of steps."""
-    if isinstance(request, TumbleRequest):
-        return whole_cost(lambda: answer_tumble(request), largest=lambda: answer_tumble(request).table.columns)
-    steps = expected_steps(request)
-    return Cost(_step_seconds(request, steps), _memory_mb(request), steps)
-
-
-def describe_motion(request: Any, steps: Any) -> dict[str, Any]:
-    """What a free motion does, or a driven one of these steps."""
+def describe_motion(request: Any, cost: Cost) -> dict[str, Any]:
+    """What a free motion does, or a driven one."""
+    steps = cost.amount
     if isinstance(request, TumbleRequest):
         return {
             "effects": ("free rotation",),
@@ -154,34 +174,11 @@ def _stepping(request: DrivenRequest, steps: int) -> str:
     if request.step is not None:
         return f"splitting of order {request.order}, step {request.step:g}"
     mean = abs(request.times[-1] - request.times[0]) / steps
-    return f"Runge-Kutta of order {ORDER}, adaptive, tolerance {request.tolerance:g} of a step; {mean:.3g} a step in the mean"
-
-
-def _step_seconds(request: DrivenRequest, steps: int) -> float:
-    """Processor time of a driven motion, from two timed parts: the first steps run in Python, the others compiled."""
-    first_steps, more = timed_steps(request)
-    if steps < more * first_steps:
-        return timed(lambda: count_first_steps(request, 1.0))
-    counts, seconds = [], []
-    for share in (first_steps / steps, more * first_steps / steps):
-        seconds.append(timed(lambda share=share: counts.append(count_first_steps(request, share))))  # type: ignore[misc]
-    near, far = counts[0], counts[-1]
-    rate = max(seconds[1] - seconds[0], 0.0) / max(far - near, 1)
-    return seconds[0] + rate * max(steps - near, 0)
-
-
-def _memory_mb(request: DrivenRequest) -> float:
-    first = beginning(request, first_share(request))
-    return traced(lambda: answer_driven(first).table.columns)[1] * len(request.times) / len(first.times)
+    return f"Runge-Kutta of order {search.ORDER}, adaptive, tolerance {request.tolerance:g} of a step; {mean:.3g} a step in the mean"
 
 
 TUMBLE = Numerics(
-    {
-        "rad": Goal("attitude", motion_error, (TOLERANCE,), ("numerics.tolerance", "numerics.step")),
-        "%": Goal("growth rate", growth_error, unfit=_under_effects),
-    },
-    knobs=(TOLERANCE, *map(_splitting, ORDERS)),
-    remarks=_remarks,
+    {"rad": Goal("attitude", motion_error), "%": Goal("growth rate", growth_error, _under_effects)},
+    knobs=(TOLERANCE, *map(_splitting, ORDERS), FREE, UNSPLIT),
     describe=describe_motion,
-    cost=motion_cost,
 )

@@ -11,16 +11,14 @@ this tolerance and a finer motion for the stated error; if that exceeds the accu
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rotor.classical.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
 from rotor.classical.step_errors import error_by_finer, step_rounding
-from rotor.requests.knob import Choice, Sought
+from rotor.requests.knob import Estimate, Prediction, Sought, first_by_proportion
 
 if TYPE_CHECKING:
     from rotor.classical.driven import DrivenRequest
@@ -35,8 +33,20 @@ REGULAR = 2.0  # the power of the time with which the error of a regular motion 
 CHAOTIC = 4.0  # a power that is seen beyond which the growth is taken as exponential
 
 
+def decade_tolerance(decade: int) -> float:
+    """The double next to a power of ten.
+
+    >>> decade_tolerance(3)
+    0.001
+    """
+    return float(f"1e-{decade}")
+
+
+TOLERANCES = tuple(map(decade_tolerance, range(LOOSEST, FINEST + 1)))  # of a search
+
+
 @dataclass(frozen=True)
-class _Motions:
+class Motions:
     """The motions of a request by the decade of their tolerance, each computed once."""
 
     request: DrivenRequest
@@ -55,21 +65,13 @@ class _Motions:
             self.computed[decade] = self.computed[max(looser)] if alike else answer_driven(request).motion
         return self.computed[decade]
 
-    def error(self, decade: int) -> float:
+    def error(self, tolerance: float) -> float:
         """The largest error of the attitude in radians, from steps (`error_by_finer`) and rounding."""
+        decade = LOOSEST + TOLERANCES.index(tolerance)
         finer = [*range(decade + FINER, FINEST_REFERENCE, FINER), FINEST_REFERENCE]
         decades = {decade_tolerance(each): each for each in finer}
         step_error = error_by_finer(self.at(decade), list(decades), lambda tolerance: self.at(decades[tolerance]))[0]
         return step_error + step_rounding(self.at(decade))
-
-
-def decade_tolerance(decade: int) -> float:
-    """The double next to a power of ten.
-
-    >>> decade_tolerance(3)
-    0.001
-    """
-    return float(f"1e-{decade}")
 
 
 def likely_decade(allowed: float) -> int:
@@ -77,33 +79,18 @@ def likely_decade(allowed: float) -> int:
     return min(max(round(-math.log10(allowed)), LOOSEST) + FINER, FINEST)
 
 
-def tolerances(sought: Sought) -> Iterator[Choice]:
-    """The loosest tolerance, in decades, that reaches an accuracy in radians; of a long motion that of its first part, then finer ones.
-
-    A plan and a run choose the same tolerance. A free motion needs none.
-    """
-    from rotor.classical.driven import DrivenRequest
-
-    request, allowed = sought.request, sought.accuracy
-    if not isinstance(request, DrivenRequest):
-        return
-    motions, misses = _Motions(request), LOOSEST - 1
-    if _is_long(request, allowed):
-        _refuse_endless(request, allowed)
-        misses, how = _pilot_decade(request, allowed)
-        chosen = replace(request, tolerance=decade_tolerance(misses))
-        yield Choice(chosen, how, partial(motions.error, misses), confirming=1.0 + 10.0 ** (FINER / ORDER))
-    if misses < FINEST:
-        decade, error = _loosest(motions, allowed, misses)
-        missed = f", finer than the plan's {decade_tolerance(misses):g}, which missed" if misses >= LOOSEST else ""
-        how = _words(decade) + missed + ("" if error <= allowed else f": {CHAOS}")
-        yield Choice(replace(request, tolerance=decade_tolerance(decade)), how, error)
+def error_of_tolerance(sought: Sought, _: object, tolerance: float) -> Estimate:
+    """The error of the whole motion, in radians."""
+    error = sought.known.setdefault("motions", Motions(sought.request)).error(tolerance)
+    return Estimate(error, remark="" if error <= sought.accuracy else f": {CHAOS}")
 
 
-def _words(decade: int) -> str:
-    return f"tolerance {decade_tolerance(decade):g} of a step" + (
-        ", nothing cheaper: the loosest there is" if decade == LOOSEST else ""
-    )
+def predicted_tolerance(sought: Sought) -> Prediction | None:
+    """Of a long motion the tolerance of its first part; a plan and a run choose the same."""
+    if not _is_long(sought.request, sought.accuracy):
+        return None
+    _refuse_endless(sought.request, sought.accuracy)
+    return Prediction(*_pilot(sought.request, sought.accuracy), 1.0 + 10.0 ** (FINER / ORDER))
 
 
 def _is_long(request: DrivenRequest, allowed: float) -> bool:
@@ -126,24 +113,24 @@ def _refuse_endless(request: DrivenRequest, allowed: float) -> None:
         )
 
 
-def _pilot_decade(request: DrivenRequest, allowed: float) -> tuple[int, str]:
-    """The decade determined from the first part of a motion, and a text that describes the choice."""
+def _pilot(request: DrivenRequest, allowed: float) -> tuple[float, str]:
+    """The tolerance determined from the first part of a motion, and a text that describes the choice."""
     from rotor.geometry.rotations import distance
 
-    motions = _Motions(beginning(request, 1 / BEGINNINGS, 0.5))
+    motions = Motions(beginning(request, 1 / BEGINNINGS, 0.5))
     likely = likely_decade(allowed)
     apart = distance(motions.at(likely).attitude, motions.at(min(likely + FINER, FINEST_REFERENCE)).attitude)
     # the half of the part that is compared with its end
     middle = int(np.searchsorted(np.abs(np.array(motions.request.times) - request.times[0]), 0.5 * _span(motions)))
     grown = math.log10(_growth(float(np.max(apart[: middle + 1])), float(np.max(apart))))
-    part = f"from the first {100 / BEGINNINGS:g} % of the time, in which errors grow {{}}"
-    needed = math.log10(allowed) - grown
-    decade = _loosest(motions, 10.0**needed)[0] if needed > -FINEST_REFERENCE else FINEST
+    needed, tolerance = math.log10(allowed) - grown, TOLERANCES[-1]
+    if needed > -FINEST_REFERENCE:
+        tolerance = first_by_proportion(TOLERANCES, lambda value: Estimate(motions.error(value)), 10.0**needed)[0]
     kind = "exponentially" if grown > REGULAR * math.log10(BEGINNINGS) else "as the square of the time at the most"
-    return decade, f"{_words(decade)}, {part.format(kind)}"
+    return tolerance, f", from the first {100 / BEGINNINGS:g} % of the time, in which errors grow {kind}"
 
 
-def _span(motions: _Motions) -> float:
+def _span(motions: Motions) -> float:
     return abs(motions.request.times[-1] - motions.request.times[0])
 
 
@@ -156,20 +143,3 @@ def _growth(middle: float, end: float) -> float:
     if middle > 0.0 and end > middle * 2.0**CHAOTIC:  # faster than any power: errors grow exponentially
         return float(min((end / middle) ** (2.0 * (BEGINNINGS - 1)), 1e300))
     return float(BEGINNINGS**REGULAR)
-
-
-def _loosest(motions: _Motions, allowed: float, misses: int = LOOSEST - 1) -> tuple[int, float]:
-    """The lowest decade whose error is at most `allowed`, else the finest, and its error; `misses` is a decade with a larger error."""
-    decade = min(max(round(-math.log10(allowed)), misses + 1), FINEST)
-    errors: dict[int, float] = {}
-    reaches = FINEST + 1
-    while reaches > misses + 1:
-        error = errors[decade] = motions.error(decade)
-        # decades, if the error is proportional to the tolerance
-        apart = max(math.floor(abs(math.log10(max(error, 1e-30) / allowed))), 1)
-        if error <= allowed:
-            reaches, decade = decade, max(decade - apart, misses + 1)
-        else:
-            misses, decade = decade, min(decade + apart, reaches - 1)
-    decade = min(reaches, FINEST)
-    return decade, errors[decade]

@@ -36,9 +36,9 @@ import numpy as np
 from rotor import units
 from rotor.fluids.request import NewBox, answer_fluid, make_box
 from rotor.fluids.settings import ELECTROSTATICS
-from rotor.requests.knob import Choice, Knob, Measure, Sought
+from rotor.requests.knob import Estimate, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, Growth, LeftOut, largest_first, traced
+from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
 
 if TYPE_CHECKING:
     from rotor.arrays import Floats
@@ -85,20 +85,24 @@ def _other_forces(request: FluidRequest) -> str:
     )
 
 
-def _shorter_steps(sought: Sought) -> Iterator[Choice]:
-    """The longest step first, with the bound of the deviation of the conserved energy, in K.
-
-    The error is of second order: the first step is extrapolated from a short one, in hundredths of a femtosecond, and then shortened.
-    """
-    request = sought.request
-    step = FIRST_STEP_FS * math.sqrt(sought.accuracy / conserved_bound_k(request, FIRST_STEP_FS))
+def _shorter_steps(sought: Sought) -> Iterator[float]:
+    """The longest step first, extrapolated from a short one, in hundredths of a femtosecond: the error is of second order."""
+    step = FIRST_STEP_FS * math.sqrt(sought.accuracy / conserved_bound_k(sought.request, FIRST_STEP_FS))
     step = max(min(math.floor(100.0 * step) / 100.0, LONGEST_STEP_FS), SHORTEST_STEP_FS)
     while step >= SHORTEST_STEP_FS:
-        longest = ", nothing cheaper: the longest there is" if step == LONGEST_STEP_FS else ""
-        how = f"a step of {step:g} fs{longest}; root mean square of the conserved energy about its mean"
-        chosen = replace(request, settings=replace(request.settings, step_fs=step))
-        yield Choice(chosen, how, conserved_bound_k(request, step))
+        yield step
         step = math.floor(95.0 * step) / 100.0
+
+
+def _error_of_step(_: Sought, request: FluidRequest, step_fs: float) -> Estimate:
+    """Bound of the deviation of the conserved energy, in K."""
+    return Estimate(
+        conserved_bound_k(request, step_fs), remark="; root mean square of the conserved energy about its mean"
+    )
+
+
+def _with_setting(request: FluidRequest, name: str, value: Any) -> FluidRequest:
+    return replace(request, settings=replace(request.settings, **{name: value}))
 
 
 def conserved_bound_k(request: FluidRequest, step_fs: float) -> float:
@@ -118,16 +122,6 @@ def conserved_bound_k(request: FluidRequest, step_fs: float) -> float:
         deviations.append(conserved_k(answer_followed(followed(replace(request, box=box, settings=settings), step_fs))))
     spread = float(np.std(deviations, ddof=1)) * math.sqrt(1.0 + 1.0 / BOXES)
     return float(np.mean(deviations)) + float(stdtrit(BOXES - 1, SURE)) * spread
-
-
-def _finer_sums(sought: Sought) -> Iterator[Choice]:
-    """The coarsest tolerance of the Ewald sum first, with the error of its forces in percent, which may grow during a run."""
-    settings = sought.request.settings
-    for tolerance in EWALD_LADDER:
-        chosen = replace(sought.request, settings=replace(settings, ewald_tolerance=tolerance))
-        spared = SPARE * force_error(chosen)
-        error = spared if spared > sought.accuracy else 0.0  # else the answer states it
-        yield Choice(chosen, f"a tolerance of {tolerance:g} of Ewald's sum", error)
 
 
 def force_error(request: FluidRequest) -> float:
@@ -214,12 +208,17 @@ STEP = Knob(
         Measure(f"positions after {FOLLOWED_FS:g} fs", "Å", _moved),
     ),
     "a step of {:g} fs",
-    change=lambda request, _, step: followed(request, step),
     key="numerics.step",
     title="length of a step",
+    attribute="step_fs",
+    change=_with_setting,
     value=lambda request: request.settings.step_fs,
+    swept=followed,
     answer=answer_followed,
-    search=_shorter_steps,
+    tried=_shorter_steps,
+    error=_error_of_step,
+    coarsest=(LONGEST_STEP_FS, "longest"),
+    text="a step of {:g} fs",
 )
 FORCE = Measure("force", "%", force_difference)
 
@@ -231,13 +230,11 @@ def _cutoff(electrostatics: str) -> Knob:
         lambda request: 0.99 * _most(request),
         (FORCE,),
         f"Ewald's sum to {FINEST_EWALD:g}, Lennard-Jones to {{:.3g}} Å",
-        change=lambda request, _, cutoff: force_function(
-            request, electrostatics, cutoff, request.settings.ewald_tolerance
-        ),
-        used=lambda request: request.settings.electrostatics == electrostatics,
         key=f"numerics.cutoff, {electrostatics}",
         title="cutoff of the forces (Å)",
         value=lambda request: request.settings.cutoff_angstrom,
+        used=lambda request: request.settings.electrostatics == electrostatics,
+        swept=lambda request, cutoff: force_function(request, electrostatics, cutoff, request.settings.ewald_tolerance),
         reference=lambda request: force_function(request, "ewald", 0.99 * _most(request), FINEST_EWALD),
         answer=lambda forces: forces(),
     )
@@ -248,13 +245,18 @@ SUM = Knob(
     FINEST_EWALD,
     (FORCE,),
     "a tolerance of {:g}",
-    change=lambda request, _, tolerance: force_function(request, "ewald", request.settings.cutoff_angstrom, tolerance),
-    used=lambda request: request.settings.electrostatics == "ewald",
     key="numerics.ewald_tolerance",
     title="tolerance of Ewald's sum",
+    attribute="ewald_tolerance",
+    change=_with_setting,
     value=lambda request: request.settings.ewald_tolerance,
+    used=lambda request: request.settings.electrostatics == "ewald",
+    swept=lambda request, tolerance: force_function(request, "ewald", request.settings.cutoff_angstrom, tolerance),
     answer=lambda forces: forces(),
-    search=_finer_sums,
+    tried=EWALD_LADDER,
+    error=lambda sought, request, tolerance: Estimate(SPARE * force_error(request)),
+    stated=True,  # of the forces where the run ends
+    text="a tolerance of {:g} of Ewald's sum",
 )
 
 
@@ -283,24 +285,13 @@ def neglected_in_fluid(
     return largest_first([*neglected, LeftOut("vibration", None, "", "molecules are rigid")])
 
 
-def fluid_cost(request: Any) -> Cost:
-    """The cost of a run, from short runs of its box; and a short run, after which forces are nearly those of the fluid."""
+def _steps(request: Any) -> int:
+    """Steps of a run and of its equilibration."""
     from rotor.fluids.equilibration import equilibration_range
 
-    settings = request.settings
-    if request.engine != "rotor":
-        raise ValueError(f"numerics.engine {request.engine}: a plan is of the engine rotor alone")
-    ready: Any = replace(with_box(request), box_equilibration_ps=0.0)  # its box is made
-    before = _steps_before(equilibration_range(request.equilibration_ps)[0], settings)
-
-    def short(steps: int) -> Any:
-        return answer_fluid(
-            replace(ready, box=ready.box.copy(), settings=replace(settings, steps=steps)), progress=lambda *_: None
-        )
-
-    seconds = Growth(short, before + settings.steps, SHORT_STEPS).seconds
-    settled, memory_mb = traced(lambda: short(min(SETTLING_STEPS, settings.steps)))
-    return Cost(seconds, memory_mb, settled)
+    return int(request.settings.steps) + _steps_before(
+        equilibration_range(request.equilibration_ps)[0], request.settings
+    )
 
 
 def _steps_before(picoseconds: float, settings: Any) -> int:
@@ -308,11 +299,36 @@ def _steps_before(picoseconds: float, settings: Any) -> int:
     return round(1e3 * picoseconds / float(settings.step_fs))
 
 
-def describe_fluid(request: Any, settled: Any) -> dict[str, Any]:
+def _short_run(request: Any, steps: int) -> Any:
+    """The first steps of a box, which remains as it is, without its equilibration."""
+    return replace(_with_setting(request, "steps", int(steps)), box=request.box.copy(), box_equilibration_ps=0.0)
+
+
+def _box_of_plan(request: Any) -> Any:
+    """The request with its box."""
+    if request.engine != "rotor":
+        raise ValueError(f"numerics.engine {request.engine}: a plan is of the engine rotor alone")
+    return replace(with_box(request), box_equilibration_ps=request.equilibration_ps)
+
+
+LENGTH = Knob(
+    key="conditions.steps",
+    fixed="the error of a mean is in its report",
+    cost=Growth(
+        SHORT_STEPS,
+        _steps,
+        _short_run,
+        _box_of_plan,
+        largest=lambda request: _short_run(request, min(SETTLING_STEPS, request.settings.steps)),
+    ),
+)
+
+
+def describe_fluid(request: Any, cost: Cost) -> dict[str, Any]:
     """What a box does, from a short run."""
     from rotor.fluids.equilibration import equilibration_range
 
-    settings = request.settings
+    settings, settled = request.settings, cost.answer
     least_ps, most_ps = equilibration_range(request.equilibration_ps)
     before = _steps_before(least_ps, settings)
     until = (
@@ -348,13 +364,11 @@ def _force_error_at_end(answer: Any) -> float:
 
 FLUID = Numerics(
     {
-        "K": Goal("conserved energy", conserved_k, (STEP,), ("numerics.step",), _other_engine, with_box),
-        "%": Goal("forces", _force_error_at_end, (SUM,), ("numerics.ewald_tolerance",), _other_forces, with_box),
+        "K": Goal("conserved energy", conserved_k, _other_engine, with_box),
+        "%": Goal("forces", _force_error_at_end, _other_forces, with_box),
     },
     bare=False,
-    knobs=(STEP, *map(_cutoff, ELECTROSTATICS), SUM),
+    knobs=(STEP, *map(_cutoff, ELECTROSTATICS), SUM, LENGTH),
     prepare=_swept_box,
-    remarks=lambda request: ("conditions.steps: the error of a mean is in its report",),
     describe=describe_fluid,
-    cost=fluid_cost,
 )

@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.formats.fit_request import answer_fit
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.left_out import neglected_in_levels
 from rotor.quantum.estimates.plans import effect_texts
 from rotor.requests.knob import DECADES, Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, Growth, LeftOut, traced
+from rotor.requests.plan import Cost, Growth, LeftOut
 
 if TYPE_CHECKING:
     from rotor.formats.fit_request import FitRequest
@@ -59,6 +58,11 @@ STEPS = Knob(
     value=lambda request: request.options.most_iterations,
     reference=lambda request: with_options(request, tolerance=FINEST_TOLERANCE),
     label="{:.0f}".format,
+    cost=Growth(
+        SHORT_ITERATIONS,
+        lambda request: min(USUAL_ITERATIONS, request.options.most_iterations),
+        largest=lambda request: with_options(request, most_iterations=1),
+    ),
 )
 TOLERANCE = Knob(
     TOLERANCES,
@@ -67,22 +71,17 @@ TOLERANCE = Knob(
     AGAINST,
     change=_with_tolerance,
     tried=DECADES,
+    coarsest=(1.0, "loosest"),
+    bounds=("MHz", "%"),
     key="tolerance of the search",
     value=lambda request: request.options.tolerance,
 )
 
 
-def fit_cost(request: Any) -> Cost:
-    """The cost of a fit: of the setup and of one iteration, for the usual number of iterations."""
-
-    def limited(iterations: int) -> Any:
-        return answer_fit(with_options(request, most_iterations=min(iterations, request.options.most_iterations)))
-
-    seconds = Growth(limited, USUAL_ITERATIONS, SHORT_ITERATIONS).seconds
-    return Cost(seconds, traced(lambda: limited(1))[1])
+ROWS = Knob(key="numerics.loss, numerics.reject_above", fixed="an accuracy does not decide which lines count")
 
 
-def describe_fit(request: Any, _: Any) -> dict[str, Any]:
+def describe_fit(request: Any, _: Cost) -> dict[str, Any]:
     """What a fit does."""
     lines, free = request.lines, request.parameters.names
     blends = len(lines) - len(set(lines.blend.tolist()))
@@ -121,12 +120,7 @@ def _levels_text(request: FitRequest) -> str:
 
 
 FIT = Numerics(
-    {
-        "MHz": Goal("frequencies of the lines", knobs=(TOLERANCE,)),
-        "%": Goal("constants", constants_error, (TOLERANCE,)),
-    },
-    knobs=(STEPS, TOLERANCE),
-    remarks=lambda request: ("numerics.loss, numerics.reject_above: an accuracy does not decide which lines count",),
+    {"MHz": Goal("frequencies of the lines"), "%": Goal("constants", constants_error)},
+    knobs=(STEPS, TOLERANCE, ROWS),
     describe=describe_fit,
-    cost=fit_cost,
 )

@@ -1,17 +1,17 @@
 """Accuracy as an input: the cheapest settings that reach the requested accuracy, and the error that is reached.
 
-| kind | accuracy of | what is chosen | error stated |
-|---|---|---|---|
-| spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins, left out if smaller; method of several | rounding, and these |
-| stark, zeeman | energies, "1 kHz" | tolerance, and with it J max of the basis | by which energies move with a higher J max, round-off |
-| align | cosines, 1e-4 | the loosest tolerance (steps, populations), the smallest J max | steps, edge, populations, phases |
-| thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections | of the sums |
-| tumble | attitude, "1e-6 rad" | see `rotor.classical.tolerance_search`; free motion is exact | from finer steps |
-| spectrum, raman | intensities, "0.1 %" | see `rotor.spectra.intensity_accuracy` | of the sum Q, of rounding, of weaker lines |
-| emission | brightness, "1 mK" | the largest least depth, in decades | lines left out, Q |
-| fit | frequencies, "1 kHz"; constants, "1 %" of their standard errors | the loosest tolerance of the search, in decades | the next step |
-| torsion | levels | nothing: exact | functions, terms of the series |
-| gas, fluid | see `rotor.thermodynamics.gas_numerics`, `rotor.fluids.numerics` | | |
+| kind | accuracy of | knob |
+|---|---|---|
+| spectrum, levels, raman | frequencies, energies, shifts, "1 kHz" | spins, left out if smaller; method of several |
+| stark, zeeman | energies, "1 kHz" | tolerance, and with it J max of the basis |
+| align | cosines, 1e-4 | the loosest tolerance (steps, populations), the smallest J max |
+| thermo | Q, U and C_v, "0.1 %" | levels summed, or the classical limit with corrections |
+| tumble | attitude, "1e-6 rad" | tolerance of a step; free motion is exact |
+| spectrum, raman | intensities, "0.1 %" | weakest line of the list |
+| emission | brightness, "1 mK" | the largest least depth, in decades |
+| fit | frequencies, "1 kHz"; constants, "1 %" of their standard errors | the loosest tolerance of the search, in decades |
+| gas | temperature, "1 K"; heat capacity, "1 %"; C1 and C2, 0.02 | molecules |
+| fluid | conserved energy, "0.5 K"; forces, "0.1 %" | step; tolerance of Ewald's sum |
 
 The accuracy concerns the numerical error with the constants as given. Uncertain constants and missing orders of distortion are listed
 in the plan. An accuracy beyond double precision is refused.
@@ -20,7 +20,7 @@ in the plan. An accuracy beyond double precision is refused.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -28,8 +28,8 @@ from rotor.frozen import dataclass
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import REQUIRED, Field, declared
 from rotor.requests.fill import Entries
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Sought, knobs_of_fields
-from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Sought
+from rotor.requests.numerics import Numerics
 from rotor.requests.readers import Custom, Quantity
 
 CONVERTED = ("MHz", "K", "Å")  # units of an accuracy for which others may stand
@@ -75,45 +75,27 @@ class Accuracy:
         confirmed: whether errors that take a run are estimated too. Raises ValueError if no setting suffices, and for a knob that is
         set as well.
         """
-        goal = self.numerics.goals[self.unit]
+        goal, knobs = self.numerics.goals[self.unit], self.knobs(request)
         if reason := goal.unfit(request):
             raise ValueError(f"accuracy: {self.text}: {reason}")
-        sets = goal.sets if any(knob.used(request) for knob in goal.knobs) else ()
-        if stated := next((key for key in sets if entries.values.get(key) is not None), ""):
+        refused = (key for knob in knobs for key in knob.refuses)
+        if stated := next((key for key in refused if entries.values.get(key) is not None), ""):
             raise ValueError(f"accuracy and {stated}: give one of them")
         chosen, words = Choice(goal.prepare(request), NOTHING_CHEAPER), list[str]()
-        for knob, field in self._knobs(goal, request, entries):
-            sought = Sought(chosen.request, self.value, compute, goal.error, entries, chosen.answer)
-            choice = self._first_within(knob.choices(sought, field), confirmed)
-            if choice is not None:
-                words.append(choice.how)
-                chosen = replace(choice, how=", and ".join(words))
+        for knob in knobs:
+            sought = Sought(chosen.request, self.value, self.unit, compute, goal.error, entries, chosen.answer)
+            choice = knob.choose(sought, confirmed)
+            if choice is None:
+                continue
+            if choice.error > self.value:
+                raise self.out_of_reach(choice.error, choice.how)
+            words.append(choice.how)
+            chosen = replace(choice, how=", and ".join(words))
         return chosen
 
-    def _knobs(self, goal: Goal, request: Any, entries: Entries) -> Iterator[tuple[Knob, Field | None]]:
-        """The knobs of a goal, or the first of a field that can be set, with that field."""
-        yield from ((knob, None) for knob in goal.knobs)
-        if goal.knobs or self.unit == "%":
-            return
-        for field, knob in knobs_of_fields(request):
-            if knob.least is not None or knob.tried:
-                if entries.has(field):
-                    raise ValueError(f"accuracy and {field.identity}: give one of them")
-                yield knob, field
-                return
-
-    def _first_within(self, choices: Iterable[Choice], confirmed: bool) -> Choice | None:
-        """The first choice within the accuracy; None without any choice."""
-        choice, error = None, 0.0
-        for choice in choices:
-            if callable(choice.error) and not confirmed:
-                return choice
-            error = choice.error() if callable(choice.error) else choice.error
-            if error <= self.value:
-                return replace(choice, error=error)
-        if choice is not None:
-            raise self.out_of_reach(error, choice.how)
-        return None
+    def knobs(self, request: Any) -> list[Knob]:
+        """The knobs of a request that are chosen for the accuracy."""
+        return [knob for knob in self.numerics.knobs_of(request) if self.unit in knob.units]
 
     @property
     def text(self) -> str:
@@ -122,7 +104,7 @@ class Accuracy:
 
     def reached(self, answer: Any, choice: Choice) -> Reached:
         """The error that an answer reached; ValueError, with the reason, if it exceeds the accuracy."""
-        error = max(self.numerics.goals[self.unit].error(answer), choice.estimate)
+        error = max(self.numerics.goals[self.unit].error(answer), choice.error)
         if error > self.value:
             raise self.out_of_reach(error, choice.how)
         if self.total:
@@ -169,9 +151,9 @@ def read_accuracy(stated: Stated, numerics: Numerics, entries: Entries = Entries
 
 def _with_error(budget: ErrorBudget, choice: Choice) -> ErrorBudget:
     """The budget with the error estimated during the choice of settings, if the answer has no truncation error."""
-    if not choice.estimate or budget.truncation.value is not None:
+    if not choice.error or budget.truncation.value is not None:
         return budget
-    return replace(budget, truncation=ErrorTerm(choice.estimate, choice.how))
+    return replace(budget, truncation=ErrorTerm(choice.error, choice.how))
 
 
 def refuse_total(budget: ErrorBudget, accuracy: float, unit: str) -> None:

@@ -1,28 +1,32 @@
-"""A knob: how fine one approximation is. It stands with its field; accuracy goals, sweeps and plans use it.
+"""A knob: how fine one approximation is. It declares its values, the error at a value, and what a calculation costs by it.
 
     relative_error: float = declared(1e-6, Quantity(above=0), "Of Q, U and C_v", "numerics.relative_error", knob=Knob(
         (1e-1, 1e-2, 1e-3), 1e-13, (Measure("Q", "%", error_of_q),), "sums to {:g}", least=1e-13))
 
-A sweep computes answers at each step and compares them with the finest value. An accuracy takes the coarsest setting whose estimated
-error is within it. `Numerics`, beside the request, holds the knobs of a verb that are no fields,
-and its plan.
+A sweep computes answers at each step and compares them with the finest value. An accuracy takes the coarsest value whose error is within
+it. A plan extrapolates the cost from small values. A knob of a field stands with it, others in the `Numerics` of a verb; nothing else
+is written for one.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import field, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotor.frozen import dataclass
 from rotor.requests.field import Field, all_fields
 from rotor.requests.fill import Entries
 
+if TYPE_CHECKING:
+    from rotor.requests.plan import Cost, Run
+
 NOTHING_CHEAPER = "exact: nothing cheaper"
-LOOSEST = ", nothing cheaper: the loosest there is"
-DECADES = tuple(10.0**-n for n in range(13))  # values of a search
+DECADES = tuple(10.0**-n for n in range(13))  # values that are tried
 Answering = Callable[[Any], Any]
+T = TypeVar("T", "Choice", "Estimate")
 
 
 @dataclass(frozen=True)
@@ -74,39 +78,54 @@ class Sweeps:
 
 @dataclass(frozen=True)
 class Choice:
-    """Settings for an accuracy, chosen or tried.
+    """Settings for an accuracy.
 
-    request: with these settings. how: the settings in words. error: estimated during the search, in the unit of the accuracy; 0 if only
-    the answer states it; a function if its estimate takes a run: a plan does not call it. answer: with these settings, if the search
-    computed it. confirming: cost of the estimate of an error in a run, in runs.
+    request: with these settings. how: the settings in words. error: estimated, in the unit of the accuracy; 0 if only the answer states
+    it. answer: with these settings, if the search computed it. confirming: cost of the estimate of an error in a run, in runs.
     """
 
     request: Any
     how: str
-    error: float | Callable[[], float] = 0.0
+    error: float = 0.0
     answer: Any = None
     confirming: float = 0.0
-
-    @property
-    def estimate(self) -> float:
-        """The error; 0 if only a run estimates it."""
-        return 0.0 if callable(self.error) else self.error
 
 
 @dataclass(frozen=True)
 class Sought:
-    """Where a search for settings begins.
+    """What is known where a value is chosen.
 
-    request: with the settings of earlier knobs. accuracy: in its unit. compute: answers a request. error: of an answer. entries: as
-    entered. answer: of the knob before, if it was computed.
+    request: with the values of earlier knobs. accuracy: in `unit`. compute: answers a request. error: of an answer. entries: as
+    entered. answer: of the knob before, if it was computed. known: what the estimates of this search share.
     """
 
     request: Any
     accuracy: float
+    unit: str
     compute: Answering
     error: Callable[[Any], float]
     entries: Entries
     answer: Any = None
+    known: dict[Any, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The error of a value. answer: if it was computed. remark: follows the value in words. least: what no finer value lowers."""
+
+    error: float
+    answer: Any = None
+    remark: str = ""
+    least: float = 0.0
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A value that a short calculation suggests. remark: follows it in words. runs: what the estimate of its error costs, in runs."""
+
+    value: Any
+    remark: str
+    runs: float
 
 
 def with_field(request: Any, name: str, value: Any) -> Any:
@@ -121,88 +140,176 @@ def with_whole(request: Any, name: str, value: float) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Knob:
-    """How fine an approximation is: of the field where the knob stands, or of `key`.
+    """How fine an approximation is.
 
-    steps: values of a sweep, coarsest first. finest: value of the reference. Both may be functions of the request.
-    measures: errors of an answer beside the reference.
-    against: the reference in words, with {:g} for its value, or a function of the value.
-    least: finest possible value of a field that bounds the error in the unit of the accuracy; None for other fields.
-    change: returns the request with a value. prepare: returns the request of a sweep. used: whether the knob affects a request.
-    tried: values tried for an accuracy, coarsest first, where no value bounds the error.
-    search: settings for an accuracy, coarsest first, each with its estimated error, where they are more than such values.
-    title: in words, for pictures. key: of a knob that is declared beside the fields. attribute: of the request, which it changes, or
-    value: of a request.
-    reference: returns the request of the reference if `change` to the finest value does not; it returns None if the true value is known.
-    answer: computes a request, by default as the verb does. repeats: number of calculations in one answer. label: formats a value.
-    series: whether the values are those of one quantity.
+    key, title: for reports; key and attribute of a field's knob are the field's. attribute: of the request, that `change` sets.
+    change: returns the request with a value. value: of a request, if not that of the attribute. used: whether the knob affects a request.
+
+    Sweep. steps: values, coarsest first. finest: value of the reference. Both may be functions of the request.
+    measures: errors of an answer beside the reference. against: the reference in words, with {:g} for its value, or a function of it.
+    fixed: why it is not swept; without a remark if empty; None: it is swept. prepare: returns the request of a sweep.
+    swept: returns the input of `answer` from a request and a value. answer: by default as the verb does. repeats: number of calculations
+    in one answer. reference: returns the input for the reference, if it is not that of `finest`, or None if the true value is known.
+    label: formats a value. series: whether the values are those of one quantity.
+
+    Accuracy. least: finest value, if the value bounds the error; else tried: values, coarsest first, and error: at a value in a changed
+    request, by default of its answer. bounds: units of the accuracies it is chosen for, by default those of the measures.
+    stated: whether the answer states the error, so that the estimate serves the choice alone. proportional: whether the values are
+    decades, and the error about proportional to them. predicted: a value that is tried first. coarsest: value that nothing can be
+    coarser than, and the word for it. text: a value in words. exclusive: whether an accuracy excludes a value of the user;
+    instead: further keys that it excludes.
+
+    Plan. cost: of a request, such as a `Growth`; None if the knob does not decide on it.
     """
 
-    steps: Iterable[Any] | Callable[[Any], Iterable[Any]]
-    finest: Any
-    measures: tuple[Measure, ...]
+    steps: Iterable[Any] | Callable[[Any], Iterable[Any]] = ()
+    finest: Any = None
+    measures: tuple[Measure, ...] = ()
     against: str | Callable[[Any], str] = "{:g}"
     least: float | None = None
-    change: Callable[[Any, str, Any], Any] = with_field
-    prepare: Callable[[Any], Any] = lambda request: request
-    used: Callable[[Any], bool] = lambda request: True
-    tried: tuple[Any, ...] = ()
-    search: Callable[[Sought], Iterable[Choice]] | None = None
-    title: str = ""
     key: str = ""
+    title: str = ""
     attribute: str = ""
+    change: Callable[[Any, str, Any], Any] = with_field
     value: Callable[[Any], Any] | None = None
-    reference: Callable[[Any], Any] | None = None
+    used: Callable[[Any], bool] = lambda request: True
+    fixed: str | Callable[[Any], str | None] | None = None
+    prepare: Callable[[Any], Any] = lambda request: request
+    swept: Callable[[Any, Any], Any] | None = None
     answer: Answering | None = None
     repeats: int = 1
+    reference: Callable[[Any], Any] | None = None
     label: Callable[[Any], str] = "{:g}".format
     series: bool = True
+    tried: Iterable[Any] | Callable[[Sought], Iterable[Any]] = ()
+    error: Callable[[Sought, Any, Any], Estimate] | None = None
+    bounds: tuple[str, ...] | None = None
+    stated: bool = False
+    proportional: bool = False
+    predicted: Callable[[Sought], Prediction | None] = lambda sought: None
+    coarsest: tuple[Any, str] = (None, "")
+    text: str | Callable[[Sought, Any], str] = ""
+    exclusive: bool = True
+    instead: tuple[str, ...] = ()
+    cost: Callable[[Any, Run, Callable[[Any], Any], Callable[[Any, Any], Any]], Cost] | None = None
+    field: Field | None = None
 
-    def sweep(self, field: Field | None, request: Any, answer: Answering) -> Sweep:
-        """The settings of this knob for a request, including the request's value. field: None for a knob that is no field."""
-        name = self.attribute if field is None else field.name
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the accuracies that the knob is chosen for."""
+        if self.bounds is not None:
+            return self.bounds
+        return tuple(measure.unit for measure in self.measures) if self.tried or self.least is not None else ()
+
+    @property
+    def refuses(self) -> tuple[str, ...]:
+        """Keys that exclude an accuracy."""
+        return (self.key, *self.instead) if self.exclusive else ()
+
+    def value_of(self, request: Any) -> Any:
+        """The value that a request has."""
+        return getattr(request, self.attribute) if self.value is None else self.value(request)
+
+    def changed(self, request: Any, value: Any) -> Any:
+        """The request with a value."""
+        return self.change(request, self.attribute, value)
+
+    def reason(self, request: Any) -> str | None:
+        """Why the knob is not swept; None if it is."""
+        return self.fixed(request) if callable(self.fixed) else self.fixed
+
+    def sweep(self, request: Any, answer: Answering) -> Sweep:
+        """The settings of this knob for a request, including the request's value."""
         plain = self.prepare(request)
-        value_of_scene = getattr(request, name) if self.value is None else self.value(plain)
+        present = self.value_of(plain)
         steps = self.steps(plain) if callable(self.steps) else self.steps
         finest = self.finest(plain) if callable(self.finest) else self.finest
+        swept = self.changed if self.swept is None else self.swept
 
         def make(value: Any) -> Any:
-            """The request with this value; a field that has it is not changed."""
-            return plain if field is not None and value == value_of_scene else self.change(plain, name, value)
+            """The input with this value; a request that has it is not changed."""
+            return plain if self.swept is None and value == present else swept(plain, value)
 
-        settings = ladder(steps, value_of_scene, make, self.label)
-        if value_of_scene is None and field is not None:
-            settings += (Setting(field.none or "none", plain, True),)
+        settings = ladder(steps, present, make, self.label)
+        if present is None and self.field is not None:
+            settings += (Setting(self.field.none or "none", plain, True),)
         against = self.against(finest) if callable(self.against) else self.against.format(finest)
-        reference = self.change(plain, name, finest) if self.reference is None else self.reference(plain)
-        key = self.key if field is None else field.key or field.name
+        reference = swept(plain, finest) if self.reference is None else self.reference(plain)
+        title = self.title or in_words(self.key)
         return Sweep(
-            key,
-            self.measures,
-            settings,
-            reference,
-            against,
-            self.answer or answer,
-            self.repeats,
-            self.title or in_words(key),
-            self.series,
-        )
+            self.key, self.measures, settings, reference, against, self.answer or answer, self.repeats, title, self.series
+        )  # fmt: skip
 
-    def choices(self, sought: Sought, field: Field | None = None) -> Iterator[Choice]:
-        """Settings for an accuracy, coarsest first. field: that `change` sets."""
-        if self.search is not None:
-            yield from self.search(sought)
-            return
-        name, key = ("", self.key) if field is None else (field.name, field.key)
-        words = in_words(key)
+    def choose(self, sought: Sought, confirmed: bool) -> Choice | None:
+        """The first value, coarsest first, whose error is within an accuracy, else the last one tried; None without values.
+
+        confirmed: whether the error of a predicted value, which takes a run, is estimated.
+        """
+        values, missed = self._values(sought), ""
+        if (predicted := self.predicted(sought)) is not None:
+            request = self.changed(sought.request, predicted.value)
+            words = self._words(sought, predicted.value) + predicted.remark
+            error = self._estimate(sought, request, predicted.value).error if confirmed else 0.0
+            finer = tuple(value for value in values if value < predicted.value)
+            if error <= sought.accuracy or not finer:
+                return Choice(request, words, error, confirming=predicted.runs)
+            values, missed = finer, f", finer than the plan's {predicted.value:g}, which missed"
+        if self.proportional:
+            attempt = partial(self._attempt, sought, missed=missed)
+            return first_by_proportion(tuple(values), lambda value: attempt(value)[0], sought.accuracy)[1]
+        choice = None
+        for value in values:
+            choice, least = self._attempt(sought, value, missed)
+            if choice.error <= sought.accuracy or least > sought.accuracy:
+                break
+        return choice
+
+    def _values(self, sought: Sought) -> Iterable[Any]:
         if self.least is not None:
-            value = max(sought.accuracy, self.least)
-            error = self.least if sought.accuracy < self.least else 0.0
-            yield Choice(self.change(sought.request, name, value), f"{words} {value:g}", error)
-        for number, value in enumerate(self.tried):
-            changed = self.change(sought.request, name, value)
-            answer = sought.compute(changed)
-            how = f"{words} {value:g}" + ("" if number else LOOSEST)
-            yield Choice(changed, how, sought.error(answer), answer)
+            return (max(sought.accuracy, self.least),)
+        return self.tried(sought) if callable(self.tried) else self.tried
+
+    def _estimate(self, sought: Sought, request: Any, value: Any) -> Estimate:
+        if self.error is not None:
+            return self.error(sought, request, value)
+        if self.least is not None:
+            return Estimate(value)
+        answer = sought.compute(request)
+        return Estimate(sought.error(answer), answer)
+
+    def _words(self, sought: Sought, value: Any) -> str:
+        text = self.text or f"{in_words(self.key)} {{:g}}"
+        coarsest, word = self.coarsest
+        alone = f", nothing cheaper: the {word} there is" if word and value == coarsest else ""
+        return (text(sought, value) if callable(text) else text.format(value)) + alone
+
+    def _attempt(self, sought: Sought, value: Any, missed: str) -> tuple[Choice, float]:
+        """A value as a choice, and what no finer value lowers of its error."""
+        request = self.changed(sought.request, value)
+        estimate = self._estimate(sought, request, value)
+        error = 0.0 if (self.stated or self.least is not None) and estimate.error <= sought.accuracy else estimate.error
+        how = self._words(sought, value) + missed + estimate.remark
+        return Choice(request, how, error, estimate.answer), estimate.least
+
+
+def first_by_proportion(values: Sequence[float], attempt: Callable[[float], T], accuracy: float) -> tuple[float, T]:
+    """The first of decades within an accuracy, else the last, with its attempt.
+
+    Errors are about proportional to the values, so that few are tried. attempt: has the error of a value.
+    """
+    attempts: dict[int, T] = {}
+    misses, reaches = -1, len(values)
+    place = min(range(len(values)), key=lambda n: abs(math.log10(values[n] / accuracy)))
+    while reaches > misses + 1:
+        attempts[place] = attempt(values[place])
+        error = attempts[place].error
+        decades = max(math.floor(abs(math.log10(max(error, 1e-30) / accuracy))), 1)
+        if error <= accuracy:
+            reaches, place = place, max(place - decades, misses + 1)
+        else:
+            misses, place = place, min(place + decades, reaches - 1)
+    first = min(reaches, len(values) - 1)
+    return values[first], attempts[first]
 
 
 def in_words(key: str) -> str:
@@ -210,12 +317,13 @@ def in_words(key: str) -> str:
     return key.partition(",")[0].rpartition(".")[2].replace("_", " ")
 
 
-def knobs_of_fields(request: Any) -> Iterator[tuple[Field, Knob]]:
-    """The fields of a request that have a knob and affect the request."""
+def knobs_of_fields(request: Any) -> Iterator[Knob]:
+    """The knobs of the fields of a request that affect it, with their keys and names."""
     structure: Any = type(request)
-    for field in all_fields(structure).values():
-        if field.knob is not None and field.knob.used(request):
-            yield field, field.knob
+    for declaration in all_fields(structure).values():
+        knob: Knob | None = declaration.knob
+        if knob is not None and knob.used(request):
+            yield replace(knob, key=declaration.identity, attribute=declaration.name, field=declaration)
 
 
 def ladder(
@@ -234,7 +342,9 @@ def ladder(
     [('0.01', False), ('0.001', True), ('0.0001', False)]
     """
     values = [
-        scene_value if scene_value is not None and math.isclose(value, scene_value, rel_tol=1e-9) else value
+        scene_value
+        if isinstance(scene_value, int | float) and math.isclose(value, scene_value, rel_tol=1e-9)
+        else value
         for value in values
     ]
     falling = len(values) > 1 and values[0] > values[-1]

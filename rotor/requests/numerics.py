@@ -1,15 +1,15 @@
-"""Accuracy goals, sweeps and plan of a verb, beyond the knobs of its fields."""
+"""Accuracy goals, knobs and plan of a verb, beyond the knobs of its fields."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
 from typing import Any
 
 from rotor.frozen import dataclass
 from rotor.requests.fill import Entries
-from rotor.requests.knob import Knob
-from rotor.requests.plan import Cost
+from rotor.requests.knob import Knob, knobs_of_fields
+from rotor.requests.plan import Cost, Run, complete_cost
 
 
 def numerical_error(answer: Any) -> float:
@@ -26,27 +26,24 @@ def numerical_error(answer: Any) -> float:
 class Goal:
     """An accuracy goal in one unit.
 
-    of: the observable in words. error: of an answer. knobs: set one after the other; without them, the first knob of a field that can be
-    set. sets: keys of the fields that they set. unfit: why the goal does not suit a request. prepare: returns the request of the search.
+    of: the observable in words. error: of an answer. unfit: why the goal does not suit a request. prepare: returns the request for which
+    knobs are chosen.
     """
 
     of: str = ""
     error: Callable[[Any], float] = numerical_error
-    knobs: tuple[Knob, ...] = ()
-    sets: tuple[str, ...] = ()
     unfit: Callable[[Any], str] = lambda request: ""
     prepare: Callable[[Any], Any] = lambda request: request
 
 
 @dataclass(frozen=True)
 class Numerics:
-    """Accuracy goals, sweeps and plan of a verb.
+    """Accuracy goals, knobs and plan of a verb.
 
     goals: by unit. bare: whether an accuracy may have no unit; it then belongs to the goal "" or, without one, to the first goal.
     percent: the unit that a percentage means, from the entries.
-    knobs: that are no fields. prepare: returns the request for their sweeps. remarks: approximations without a sweep, with the reason.
-    describe: fields of a plan from a request and an answer that its cost has. cost: of a request; None: that of a complete run.
-    rounding: error of the highest level from rounding, in MHz.
+    knobs: that are no fields. prepare: returns the request for their sweeps.
+    describe: fields of a plan from a request and its cost. rounding: error of the highest level from rounding, in MHz.
     """
 
     goals: Mapping[str, Goal] = field(default_factory=lambda: {"MHz": Goal()})
@@ -54,7 +51,17 @@ class Numerics:
     percent: Callable[[Entries], str] = lambda entries: "%"
     knobs: tuple[Knob, ...] = ()
     prepare: Callable[[Any], Any] = lambda request: request
-    remarks: Callable[[Any], Iterable[str]] = lambda request: ()
-    describe: Callable[[Any, Any], Mapping[str, Any]] | None = None
-    cost: Callable[[Any], Cost] | None = None
+    describe: Callable[[Any, Cost], Mapping[str, Any]] | None = None
     rounding: Callable[[Any], float] | None = None
+
+    def knobs_of(self, request: Any) -> Iterator[Knob]:
+        """All knobs that affect a request: those of its fields first."""
+        yield from knobs_of_fields(request)
+        yield from (knob for knob in self.knobs if knob.used(request))
+
+    def cost(self, request: Any, run: Run) -> Cost:
+        """The cost of a request by the first knob that decides on it, else that of a complete run."""
+        for knob in self.knobs_of(request):
+            if knob.cost is not None:
+                return knob.cost(request, run, knob.value_of, knob.changed)
+        return complete_cost(request, run)

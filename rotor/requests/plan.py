@@ -1,8 +1,8 @@
 """Plan of a request: what it will do, and its time and memory, extrapolated from shorter calls.
 
-The calibration runs the same request to a lower J (or with fewer molecules, fields, steps) and scales by the remaining work. Seconds are
-processor time without start-up and compilation, within a factor of 3 above 1 s. Memory is the peak of what Python and NumPy allocate in
-the same short runs, and grows with the size of the answer.
+A knob declares how the cost grows with an amount of the request (`Growth`), such as J max or the number of molecules; the calibration runs
+the request with small amounts and scales by the remaining work. Seconds are processor time without start-up and compilation, within a
+factor of 3 above 1 s. Memory is the peak of what Python and NumPy allocate in the same short runs, and grows with the size of the answer.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, field
-from functools import cached_property, partial
-from typing import Any, TypeVar
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
 
 from rotor.frozen import dataclass
 
@@ -77,67 +77,88 @@ class Plan:
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of a request. seconds: processor time. memory_mb: peak. answer: of the request, or of a shorter one that describes it."""
+    """Cost of a request. seconds: processor time. memory_mb: peak. answer: of the request, or of a shorter one that describes it.
+    amount: by which it was extrapolated.
+    """
 
     seconds: float
     memory_mb: float
     answer: Any = None
+    amount: Any = None
 
 
-def whole_cost(call: Callable[[], Any], times: float = 1.0, largest: Callable[[], Any] | None = None) -> Cost:
-    """The cost of a call, and its answer. times: of its seconds. largest: the call that takes the memory, if it is another."""
-    answers: list[Any] = []
-    seconds = timed(lambda: answers.append(call()))
-    return Cost(times * seconds, traced(largest or call)[1], answers[-1])
+class Run(NamedTuple):
+    """How a verb runs a request. compute: its answer. complete: the answer with its table, which is made on demand."""
+
+    compute: Callable[[Any], Any]
+    complete: Callable[[Any], Any]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Growth:
-    """A call whose cost is extrapolated from two smaller ones: a constant part, and a part proportional to the work.
+    """How the cost of a request grows with an amount of it: a constant part, and a part proportional to the work.
 
-    call: takes a size. size: the requested one. sizes: of the two short calls, smaller first. work: amount that the time is
-    proportional to, from a size; memory: likewise for the memory. A call no larger than the second size is measured directly.
+    short: two small amounts that are measured, smaller first; or one, and the whole cost is proportional to the work. It may be a
+    function of the request. An amount no larger than the second is measured directly.
+    amount: of a request, by default the value of the knob. at: the request with an amount, by default as the knob sets it.
+    prepare: returns the request that is measured. work: what the time is proportional to, from a request and an amount; memory: likewise.
+    largest: the request that takes the memory, if it does not follow from the short ones. table: whether the table is part of a run.
     """
 
-    call: Callable[[int], Any]
-    size: int
-    sizes: tuple[int, int]
-    work: Callable[[int], float] = float
-    memory: Callable[[int], float] = float
+    short: tuple[float, ...] | Callable[[Any], tuple[float, ...]]
+    amount: Callable[[Any], float] | None = None
+    at: Callable[[Any, Any], Any] | None = None
+    prepare: Callable[[Any], Any] = lambda request: request
+    work: Callable[[Any, float], float] = lambda request, amount: amount
+    memory: Callable[[Any, float], float] = lambda request, amount: amount
+    largest: Callable[[Any], Any] | None = None
+    table: bool = True
 
-    @property
-    def seconds(self) -> float:
-        """Processor time (s)."""
-        first, _, taken = self._short_calls
-        return self._extrapolated(taken, lambda: timed(partial(self.call, first)), self.work)
+    def __call__(
+        self, request: Any, run: Run, value: Callable[[Any], float], changed: Callable[[Any, Any], Any]
+    ) -> Cost:
+        """The cost, with the answer of the largest request, else that of a short one. value, changed: of the knob."""
+        ready, at, answers = self.prepare(request), self.at or changed, list[Any]()
+        amount = (self.amount or value)(ready)
+        short = self.short(ready) if callable(self.short) else self.short
 
-    @property
-    def memory_mb(self) -> float:
-        """Peak memory."""
-        first, second, _ = self._short_calls
-        most = traced(partial(self.call, second))[1]
-        return self._extrapolated(most, lambda: traced(partial(self.call, first))[1], self.memory)
+        def call(part: float) -> Any:
+            answers[:1] = [(run.complete if self.table else run.compute)(at(ready, part))]
+            return answers[0]
 
-    @property
-    def cost(self) -> Cost:
-        """Both."""
-        return Cost(self.seconds, self.memory_mb)
+        first, second, taken = _short_calls(call, amount, short)
 
-    @cached_property
-    def _short_calls(self) -> tuple[int, int, float]:
-        """Sizes of the two short calls, grown until the second takes long enough, and its time: constant parts dominate shorter ones."""
-        first, second = (min(size, self.size) for size in self.sizes)
-        while (taken := timed(partial(self.call, second))) < ENOUGH_SECONDS and second < self.size:
-            first, second = min(LARGER * first, self.size), min(LARGER * second, self.size)
-        return first, second, taken
+        def extrapolated(most: float, least: Callable[[], float], work: Callable[[Any, float], float]) -> float:
+            """From the cost of the second call and, unless that is all, of the first."""
+            if second == amount:
+                return most
+            if len(short) == 1:
+                return most * work(ready, amount) / work(ready, second)
+            rate = max(most - least(), 0.0) / max(work(ready, second) - work(ready, first), 1e-300)
+            return most + rate * (work(ready, amount) - work(ready, second))
 
-    def _extrapolated(self, most: float, measure_first: Callable[[], float], work: Callable[[int], float]) -> float:
-        """Cost of the call at `size` from that of the second short call and, unless that is all, of the first."""
-        first, second, _ = self._short_calls
-        if second == self.size:
-            return most
-        rate = max(most - measure_first(), 0.0) / max(work(second) - work(first), 1e-300)
-        return most + rate * (work(self.size) - work(second))
+        seconds = extrapolated(taken, lambda: timed(partial(call, first)), self.work)
+        if self.largest is not None:
+            largest = self.largest(ready)
+            answer, peak = traced(lambda: run.complete(largest))
+            return Cost(seconds, peak, answer, amount)
+        peak = extrapolated(traced(partial(call, second))[1], lambda: traced(partial(call, first))[1], self.memory)
+        return Cost(seconds, peak, answers[0], amount)
+
+
+def _short_calls(call: Callable[[float], Any], amount: float, short: tuple[float, ...]) -> tuple[float, float, float]:
+    """Two small amounts, grown until the second call takes long enough (constant parts dominate shorter ones), and its time."""
+    first, second = (min(part, amount) for part in (short[0], short[-1]))
+    while (taken := timed(partial(call, second))) < ENOUGH_SECONDS and second < amount and len(short) > 1:
+        first, second = min(LARGER * first, amount), min(LARGER * second, amount)
+    return first, second, taken
+
+
+def complete_cost(request: Any, run: Run) -> Cost:
+    """The cost of a complete run."""
+    answers: list[Any] = []
+    seconds = timed(lambda: answers.append(run.complete(request)))
+    return Cost(seconds, traced(lambda: run.complete(request))[1], answers[-1])
 
 
 def timed(call: Callable[[], Any], long: float = 3.0) -> float:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.frozen import dataclass
-from rotor.requests.knob import Setting, Sweep, Sweeps, knobs_of_fields
+from rotor.requests.knob import Setting, Sweep, Sweeps
 from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import Scene
 from rotor.table import Table
@@ -133,11 +133,13 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
     calculation = scene_calculation(scene, folder)
     verb, choice = calculation.verb, calculation.choice
     request = calculation.request if choice is None else choice.request
-    sweeps = [knob.sweep(field, request, verb.compute) for field, knob in knobs_of_fields(request)]
     numerics = verb.load_numerics()
+    knobs = [(knob, knob.reason(request)) for knob in numerics.knobs_of(request)]
     prepared = numerics.prepare(request)
-    sweeps += [knob.sweep(None, prepared, verb.compute) for knob in numerics.knobs if knob.used(prepared)]
-    return Sweeps(tuple(sweeps), tuple(numerics.remarks(request)))
+    sweeps = [
+        knob.sweep(prepared if knob.field is None else request, verb.compute) for knob, why in knobs if why is None
+    ]
+    return Sweeps(tuple(sweeps), tuple(f"{knob.key}: {why}" for knob, why in knobs if why))
 
 
 def work_precision(

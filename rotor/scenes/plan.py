@@ -9,7 +9,7 @@ from typing import Any
 from rotor.requests.accuracy import Accuracy
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
-from rotor.requests.plan import LONG_SEARCH, Plan, timed, whole_cost
+from rotor.requests.plan import LONG_SEARCH, Plan, Run, timed
 from rotor.scenes.outputs import Where, files_of
 from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import Scene
@@ -72,20 +72,20 @@ def _with_outcome(plan: Plan, calculation: Calculation, choice: Choice | None) -
 def coarser_settings(calculation: Calculation, errors: ErrorBudget | None) -> str:
     """Advice to use an accuracy of a tenth of the model or data error; empty if the settings are no finer than that.
 
-    Only for kinds whose accuracy is set by one field, and if the scene leaves that field out.
+    Only if the accuracy is set by fields alone, and if the scene leaves them out.
     """
     numerics, entries = calculation.verb.load_numerics(), calculation.entries
-    goals = numerics.goals
-    if errors is None or errors.numerical is None or errors.unit not in goals or goals[errors.unit].knobs:
+    if errors is None or errors.numerical is None or errors.unit not in numerics.goals:
         return ""
     uncertain = max((errors.model, errors.data), key=lambda term: term.value or 0.0)
     goal = float(f"{SHARE * (uncertain.value or 0.0):.2g}")
     if not 0.0 < goal > errors.numerical:
         return ""
+    accuracy = Accuracy(goal, errors.unit, False, numerics)
+    if any(knob.field is None for knob in accuracy.knobs(calculation.request)):
+        return ""
     try:
-        choice = Accuracy(goal, errors.unit, False, numerics).chosen(
-            calculation.request, entries, calculation.verb.compute
-        )
+        choice = accuracy.chosen(calculation.request, entries, calculation.verb.compute)
     except ValueError:  # the scene sets the field
         return ""
     if choice.how == NOTHING_CHEAPER:
@@ -114,11 +114,17 @@ def _plan(calculation: Calculation) -> tuple[Plan, Choice | None]:
 def plan_of_request(verb: Verb, request: Any) -> Plan:
     """The plan of a request: its cost, and what its verb says of it."""
     numerics = verb.load_numerics()
-    cost = whole_cost(lambda: verb.compute(request)) if numerics.cost is None else numerics.cost(request)
+
+    def complete(request: Any) -> Any:
+        answer = verb.compute(request)
+        verb.table(answer).columns  # noqa: B018  # made on demand
+        return answer
+
+    cost = numerics.cost(request, Run(verb.compute, complete))
     described = (
         {"counts": {"rows": len(verb.table(cost.answer))}}
         if numerics.describe is None
-        else numerics.describe(request, cost.answer)
+        else numerics.describe(request, cost)
     )
     return Plan(verb.name, seconds=cost.seconds, memory_mb=cost.memory_mb, **described)
 

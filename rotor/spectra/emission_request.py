@@ -141,7 +141,7 @@ def _brightness_error(answer: Any, reference: Any) -> float:
 
 DEPTH = Knob(
     lambda request: [request.least_depth * more for more in (1e5, 1e4, 1e3, 1e2, 1e1)], lambda request: 1e-2 * request.least_depth,
-    (Measure("brightness", "K", _brightness_error),), "a least depth of {:g}", tried=DECADES,
+    (Measure("brightness", "K", _brightness_error),), "a least depth of {:g}", tried=DECADES, coarsest=(1.0, "loosest"),
     title="least optical depth of a line",
 )  # fmt: skip
 

@@ -6,13 +6,13 @@ intensity of the decade before (docs/accuracy.md), so that lines below the finer
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from rotor.requests.budget import ROUNDING
 from rotor.requests.field import declared_fields
-from rotor.requests.knob import Choice, Sought
+from rotor.requests.knob import Estimate, Knob, Measure, Sought
 
 SPARE = 1.25
 MOST_DECADES = 12  # largest lowering of a cut
@@ -28,32 +28,27 @@ def intensity_error(answer: Any) -> float:
     )
 
 
-@dataclass(frozen=True)
-class Cut:
-    """An intensity cut. name: of the field. lower: returns the cut lowered by some decades. left_out: percentage that an answer lacks
-    compared with a reference. answer: computes a request.
+def cut_knob(
+    name: str, steps: Any, finest: Any, measure: Measure, lower: Callable[[float, int], float], title: str
+) -> Knob:
+    """The knob of an intensity cut: the cut, then lower ones by decades, with the intensity that weaker lines hold.
+
+    Of a cut that the user set, that cut alone: a higher cut would be cheaper but leave out requested lines. No lower cut helps if the
+    intensities of lines are not good enough. name: of the field. lower: returns the cut lowered by some decades.
     """
 
-    name: str
-    lower: Callable[[float, int], float]
-    left_out: Callable[[Any, Any], float]
-    answer: Callable[[Any], Any]
-
-    def choices(self, sought: Sought) -> Iterator[Choice]:
-        """The cut, then lower ones by decades, with the intensity that weaker lines hold; of a cut that the user set, that cut alone.
-
-        A higher cut would be cheaper but leave out requested lines. No lower cut helps if the intensities of lines are not good enough.
-        """
+    def lower_cuts(sought: Sought) -> list[float]:
         structure: Any = type(sought.request)
-        field, cut = declared_fields(structure)[self.name], getattr(sought.request, self.name)
-        if cut is None:
-            return
-        for decades in range(MOST_DECADES + 1 if cut == field.default else 1):
-            chosen = replace(sought.request, **{self.name: self.lower(cut, decades)})
-            answer = self.answer(chosen)
-            finer = self.answer(replace(chosen, **{self.name: self.lower(cut, decades + FINER)}))
-            missing, line_error = SPARE * self.left_out(answer, finer), intensity_error(answer)
-            how = f"{field.last} {getattr(chosen, self.name):g}, weaker lines hold {missing:.1g} %"
-            yield Choice(chosen, how, missing + line_error)
-            if line_error > sought.accuracy:
-                return
+        cut = getattr(sought.request, name)
+        usual = cut == declared_fields(structure)[name].default
+        return [] if cut is None else [lower(cut, decades) for decades in range(MOST_DECADES + 1 if usual else 1)]
+
+    def error(sought: Sought, request: Any, cut: float) -> Estimate:
+        answer, finer = sought.compute(request), sought.compute(replace(request, **{name: lower(cut, FINER)}))
+        missing, line_error = SPARE * measure.error(answer, finer), intensity_error(answer)
+        return Estimate(missing + line_error, remark=f", weaker lines hold {missing:.1g} %", least=line_error)
+
+    return Knob(
+        steps, finest, (measure,), lambda finest: "no cut" if finest is None else f"a cut at {finest:g}", title=title,
+        tried=lower_cuts, error=error, text=f"{name} {{:g}}", exclusive=False,
+    )  # fmt: skip

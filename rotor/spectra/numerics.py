@@ -8,22 +8,23 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.estimates.accuracy import (
+    SHORT_J,
+    by_blocks,
     distortion,
     energies_like,
     hyperfine,
     largest,
     levels_error,
-    reason_of_no_distortion_sweep,
     rounding_of,
 )
 from rotor.quantum.estimates.left_out import neglected_in_levels
-from rotor.quantum.estimates.plans import SHORT_J, effect_texts, level_parts, plan_fields
+from rotor.quantum.estimates.plans import effect_texts, level_parts, plan_fields
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
-from rotor.spectra.intensity_accuracy import Cut, intensity_error
-from rotor.spectra.raman_request import RELATIVE_CUT, SECTION, answer_raman, section_left_out
-from rotor.spectra.request import CUT, INTENSITY, answer_spectrum, intensity_left_out
+from rotor.spectra.intensity_accuracy import intensity_error
+from rotor.spectra.raman_request import SECTION, answer_raman
+from rotor.spectra.request import INTENSITY, answer_spectrum
 from rotor.spectra.widths import doppler, pressure_width
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def list_error(answer: Any) -> float:
     return levels_error(answer, answer.lines.top, answer.lines.levels)
 
 
-def highest_j(measure: Measure) -> Knob:
+def highest_j(measure: Measure, cost: Growth | None = None) -> Knob:
     """The highest J of the levels that lines connect."""
     return Knob(
         lambda request: [max(1, round(share * request.jmax)) for share in SHARES_OF_J],
@@ -61,36 +62,26 @@ def highest_j(measure: Measure) -> Knob:
         title="highest J of the basis",
         attribute="jmax",
         label=str,
+        cost=cost,
     )
 
 
-def _knobs(of: str, lost: Measure, error: Callable[[Any, Any], float]) -> tuple[Knob, ...]:
-    """Highest J (by the intensity lost), order of distortion and treatment of spins (by the error of frequencies)."""
-    frequency = Measure(of, "MHz", lambda answer, reference: error(answer.lines, reference.lines))
-    return highest_j(lost), distortion(frequency), hyperfine(frequency)
-
-
 def _line_numerics(
-    names: tuple[str, str],
-    cut: Cut,
-    weakest: Knob,
-    knobs: tuple[Knob, ...],
+    names: tuple[str, str, str],
+    answer: Callable[[Any], Any],
+    reach: Knob,
+    error: Callable[[Any, Any], float],
     describe: Callable[[Any, Any], Mapping[str, Any]],
-    cost: Callable[[Any], Cost] | None,
     rounding: Callable[[Any], float],
 ) -> Numerics:
-    """Numerics of a list of lines. names: of frequencies and intensities. weakest: knob of the cut. knobs: the last is that of spins."""
-    frequencies, intensities = names
+    """Numerics of a list of lines. names: of the error of a line, of frequencies and of intensities. error: of frequencies in a list."""
+    of, frequencies, intensities = names
+    frequency = Measure(of, "MHz", lambda answer, reference: error(answer.lines, reference.lines))
     return Numerics(
-        {
-            "MHz": Goal(frequencies, list_error, knobs[-1:]),
-            "%": Goal(intensities, intensity_error, (replace(weakest, search=cut.choices),)),
-        },
-        knobs=knobs,
-        prepare=lambda request: replace(request, jmax=cut.answer(request).lines.jmax),
-        remarks=lambda request: reason_of_no_distortion_sweep(request.top),
+        {"MHz": Goal(frequencies, list_error), "%": Goal(intensities, intensity_error)},
+        knobs=(reach, distortion(frequency), hyperfine(frequency)),
+        prepare=lambda request: replace(request, jmax=answer(request).lines.jmax),
         describe=describe,
-        cost=cost,
         rounding=rounding,
     )
 
@@ -149,19 +140,16 @@ def _flipped(species: str, flip: tuple[bool, bool]) -> str:
     )
 
 
-def spectrum_cost(request: Any) -> Cost:
-    """The cost of a line list, from lists to lower J."""
-    jmax, power = _spectrum_jmax(request)[0], 3 if request.top.kind == "asymmetric" else 1
-    return Growth(
-        lambda j: answer_spectrum(replace(request, jmax=j)),
-        jmax,
-        (max(SHORT_J[0], jmax // 3), max(SHORT_J[1], jmax // 2)),
-        lambda j: (j + 1.0) ** power,
-        lambda j: (j + 1.0) ** (1 if request.top.kind == "linear" else 2),
-    ).cost
+LENGTH = Growth(
+    lambda request: (max(SHORT_J[0], request.jmax // 3), max(SHORT_J[1], request.jmax // 2)),
+    prepare=lambda request: replace(request, jmax=_spectrum_jmax(request)[0]),
+    work=lambda request, j: by_blocks(request.top, j),
+    memory=lambda request, j: (j + 1.0) ** (1 if request.top.kind == "linear" else 2),
+    table=False,  # long lists are written in parts
+)
 
 
-def describe_spectrum(request: Any, _: Any) -> dict[str, Any]:
+def describe_spectrum(request: Any, _: Cost) -> dict[str, Any]:
     """What a line list does."""
     from rotor.quantum.estimates.limits import populated_j
 
@@ -187,11 +175,11 @@ def describe_spectrum(request: Any, _: Any) -> dict[str, Any]:
     }
 
 
-def describe_raman(request: Any, answer: Any) -> dict[str, Any]:
+def describe_raman(request: Any, cost: Cost) -> dict[str, Any]:
     """What Raman lines are, with J max of the answer."""
     from rotor.quantum.estimates.limits import populated_j
 
-    top, jmax = request.top, answer.lines.jmax
+    top, answer, jmax = request.top, cost.answer, cost.answer.lines.jmax
     parts = (("J max", f"{jmax}: {answer.jmax_source}"), *level_parts(top, jmax, request.effects))
     described = plan_fields(top, populated_j(top, request.temperature_k), request.effects)
     return {**described, "parts": parts, "counts": {"lines": len(answer.lines)}}
@@ -201,40 +189,30 @@ def _raman_rounding(request: Any) -> float:
     return rounding_of(request.top, int(answer_raman(request).lines.jmax))
 
 
-def _lower_decades(cut: float, decades: int) -> float:
-    return cut - decades
-
-
-def _lower_factor(cut: float, decades: int) -> float:
-    return float(cut * 10.0**-decades)
-
-
 SPECTRUM = _line_numerics(
-    ("frequencies", "intensities"),
-    Cut("min_lgint", _lower_decades, intensity_left_out, answer_spectrum),
-    CUT,
-    _knobs("frequency of a line", INTENSITY, line_error),
+    ("frequency of a line", "frequencies", "intensities"),
+    answer_spectrum,
+    highest_j(INTENSITY, LENGTH),
+    line_error,
     describe_spectrum,
-    spectrum_cost,
     lambda request: rounding_of(request.top, _spectrum_jmax(request)[0]),
 )
 RAMAN = _line_numerics(
-    ("shifts", "cross sections"),
-    Cut("min_relative", _lower_factor, section_left_out, answer_raman),
-    RELATIVE_CUT,
-    _knobs("shift of a line", SECTION, shift_error),
+    ("shift of a line", "shifts", "cross sections"),
+    answer_raman,
+    highest_j(SECTION),
+    shift_error,
     describe_raman,
-    None,
     _raman_rounding,
 )
 
 
-def describe_emission(request: Any, answer: Any) -> dict[str, Any]:
+def describe_emission(request: Any, cost: Cost) -> dict[str, Any]:
     """What a source does."""
     from rotor.quantum.estimates.limits import populated_j
     from rotor.tops.top import Top
 
-    effects: list[str] = []
+    answer, effects = cost.answer, list[str]()
     neglected = [LeftOut("departures from one excitation temperature", None, "", "collisions and radiation")]
     for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
         if not isinstance(top, Top):

@@ -18,10 +18,11 @@ from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
-from rotor.requests.knob import Knob, Measure
+from rotor.requests.knob import Measure
 from rotor.requests.readers import Quantity, Whole
 from rotor.spectra.budgets import frequencies_budget
 from rotor.spectra.intensity import largest
+from rotor.spectra.intensity_accuracy import cut_knob
 from rotor.spectra.raman import (
     DEFAULT_LASER_NM,
     DEFAULT_MIN_RELATIVE,
@@ -49,11 +50,11 @@ def section_left_out(answer: Any, reference: Any) -> float:
 
 
 SECTION = Measure("total cross section", "%", section_left_out)
-RELATIVE_CUT = Knob(
+RELATIVE_CUT = cut_knob(
+    "min_relative",
     lambda request: [cut for cut in (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8) if request.min_relative is None or cut > request.min_relative],
-    lambda request: None if request.min_relative is None else 1e-2 * request.min_relative, (SECTION,),
-    lambda finest: "no cut" if finest is None else f"a cut at {finest:g}",
-    title="weakest line in the list, relative to the strongest",
+    lambda request: None if request.min_relative is None else 1e-2 * request.min_relative,
+    SECTION, lambda cut, decades: cut * 10.0**-decades, "weakest line in the list, relative to the strongest",
 )  # fmt: skip
 
 

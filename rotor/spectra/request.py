@@ -23,10 +23,11 @@ from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared, identical, part
-from rotor.requests.knob import Knob, Measure
+from rotor.requests.knob import Measure
 from rotor.requests.readers import INFINITE, Flag, Quantity, Range, Text, Whole
 from rotor.spectra.budgets import frequencies_budget
 from rotor.spectra.intensity import USUAL_CUT, largest
+from rotor.spectra.intensity_accuracy import cut_knob
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.table import TextOf
 from rotor.thermodynamics import VibrationalStates
@@ -82,11 +83,11 @@ def intensity_left_out(answer: Any, reference: Any) -> float:
 
 
 INTENSITY = Measure("integrated intensity", "%", intensity_left_out)
-CUT = Knob(
+CUT = cut_knob(
+    "min_lgint",
     lambda request: COARSE_CUTS if request.min_lgint is None else tuple(request.min_lgint + decades for decades in COARSER_CUTS),
-    lambda request: None if request.min_lgint is None else request.min_lgint - FINER_CUT, (INTENSITY,),
-    lambda finest: "no cut" if finest is None else f"a cut at {finest:g}",
-    title="least intensity in the list, log10(nm² MHz)",
+    lambda request: None if request.min_lgint is None else request.min_lgint - FINER_CUT,
+    INTENSITY, lambda cut, decades: cut - decades, "least intensity in the list, log10(nm² MHz)",
 )  # fmt: skip
 
 

@@ -33,7 +33,7 @@ from rotor.tops.facts import top_facts
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-MOST_MOLECULES = 10_000_000  # 1.4 GB, see `gas_numerics.BYTES_A_MOLECULE`
+MOST_MOLECULES = 10_000_000  # 1.4 GB: momentum, attitude, position, velocity and energies
 MOST_TIMES = 100_000
 DEFAULT_TIMES = 101
 SETTLED = 12.0  # rms rotation angle in radians at which the table of the correlation functions ends

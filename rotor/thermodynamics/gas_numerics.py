@@ -15,14 +15,13 @@ of ln Q (`rotor.thermodynamics.classical_limit`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure, Sought, with_whole
+from rotor.requests.knob import NOTHING_CHEAPER, Estimate, Knob, Measure, Sought, with_whole
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
 
@@ -35,7 +34,7 @@ MOLECULES = (100, 300, 1_000, 3_000, 10_000)
 SEEDS = 8  # gases whose errors are averaged
 MOST_IN_REFERENCE = 200_000
 SHORT_GAS = (500, 2000)  # of the calibration
-BYTES_A_MOLECULE = 136  # momentum, attitude, position, velocity and energies stored per molecule
+STORED_SHARE = 0.13  # memory of a stored molecule, 136 bytes, over that of one at work
 
 
 def quantile(confidence: float) -> float:
@@ -66,16 +65,18 @@ def relative_spread(unit: str, degrees: int) -> float:
     return math.sqrt(2.0 / degrees) if unit == "K" else math.sqrt(2.0 + 12.0 / degrees)
 
 
-def _enough_molecules(unit: str, sought: Sought) -> Iterator[Choice]:
+def _enough_molecules(sought: Sought) -> list[int]:
     """As many molecules as an accuracy of the temperature (K), the heat capacity (%), or C1 and C2 needs, at most those of a run."""
     from rotor.thermodynamics.classical_gas import MOST_MOLECULES
 
     request = sought.request
-    deviation = quantile(request.confidence) * _spread(request, unit)
-    count = min(max(math.ceil((deviation / sought.accuracy) ** 2), 2), MOST_MOLECULES)
-    error = deviation / math.sqrt(count) if count == MOST_MOLECULES else 0.0  # else the answer states it
-    how = f"{count} molecules, at a confidence of {request.confidence:g}"
-    yield Choice(replace(request, molecules=count), how, error)
+    deviation = sought.known["deviation"] = quantile(request.confidence) * _spread(request, sought.unit)
+    return [min(max(math.ceil((deviation / sought.accuracy) ** 2), 2), MOST_MOLECULES)]
+
+
+def _error_of_molecules(sought: Sought, request: Any, count: int) -> Estimate:
+    error = sought.known["deviation"] / math.sqrt(count)
+    return Estimate(error, remark=f", at a confidence of {request.confidence:g}")
 
 
 def _spread(request: GasRequest, unit: str) -> float:
@@ -151,16 +152,28 @@ def _gases(request: Any) -> list[Any]:
     return [answer_gas(replace(request, seed=request.seed + 10 * number)) for number in range(SEEDS)]
 
 
+def _held(request: Any, molecules: float) -> float:
+    """Memory of a gas, in molecules at work: a piece is propagated at once, others are stored."""
+    from rotor.classical.gas.ensembles import PIECE
+
+    return min(molecules, PIECE) + STORED_SHARE * max(molecules - PIECE, 0.0)
+
+
 def _molecules(**more: Any) -> Knob:
     """The number of molecules."""
     return Knob(
         lambda request: [count for count in MOLECULES if count < request.molecules],
         lambda request: min(100 * request.molecules, MOST_IN_REFERENCE),
-        change=with_whole,
         key="numerics.molecules",
         title="number of molecules",
         attribute="molecules",
+        change=with_whole,
         label="{:.0f}".format,
+        tried=_enough_molecules,
+        error=_error_of_molecules,
+        text="{} molecules",
+        stated=True,
+        cost=Growth(SHORT_GAS, memory=_held),
         **more,
     )
 
@@ -197,18 +210,7 @@ def neglected_in_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
     )
 
 
-def gas_cost(request: Any) -> Cost:
-    """The cost of a classical gas, from smaller ones."""
-    from rotor.classical.gas.ensembles import PIECE
-    from rotor.thermodynamics.classical_gas import answer_gas
-
-    together = min(request.molecules, PIECE)
-    cost = Growth(lambda n: answer_gas(replace(request, molecules=n)), request.molecules, SHORT_GAS)
-    rest = BYTES_A_MOLECULE * (request.molecules - together) / 1e6
-    return Cost(cost.seconds, replace(cost, size=together).memory_mb + rest)
-
-
-def describe_gas(request: Any, _: Any) -> dict[str, Any]:
+def describe_gas(request: Any, _: Cost) -> dict[str, Any]:
     """What a classical gas does."""
     return {
         "effects": ("free rotation of rigid molecules", "free flight"),
@@ -219,26 +221,20 @@ def describe_gas(request: Any, _: Any) -> dict[str, Any]:
     }
 
 
-def _goal(quantity: str, unit: str, knob: Knob, unfit: Callable[[Any], str] = lambda request: "") -> Goal:
-    searched = replace(knob, search=partial(_enough_molecules, unit))
-    return Goal(quantity, partial(gas_error, unit), (searched,), ("numerics.molecules",), unfit)
-
-
 def _without_times(request: Any) -> str:
     """Why an accuracy without a unit does not suit a request."""
     reason = "an accuracy without a unit is one of correlation functions; give observables.times, or the unit K or %"
     return reason if request.times_ps is None else ""
 
 
+MOTION = Knob(key="the motion of each molecule", fixed=f"{NOTHING_CHEAPER}; theta functions, round-off alone")
 GAS = Numerics(
     {
-        "K": _goal("temperature", "K", KINETIC),
-        "%": _goal("heat capacity", "%", KINETIC),
-        "": _goal("C1 and C2", "", CURVES, _without_times),
+        "K": Goal("temperature", partial(gas_error, "K")),
+        "%": Goal("heat capacity", partial(gas_error, "%")),
+        "": Goal("C1 and C2", partial(gas_error, ""), _without_times),
     },
     percent=lambda entries: "%" if entries.values.get("observables.times") is None else "",  # C1 and C2 are 1 at first
-    knobs=(KINETIC, CURVES),
-    remarks=lambda request: (f"the motion of each molecule: {NOTHING_CHEAPER}; theta functions, round-off alone",),
+    knobs=(KINETIC, CURVES, MOTION),
     describe=describe_gas,
-    cost=gas_cost,
 )

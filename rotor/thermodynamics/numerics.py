@@ -7,21 +7,30 @@ from typing import Any
 
 from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.estimates.plans import plan_fields
+from rotor.requests.knob import Knob
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.plan import Cost, LeftOut, whole_cost
+from rotor.requests.plan import Cost, Growth, LeftOut
+
+TEMPERATURES = Knob(
+    key="conditions.temperature",
+    fixed="",
+    cost=Growth(
+        (1,),
+        lambda request: len(request.temperatures_k),
+        lambda request, _: replace(request, temperatures_k=(max(request.temperatures_k),)),
+        work=lambda request, count: 1.0,  # the levels at the highest temperature take the time
+        largest=lambda request: request,
+    ),
+)
+VIBRATION = Knob(
+    key="vibration", fixed="its states are summed in closed form", used=lambda request: bool(request.vibrations)
+)
 
 
-def thermo_cost(request: Any) -> Cost:
-    """The cost of thermodynamic functions, and those at the highest temperature, whose levels take the time."""
-    from rotor.thermodynamics.request import answer_thermo
-
-    hottest = replace(request, temperatures_k=(max(request.temperatures_k),))
-    return whole_cost(lambda: answer_thermo(hottest), largest=lambda: answer_thermo(request))
-
-
-def describe_thermo(request: Any, hot: Any) -> dict[str, Any]:
-    """What thermodynamic functions are, from those at the highest temperature."""
-    hottest, jmax = max(request.temperatures_k), int(hot.functions.jmax.max())
+def describe_thermo(request: Any, cost: Cost) -> dict[str, Any]:
+    """What thermodynamic functions are."""
+    hot, hottest = cost.answer, max(request.temperatures_k)
+    jmax = int(hot.functions.jmax.max())
     summed = f"levels summed to J = {jmax} at {hottest:g} K" if jmax >= 0 else "classical with corrections: no levels"
     described = plan_fields(request.top, populated_j(request.top, hottest), hot.effects)
     vibration = [] if request.vibrations else [LeftOut("vibration", None, "", "no states given")]
@@ -34,8 +43,9 @@ def describe_thermo(request: Any, hot: Any) -> dict[str, Any]:
     }
 
 
-def describe_torsion(request: Any, answer: Any) -> dict[str, Any]:
+def describe_torsion(request: Any, cost: Cost) -> dict[str, Any]:
     """What a torsion is: basis and potential."""
+    answer = cost.answer
     scanned = "" if answer.scan is None else f"; {len(answer.scan.angles) + 1} relaxed geometries"
     return {
         "effects": (f"potential: {answer.source}, barrier {answer.facts()['barrier_cm']:.4g} cm⁻¹",),
@@ -46,18 +56,17 @@ def describe_torsion(request: Any, answer: Any) -> dict[str, Any]:
     }
 
 
-def _remark_on_basis(request: Any) -> tuple[str, ...]:
-    """Without a scan nothing can be chosen, since the basis follows from the energies."""
+def _has_potential(request: Any) -> bool:
+    """Whether nothing can be chosen, since without a scan the basis follows from the energies."""
     from rotor.thermodynamics.torsion_potential import is_scan
 
-    why = "basis: its size follows from the highest energy; the error is stated with each run"
-    return () if is_scan(request.potential) else (why,)
+    return not is_scan(request.potential)
 
 
-THERMO = Numerics(
-    {"": Goal("Q, U and C_v")},
-    remarks=lambda request: ("vibration: its states are summed in closed form",) if request.vibrations else (),
-    describe=describe_thermo,
-    cost=thermo_cost,
+BASIS = Knob(
+    key="basis",
+    fixed="its size follows from the highest energy; the error is stated with each run",
+    used=_has_potential,
 )
-TORSION = Numerics({"MHz": Goal("levels")}, remarks=_remark_on_basis, describe=describe_torsion)
+THERMO = Numerics({"": Goal("Q, U and C_v")}, knobs=(TEMPERATURES, VIBRATION), describe=describe_thermo)
+TORSION = Numerics({"MHz": Goal("levels")}, knobs=(BASIS,), describe=describe_torsion)

@@ -219,7 +219,7 @@ class Verb:
     has_scenes: ClassVar[bool] = True
 
     def load_numerics(self) -> Numerics:
-        """Accuracy goals, sweeps and plan; by default those of the knobs alone."""
+        """Accuracy goals, knobs and plan; by default those of the fields alone."""
         from rotor.requests.numerics import Numerics
 
         module, _, name = self.numerics.partition(":")
@@ -227,8 +227,8 @@ class Verb:
         return numerics
 
     def compute(self, request: Any) -> Any:
-        """The answer to a request, with default display options."""
-        return self.answer(request, Work(shown=self.read_shown(Entries())))
+        """The answer to a request, with default display options and without messages."""
+        return self.answer(request, Work(shown=self.read_shown(Entries()), from_scene=True))
 
     @property
     def has_json(self) -> bool:

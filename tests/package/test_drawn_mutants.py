@@ -11,7 +11,7 @@ import rotor
 from rotor.formats.spcat.hamiltonian.codes import _whole_code
 from rotor.formats.spcat.text.par import Parameter
 from rotor.quantum.wang import wang_matrix
-from rotor.requests.plan import Growth
+from rotor.requests.plan import Growth, Run
 
 # Refusals
 
@@ -353,10 +353,12 @@ def test_a_cost_proportional_to_the_work_is_extrapolated_exactly(monkeypatch):
     def taken(cost, size):
         """What a clock would say of a call; the short calls are long enough."""
         calls.clear()
-        return Growth(lambda n: calls.append(n) or cost(n), size, (4, 8)).seconds
+        run = Run(None, lambda n: calls.append(n) or cost(n))
+        return Growth((4, 8))(size, run, lambda size: size, lambda size, n: n).seconds
 
     calls = []
     monkeypatch.setattr("rotor.requests.plan.timed", lambda call: call())
+    monkeypatch.setattr("rotor.requests.plan.traced", lambda call: (None, 0.0))
 
     measured = taken(lambda n: 10.0 + 3.0 * n, 100)
     assert measured == pytest.approx(310.0, rel=1e-14)  # round-off of three operations

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
+import re
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -13,9 +16,11 @@ from places import PROJECT
 
 from rotor.quantum.estimates.accuracy import energies_like, to_order
 from rotor.requests.accuracy import read_accuracy
+from rotor.requests.field import all_fields
 from rotor.requests.fill import Entries
-from rotor.requests.knob import Choice, Knob, Measure, Setting, Sweep
+from rotor.requests.knob import Choice, Knob, Measure, Setting, Sweep, with_whole
 from rotor.requests.numerics import Goal, Numerics
+from rotor.requests.plan import Growth, Run
 from rotor.scenes import accuracy_sweep
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, panels_of, sweep, work_precision
 from rotor.scenes.scene import (
@@ -244,17 +249,28 @@ def test_settings_of_highest_j_rise_and_hold_that_of_the_scene():
     assert (reach.reference.jmax, reach.against, reach.title) == (74, "J max 74", "highest J of the basis")
 
 
-def test_a_toy_knob_is_swept_and_searched_without_further_code():
-    """Terms of Σ 1/n²: the error of N terms lies between 1/(N + 1) and 1/N."""
+@dataclass(frozen=True)
+class Terms:
+    """The sum of so many terms 1/n²."""
 
-    def total(orders: range) -> float:
-        return math.fsum(1.0 / n**2 for n in orders)
+    count: int = 30
 
-    knob = Knob(
-        (1, 10, 100), 10_000, (Measure("sum", "", lambda answer, reference: abs(answer - reference)),), "{:g} terms",
-        change=lambda request, _, terms: range(1, int(terms) + 1), tried=(1, 10, 100), key="numerics.terms", value=lambda request: request,
-    )  # fmt: skip
-    rows, against, remarks, _ = sweep(knob.sweep(None, 30, total), 10.0)
+
+def answer_terms(request: Terms) -> float:
+    return math.fsum(1.0 / n**2 for n in range(1, request.count + 1))
+
+
+TERMS = Knob(
+    (1, 10, 100), 10_000, (Measure("sum", "", lambda answer, reference: abs(answer - reference)),), "{:g} terms",
+    key="numerics.terms", attribute="count", change=with_whole, tried=(1, 10, 100), coarsest=(1, "loosest"),
+    cost=Growth((1_000, 10_000)),
+)  # fmt: skip
+NUMERICS = Numerics({"": Goal("sum", lambda answer: math.pi**2 / 6 - answer)}, knobs=(TERMS,))
+
+
+def test_a_toy_knob_is_swept_without_further_code():
+    """The error of N terms lies between 1/(N + 1) and 1/N."""
+    rows, against, remarks, _ = sweep(TERMS.sweep(Terms(), answer_terms), 10.0)
     assert [(row.knob, row.setting, row.own) for row in rows] == [
         ("numerics.terms", "1", False), ("numerics.terms", "10", False), ("numerics.terms", "30", True),
         ("numerics.terms", "100", False),
@@ -263,16 +279,13 @@ def test_a_toy_knob_is_swept_and_searched_without_further_code():
     for row in rows:
         assert 1 / (int(row.setting) + 1) - 1e-4 < row.error < 1 / int(row.setting)
 
-    def error(answer: float) -> float:
-        return math.pi**2 / 6 - answer
 
-    numerics = Numerics({"": Goal("sum", error, (knob,), ("numerics.terms",))})
-
+def test_a_toy_knob_is_chosen_without_further_code():
     def chosen(accuracy: float, entries: Entries = Entries()) -> Choice:  # noqa: B008
-        return read_accuracy(accuracy, numerics, entries).chosen(30, entries, total)
+        return read_accuracy(accuracy, NUMERICS, entries).chosen(Terms(), entries, answer_terms)
 
     choice = chosen(0.05)
-    assert (choice.request, choice.how, choice.answer) == (range(1, 101), "terms 100", total(range(1, 101)))
+    assert (choice.request, choice.how, choice.answer) == (Terms(100), "terms 100", answer_terms(Terms(100)))
     assert chosen(0.7).how == "terms 1, nothing cheaper: the loosest there is"
     with pytest.raises(
         ValueError, match=r"accuracy: 0.001 cannot be given: the error here is 0.01 \(terms 100\); ask for less"
@@ -280,9 +293,40 @@ def test_a_toy_knob_is_swept_and_searched_without_further_code():
         chosen(1e-3)
     with pytest.raises(ValueError, match=r"accuracy and numerics.terms: give one of them"):
         chosen(0.05, Entries({"numerics.terms": 3}))
-    unknown = replace(numerics, goals={"": replace(numerics.goals[""], unfit=lambda request: "of another sum")})
+    unknown = replace(NUMERICS, goals={"": replace(NUMERICS.goals[""], unfit=lambda request: "of another sum")})
     with pytest.raises(ValueError, match=r"accuracy: 0.05: of another sum"):
-        read_accuracy(0.05, unknown).chosen(30, Entries(), total)
+        read_accuracy(0.05, unknown).chosen(Terms(), Entries(), answer_terms)
+
+
+def test_a_toy_knob_is_planned_without_further_code():
+    calls = []
+
+    def counted(request: Terms) -> float:
+        calls.append(request.count)
+        return answer_terms(request)
+
+    few, many = (NUMERICS.cost(Terms(count), Run(counted, counted)) for count in (2_000_000, 4_000_000))
+    assert max(calls) < 2_000_000  # from short sums
+    assert 1.5 < many.seconds / few.seconds < 2.7  # 2, of an idle clock
+    assert many.amount == 4_000_000
+
+
+@pytest.mark.parametrize("kind", sorted(SCENE_VERBS))
+def test_a_kind_has_knobs_and_no_code_of_its_own_that_chooses_sweeps_or_plans(kind):
+    verb = verb_of(kind)
+    numerics = verb.load_numerics()
+    assert type(numerics) is Numerics
+    knobs = [*(field.knob for field in all_fields(verb.request).values() if field.knob is not None), *numerics.knobs]
+    for knob in knobs:
+        assert type(knob) is Knob
+        assert (knob.fixed is None) <= bool(knob.steps and knob.measures)  # swept, or the reason why not
+        assert not knob.units or knob.least is not None or knob.tried
+        assert knob.cost is None or callable(knob.cost)
+    assert {unit for knob in knobs for unit in knob.units} <= {*numerics.goals, "Å"}
+    source = inspect.getsource(inspect.getmodule(verb.request)) + inspect.getsource(
+        import_module(verb.numerics.partition(":")[0] or "rotor.requests.numerics")
+    )
+    assert not re.search(r"\b(Choice|Sweep|timed|traced)\(", source)
 
 
 def test_the_command_accuracy_sweeps_a_scene(call, folder):

@@ -331,3 +331,20 @@ def test_the_command_states_the_error(call):
     content = json.loads(call("run", "s.toml", "--json", "-")[1])
     assert 0 <= content["accuracy"]["error"] <= content["accuracy"]["asked"] == 1e-3
     assert rotor.__version__ == content["rotor_version"]
+
+
+@pytest.mark.parametrize("accuracy", ["1 kHz", None])
+def test_spins_bring_no_distortion_back(accuracy):
+    """Of a top that is rigid by choice, the treatment of spins was chosen and swept with distortion."""
+    from rotor.scenes.accuracy_sweep import knobs_of
+
+    effects = {"distortion": False} if accuracy else {"distortion": False, "hyperfine": True}
+    scene = LevelsScene(molecule="HCN", effects=effects, accuracy=accuracy)
+    requests = (
+        [scene_calculation(scene).choice.request]
+        if accuracy
+        else [setting.request for knob in knobs_of(scene).knobs for setting in knob.settings]
+    )
+    names = [{effect.name for effect in request.effects} for request in requests]
+    assert "nuclear quadrupole" in names[-1]
+    assert not any("centrifugal distortion" in each for each in names)

@@ -9,54 +9,78 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.quantum.estimates.plans import describe_levels, levels_cost
+from rotor.quantum.estimates.plans import describe_levels
 from rotor.requests.budget import ROUNDING
-from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Measure, Sought
+from rotor.requests.knob import NOTHING_CHEAPER, Estimate, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics, numerical_error
+from rotor.requests.plan import Growth
 
 if TYPE_CHECKING:
     from rotor.quantum.levels import Levels
     from rotor.tops.top import Top
 
-TREATMENTS = ("left out", "first-order", "N-diagonal", "exact")
-EXACT, FOR_METHOD = "exact", 0.9  # default treatment of spins; share of an accuracy for the error of another treatment
+TREATMENTS = ("left out", "first-order", "N-diagonal", "auto", "exact")
+FOR_METHOD = 0.9  # share of an accuracy for the error of another treatment
 SPINS = frozenset({"nuclear quadrupole", "spin-rotation", "spin-spin", "hyperfine method"})
+SHORT_J = (12, 30)  # J from which the cost is extrapolated; up to the second J it is measured
 
 
-def _treatments(sought: Sought) -> Iterator[Choice]:
+class Treatment(NamedTuple):
+    """A treatment of spins by its place in TREATMENTS, and the tolerance of "auto"."""
+
+    place: int
+    tolerance_mhz: float = 0.0
+
+    def __str__(self) -> str:
+        return TREATMENTS[self.place]
+
+
+LEFT_OUT, FIRST_ORDER, DIAGONAL, AUTO, EXACT = map(Treatment, range(len(TREATMENTS)))
+
+
+def _treatments(sought: Sought) -> Iterator[Treatment]:
     """Treatments of spins with known constants, cheapest first: left out, of several spins the cheapest method, and exact.
 
     All orders of distortion remain: for water up to J = 40 (13 ms) orders above J⁴ cost 3 ms, and they are not small against 1 kHz. A
     single nucleus is exact at the same cost (docs/accuracy.md). Spins that the user turned on or off remain so.
     """
-    from rotor.quantum.effects.of_top import effects_of
-    from rotor.quantum.effects.watson import Centrifugal
-
-    request, entries = sought.request, sought.entries.values
-    top = request.top
-    present = any(effect.spins(top) for effect in request.effects)
+    top, entries, present = sought.request.top, sought.entries.values, _has_spins(sought.request)
     if top.spin_constants is None or not (present or entries.get("effects.hyperfine") is None):
         return
-    size = _spin_size(top)
+    sought.known["size"] = _spin_size(top)
     if not present:
-        yield Choice(request, f"spins of nuclei left out, {size:.2g} MHz", size)
-    if len(top.spin_constants.twice) > 1 and entries.get("effects.hyperfine_method", EXACT) == EXACT:
-        tolerance = FOR_METHOD * sought.accuracy
-        effects = effects_of(top, True, "auto", tolerance)
-        if not any(isinstance(effect, Centrifugal) for effect in request.effects):
-            effects = tuple(effect for effect in effects if not isinstance(effect, Centrifugal))
-        how = f"with spins of nuclei, {size:.2g} MHz, by the cheapest method to {tolerance:g} MHz"
-        yield Choice(replace(request, effects=effects), how)  # its answer states the error of the method
-    elif present:
-        yield Choice(request, "with spins of nuclei: exact, nothing cheaper")
+        yield LEFT_OUT
+    method = entries.get("effects.hyperfine_method", str(EXACT))
+    if method != str(EXACT):
+        yield Treatment(TREATMENTS.index(method))
+    elif len(top.spin_constants.twice) > 1:
+        yield AUTO._replace(tolerance_mhz=FOR_METHOD * sought.accuracy)
     else:
-        how = f"with spins of nuclei, {size:.2g} MHz: exact, nothing cheaper"
-        yield Choice(replace(request, effects=effects_of(top, True)), how)
+        yield EXACT
+
+
+def _treatment_error(sought: Sought, _: Any, treatment: Treatment) -> Estimate:
+    """The size of spins that are left out; the answer states the error of other treatments."""
+    return Estimate(sought.known["size"] if treatment == LEFT_OUT else 0.0)
+
+
+def _treatment_text(sought: Sought, treatment: Treatment) -> str:
+    size = f"{sought.known['size']:.2g} MHz"
+    if treatment == LEFT_OUT:
+        return f"spins of nuclei left out, {size}"
+    if treatment.tolerance_mhz:
+        return f"with spins of nuclei, {size}, by the cheapest method to {treatment.tolerance_mhz:g} MHz"
+    spins = "with spins of nuclei" + ("" if _has_spins(sought.request) else f", {size}")
+    return f"{spins}: {treatment}" + (", nothing cheaper" if treatment == EXACT else "")
+
+
+def _has_spins(request: Any) -> bool:
+    return any(effect.spins(request.top) for effect in request.effects)
 
 
 def _spin_size(top: Any) -> float:
@@ -119,17 +143,18 @@ def to_order(top: Top, order: int) -> Top:
     return top.with_constants(top.constants.replace(**above))
 
 
-def _has_distortion(request: Any) -> bool:
-    """Whether orders of distortion can be swept."""
-    names = [name for name in request.top.constants.values if name not in "ABC"]
-    present = any(effect.name == "centrifugal distortion" for effect in request.effects)
-    return bool(names) and request.top.states is None and present
-
-
 def _orders(request: Any) -> list[int]:
     """Powers of J in the operators of the constants."""
     top = request.top
     return [2, *sorted({order_of(name, top) for name in top.constants.values if name not in "ABC"})]
+
+
+def _without_orders(request: Any) -> str | None:
+    """Why orders of distortion cannot be swept; None if they can."""
+    if request.top.states is not None:
+        return "not swept: the top has several states"
+    present = any(effect.name == "centrifugal distortion" for effect in request.effects)
+    return None if present and len(_orders(request)) > 1 else ""
 
 
 def distortion(measure: Measure) -> Knob:
@@ -139,52 +164,65 @@ def distortion(measure: Measure) -> Knob:
         None,
         (measure,),
         lambda _: "all constants; the orders that they do not have are in the plan",
+        key="effects.distortion",
+        title="order of centrifugal distortion",
         change=lambda request, _, order: replace(request, top=to_order(request.top, order)),
+        value=lambda request: _orders(request)[-1],
+        fixed=_without_orders,
         prepare=lambda request: replace(
             request, top=request.top.with_constants(request.top.constants)
         ),  # no level table
-        used=_has_distortion,
-        key="effects.distortion",
-        title="order of centrifugal distortion",
-        value=lambda request: _orders(request)[-1],
         reference=lambda request: request,
         label="order J^{}".format,
     )
 
 
 def hyperfine(measure: Measure) -> Knob:
-    """The treatment of hyperfine structure, from none to the exact one, by its place in TREATMENTS."""
+    """The treatment of hyperfine structure, from none to the exact one."""
     return Knob(
-        range(len(TREATMENTS)),
-        TREATMENTS.index(EXACT),
+        (LEFT_OUT, FIRST_ORDER, DIAGONAL, EXACT),
+        EXACT,
         (measure,),
         lambda _: "the exact method itself",
-        change=lambda request, _, place: _treated(request, TREATMENTS[place]),
-        used=lambda request: any(effect.name in SPINS for effect in request.effects),
         key="effects.hyperfine_method",
         title="method of hyperfine structure",
+        change=_treated,
         value=_treatment,
-        label=lambda place: TREATMENTS[place],
-        search=_treatments,
+        fixed=lambda request: None if any(effect.name in SPINS for effect in request.effects) else "",
+        label=str,
         series=False,
+        tried=_treatments,
+        error=_treatment_error,
+        text=_treatment_text,
+        exclusive=False,
     )
 
 
-def _treatment(request: Any) -> int | None:
-    """The place of a request's treatment in TREATMENTS; None for another treatment."""
+def _treatment(request: Any) -> Treatment | None:
+    """The treatment of a request; None for one that depends on a tolerance."""
     from rotor.quantum.hyperfine_method import HyperfineMethod
 
-    used = next((effect.method for effect in request.effects if isinstance(effect, HyperfineMethod)), EXACT)
-    return TREATMENTS.index(used) if used in TREATMENTS else None
+    if not _has_spins(request):
+        return LEFT_OUT
+    name = next((effect.method for effect in request.effects if isinstance(effect, HyperfineMethod)), str(EXACT))
+    treatment = Treatment(TREATMENTS.index(name))
+    return None if treatment == AUTO else treatment
 
 
-def _treated(request: Any, treatment: str) -> Any:
-    """The request with another treatment of spins."""
+def _treated(request: Any, _: str, treatment: Treatment) -> Any:
+    """The request with another treatment of spins; it has distortion only if it had it before."""
     from rotor.quantum.effects.of_top import effects_of
+    from rotor.quantum.effects.watson import Centrifugal
 
-    if treatment == TREATMENTS[0]:
-        return replace(request, effects=effects_of(request.top, False))
-    return replace(request, effects=effects_of(request.top, True, treatment))
+    if treatment == _treatment(request):
+        return request
+    tolerance = [treatment.tolerance_mhz] if treatment.tolerance_mhz else []
+    effects = effects_of(request.top, treatment != LEFT_OUT, str(treatment), *tolerance)
+    has_distortion = any(isinstance(effect, Centrifugal) for effect in request.effects)
+    return replace(
+        request,
+        effects=tuple(effect for effect in effects if has_distortion or not isinstance(effect, Centrifugal)),
+    )
 
 
 def rounding_of(top: Any, j: int) -> float:
@@ -194,9 +232,9 @@ def rounding_of(top: Any, j: int) -> float:
     return rounding_mhz(answer_levels(LevelsRequest(top, jmin=j, jmax=j)).table.levels)
 
 
-def reason_of_no_distortion_sweep(top: Top) -> tuple[str, ...]:
-    """Reason why distortion of a top with several states is not swept."""
-    return ("effects.distortion: not swept: the top has several states",) if top.states is not None else ()
+def by_blocks(top: Top, j: float) -> float:
+    """Work of the levels up to J: blocks of an asymmetric top are diagonalised, other tops have closed forms."""
+    return (j + 1.0) ** (3 if top.kind == "asymmetric" else 1)
 
 
 ENERGY = Measure(
@@ -204,19 +242,20 @@ ENERGY = Measure(
     "MHz",
     lambda answer, reference: level_error(answer.table.levels, reference.table.levels),
 )
-HYPERFINE = hyperfine(ENERGY)
-LEVELS = Numerics(
-    {
-        "MHz": Goal(
-            "energies", lambda answer: levels_error(answer, answer.request.top, answer.table.levels), (HYPERFINE,)
-        )
-    },
-    knobs=(distortion(ENERGY), HYPERFINE),
-    remarks=lambda request: (
-        f"observables.jmax: {NOTHING_CHEAPER}; it says which levels, not how well",
-        *reason_of_no_distortion_sweep(request.top),
+JMAX = Knob(
+    key="observables.jmax",
+    attribute="jmax",
+    fixed=f"{NOTHING_CHEAPER}; it says which levels, not how well",
+    cost=Growth(
+        SHORT_J,
+        prepare=lambda request: replace(request, jmin=0, kmin=None, kmax=None, max_energy_mhz=None),
+        work=lambda request, j: by_blocks(request.top, j),
+        memory=lambda request, j: by_blocks(request.top, j),
     ),
+)
+LEVELS = Numerics(
+    {"MHz": Goal("energies", lambda answer: levels_error(answer, answer.request.top, answer.table.levels))},
+    knobs=(JMAX, distortion(ENERGY), hyperfine(ENERGY)),
     describe=describe_levels,
-    cost=levels_cost,
     rounding=lambda request: rounding_of(request.top, request.jmax),
 )

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.estimates.left_out import neglected_in_levels
-from rotor.requests.plan import Cost, Growth
+from rotor.requests.plan import Cost
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.internal_rotation import InternalRotationConstants
     from rotor.tops.top import Top
 
-SHORT_J = (12, 30)  # J from which the cost is extrapolated; up to the second J it is measured
 ENERGY = "energies are eigenvalues of the truncated Hamiltonian"
 MOST_J_COMPARED = {1: 30, 2: 8, 3: 3}  # highest J at which the torsional truncation is estimated, by number of tops
 
@@ -91,20 +89,7 @@ def torsional_parts(top: Top, constants: InternalRotationConstants, jmax: int) -
     ]
 
 
-def levels_cost(request: Any) -> Cost:
-    """The cost of a list of levels: blocks of an asymmetric top are diagonalised, other tops have closed forms."""
-    from rotor.quantum.request import answer_levels
-
-    plain = replace(request, jmin=0, kmin=None, kmax=None, max_energy_mhz=None)
-    power = 3 if request.top.kind == "asymmetric" else 1
-
-    def work(j: int) -> float:
-        return (j + 1.0) ** power
-
-    return Growth(lambda j: answer_levels(replace(plain, jmax=j)).table.columns, request.jmax, SHORT_J, work, work).cost
-
-
-def describe_levels(request: Any, _: Any) -> dict[str, Any]:
+def describe_levels(request: Any, _: Cost) -> dict[str, Any]:
     """What a list of levels is."""
     top, jmax, first = request.top, request.jmax, request.jmin
     count = (jmax + 1) ** 2 - first**2 if top.kind == "asymmetric" else jmax + 1 - first

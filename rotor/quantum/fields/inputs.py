@@ -45,8 +45,8 @@ ENERGY = Measure(
     "energy", "MHz", lambda answer, reference: largest_difference(answer.states.energy_mhz, reference.states.energy_mhz)
 )
 TOLERANCE = Knob(
-    TOLERANCES_MHZ, _finest, (ENERGY,), "a tolerance of {:g} MHz", LEAST_MHZ, _with_tolerance, _energies_alone,
-    used=lambda request: request.jmax is None,
+    TOLERANCES_MHZ, _finest, (ENERGY,), "a tolerance of {:g} MHz", LEAST_MHZ,
+    change=_with_tolerance, prepare=_energies_alone, used=lambda request: request.jmax is None,
 )  # fmt: skip
 
 

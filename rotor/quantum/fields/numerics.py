@@ -37,8 +37,15 @@ def _energies(request: Any) -> Any:
     return np.concatenate([part.energies[:, part.j <= fields.j_highest].ravel() for part in parts])
 
 
-def _basis(steps: Callable[[Any], Iterable[int]], measure: Measure, answer: Callable[[Any], Any]) -> Knob:
-    """J max of the basis, if the request has it."""
+def _smaller_bases(request: Any) -> Iterable[int]:
+    """J max from the least one for the states to that of the request."""
+    return range(request.j_highest + 2, request.jmax + 1)
+
+
+def _basis(
+    steps: Callable[[Any], Iterable[int]], measure: Measure, answer: Callable[[Any], Any], used: Callable[[Any], bool]
+) -> Knob:
+    """J max of the basis."""
     return Knob(
         steps,
         lambda request: request.jmax + MORE_J,
@@ -46,33 +53,39 @@ def _basis(steps: Callable[[Any], Iterable[int]], measure: Measure, answer: Call
         "J max {}",
         key="numerics.jmax",
         title="highest J of the basis",
-        used=lambda request: request.jmax is not None,
         attribute="jmax",
+        used=used,
         answer=answer,
     )
 
 
-def _at(request: Any, answer: Callable[[Any], Any], values: tuple[float, ...]) -> Any:
-    """The answer at other fields."""
-    return answer(replace(request, **{request.map.kind.name: values}))
+def _fields(request: Any, count: int) -> Any:
+    """The request at fewer fields: the ends, then the highest, which need the largest basis."""
+    name = request.map.kind.name
+    fields = getattr(request, name)
+    ordered = dict.fromkeys((max(fields), min(fields), *sorted(fields, key=abs, reverse=True)))
+    return replace(request, **{name: tuple(ordered)[:count]})
 
 
-def _cost_in_field(answer: Callable[[Any], Any], request: Any) -> Cost:
-    """The cost of levels in a field, from fewer fields; and the answer at the ends of the fields."""
-    fields = getattr(request, request.map.kind.name)
-    ends = _at(request, answer, tuple(dict.fromkeys((min(fields), max(fields)))))
-    lasting = sorted(fields, key=abs, reverse=True)  # the highest fields need the largest basis
-    cost = Growth(lambda n: _at(request, answer, tuple(lasting[:n])).states.columns, len(fields), SHORT_FIELDS)
-    return Cost(cost.seconds, cost.memory_mb, ends)
+FIELDS = Knob(
+    key="conditions.field",
+    fixed="",
+    cost=Growth(
+        SHORT_FIELDS,
+        lambda request: len(getattr(request, request.map.kind.name)),
+        _fields,
+        lambda request: replace(request, diabatic_gap_mhz=None) if hasattr(request, "diabatic_gap_mhz") else request,
+    ),
+)
 
 
-def _describe_in_field(acts: str, good: str, within: str, request: Any, ends: Any) -> dict[str, Any]:
+def _describe_in_field(acts: str, good: str, within: str, request: Any, cost: Cost) -> dict[str, Any]:
     """What levels in a field are. acts: what acts in the field, with its strength. within: effect that the field contains."""
     top, j, fields, facts = (
         request.top,
         max(request.j_highest, 1),
         getattr(request, request.map.kind.name),
-        ends.facts(),
+        cost.answer.facts(),
     )
     described = plan_fields(top, j, request.effects or SEMI_RIGID)
     known_names = {limit.name for limit in described["left_out"]}
@@ -99,16 +112,14 @@ def _describe_in_field(acts: str, good: str, within: str, request: Any, ends: An
 ENERGIES = Measure("energy", "MHz", largest_difference)
 STARK = Numerics(
     {"MHz": Goal("energies")},
-    knobs=(_basis(lambda request: range(request.j_highest + 2, request.jmax + 1), ENERGIES, _energies),),
+    knobs=(_basis(_smaller_bases, ENERGIES, _energies, lambda request: True), FIELDS),
     prepare=_with_basis,
     describe=partial(
         _describe_in_field, "dipole in the field, up to {:g} kV/cm", "|M|", "Stark shift of a stray field"
     ),
-    cost=lambda request: _cost_in_field(answer_stark, replace(request, diabatic_gap_mhz=None)),
 )
 ZEEMAN = Numerics(
     {"MHz": Goal("energies")},
-    knobs=(_basis(lambda request: (), ENERGY, answer_zeeman),),
+    knobs=(_basis(lambda request: (), ENERGY, answer_zeeman, lambda request: request.jmax is not None), FIELDS),
     describe=partial(_describe_in_field, "magnetic moments in the field, up to {:g} T", "M", ""),
-    cost=partial(_cost_in_field, answer_zeeman),
 )
