@@ -1,7 +1,7 @@
 """Moments that make lines besides the dipole of a state: dipoles that depend on the rotation, and magnetic moments.
 
     electric    Σ_i μ_i φ_pi, with half anticommutators or commutators of N² and Nz² (Herman-Wallis corrections)
-    written     Σ c N_i ... φ_pk ... N_l, a sum of products of one direction cosine with components of N, each with its factor c
+    written     any operator, such as Σ c N_i ... φ_pk ... N_l, products of one direction cosine with components of N
     magnetic    g μB N_p, g μB S_p of one spin, or g μB Σ_ij c_ij φ_pi S_j (j along the molecule), c symmetric and traceless;
                 g μB Σ_ij c_ij ½{φ_pi, N_j}
     of a spin   Σ_q ½{φ_p, N_q} S_q with the part of rank 2 alone, φ = Σ_i μ_i φ_i; i Σ_ij c_ij φ_pi S_j between two states
@@ -12,10 +12,9 @@ strengths are added.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
-from rotor.arrays import Floats, Ints
+from rotor.quantum.operators.algebra import Operator
 
 DEBYE_PER_BOHR_MAGNETON = 0.009274  # as SPCAT has it; 9.2740101e-3 by CODATA 2018
 
@@ -23,36 +22,21 @@ Vector = tuple[float, float, float]
 Matrix = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
 
 
-FactorOfK = Callable[[Ints, Ints, Ints], Floats]  # of J, K' and K''
-
-
-class Word(NamedTuple):
-    """c N_i ... φ_pk ... N_l with i ... to the left and ... l to the right of the cosine along k; without a cosine c N_i ... alone."""
-
-    factor: complex
-    left: str
-    cosine: str
-    right: str
-
-
 class Written(NamedTuple):
-    """A moment as a sum of words, from the second of its states to the first.
+    """A moment as an operator, from the second of its states to the first: ⟨N'K'‖M‖N K⟩, or, of one with a spin, of the part on |N K⟩.
 
-    electric: whether it is a part of the electric dipole. commutator: ½[N², ] of the whole. factor_of_k: what an element from K'' to K' is
-    multiplied with, signs of K counted. A moment of the spin `Moment.spin` has words without a cosine.
+    electric: whether it is a part of the electric dipole.
     """
 
-    words: tuple[Word, ...]
+    operator: Operator
     electric: bool
-    commutator: bool = False
-    factor_of_k: FactorOfK | None = None
 
 
 class Moment(NamedTuple):
     """One moment between two states v', v, or of one.
 
     value_debye: what it is multiplied with. along_abc: μ of an electric moment, None of a magnetic one. powers: of an electric one, ""
-    none, "J" ½{N², }, "JJ" ½{N⁴, }, "K" ½{Nz², }, "[J]" ½[N², ], "[[J]]" ¼[N², [N², ]]; of a magnetic one "3K-J" ½(3Nz² - N²).
+    none, "J" ½{N², }, "JJ" ½{N⁴, }, "K" ½{Nz², }, "[J]" ½[N², ], "[[J]]" ¼[N², [N², ]].
     spin: of a magnetic moment, the spin's name, "" the rotation. tensor: c of a magnetic moment that is not isotropic. cosine: of an
     electric one α', α of the two states where an element is multiplied by cos(α'K' + αK), a Fourier term of internal rotation.
     written: a moment of another form, in place of all these but `spin`. Of a spin: along_abc is half of {φ, N} of rank 2 with the spin,

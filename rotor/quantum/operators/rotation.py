@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Ints
 from rotor.quantum.operators.algebra import UNIT, Factor, Labels, Operator, Shift, Values, diagonal, shift
 from rotor.quantum.symmetric_top_elements import closed_coupling
+from rotor.quantum.tensors import spherical_components
 from rotor.quantum.wigner import three_j
 from rotor.tops.operators import Powers, axis_order
 
@@ -156,6 +157,12 @@ def body_tensor(components: ArrayLike) -> Operator:
         if parts[rank + q] != 0
     ]
     return reduce(lambda x, y: x + y, terms, Operator())
+
+
+@cache
+def direction_cosine(axis: str, representation: str) -> Operator:
+    """⟨J'K'‖φ‖JK⟩ of the direction cosines between space and the axis a, b or c."""
+    return body_tensor(spherical_components([float(axis == letter) for letter in "abc"], 1, representation))
 
 
 def _tensor_shift(rank: int, q: int, rise: int) -> Operator:

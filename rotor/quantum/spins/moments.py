@@ -81,8 +81,7 @@ def _between_parts(moment: Moment, left: Part, right: Part, representation: str)
     up, low = left.basis, right.basis
     if moment.written is not None:
         back = left.v != right.v and (left.v, right.v) != moment.states
-        element = written_elements(moment.written, up, low, representation, back)
-        return element * _factor(moment.powers, left, right) if element is not None and moment.powers else element
+        return written_elements(moment.written, up, low, back)
     if moment.along_abc is not None and moment.spin:
         element = tensor_elements(up, low, tensor_of(moment.along_abc, 1, representation))
         return None if element is None else element * _stretch(up.j, low.j)
@@ -101,10 +100,7 @@ def _between_parts(moment: Moment, left: Part, right: Part, representation: str)
     if up != low:
         return None
     n = low.j
-    diagonal = np.full(low.size, 1.0 if moment.spin else sqrt(n * (n + 1.0) * (2 * n + 1)))
-    if moment.powers == "3K-J":
-        diagonal *= (3.0 * low.k.astype(float) ** 2 - n * (n + 1.0)) / 2
-    return np.diag(diagonal)
+    return np.asarray((1.0 if moment.spin else sqrt(n * (n + 1.0) * (2 * n + 1))) * np.eye(low.size))
 
 
 def moments_of(

@@ -7,10 +7,17 @@ from typing import NamedTuple
 
 from rotor.formats.spcat.hamiltonian.code_table import state_digits
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
-from rotor.formats.spcat.hamiltonian.moment_words import imaginary, moment_tensor, type_words
+from rotor.formats.spcat.hamiltonian.moment_operators import (
+    commutator_with_n2,
+    imaginary,
+    moment_operator,
+    moment_tensor,
+)
 from rotor.formats.spcat.hamiltonian.series import Series, angles_by_k, k_factor
 from rotor.formats.spcat.text.int_file import Dipole
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment, Written
+from rotor.quantum.operators.algebra import Operator, half_anticommutator
+from rotor.quantum.operators.rotation import j_squared, j_z, weighted
 
 Dipoles = dict[tuple[int, int], tuple[float, float, float]]
 
@@ -80,7 +87,7 @@ def line_moment(
     | TYP, I1, SYM | moment |
     |---|---|
     | 3, 5, 9, 10 | ½{N², φ}, ½[N², φ], ½{N⁴, φ}, ¼[N², [N², φ]], or of N or a spin in place of φ but for 5 |
-    | 0, 1, 2, 4, 6, 11, 12 | see `moment_words` |
+    | 0, 1, 2, 4, 6, 11, 12 | see `moment_operators` |
     | 7; n; any | TYP 0 times a cosine of K, a Fourier term of internal rotation (`series`) |
     | 8; n; any | i times TYP 0 times a sine of K; with n = 0 ½i{Nz, TYP 0}, as the program has it |
 
@@ -115,10 +122,9 @@ def line_moment(
     if code.axis and powers and (powers != "[J]" or states[0] == states[1]):
         return Moment(value, states, _along(code.axis), powers)
     if (code.typ == 5 and code.axis) or code.typ in _WRITTEN:
-        words = type_words(0 if powers else code.typ, code.axis, oblate, as_spcat=as_spcat)
-        commutator = code.typ in (5, 11)
-        written = Written(words, bool(code.axis), commutator)
-        return Moment(value, states[::-1], powers="" if commutator else powers, written=written)
+        operator = moment_operator(0 if powers else code.typ, code.axis, oblate, as_spcat=as_spcat)
+        operator = commutator_with_n2(operator) if code.typ == 5 else _with_n2(operator, powers)
+        return Moment(value, states[::-1], written=Written(operator, bool(code.axis)))
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
 
 
@@ -149,21 +155,30 @@ def _along(axis: int) -> tuple[float, float, float]:
     return (float(axis == 1), float(axis == 2), float(axis == 3))
 
 
+def _with_n2(operator: Operator, powers: str) -> Operator:
+    """½{N², O}, ½{N⁴, O} or ¼[N², [N², O]] by the name of the powers; O for none."""
+    if powers == "[[J]]":
+        return commutator_with_n2(commutator_with_n2(operator))
+    return half_anticommutator(j_squared(len(powers)), operator) if powers else operator
+
+
 def _spin_moment(
     dipole: Dipole, code: DipoleCode, states: tuple[int, int], value: float, oblate: bool, as_spcat: bool
 ) -> Moment:
     """The magnetic moment of a spin."""
     spin = f"I{code.spin}"
     if code.axis == 0 and code.typ in (0, 3, 4, 6, 9):
-        words = type_words(0 if code.typ in _POWERS else code.typ, 0, oblate, with_spin=True)
-        return Moment(value, states, powers=_POWERS.get(code.typ, ""), spin=spin, written=Written(words, False))
+        operator = moment_operator(0 if code.typ in _POWERS else code.typ, 0, oblate, with_spin=True)
+        operator = _with_n2(operator, _POWERS.get(code.typ, ""))
+        return Moment(value, states, spin=spin, written=Written(operator, False))
     if code.typ == 0 and code.axis == (3 if oblate else 1):
         return Moment(value, states[::-1], _along(code.axis), spin=spin)
     if code.typ in (1, 2):
         if code.axis == 0 and as_spcat:
-            if code.typ == 1:
-                return Moment(value, states, powers="3K-J", spin=spin)
-            return Moment(value, states, spin=spin, written=Written(type_words(6, 0, oblate, with_spin=True), False))
+            operator = (
+                1.5 * j_z(2) - 0.5 * j_squared() if code.typ == 1 else moment_operator(6, 0, oblate, with_spin=True)
+            )
+            return Moment(value, states, spin=spin, written=Written(operator, False))
         tensor = moment_tensor(code.typ, code.axis, oblate)
         return Moment(value, states[::-1], tensor=tensor, spin=spin, with_i=code.axis > 0)
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
@@ -184,12 +199,9 @@ def _fourier_moment(
         return Moment(dipole.value, states, _along(code.axis), cosine=(high, low))
     in_debye = bool(code.axis) or (sine and not as_spcat)
     value = dipole.value * (1.0 if in_debye else DEBYE_PER_BOHR_MAGNETON)
-    words = type_words(0, code.axis, oblate, as_spcat=as_spcat)
-    if sine:
-        words = tuple(word._replace(factor=imaginary(oblate) * word.factor) for word in words)
-    factor = k_factor(n, sine, series, code.states)
-    written = Written(words, bool(code.axis), factor_of_k=lambda n, above, below: factor(n, n, above, below))
-    return Moment(value, states[::-1], written=written)
+    plain_operator = (imaginary(oblate) if sine else 1.0) * moment_operator(0, code.axis, oblate, as_spcat=as_spcat)
+    operator = weighted(plain_operator, k_factor(n, sine, series, code.states))
+    return Moment(value, states[::-1], written=Written(operator, bool(code.axis)))
 
 
 def _meaning(code: DipoleCode) -> str:

@@ -25,7 +25,15 @@ import numpy as np
 from rotor.formats.spcat.hamiltonian.code_table import Tensor
 from rotor.formats.spcat.hamiltonian.codes import basis_of
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
-from rotor.quantum.operators.rotation import Weight, body_tensor, components, ladder, sum_of_powers, weighted
+from rotor.quantum.operators.rotation import (
+    Weight,
+    body_tensor,
+    components,
+    direction_cosine,
+    ladder,
+    sum_of_powers,
+    weighted,
+)
 from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Rotor, Scalar
 from rotor.quantum.tensors import spherical_components
 
@@ -46,7 +54,9 @@ def tensor_operator(tensor: Tensor, spins: int, axes: str) -> Operator:
         frame = "cba" if z == "a" else "abc"
         factor = (0.5 if k == order else tensor.factor_below()) * imaginary(axes, tensor.odd)
         if k == 0:
-            return imaginary(axes, True) * (_cosine(z, axes) if rank else components(basis_of(axes))[z])
+            return imaginary(axes, True) * (
+                direction_cosine(z, basis_of(axes)) if rank else components(basis_of(axes))[z]
+            )
     up, down = ((_stretched if k == order else _below)(order, rank, frame, sign, axes) for sign in (1, -1))
     return factor * (up + down if cosine else -1j * (up - down))  # i(E - E†) is Hermitian, as E + E† is
 
@@ -65,7 +75,8 @@ def _stretched(order: int, rank: int, frame: str, sign: int, axes: str) -> Opera
     if not rank:
         return n
     if rank == 1:
-        return _cosine(frame[0], axes, sign * 1j, frame[1]) @ n
+        along_x, along_y = (direction_cosine(axis, basis_of(axes)) for axis in frame[:2])
+        return (along_x + sign * 1j * along_y) @ n
     plane = np.zeros((2, 3, 3))
     plane[0, x, x], plane[0, y, y], plane[1, x, y], plane[1, y, x] = 1.0, -1.0, 1.0, 1.0
     real, imaginary_part = (spherical_components(matrix, 2, basis_of(axes)) for matrix in plane)
@@ -91,14 +102,6 @@ def _circular(frame: str, sign: int, power: int, axes: str) -> Operator:
     return (sign * 1j if swapped else 1.0) ** power * ladder(-power if lowers != swapped else power)
 
 
-def _cosine(axis: str, axes: str, factor: complex = 0.0, other: str = "") -> Operator:
-    """φ along an axis, and a factor times φ along another one."""
-    parts = [
-        spherical_components([float(letter == each) for letter in "abc"], 1, basis_of(axes)) for each in (axis, other)
-    ]
-    return body_tensor(parts[0] + factor * parts[1])
-
-
 def multiplied(rotor: Rotor, factor: Weight, whole: complex, odd: bool, axes: str) -> ByElements:
     """An operator times a number, its elements times a function.
 
@@ -121,5 +124,5 @@ def operator_of(rotor: Rotor, axes: str) -> Operator:
         return factor * body_tensor(spherical_components(c, rotor.rank, basis_of(axes)))
     along, total = components(basis_of(axes)), Operator()
     for i, k in np.argwhere(c).tolist():
-        total = total + c[i, k] * half_anticommutator(_cosine("abc"[i], axes), along["abc"[k]])
+        total = total + c[i, k] * half_anticommutator(direction_cosine("abc"[i], basis_of(axes)), along["abc"[k]])
     return total
