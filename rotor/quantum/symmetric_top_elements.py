@@ -1,4 +1,4 @@
-"""Elements of a tensor between functions |J k⟩ of a symmetric top: closed forms up to rank 2, the plain form for any.
+"""Elements of a tensor between functions |J k⟩ of a symmetric top: closed forms up to rank 2, a 3j symbol above.
 
 Phases and normalisation are those of `tensors`, which puts Wang blocks together of these.
 """
@@ -6,7 +6,7 @@ Phases and normalisation are those of `tensors`, which puts Wang blocks together
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.quantum.wigner import three_j
@@ -28,14 +28,15 @@ def coupling(j_low: float, j_up: float, rank: int, q: int, k: ArrayLike) -> Floa
     exists = (np.abs(k) <= j_low) & (np.abs(k + q) <= j_up)
     if not abs(j_up - j_low) <= rank <= j_up + j_low or abs(q) > rank:
         return np.zeros(k.shape)
-    values = coupling_of_existing(j_low, j_up, rank, q, np.where(exists, k, max(-j_low, -j_up - q)))
+    values = coupling_of_existing(j_low, int(j_up - j_low), rank, q, np.where(exists, k, max(-j_low, -j_up - q)))
     return np.where(exists, values, 0.0)
 
 
-def coupling_of_existing(j: float, j_up: float, rank: int, q: int, k: Floats) -> Floats:
-    """`coupling` (n,) for k and k + q that exist."""
+def coupling_of_existing(j: float | Floats, rise: int, rank: int, q: int, k: Floats) -> Floats:
+    """`coupling` (n,) to J' = J + `rise`, for k and k + q that exist; one J for all k or one for each."""
     if rank <= 2:
-        return closed_coupling(j, int(j_up - j), rank, q, k)
+        return closed_coupling(j, rise, rank, q, k)
+    j_up = j + rise
     root = np.sqrt((2.0 * j_up + 1) * (2 * j + 1))
     return np.asarray(np.where((j_up - k - q) % 2, -root, root) * three_j(j_up, rank, j, -k - q, q, k))
 
@@ -96,17 +97,3 @@ def _tensor_level(j: float | Floats, k: Floats, q: int) -> Floats:
     if q == 1:
         return np.asarray(-(2 * k + 1) * np.sqrt(3 * (j - k) * (j + k + 1) / norm))
     return np.asarray(np.sqrt(3 * (j - k) * (j - k - 1) * (j + k + 1) * (j + k + 2) / norm))
-
-
-def symmetric_top_elements(j_up: int, j_low: int, components: ArrayLike) -> NDArray[np.complex128]:
-    """⟨J'k'‖T^K‖J k⟩ over all k' and k, rising from -J' and -J, (2J'+1, 2J+1): the plain form, for any T^K_q.
-
-    components: T^K_q, q = -K ... K.
-    """
-    parts = np.asarray(components, dtype=complex)
-    rank, k = len(parts) // 2, np.arange(-j_low, j_low + 1)
-    out = np.zeros((2 * j_up + 1, 2 * j_low + 1), dtype=complex)
-    for q, part in enumerate(parts, -rank):
-        reached = np.abs(k + q) <= j_up
-        out[k[reached] + q + j_up, k[reached] + j_low] = part * coupling(j_low, j_up, rank, q, k[reached])
-    return out

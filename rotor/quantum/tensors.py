@@ -241,7 +241,7 @@ def wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
     first, last = max(0, -step), min(j_low, j_up - step)
     out = np.zeros(j_low + 1)
     if first <= last:
-        out[first : last + 1] = coupling_of_existing(j_low, j_up, rank, step, np.arange(first, last + 1.0))
+        out[first : last + 1] = coupling_of_existing(j_low, j_up - j_low, rank, step, np.arange(first, last + 1.0))
         out[first] *= np.sqrt(2.0) if step else 1.0
     out.flags.writeable = False  # it is shared
     return out

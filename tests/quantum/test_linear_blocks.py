@@ -17,6 +17,7 @@ from linear_functions import (
     product,
     with_real_phases,
 )
+from plain_tensors import symmetric_top_elements
 
 import rotor
 from rotor import units
@@ -113,8 +114,6 @@ def test_a_function_that_stands_twice_is_refused():
 
 @pytest.mark.parametrize("rank", [1, 2, 3])
 def test_reduced_elements_of_tensors_are_the_plain_ones(rank):
-    from rotor.quantum.symmetric_top_elements import symmetric_top_elements
-
     rng = np.random.default_rng(5)
     parts = rng.normal(size=2 * rank + 1) + 1j * rng.normal(size=2 * rank + 1)
     basis = functions(5, real=False)

@@ -9,6 +9,7 @@ import pytest
 import qutip
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from plain_tensors import symmetric_top_elements
 from scipy import sparse
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
@@ -16,7 +17,7 @@ from slow_matrix import AXES, watson_matrix
 
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.symmetric_top_elements import coupling, symmetric_top_elements
+from rotor.quantum.symmetric_top_elements import coupling
 from rotor.quantum.tensors import (
     BodyTensor,
     acting_on,

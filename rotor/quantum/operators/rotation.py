@@ -18,9 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Ints
 from rotor.quantum.operators.algebra import UNIT, Factor, Labels, Operator, Shift, Values, diagonal, shift
-from rotor.quantum.symmetric_top_elements import closed_coupling
+from rotor.quantum.symmetric_top_elements import coupling_of_existing
 from rotor.quantum.tensors import spherical_components
-from rotor.quantum.wigner import three_j
 from rotor.tops.operators import Powers, axis_order
 
 Weight = Callable[[Ints, Ints, Ints, Ints], Values]  # of J', J, K' and K
@@ -170,13 +169,7 @@ def _tensor_shift(rank: int, q: int, rise: int) -> Operator:
         j, k = labels["J"], labels["K"]
         exists = (np.abs(k + q) <= j + rise) & (np.abs(rise) <= rank) & (2 * j + rise >= rank)
         values = np.zeros(len(j))
-        lower, projection = j[exists], k[exists]
-        if rank <= 2:
-            values[exists] = closed_coupling(lower, rise, rank, q, projection.astype(float))
-            return values
-        root = np.sqrt((2.0 * (lower + rise) + 1) * (2 * lower + 1))
-        sign = np.where((lower + rise - projection - q) % 2, -1.0, 1.0)
-        values[exists] = sign * root * three_j(lower + rise, rank, lower, -projection - q, q, projection)
+        values[exists] = coupling_of_existing(j[exists], rise, rank, q, k[exists].astype(float))
         return values
 
     return shift(factor, J=rise, K=q)

@@ -35,8 +35,7 @@ from rotor.quantum.operators.rotation import matrix_of_j
 from rotor.quantum.symmetric_top_elements import coupling
 from rotor.quantum.tensors import BodyTensor, Complexes, block_elements, body_tensor, phase_exponent
 from rotor.quantum.wang.basis import SPECIES, SpeciesFactors, WangBlock
-from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
-from rotor.tops.operators import Operators, Powers
+from rotor.tops.operators import Powers
 
 EVERY_STATE = -1  # in place of v: a term that is diagonal in the states and equal in all of them
 
@@ -89,22 +88,6 @@ class Scalar:
     operators: tuple[tuple[Powers, float], ...] = (((0, 0, 0), 1.0),)
     rank = 0
     odd = False
-
-    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
-        """The matrix between two blocks, None where it is zero."""
-        if up != low:
-            return None
-        operators: Operators = dict(self.operators)
-        scalar = scalar_energy(operators, low.j)
-        if isinstance(low, AxialState):
-            x = low.j * (low.j + 1.0)
-            along = sum(c * x**p * low.axial_k ** (2 * q) for (p, q, _), c in self.operators if q)
-            return np.array([[scalar + along]])
-        bands = block_bands(JMatrix(operators, low.j), low)
-        matrix = np.diag(bands[0] + scalar)
-        for n, band in enumerate(bands[1:], 1):
-            matrix += np.diag(band, n) + np.diag(band, -n)
-        return np.asarray(matrix)
 
 
 @dataclass(frozen=True)

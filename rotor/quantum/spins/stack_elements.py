@@ -11,6 +11,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.spins.operators import (
+    ByElements,
+    BySpecies,
     Cosines,
     CosinesWithN,
     Rotor,
@@ -124,7 +126,9 @@ def _scalar_elements(rotor: Scalar, left: Section, right: Section, pairs: Pairs)
     return elements
 
 
-def _one_by_one(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
+def _one_by_one(
+    rotor: ByElements | BySpecies, left: Section, right: Section, pairs: Pairs, representation: str
+) -> Floats | None:
     """Elements of any operator, pair by pair."""
     total: Floats | None = None
     for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):

@@ -7,8 +7,9 @@ import pytest
 
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
+from rotor.quantum.operators.rotation import matrix_of_j, sum_of_powers
 from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of, tensors_of_stacks
-from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar, tensor_elements
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar, functions_of, tensor_elements
 from rotor.quantum.spins.rotor import Piece, acts, solved_rotor
 from rotor.quantum.tensors import body_tensor, tensor_between
 from rotor.tops.constants import Constants
@@ -40,13 +41,23 @@ def _blocks(effects: tuple) -> tuple[list, str]:
     return solved_rotor(TOP, (*SEMI_RIGID, *effects), [], 0, 7, None)
 
 
+def elements_of(rotor, up, low, representation: str) -> np.ndarray | None:
+    """The elements between two Wang blocks; of powers of N from the algebra."""
+    if not isinstance(rotor, Scalar):
+        return rotor.elements(up, low, representation)
+    if up != low:
+        return None
+    functions = functions_of(low)
+    return (functions.conj().T @ matrix_of_j(sum_of_powers(dict(rotor.operators)), low.j) @ functions).real
+
+
 def one_way(up, low, pieces: list, representation: str) -> np.ndarray | None:
     """Σ value ⟨r'‖X‖r⟩ between the states of two blocks, part by part."""
     total = None
     for piece in pieces:
         for left in up.parts:
             for right in low.parts:
-                computed = piece.rotor.elements(left.basis, right.basis, representation)
+                computed = elements_of(piece.rotor, left.basis, right.basis, representation)
                 if acts(piece, left.v, right.v) and computed is not None and computed.any():
                     m, n = left.basis.j, right.basis.j
                     bra, ket = (part.basis.k.astype(float) ** (2 * piece.nz2) for part in (left, right))
