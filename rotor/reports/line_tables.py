@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, record_table, table_records
+from rotor.requests.budget import two_digits
 
 if TYPE_CHECKING:
     from rotor.spectra.lines import Lines
@@ -56,9 +57,13 @@ def patterns_table(records: list[dict[str, Any]], names: str) -> Table:
     )
 
 
+ROUGH_MHZ = 100.0  # errors of estimated constants have two digits
 _COLUMNS: dict[str, tuple[str, str | Callable[[Any], str]]] = {
     "frequency_mhz": ("frequency (MHz)", "{frequency_mhz:.4f}"),
-    "error_mhz": ("error (MHz)", "{error_mhz:.4f}"),
+    "error_mhz": (
+        "error (MHz)",
+        lambda row: f"{row['error_mhz']:.4f}" if row["error_mhz"] < ROUGH_MHZ else two_digits(row["error_mhz"]),
+    ),
     "lgint": (
         "lgint",
         lambda row: "<-300" if math.isinf(row["lgint"]) else f"{row['lgint']:.4f}",

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor import units
+from rotor.quantum.estimates.beyond import ESTIMATED, Limit
 from rotor.quantum.estimates.budgets import NO_SAMPLES, model_term
 from rotor.quantum.estimates.limits import ELECTRON_SPIN, QUADRUPOLE, all_limits, populated_j
 from rotor.quantum.estimates.splittings import depth_lost, splitting_nuclei
@@ -29,7 +30,7 @@ from rotor.spectra.emission import KM_PER_S, contrast_k
 from rotor.spectra.emitters import CatalogueLines
 
 if TYPE_CHECKING:
-    from rotor.quantum.estimates.beyond import Limit
+    from rotor.tops.top import Top
 
 # couplings that split lines about their centre of gravity
 SPLITTING = frozenset({QUADRUPOLE, "spin-rotation", "spin-spin", ELECTRON_SPIN})
@@ -80,7 +81,7 @@ def _model(answer: Any, number: int, per_mhz: float, opaque: float) -> ErrorTerm
     top, source = request.molecules[number], request.sources[number]
     if isinstance(top, CatalogueLines):
         return ErrorTerm(None, "a catalogue does not state what its lines neglect")
-    limits = all_limits(top, populated_j(top, source.excitation_k), lines.effects)
+    limits = [*all_limits(top, populated_j(top, source.excitation_k), lines.effects), *_estimated(top, peak)]
     splittings = [limit for limit in limits if limit.name in SPLITTING and limit.size_mhz is not None]
     shifts = model_term([limit for limit in limits if limit not in splittings])
     if peak is None or not splittings:
@@ -94,6 +95,12 @@ def _model(answer: Any, number: int, per_mhz: float, opaque: float) -> ErrorTerm
     # an error cannot exceed the brightness
     whole = min((larger.value or 0.0) + (smaller.value or 0.0), abs(peak.brightness_k))
     return ErrorTerm(whole, f"{larger.source}; {smaller.source}", larger.remedy)
+
+
+def _estimated(top: Top, peak: Any) -> list[Limit]:
+    """The shift of the brightest line by errors of estimated A, B, C, which it shares with them: δν/ν = δB/B."""
+    relative = max((error / top.constants[name] for name, error in top.estimated_errors_mhz.items()), default=0.0)
+    return [Limit(ESTIMATED, relative * peak.observed_mhz, "")] if relative and peak is not None else []
 
 
 def _shifted(term: ErrorTerm, per_mhz: float, brightness: float) -> ErrorTerm:

@@ -17,7 +17,7 @@ import numpy as np
 
 from rotor.quantum.estimates.budgets import NO_SAMPLES, NO_UNCERTAINTIES, model_term
 from rotor.quantum.estimates.limits import SPIN_LIMITS
-from rotor.quantum.estimates.uncertainty import known_covariance, source_of_errors
+from rotor.quantum.estimates.uncertainty import ESTIMATES, known_covariance, source_of_errors
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.thermodynamics.functions import GAS_CONSTANT
 from rotor.units import MHZ_PER_K
@@ -85,6 +85,8 @@ def q_data_error(functions: ThermoFunctions, parameters: Sequence[str]) -> Error
     )
     energy = functions.energy_j_per_mol / (GAS_CONSTANT * functions.temperature_k)  # U/RT
     value = float(energy.max(initial=0.0)) * float(np.linalg.norm(share @ covariance.factor))
+    if top.estimated_errors_mhz:
+        return ErrorTerm(value, f"{ESTIMATES} of A, B, C", "measured constants")
     return ErrorTerm(value, "uncertainties of A, B, C", "more precise constants")
 
 

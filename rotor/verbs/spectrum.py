@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rotor.frozen import dataclass
+from rotor.quantum.estimates.uncertainty import ESTIMATES
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part
@@ -241,7 +242,8 @@ def _error_column(answer: SpectrumAnswer) -> list[tuple[str, str]]:
         return [("column error", "from the table of energies; effects left out are not in it")]
     exact = ", ".join(lines.exact_constants if lines.levels.has_named_constants else ())
     without = f", with {exact} as exact" if exact else ""
-    return [("column error", f"from errors of the constants alone{without}; effects left out are not in it")]
+    errors = ESTIMATES if (lines.errors_from or "").startswith(ESTIMATES) else "errors"
+    return [("column error", f"from {errors} of the constants alone{without}; effects left out are not in it")]
 
 
 def _layer_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -14,14 +14,12 @@ from rotor.classical.tumble import TumbleRequest, answer_tumble
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.estimates.budgets import model_term
-from rotor.quantum.estimates.limits import all_limits, populated_j
 from rotor.quantum.estimates.splittings import line_components
 from rotor.quantum.request import LevelsRequest, answer_levels
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.spectra.brightness_budget import steepness
 from rotor.spectra.request import SpectrumRequest, answer_spectrum
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
-from rotor.thermodynamics.vibration import VibrationalStates
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
@@ -112,7 +110,7 @@ def test_an_accuracy_is_compared_with_the_whole_budget(call, folder):
     assert "reached" not in text
     assert text.startswith("accuracy 0.001 MHz: numerical error at most")
     assert "left out about" in text
-    assert "(error of the geometry" in text
+    assert "data 1600 MHz is larger (estimated constants: estimated errors of A, B, C" in text
     assert text.endswith("measured constants would lower it")
 
 
@@ -213,15 +211,13 @@ def test_the_data_of_q_are_its_derivatives(kind, constants):
     assert partition().errors.data.value == pytest.approx(math.hypot(*(float(x[0]) for x in shifts)), rel=0.01)
 
 
-def test_the_model_of_q_is_the_error_of_the_geometry():
-    """Q of a bent molecule goes as (ABC)^-1/2: a geometry that is off by r makes it wrong by 3r/2."""
+def test_the_error_of_q_of_a_geometry_is_that_of_its_constants():
+    """Q of a bent molecule goes as (ABC)^-1/2: constants that are off by r each, alone, make it wrong by √3 r/2."""
     top = rotor.read("SMILES:CC(Cl)C#N")
-    relative = top.molecule.uncertainty
-    with_vibration = answer_thermo(ThermoRequest(top, (300.0,), vibrations=VibrationalStates.parse("200")))
-    limits = {limit.name: limit.size_mhz for limit in all_limits(top, populated_j(top, 300.0), with_vibration.effects)}
-    share = limits["error of the geometry"] / sum(size for size in limits.values() if size)
-    assert with_vibration.errors.model.value * share == pytest.approx(1.5 * relative, rel=0.5)
-    assert answer_thermo(ThermoRequest(top, (300.0,))).errors.model.source == "vibration is left out"
+    answer = answer_thermo(ThermoRequest(top, (300.0,)))
+    assert answer.errors.data.value == pytest.approx(math.sqrt(3) / 2 * top.molecule.uncertainty, rel=1e-3)
+    assert answer.errors.data.source == "estimated errors of A, B, C"
+    assert answer.errors.model.source == "vibration is left out"
 
 
 def test_numerical_errors_of_q_are_bounds():
@@ -416,7 +412,7 @@ RIGID = '[molecule]\nconstants = "B=6000(1) D=0.001 MHz"\n[observables]\njmax = 
         (
             'molecule = "SMILES:CC(Cl)C#N"\n',
             '{ total = "1 MHz" }',
-            "data not estimated: no uncertainties of the constants",
+            "is larger (estimated constants: estimated errors of A, B, C, uncorrelated",
         ),
         (RIGID, '{ totl = "1 MHz" }', "totl"),
     ],

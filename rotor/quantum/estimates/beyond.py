@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 FACTORS = {"linear": 0.3, "other": 3.0, "higher": 1.0}  # c
 COMPUTE = "its constants are known, add the effects of spins"  # reports replace this by the option
+ZERO_POINT, ESTIMATED = "vibration-rotation difference", "errors of the estimated constants"
 OF_CHI = 0.5  # largest shift relative to χ: χ/2 for J = 1 with I = 1, χ/4 for higher J
 
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.quantum.estimates.beyond import Limit
-from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, source_of_errors
+from rotor.quantum.estimates.beyond import ESTIMATED, ZERO_POINT, Limit
+from rotor.quantum.estimates.uncertainty import ESTIMATES, known_covariance, level_spread, source_of_errors
 from rotor.quantum.hyperfine_method import used_method
 from rotor.quantum.tabulated import tabulated_level_errors
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from rotor.quantum.levels import Levels
     from rotor.tops.top import Top
 
-GEOMETRY = ("error of the geometry", "vibration-rotation difference")
 NO_SAMPLES = ErrorTerm(0.0, "nothing is sampled")
 NO_UNCERTAINTIES = "no uncertainties of the constants are known"
 
@@ -55,7 +54,7 @@ def model_term(limits: Sequence[Limit]) -> ErrorTerm:
         return ErrorTerm(None, unknown or "no effect that is left out has a known size")
     _, largest, levels = max(sizes)
     source = largest + (f" at {levels}" if levels else "") + (f" and {len(sizes) - 1} more" if len(sizes) > 1 else "")
-    remedy = "measured constants" if largest in GEOMETRY else f"{largest} in the calculation"
+    remedy = "measured constants" if largest in (ZERO_POINT, ESTIMATED) else f"{largest} in the calculation"
     return ErrorTerm(
         float(sum(size for size, *_ in sizes)), source + (f"; {unknown} not estimated" if unknown else ""), remedy
     )
@@ -68,6 +67,8 @@ def data_term(errors_mhz: Floats | None, source: str | None) -> ErrorTerm:
     """
     if errors_mhz is None or not len(errors_mhz):
         return ErrorTerm(None, (source or NO_UNCERTAINTIES).removeprefix("none: "))
+    if source is not None and source.startswith(ESTIMATES):
+        return ErrorTerm(float(errors_mhz.max()), f"estimated constants: {source}", "measured constants")
     return ErrorTerm(float(errors_mhz.max()), f"constants: {source}", "more precise constants")
 
 

@@ -3,7 +3,7 @@
 | sign | effect | size |
 |---|---|---|
 | a nucleus of spin 1 or more | nuclear quadrupole coupling | known, or the gradient in covalent bonds (`splittings`) |
-| constants from a geometry only | error of the geometry, centrifugal distortion | δB/B · 2B(J+1); 4D(J+1)³, D = 4B³/ν² |
+| constants from a geometry only | centrifugal distortion | 4D(J+1)³, D = 4B³/ν² |
 | the same | vibration-rotation difference, B_e - B_0 | δB/B (`zero_point`) · 2B(J+1) |
 | a methyl group beside atoms off its axis | internal rotation | A - E difference of lines (`internal_rotation`); at most F |
 | a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, as in NH3; 1.6 GHz, as in ND3, for heavy hydrogens |
@@ -27,7 +27,7 @@ import numpy as np
 from rotor import units
 from rotor.arrays import Ints
 from rotor.quantum.effect import EffectSize, QuantumEffect, effect_sizes
-from rotor.quantum.estimates.beyond import COMPUTE, Limit, known_couplings, next_order
+from rotor.quantum.estimates.beyond import COMPUTE, ZERO_POINT, Limit, known_couplings, next_order
 from rotor.quantum.estimates.splittings import Splitting, splitting_nuclei
 
 if TYPE_CHECKING:
@@ -44,7 +44,6 @@ QUADRUPOLE = "nuclear quadrupole"
 _MULTIPLETS = (
     "the molecule has unpaired electrons: levels and lines are multiplets, by spin constants such as eps_aa(S)"
 )
-ZERO_POINT = "vibration-rotation difference"
 SPIN_LIMITS = frozenset({QUADRUPOLE, "magnetic coupling of nuclear spins", ELECTRON_SPIN})
 # the splittings of NH3 and ND3, see docs/limitations.md and data/molecules
 AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = (
@@ -131,17 +130,10 @@ def limit_facts(top: Top, j: int, effects: Sequence[QuantumEffect], further: Seq
 
 
 def _constant_limits(top: Top, j: int) -> list[Limit]:
-    """The error of a geometry, and the distortion that rigid constants neglect."""
+    """Zero-point vibration of a geometry, and the distortion that rigid constants neglect."""
     limits, b = [], _largest(top)
     rigid = not any(name not in "ABC" for name in top.constants.values)
     from_geometry = top.molecule is not None and top.source == top.molecule.source
-    if from_geometry and top.molecule is not None and top.molecule.uncertainty:
-        relative = top.molecule.uncertainty
-        text = f"A, B, C follow from a geometry good to {100 * relative:.2g} %, and all frequencies with them"
-        limits.append(Limit("error of the geometry", relative * 2 * b * (j + 1), text))
-    if top.scaling_error and not from_geometry:
-        text = f"A, B, C are scaled from those of another isotopologue, good to about {100 * top.scaling_error:.2g} %"
-        limits.append(Limit("error of the scaling", top.scaling_error * 2 * b * (j + 1), text))
     if from_geometry and top.molecule is not None:
         limits += _zero_point(top.molecule, 2 * b * (j + 1))
     if rigid and top.kind != "spherical":

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 
+ESTIMATES = "estimated errors"
 _AT_ONCE = 1 << 16  # lines computed at a time
 
 
@@ -58,8 +59,9 @@ def line_errors(spread: Floats, upper: NDArray[np.integer], lower: NDArray[np.in
 def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None:
     """Covariance of these parameters: that of the top, else its uncertainties if they count as uncorrelated.
 
-    Spin constants that the covariance does not contain enter with their uncertainties, uncorrelated. None for a top with a table of
-    energies, which do not follow from its constants, and if correlations are not known.
+    Estimated errors of A, B, C (`Top.estimated_errors_mhz`), and uncertainties of spin constants that the covariance does not contain,
+    enter as uncorrelated. None for a top with a table of energies, which do not follow from its constants, and if correlations are not
+    known.
     """
     if top.level_table is not None:
         return None
@@ -67,11 +69,13 @@ def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None
         covariance = Covariance.from_uncertainties(top.constants) if top.independent_errors else None
     else:
         covariance = top.covariance.of(parameters)
-    spins = top.spin_constants.uncertainties if top.spin_constants else {}
-    if covariance is None:
+    estimates = top.estimated_errors_mhz
+    if covariance is None and not estimates:
         return None
+    covariance = covariance or Covariance((), np.zeros((0, 0)))
+    further = {**estimates, **(top.spin_constants.uncertainties if top.spin_constants else {})}
     alone = {
-        name: error for name, error in spins.items() if error and name in parameters and name not in covariance.names
+        name: error for name, error in further.items() if error and name in parameters and name not in covariance.names
     }
     return covariance.beside(alone) if alone else covariance
 
@@ -95,7 +99,9 @@ def source_of_errors(top: Top, parameters: Collection[str], covariance: Covarian
         has_uncertainties = top.constants.uncertainties and top.covariance is None
         return "none: the constants are from a fit whose correlations are not known" if has_uncertainties else None
     together = covariance or (top.covariance.of(parameters) if top.covariance else None)
-    alone = [name for name in used.names if together is None or name not in together.names]
-    texts = [f"covariance of {', '.join(together.names)}"] if together else []
+    estimates = [name for name in used.names if covariance is None and name in top.estimated_errors_mhz]
+    alone = [name for name in used.names if name not in estimates and (together is None or name not in together.names)]
+    texts = [f"{ESTIMATES} of {', '.join(estimates)}, uncorrelated"] if estimates else []
+    texts += [f"covariance of {', '.join(together.names)}"] if together else []
     texts += [f"uncertainties of {', '.join(alone)}, uncorrelated"] if alone else []
     return "; ".join(texts)

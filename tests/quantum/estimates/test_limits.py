@@ -42,7 +42,7 @@ def test_the_unit_of_field_gradients():
     [
         ("CH3OH", "internal rotation"), ("CH3CHO", "internal rotation"), ("camphor", "internal rotation"),
         ("SMILES:CN", "inversion"), ("O2", "electron spin"), ("HCN", "nuclear quadrupole"),
-        ("D2O", "nuclear quadrupole"), ("CH3Cl", "nuclear quadrupole"), ("SMILES:CO", "error of the geometry"),
+        ("D2O", "nuclear quadrupole"), ("CH3Cl", "nuclear quadrupole"), ("SMILES:CO", "vibration-rotation difference"),
         ("CH3OH", "centrifugal distortion"), ("water", "magnetic coupling of nuclear spins"),
     ],
 )  # fmt: skip
@@ -56,7 +56,7 @@ def test_signs_of_what_is_left_out(source, name):
         ("CH3CN", "internal rotation"), ("CH3CCH", "internal rotation"), ("CH3F", "internal rotation"),
         ("PH3", "inversion"), ("HCONH2", "inversion"), ("water", "nuclear quadrupole"), ("CO", "electron spin"),
         ("CH3O", "internal rotation"),
-        ("water", "centrifugal distortion"), ("CO", "magnetic coupling of nuclear spins"), ("H2CO", "error of the geometry"),
+        ("water", "centrifugal distortion"), ("CO", "magnetic coupling of nuclear spins"), ("H2CO", "vibration-rotation difference"),
     ],
 )  # fmt: skip
 def test_no_false_signs(source, name):
