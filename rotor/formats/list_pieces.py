@@ -78,7 +78,7 @@ class Plan:
         return levels, (levels.quanta[name] - half) // 2 if name in levels.halves else levels.quanta[name]
 
 
-def plan_of(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, float], folder: Path) -> Plan:
+def list_plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, float], folder: Path) -> Plan:
     """The input of all pieces; `start` is the list of J = 0, with its settings."""
     top, dipole, q = start.top, start.top.dipole_abc_debye, start.partition
     assert dipole is not None  # line_list has refused a top without one
@@ -112,7 +112,7 @@ def plan_of(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float
     )
 
 
-def ranges_of(plan: Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
+def piece_ranges(plan: Plan, piece_lines: int) -> Iterator[tuple[int, int]]:
     """First and last lower J (or number of F) of the pieces, chosen for about `piece_lines` transitions in each."""
     # closed forms start at J = 0; their lists, of about J² lines, are one piece
     if plan.top.kind != "asymmetric" and not plan.twice_spins:

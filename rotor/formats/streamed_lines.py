@@ -18,7 +18,7 @@ from typing import Any
 
 from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.line_tables import as_printed
-from rotor.formats.list_pieces import BATCH, Plan, make_piece, plan_of, ranges_of
+from rotor.formats.list_pieces import BATCH, Plan, list_plan, make_piece, piece_ranges
 from rotor.formats.provenance import write_beside
 from rotor.formats.sorted_pieces import engine_in, listed, open_folder, row_count, sort_pieces
 from rotor.formats.spcat.text.cat import format_lines
@@ -222,8 +222,8 @@ def sorted_lines(
         vibrational_factor=vibrational_factor,
         effects=effects,
     )
-    plan = plan_of(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, folder)
-    ranges = list(ranges_of(plan, piece_lines))
+    plan = list_plan(start, jmax, -math.inf if min_lgint is None else min_lgint, range_mhz, folder)
+    ranges = list(piece_ranges(plan, piece_lines))
     record = _provenance(plan, ranges) | {"errors_from": start.errors_from}
     open_folder(plan.folder, record)
 

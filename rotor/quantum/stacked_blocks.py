@@ -1,4 +1,4 @@
-"""A vector fixed in the molecule, acting on all Wang blocks of one J whose K have one parity, in one product.
+"""A vector fixed in the molecule, acting on all Wang blocks of successive J whose K have one parity, in one product.
 
 E+ and E- (O+ and O-, see `wang.basis`) have the same K but for K = 0, and the vector has the same elements between them up to
 factors of a whole pair of blocks, so that their eigenvectors stand side by side, in rows of one K. With c± the coupling from K of a
@@ -6,44 +6,55 @@ lower block to K ± 1 of an upper one, U its states, the components along z, x a
 
     z: T_0 c_0(K) U(K),    x: |Re T_1| (c+(K) U(K+1) - c-(K) U(K-1)),    y: |Im T_1| (c+(K) U(K+1) + c-(K) U(K-1)).
 
-A line list needs squares of elements only. So thousands of small products become a dozen for each J.
+A line list needs squares of elements only. So thousands of small products become a dozen for several J together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property
-from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, Indices
 from rotor.frozen import dataclass
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.tensors import BodyTensor, wang_coupling
 from rotor.quantum.wang.basis import WangBlock
 
+Sector = tuple[int, int]  # parity of K and sign of a Wang block
+
 
 @dataclass(frozen=True)
 class ParityStates:
-    """The states of the blocks of one J with K even (parity 0) or odd (1).
+    """The states of the blocks of successive J with K even (parity 0) or odd (1), padded to those of the last J.
 
-    columns: (size, n) eigenvectors over K = parity, parity + 2, ...; 0 at K = 0 of E-. blocks: by their sign, with the slice of
-    their columns.
+    columns: (J, size, 2 m) eigenvectors over K = parity, parity + 2, ..., those of sign + before those of sign -. rows: (J, 2 m) of the
+    states in the levels; -1, with columns of zeros, where there is no state.
     """
 
-    j: int
+    js: range
     parity: int
     columns: Floats
-    blocks: dict[int, tuple[SolvedBlock, slice]]
+    rows: Indices
+
+    def selected(self, part: slice) -> ParityStates:
+        """Those of some J."""
+        return ParityStates(self.js[part], self.parity, self.columns[part], self.rows[part])
+
+    def sign_slice(self, sign: int) -> slice:
+        """The states of one sign."""
+        count = self.columns.shape[1]
+        return slice(0, count) if sign > 0 else slice(count, 2 * count)
 
 
 class Product(NamedTuple):
-    """Two blocks that a vector connects: the states of the upper one, moved, (low.size, n_up), and the lower one."""
+    """What a vector makes of upper states, (J, low size, n_up), the lower states (J, low size, n_low) and their rows (J, n_low)."""
 
     moved: Floats
-    low: SolvedBlock
+    low: Floats
+    rows: Indices
 
 
 def are_whole(blocks: Iterable[SolvedBlock]) -> bool:
@@ -55,26 +66,21 @@ def are_whole(blocks: Iterable[SolvedBlock]) -> bool:
     )
 
 
-def stacks_by_j(blocks: Iterable[SolvedBlock]) -> Iterator[tuple[int, dict[int, ParityStates]]]:
-    """Each J, rising, with its stacks by their parity. The blocks must be whole and in the order of J."""
-    for j, blocks_of_j in groupby(blocks, key=lambda block: block.basis.j):
-        of_parity: dict[int, list[SolvedBlock]] = {}
-        for block in blocks_of_j:
-            of_parity.setdefault(block.basis.first_k % 2, []).append(block)
-        yield j, {parity: _stack(of_parity[parity], j, parity) for parity in sorted(of_parity)}
-
-
-def _stack(blocks: list[SolvedBlock], j: int, parity: int) -> ParityStates:
-    columns = np.empty(((j - parity) // 2 + 1, sum(len(block.energies_mhz) for block in blocks)))
-    by_sign, at = {}, 0
-    for block in blocks:
-        (_, _, first_k, sign, size) = block.basis
-        here = slice(at, at + size)
-        columns[first_k // 2 :, here] = block.vectors
-        columns[: first_k // 2, here] = 0.0
-        by_sign[sign] = block, here
-        at = here.stop
-    return ParityStates(j, parity, columns, by_sign)
+def stacked(blocks: Mapping[tuple[int, Sector], SolvedBlock], js: range) -> dict[int, ParityStates]:
+    """The states of successive J by their parity; blocks that are not there have no states."""
+    stacks = {}
+    for parity in (0, 1):
+        size = (js[-1] - parity) // 2 + 1
+        columns, rows = np.zeros((len(js), size, 2 * size)), np.full((len(js), 2 * size), -1, dtype=np.int32)
+        for place, j in enumerate(js):
+            for sign, at in ((1, 0), (-1, size)):
+                block = blocks.get((j, (parity, sign)))
+                if block is not None:
+                    count, first = len(block.energies_mhz), block.basis.first_k // 2
+                    columns[place, first : first + count, at : at + count] = block.vectors
+                    rows[place, at : at + count] = np.arange(block.start, block.start + count)
+        stacks[parity] = ParityStates(js, parity, columns, rows)
+    return stacks
 
 
 @dataclass(frozen=True)
@@ -105,30 +111,27 @@ class Vector:
         return out
 
     def products(
-        self, ups: dict[int, ParityStates], lows: dict[int, ParityStates]
-    ) -> Iterator[tuple[SolvedBlock, Product]]:
-        """Every pair of blocks that the vector connects, by its upper block, each pair once.
+        self, ups: Mapping[int, ParityStates], lows: Mapping[int, ParityStates]
+    ) -> Iterator[tuple[Sector, Product]]:
+        """Every pair of blocks that the vector connects, by the sector of the upper one, each pair once.
 
-        ups, lows: the stacks of J and of J - 1, or twice those of J.
+        ups, lows: the stacks of some J and of J - 1, or twice those of J.
         """
+        rise = ups[0].js[0] - lows[0].js[0]
         for parity, up in ups.items():
-            if up.j == 0:  # a vector has no elements within J = 0
-                continue
-            same, other = lows.get(parity), lows.get(1 - parity)
-            if same is not None and self.sizes[0]:
-                yield from self._along(up, same)
-            if other is not None and any(self.sizes[1:]) and (other.j < up.j or parity):  # E with O is O with E
-                yield from self._across(up, other)
+            if self.sizes[0]:
+                yield from self._along(up, lows[parity], rise)
+            if any(self.sizes[1:]) and (rise or parity):  # E with O is O with E
+                yield from self._across(up, lows[1 - parity], rise)
 
-    def _along(self, up: ParityStates, low: ParityStates) -> Iterator[tuple[SolvedBlock, Product]]:
-        partner, _ = self.partners[up.j - low.j, up.parity, True]
+    def _along(self, up: ParityStates, low: ParityStates, rise: int) -> Iterator[tuple[Sector, Product]]:
+        partner, _ = self.partners[rise, up.parity, True]
         moved = _shifted(up, low, 0)
         moved *= self.sizes[0]
-        signs = (1, -1) if up.j > low.j else (1,)  # + with - is - with +
-        yield from _pairs(up, low, moved, partner, signs)
+        yield from _pairs(up, low, moved, partner, (1, -1) if rise else (1,))  # + with - is - with +
 
-    def _across(self, up: ParityStates, low: ParityStates) -> Iterator[tuple[SolvedBlock, Product]]:
-        real_partner, imaginary_partner = self.partners[up.j - low.j, up.parity, False]
+    def _across(self, up: ParityStates, low: ParityStates, rise: int) -> Iterator[tuple[Sector, Product]]:
+        real_partner, imaginary_partner = self.partners[rise, up.parity, False]
         raised, lowered = _shifted(up, low, 1), _shifted(up, low, -1)
         _, real, imaginary = self.sizes
         if real:
@@ -143,19 +146,23 @@ class Vector:
 
 def _pairs(
     up: ParityStates, low: ParityStates, moved: Floats, partner: int, signs: tuple[int, ...]
-) -> Iterator[tuple[SolvedBlock, Product]]:
+) -> Iterator[tuple[Sector, Product]]:
     for sign in signs:
-        if sign in up.blocks and partner * sign in low.blocks:
-            (block, here), (other, _) = up.blocks[sign], low.blocks[partner * sign]
-            yield block, Product(moved[other.basis.first_k // 2 :, here], other)
+        there = low.sign_slice(partner * sign)
+        product = Product(moved[:, :, up.sign_slice(sign)], low.columns[:, :, there], low.rows[:, there])
+        yield (up.parity, sign), product
 
 
 def _shifted(up: ParityStates, low: ParityStates, step: int) -> Floats:
-    """c(K) U(K + step) over the K of the lower stack, (low size, n_up); 0 where K + step is beyond the upper one."""
-    offset, size = (low.parity + step - up.parity) // 2, len(low.columns)
-    first, last = max(0, -offset), min(size, len(up.columns) - offset)
-    coupling = wang_coupling(low.j, up.j, 1, step)[low.parity :: 2]
-    out = np.empty((size, up.columns.shape[1]))
-    out[:first], out[last:] = 0.0, 0.0
-    np.multiply(up.columns[first + offset : last + offset], coupling[first:last, None], out=out[first:last])
+    """c(K) U(K + step) over the K of the lower stack, (J, low size, n_up); 0 where K + step is beyond the upper one."""
+    offset, size = (low.parity + step - up.parity) // 2, low.columns.shape[1]
+    first, last = max(0, -offset), min(size, up.columns.shape[1] - offset)
+    coupling = np.zeros((len(up.js), size, 1))
+    for row, (upper_j, lower_j) in enumerate(zip(up.js, low.js, strict=True)):
+        if upper_j > 0 and lower_j >= 0:  # a vector has no elements within J = 0
+            values = wang_coupling(lower_j, upper_j, 1, step)[low.parity :: 2]
+            coupling[row, : len(values), 0] = values
+    out = np.empty((len(up.js), size, up.columns.shape[2]))
+    out[:, :first], out[:, last:] = 0.0, 0.0
+    np.multiply(up.columns[:, first + offset : last + offset], coupling[:, first:last], out=out[:, first:last])
     return out

@@ -7,17 +7,23 @@ that two comparisons of S suffice for most elements.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Indices
+from rotor.arrays import Floats, Indices, runs_of_similar_size
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.stacked_blocks import ParityStates, Product, Vector, stacks_by_j
+from rotor.quantum.stacked_blocks import Product, Sector, Vector, stacked
 from rotor.quantum.tensors import BodyTensor
 
 SMALLEST_MHZ = 1e-30  # replaces 0 between states of equal energy
+ALIKE, SMALL, AT_ONCE = (
+    1.15,
+    8,
+    12_000,
+)  # sizes of blocks of several J in one array: ratio, small ones, elements of a pair of blocks
 ROUND_OFF = 1e-9  # relative margin of a threshold for lines that are compared exactly later
 
 StrongLines = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²
@@ -48,21 +54,23 @@ def strong_lines(
     """
     vector, most = Vector(dipole), sum(abs(part) ** 2 for part in dipole.components)
     counts = reaching(levels, needed, most)
-    memory = _Memory(len(levels))
-    below: dict[int, ParityStates] = {}
-    before = -2
-    all_j = [block.basis.j for block in blocks]
-    lower = {j for j, block in zip(all_j, blocks, strict=True) if counts[block.start]}
-    near = lower.union(*({j - 1, j + 1} for j in lower))
-    for j, stacks in stacks_by_j([block for j, block in zip(all_j, blocks, strict=True) if j in near]):
-        by_upper: dict[int, tuple[SolvedBlock, list[Product]]] = {}
-        for lows in (below, stacks) if before == j - 1 else (stacks,):
-            for up, product in vector.products(stacks, lows):
-                by_upper.setdefault(up.start, (up, []))[1].append(product)
-        for up, products in by_upper.values():
-            for part in _parts(up, products, counts):
-                yield _strong_lines(*part, levels.energy_mhz, needed, highest_mhz, memory)
-        below, before = stacks, j
+    lower = [block.basis.j for block in blocks if counts[block.start]]
+    if not lower:
+        return
+    bounds, memory = _Bounds(levels, needed, highest_mhz), _Memory()
+    sectors = {(block.basis.j, (block.basis.first_k % 2, block.basis.sign)): block for block in blocks}
+    first, last = max(min(lower) - 1, 0), max(lower) + 1
+    for run in runs_of_similar_size([j // 2 + 1 for j in range(first, last + 1)], ALIKE, SMALL, AT_ONCE):
+        stacks = stacked(sectors, range(first + run.start - 1, first + run.stop))  # and those of the J below
+        ups, below = ({p: stack.selected(part) for p, stack in stacks.items()} for part in (slice(1, None), slice(-1)))
+        by_upper: dict[Sector, list[Product]] = {}
+        for lows in (below, ups):
+            for sector, product in vector.products(ups, lows):
+                by_upper.setdefault(sector, []).append(product)
+        for (parity, sign), products in by_upper.items():
+            rows = ups[parity].rows[:, ups[parity].sign_slice(sign)]
+            for part in _parts(rows, products, counts):
+                yield _strong_lines(*part, bounds, memory)
 
 
 def reaching(levels: Levels, needed: Floats, most: float) -> dict[int, int]:
@@ -83,36 +91,56 @@ def reaching(levels: Levels, needed: Floats, most: float) -> dict[int, int]:
     return dict(zip(starts.tolist(), counts.tolist(), strict=True))
 
 
-Part = tuple[
-    int, int, list[tuple[Product, int, int]]
-]  # first state and number of states of the upper block; for each product, first and last state of the lower block
+Part = tuple[Indices, list[tuple[Product, slice]]]  # rows of upper states; with each product, some of its lower states
 
 
-def _parts(up: SolvedBlock, products: list[Product], counts: Mapping[int, int]) -> Iterator[Part]:
+def _parts(rows: Indices, products: list[Product], counts: dict[int, int]) -> Iterator[Part]:
     """Parts of blocks between which a line may reach the cut: those with low-lying states of either block."""
-    reaching_up, all_up = counts[up.start], len(up.energies_mhz)
+    reaching_up, all_up = _most_reaching(rows, counts), rows.shape[1]
     if reaching_up == all_up:
-        yield up.start, all_up, [(product, 0, len(product.low.energies_mhz)) for product in products]
+        yield rows, [(product, slice(None)) for product in products]
         return
-    lowest = [(product, 0, split) for product in products if (split := counts[product.low.start])]
+    splits = [_most_reaching(product.rows, counts) for product in products]
+    lowest = [(product, slice(split)) for product, split in zip(products, splits, strict=True) if split]
     if lowest:
-        yield up.start, all_up, lowest
-    others = [(product, counts[product.low.start], len(product.low.energies_mhz)) for product in products]
-    others = [(product, first, last) for product, first, last in others if first < last]
+        yield rows, lowest
+    others = [
+        (product, slice(split, None))
+        for product, split in zip(products, splits, strict=True)
+        if split < product.rows.shape[1]
+    ]
     if reaching_up and others:
-        yield up.start, reaching_up, others
+        yield rows[:, :reaching_up], others
+
+
+def _most_reaching(rows: Indices, counts: dict[int, int]) -> int:
+    """How many of the lowest states of blocks (J, n) may reach the cut, in that J where they are most."""
+    return max((counts.get(start, 0) for start in rows[:, :1].ravel().tolist()), default=0)
+
+
+class _Bounds:
+    """What a line of each level needs, and the energies; the last place is that of states that are not there."""
+
+    def __init__(self, levels: Levels, needed: Floats, highest_mhz: float) -> None:
+        self.needed, self.highest_mhz = np.append(needed, np.inf), highest_mhz
+        self.from_mhz, self.to_mhz = (np.append(levels.energy_mhz, beyond) for beyond in (np.inf, -np.inf))
+
+    def strengths(self, rows: Indices) -> Floats:
+        """S (J, n) below which a line of each level with another one of these is too weak."""
+        span = self.to_mhz[rows].max(axis=1) - self.from_mhz[rows].min(axis=1)
+        span = np.maximum(np.minimum(span, self.highest_mhz), SMALLEST_MHZ)
+        return np.asarray((1 - ROUND_OFF) / span[:, None] * self.needed[rows])  # the bound must not cut by round-off
 
 
 class _Memory:
-    """Reused arrays: products of one block, masks of elements above the cut, and the numbers of all levels."""
+    """Reused arrays: products of blocks, and masks of elements above the cut."""
 
-    def __init__(self, levels: int) -> None:
-        self.rows = np.arange(levels, dtype=np.int32)
+    def __init__(self) -> None:
         self._elements, self._keep, self._other = np.empty(0), np.empty(0, np.bool_), np.empty(0, np.bool_)
 
-    def arrays(self, shape: tuple[int, int]) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+    def arrays(self, *shape: int) -> tuple[Floats, NDArray[np.bool_], NDArray[np.bool_]]:
         """An array for elements, and two for masks."""
-        size = shape[0] * shape[1]
+        size = math.prod(shape)
         if len(self._elements) < size:
             self._elements, self._keep, self._other = np.empty(size), np.empty(size, np.bool_), np.empty(size, np.bool_)
         return (
@@ -123,30 +151,28 @@ class _Memory:
 
 
 def _strong_lines(
-    start: int, count: int, products: list[tuple[Product, int, int]], energy: Floats, needed: Floats,
-    highest_mhz: float, memory: _Memory,
-) -> StrongLines:  # fmt: skip
-    """Lines between `count` states from `start` on and states of lower blocks, whose strengths may suffice."""
-    stop = start + count
-    others = np.concatenate([memory.rows[product.low.start + a : product.low.start + b] for product, a, b in products])
-    strength, keep, other = memory.arrays((count, len(others)))
+    rows: Indices, products: list[tuple[Product, slice]], bounds: _Bounds, memory: _Memory
+) -> StrongLines:
+    """Lines between upper states (J, n) and states of lower blocks, whose strengths may suffice."""
+    count = rows.shape[1]
+    others = np.concatenate([product.rows[:, part] for product, part in products], axis=1)
+    width = others.shape[1]
+    strength, keep, other = memory.arrays(len(rows), count, width)
 
     at = 0
-    for product, a, b in products:
-        np.matmul(product.moved[:, :count].T, product.low.vectors[:, a:b], out=strength[:, at : at + b - a])
-        at += b - a
+    for product, part in products:
+        low = product.low[:, :, part]
+        to = at + low.shape[2]
+        np.matmul(product.moved[:, :, :count].transpose(0, 2, 1), low, out=strength[:, :, at:to])
+        at = to
     np.multiply(strength, strength, out=strength)
 
-    # energies rise within a block
-    lowest = min([energy[start], *(product.low.energies_mhz[a] for product, a, _ in products)])
-    highest = max([energy[stop - 1], *(product.low.energies_mhz[b - 1] for product, _, b in products)])
-    span = max(min(highest - lowest, highest_mhz), SMALLEST_MHZ)
-    scale = (1 - ROUND_OFF) / span  # the bound must not cut by round-off
-    np.greater_equal(strength, scale * needed[start:stop, None], out=keep)
-    np.greater_equal(strength, scale * needed[others], out=other)
+    least = bounds.strengths(np.concatenate([rows, others], axis=1))
+    np.greater_equal(strength, least[:, :count, None], out=keep)
+    np.greater_equal(strength, least[:, None, count:], out=other)
     np.logical_or(keep, other, out=keep)
 
     places = np.flatnonzero(keep)
-    row = places // len(others)
-    column = places - row * len(others)
-    return memory.rows[row + start], others[column], strength.reshape(-1)[places]
+    row = places // width
+    column = row // count * width + places - row * width
+    return rows.ravel()[row], others.ravel()[column], strength.reshape(-1)[places]
