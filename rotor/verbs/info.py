@@ -106,16 +106,27 @@ def _constants_table(top: Top) -> Table:
     for name, mhz in top.constants.values.items():
         guess = estimated.get(name)
         error = f"{stated[name]:.2g}" if name in stated else f"about {known_digits(guess, guess)}" if guess else ""
-        wavenumber = known_digits(mhz / MHZ_PER_CM, guess and guess / MHZ_PER_CM, 10)
+        wavenumber = known_digits(mhz / MHZ_PER_CM, guess and guess / MHZ_PER_CM, wavenumber_digits(mhz))
         rows.append((name, known_digits(mhz, guess), error, wavenumber))
     return Table("", ("constant", "MHz", "± MHz", "cm-1"), rows, frozenset({"constant"}))
+
+
+def wavenumber_digits(mhz: float) -> int:
+    """Significant digits of a constant in cm⁻¹: one more than it has in MHz, at most 10.
+
+    >>> wavenumber_digits(5689.28), wavenumber_digits(10000.0), wavenumber_digits(0.00125), wavenumber_digits(6081.492114)
+    (7, 6, 4, 10)
+    """
+    digits, _, _ = f"{abs(mhz):.12g}".partition("e")
+    return min(10, 1 + len(digits.replace(".", "").lstrip("0")))
 
 
 def _states_table(top: Top) -> Table | None:
     """Constants of further vibrational states and their couplings."""
     if top.states is None:
         return None
-    rows = [(name, f"{mhz:.12g}", f"{mhz / MHZ_PER_CM:.10g}") for name, mhz in top.states.values.items()]
+    values = top.states.values.items()
+    rows = [(name, f"{mhz:.12g}", f"{mhz / MHZ_PER_CM:.{wavenumber_digits(mhz)}g}") for name, mhz in values]
     return Table("", ("of states", "MHz", "cm-1"), rows, frozenset({"of states"}))
 
 

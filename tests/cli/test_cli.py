@@ -616,3 +616,9 @@ def test_an_estimated_dipole_of_isotopologues_has_the_digits_that_are_known(call
     (parent,) = [line for line in out.splitlines() if line.startswith("C2H4O ")]
     assert " 2.4 " in parent
     assert not re.search(r"\d\.\d{4}  ", parent.partition(" abc ")[2].partition(" ")[2])
+
+
+def test_constants_in_wavenumbers_have_no_more_digits_than_in_mhz(call):
+    """5689.28 MHz was followed by 0.1897739536 cm-1."""
+    rows = [line.split() for line in call("info", "benzene")[1].splitlines() if line.startswith(("B ", "DJ "))]
+    assert rows == [["B", "5689.28", "0.189774"], ["DJ", "0.00125", "4.17e-08"]]
