@@ -19,14 +19,14 @@ class Workspace:
     """Reusable memory for large temporary arrays: allocating it each time would cost as much as the work on it."""
 
     def __init__(self) -> None:
-        self._arrays = dict[str, Floats]()
+        self._arrays = dict[tuple[str, Any], NDArray[Any]]()
 
-    def array(self, name: str, *shape: int) -> Floats:
-        """An uninitialised array of this shape, valid until the next request with the same name."""
-        size = math.prod(shape)
-        if name not in self._arrays or len(self._arrays[name]) < size:
-            self._arrays[name] = np.empty(size)
-        return self._arrays[name][:size].reshape(shape)
+    def array(self, name: str, *shape: int, dtype: Any = np.float64) -> NDArray[Any]:
+        """An uninitialised array of this shape, valid until the next request with the same name and type."""
+        size, key = math.prod(shape), (name, dtype)
+        if key not in self._arrays or len(self._arrays[key]) < size:
+            self._arrays[key] = np.empty(size, dtype=dtype)
+        return self._arrays[key][:size].reshape(shape)
 
 
 def hold_freed_memory() -> None:

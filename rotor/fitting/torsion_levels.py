@@ -9,8 +9,8 @@ point (`rotor.quantum.internal_rotation.chain_rule`).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,27 @@ from rotor.arrays import Floats, Ints
 from rotor.fitting.top_constants import TopConstants
 from rotor.quantum.basis.elements import Elements
 from rotor.quantum.internal_rotation.chain_rule import ANGLE, ChainRule, chain_rule, further_operators
-from rotor.quantum.internal_rotation.coupled_spins import CoupledLevels, coupled_levels
-from rotor.quantum.internal_rotation.levels import TurningTops, species_blocks, turning_model
+from rotor.quantum.internal_rotation.hyperfine import (
+    coupled_blocks,
+    refuse_across_plane,
+    refuse_unlike_nuclei,
+)
+from rotor.quantum.internal_rotation.levels import (
+    TorsionMoments,
+    TurningTops,
+    blocks_of_species,
+    species_blocks,
+    turning_model,
+)
 from rotor.quantum.internal_rotation.model import RamModel
-from rotor.quantum.internal_rotation.nuclei import BY_ANGLE, Nuclei
+from rotor.quantum.internal_rotation.rho_axis_tensors import slope_by_angle
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
+from rotor.quantum.levels import SolvedBlock, placed
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
+from rotor.quantum.spins.linear_blocks import slopes_of_blocks, slopes_of_species, species_tables
+from rotor.quantum.spins.rotor import Terms, channels_of
+from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional, sigma_species
 
 MOVED = 0.01  # relative change of a torsional constant above which the torsional functions are rebuilt
@@ -60,13 +74,32 @@ class LabelledSpecies:
 
 
 @dataclass(frozen=True, eq=False)
+class Spins:
+    """Nuclear spins and the terms of their constants."""
+
+    scheme: Scheme
+    terms: tuple[SpinTerm, ...]
+
+    def valued(self, values: Mapping[str, float]) -> Terms:
+        """The terms with the values of their constants."""
+        return [(values[term.name] * term.factor, term) for term in self.terms if values[term.name]]
+
+    def derivatives(self, values: Mapping[str, float], by_angle: bool) -> dict[str, Terms]:
+        """Derivatives of the terms by each constant, and by the angle of ρ, with which all tensors turn."""
+        names = dict.fromkeys(term.name for term in self.terms)
+        out: dict[str, Terms] = {name: [(t.factor, t) for t in self.terms if t.name == name] for name in names}
+        turning = [(value, replace(term, rotor=slope_by_angle(term.rotor))) for value, term in self.valued(values)]
+        return out | ({ANGLE: turning} if by_angle else {})
+
+
+@dataclass(frozen=True, eq=False)
 class TorsionLevels(LevelModel):
     """Levels of all species by label, for any values of the constants."""
 
     names: tuple[str, ...]
     count: int
     constants: InternalRotationConstants
-    nuclei: Nuclei | None
+    spins: Spins | None
     species: tuple[LabelledSpecies, ...]
     _blocks: dict[str, tuple[Floats, SpeciesBlocks]] = field(default_factory=dict)
 
@@ -90,22 +123,19 @@ class TorsionLevels(LevelModel):
         levels = self._solved(part, name, model)
         further = further_operators(model, name, chain)
         elements = levels.functions.elements(list(further.values())) if further else None
-        if self.nuclei is None:
+        if self.spins is None:
             rows = _label_rows(levels.quanta, ("j", "vt", "ka", "kc"), part, part.keys)
             values, direct = levels.energies[rows], _rotational_slopes(levels, levels.rows[rows], elements)
             spin_slopes: dict[str, Floats] = {}
         else:
-            coupled = self._with_spins(part, levels, model, chain, named)
-            names = ("n", "vt", "ka", "kc", *self.nuclei.sums)
-            rows = _label_rows(coupled.quanta, names, part, np.hstack([part.keys, part.sums]))
-            values, (direct, spins) = coupled.energies[rows], coupled.slopes(rows, elements)
-            spin_slopes = {constant.name: spins[:, i] for i, constant in enumerate(coupled.nuclei.constants)}
+            moments = TorsionMoments(levels, model, elements)
+            spins = self.spins.derivatives(named, ANGLE in chain.quantities)
+            values, direct, spin_slopes = _with_spins(self.spins, part, moments, self.spins.valued(named), spins)
         count = len(model.coefficients)
         slopes = dict(zip(model.values, (direct[:, :count] @ model.jacobian).T, strict=True))
-        slopes |= dict(zip(further, direct[:, count:].T, strict=True)) | spin_slopes
-        for by_angle in (value for key, value in spin_slopes.items() if key.startswith(BY_ANGLE.format(""))):
-            slopes[ANGLE] = slopes[ANGLE] + by_angle
-        return values, chain.slopes(self.names, slopes, len(rows))
+        slopes |= dict(zip(further, direct[:, count:].T, strict=True))
+        slopes |= {key: slopes.get(key, 0.0) + slope for key, slope in spin_slopes.items()}
+        return values, chain.slopes(self.names, slopes, len(values))
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
         """Always 1: levels are labelled by their dominant basis state at any constants."""
@@ -113,26 +143,11 @@ class TorsionLevels(LevelModel):
 
     def _solved(self, part: LabelledSpecies, name: str, model: TurningTops) -> SpeciesLevels:
         """The torsion-rotation levels of a species; with spins up to the v_t of predictions, as basis of the hyperfine levels."""
-        vt_max = max(part.vt_max, self.constants.vt_max if self.nuclei else 0)
+        vt_max = max(part.vt_max, self.constants.vt_max if self.spins else 0)
         by_energy = self.constants.names == "energy"
         if isinstance(model, RamModel) and not model.angle:
             return self._species_blocks(part, model).solve(model.coefficients, vt_max, by_energy)
         return self._new_blocks(part, name, model).solve_once(model.coefficients, vt_max, by_energy)
-
-    def _with_spins(
-        self,
-        part: LabelledSpecies,
-        levels: SpeciesLevels,
-        model: TurningTops,
-        chain: ChainRule,
-        named: Mapping[str, float],
-    ) -> CoupledLevels:
-        """The levels coupled to nuclei with these values of their constants."""
-        assert self.nuclei is not None
-        nuclei = self.nuclei.with_values(named)
-        if ANGLE in chain.quantities:
-            nuclei = nuclei.with_slope_by_angle()
-        return coupled_levels(levels, nuclei, model.angle, model.has_plane, part.twice_f)
 
     def _species_blocks(self, part: LabelledSpecies, model: RamModel) -> SpeciesBlocks:
         """The blocks of a species, rebuilt if the torsional constants have changed."""
@@ -144,8 +159,39 @@ class TorsionLevels(LevelModel):
 
     def _new_blocks(self, part: LabelledSpecies, name: str, model: TurningTops) -> SpeciesBlocks:
         """New blocks for the J that the labels need."""
-        j = part.rotations(self.nuclei.twice_total if self.nuclei else 0)
+        j = part.rotations(self.spins.scheme.total if self.spins else 0)
         return species_blocks(model, name, int(j.min()), int(j.max()), self.constants.functions, j)
+
+
+def _with_spins(
+    spins: Spins, part: LabelledSpecies, moments: TorsionMoments, terms: Terms, derivatives: Mapping[str, Terms]
+) -> tuple[Floats, Floats, dict[str, Floats]]:
+    """Energies of labels, and their derivatives by coefficients of the torsion-rotation and by those of terms with spins."""
+    if moments.model.has_plane:
+        refuse_across_plane(terms)
+    quanta = moments.levels.quanta
+    names = np.column_stack([np.arange(len(quanta["vt"])), quanta["ka"], quanta["kc"]])
+    free = placed(blocks_of_species(moments, 1))
+    blocks = list(placed(coupled_blocks(free, names, spins.scheme, terms, part.twice_f.tolist())))
+    labels = np.concatenate([block.labels for block in blocks])
+    keys = [quanta["j"][labels[:, 0]], quanta["vt"][labels[:, 0]], labels[:, 1:3], labels[:, 4:]]
+    columns = dict(zip(("n", "vt", "ka", "kc", *spins.scheme.names), np.column_stack(keys).T, strict=True))
+    rows = _label_rows(columns, tuple(columns), part, np.hstack([part.keys, part.sums]))
+    needed, places = np.unique(rows, return_inverse=True)
+    chosen = list(placed(_states_at(blocks, needed)))
+    channels = [channels_of(of_parameter, spins.scheme) for of_parameter in derivatives.values()]
+    by_spins = slopes_of_blocks(species_tables(blocks[0].spins.shared, channels), chosen, len(channels))
+    direct = [slopes_of_species(block, moments.slopes_of_terms) for block in chosen]
+    energies = np.concatenate([block.energies_mhz for block in chosen])
+    slopes = dict(zip(derivatives, by_spins[places].T, strict=True))
+    return energies[places], np.concatenate(direct)[places], slopes
+
+
+def _states_at(blocks: Sequence[SolvedBlock], rows: Ints) -> Iterator[SolvedBlock]:
+    """Blocks with only the states at these rows, which rise."""
+    for block in blocks:
+        here = rows[(rows >= block.start) & (rows < block.start + len(block.energies_mhz))] - block.start
+        yield replace(block, energies_mhz=block.energies_mhz[here], vectors=block.vectors[:, here])
 
 
 def _rotational_slopes(levels: SpeciesLevels, rows: Ints, further: Elements | None) -> Floats:
@@ -161,19 +207,23 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
     """
     internal = constants.top.internal_rotation
     assert internal is not None
-    nuclei = Nuclei.of(constants.top, constants.effects) if constants.hyperfine else None
+    spins = None
+    if constants.hyperfine:
+        terms = tuple(term for effect in constants.effects for term in effect.spin_terms(constants.top))
+        spins = Spins(scheme_of(constants.top, constants.effects), terms)
+        refuse_unlike_nuclei(spins.scheme, terms)
     columns = dict(zip(constants.quanta, labels.T, strict=True))
-    keys = np.column_stack([columns[name] for name in ("j" if nuclei is None else "n", "vt", "ka", "kc")])
-    sums = _doubled_sums(columns, nuclei, constants.halves)
+    keys = np.column_stack([columns[name] for name in ("j" if spins is None else "n", "vt", "ka", "kc")])
+    sums = _doubled_sums(columns, spins, constants.halves)
     numbers = {SPECIES_NUMBERS[name]: name for name in sigma_species(internal.tops)}
     meaning = ", ".join(f"{number} is {name}" for number, name in numbers.items())
     rules = [
         (f"species: {meaning}", np.isin(columns["species"], list(numbers))),
-        (f"Ka + Kc is {'J' if nuclei is None else 'N'} or one more", _exist(keys)),
+        (f"Ka + Kc is {'J' if spins is None else 'N'} or one more", _exist(keys)),
         (f"v_t is at most {internal.functions - 2}", keys[:, 1] <= internal.functions - 2),
         (
             "each sum of angular momenta goes from their difference to their sum, |N - I| to N + I",
-            _coupled(keys[:, 0], sums, nuclei),
+            _coupled(keys[:, 0], sums, spins),
         ),
     ]
     for rule, right in rules:
@@ -187,13 +237,13 @@ def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:
         for number, name in numbers.items()
         if len(here := np.flatnonzero(columns["species"] == number))
     ]
-    return TorsionLevels(tuple(constants.values), len(labels), internal, nuclei, tuple(parts))
+    return TorsionLevels(tuple(constants.values), len(labels), internal, spins, tuple(parts))
 
 
-def _coupled(n: Ints, sums: Ints, nuclei: Nuclei | None) -> NDArray[np.bool_]:
+def _coupled(n: Ints, sums: Ints, spins: Spins | None) -> NDArray[np.bool_]:
     """Whether each doubled sum (labels, sums) can be coupled from the preceding sum (first N) and its spin."""
     right, before = np.ones(len(n), dtype=bool), 2 * n
-    for spin, total in zip(nuclei.spins if nuclei else (), sums.T, strict=True):
+    for spin, total in zip(spins.scheme.spins if spins else (), sums.T, strict=True):
         right &= (
             (total >= np.abs(before - spin.twice))
             & (total <= before + spin.twice)
@@ -203,11 +253,11 @@ def _coupled(n: Ints, sums: Ints, nuclei: Nuclei | None) -> NDArray[np.bool_]:
     return right
 
 
-def _doubled_sums(columns: Mapping[str, Ints], nuclei: Nuclei | None, halves: frozenset[str]) -> Ints:
+def _doubled_sums(columns: Mapping[str, Ints], spins: Spins | None, halves: frozenset[str]) -> Ints:
     """The doubled sums F1 ... F (labels, sums); empty without spins."""
-    if nuclei is None:
+    if spins is None:
         return np.zeros((len(columns["species"]), 0), dtype=np.int64)
-    return np.column_stack([columns[name] if name in halves else 2 * columns[name] for name in nuclei.sums])
+    return np.column_stack([columns[name] if name in halves else 2 * columns[name] for name in spins.scheme.names])
 
 
 def _label_rows(quanta: Mapping[str, Ints], names: Sequence[str], part: LabelledSpecies, keys: Ints) -> Ints:

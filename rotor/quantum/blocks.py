@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -163,11 +163,11 @@ class SolvedBlocks:
         """⟨ψ|O|ψ⟩ (levels, operators) of the levels at these rows, of Hermitian operators between the functions of these blocks."""
         linear = self.linear
         slopes, blocks = np.zeros((len(levels), len(elements.values))), linear.block[levels]
-        for (up, low), (rows, columns, values) in linear.between_blocks(elements, np.unique(blocks)).items():
-            if up == low:  # blocks of H may be finer than those of O
-                chosen = np.flatnonzero(blocks == up)
-                vectors = self.vectors(up)[1][:, linear.rank[levels[chosen]]]
-                slopes[chosen] = (values @ (vectors[rows].conj() * vectors[columns])).real.T
+        entries = linear.between_blocks(elements, np.unique(blocks))
+        for block in {up for up, low in entries if up == low}:  # blocks of H may be finer than those of O
+            chosen = np.flatnonzero(blocks == block)
+            vectors = self.vectors(block)[1][:, linear.rank[levels[chosen]]]
+            slopes[chosen] = expectations(entries, {block: vectors}, len(elements.values))
         return slopes
 
     @cached_property
@@ -178,6 +178,18 @@ class SolvedBlocks:
             for i, stack in enumerate(self.linear.stacks)
             for place, number in enumerate(block[stack[:, 0]].tolist())
         }
+
+
+def expectations(
+    entries: Mapping[tuple[int, int], Entries], vectors: Mapping[int, NDArray[Any]], operators: int
+) -> Floats:
+    """⟨ψ|O|ψ⟩ (m, operators) of Hermitian operators; vectors: (functions, m) of ψ in each of its blocks."""
+    total = np.zeros((operators, next(iter(vectors.values())).shape[1]))
+    for up, low in product(vectors, repeat=2):
+        if (up, low) in entries:
+            rows, columns, values = entries[up, low]
+            total += (values @ (vectors[up][rows].conj() * vectors[low][columns])).real
+    return total.T
 
 
 def linear_blocks(functions: Basis, terms: Mapping[str, Operator]) -> LinearBlocks:

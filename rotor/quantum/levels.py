@@ -25,6 +25,7 @@ from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
+    from rotor.quantum.spins.operators import Rotor
     from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
 
@@ -41,7 +42,7 @@ class Used:
 
 
 class SpeciesMoments(ABC):
-    """Elements of molecule-fixed tensors between the blocks of one species, and derivatives of its states."""
+    """Elements of operators between the blocks of one species without spins, and derivatives of its states."""
 
     @property
     @abstractmethod
@@ -57,16 +58,24 @@ class SpeciesMoments(ABC):
         """Reduced elements (n_up, n_low) of one component; those of odd rank without their factor i where functions are `combined`."""
 
     @abstractmethod
-    def slopes(self, block: SolvedBlock, names: Sequence[str]) -> Floats:
-        """∂E/∂c (n, names) of the states of a block by constants of the Hamiltonian."""
+    def beside_spins(self, rotor: Rotor, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+        """Reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
+
+    @abstractmethod
+    def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
+        """∂E/∂c (m, names) of mixtures of the states of blocks by constants of the Hamiltonian without spins."""
 
 
 class SpeciesFunctions(NamedTuple):
-    """Functions of a block of one species: twice the total angular momentum, numbers of the block and of its states in the species."""
+    """Functions of a block of one species: J (N beside spins), the number of the block in the species, and its place among those of J.
 
-    twice_j: int
+    size: functions of a part beside spins, where each state of the block is one.
+    """
+
+    j: int
     number: int
-    states: Ints
+    place: int
+    size: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +83,10 @@ class SolvedBlock:
     """States solved together over Wang blocks of one J, functions |N K⟩, of a species of internal rotation, or with spins.
 
     energies (n,) in MHz, rising, and eigenvectors (functions, n) in columns. parts: the state v and the functions of each range of rows;
-    those of the rotation beside spins have the names of these too. start: place of the first state in the arrays of `Levels`. labels: of
-    states of coupled blocks v, Ka, Kc (n, 3); with spins v, Ka (K if axial), Kc and the doubled pattern N, J ... F, (n, 3 + pattern).
-    mixing: (n,) squared overlaps with the functions that name them. moments: of a species, which has its own; components: 2 where its
+    those of the rotation beside spins have the names of these too, those of a species are its states there. start: place of the first
+    state in the arrays of `Levels`. labels: of states of coupled blocks v, Ka, Kc (n, 3); with spins v (of a species the row of a level),
+    Ka (K if axial), Kc and the doubled pattern N, J ... F, (n, 3 + pattern). mixing: (n,) squared overlaps with the functions that name
+    them. moments: of a species without spins, which has its own; components: 2 where its
     states σ and -σ coincide. spins: the functions of a block of one F (`spins.blocks.SpinFunctions`), which has no other parts. Functions
     of a coupled block carry the factor of `wang.basis.phase`, those of a Wang block without labels do not.
     """
@@ -106,7 +116,7 @@ class SolvedBlock:
         """Twice the total angular momentum: 2J, with spins 2F."""
         if self.spins is not None:
             return int(self.spins.twice_f)
-        return 2 * self.j if self.moments is None else int(self.basis.twice_j)
+        return 2 * self.j
 
     @property
     def axial_k(self) -> int | None:
@@ -116,7 +126,8 @@ class SolvedBlock:
     @property
     def combined(self) -> bool:
         """Whether functions of K and -K are combined, so that reduced elements of odd rank are i times real."""
-        return self.axial_k is None if self.moments is None else self.moments.combined
+        moments = self.moments if self.spins is None else self.spins.rotor.moments
+        return self.axial_k is None if moments is None else moments.combined
 
     @property
     def paired(self) -> bool:
@@ -139,6 +150,9 @@ class SolvedBlock:
                     total = moved if total is None else total + moved
         return total
 
+
+Mixtures = Sequence[tuple[SolvedBlock, NDArray[Any]]]
+"""Blocks of one J, and coefficients (states, m) of their states in m functions."""
 
 Connections = tuple[list[tuple[SolvedBlock, SolvedBlock]], Callable[[SolvedBlock, SolvedBlock], Floats]]
 """Pairs of blocks that an operator connects, and the function that returns the reduced elements between them."""

@@ -143,8 +143,13 @@ def _connections(
     return pairs, _side_by_side(between)
 
 
-def _side_by_side(pair_amplitudes: Callable[[Any, Any], Floats]) -> Amplitudes:
-    return lambda up, lows: np.hstack([pair_amplitudes(up, low) for low in lows])
+def _side_by_side(pair_amplitudes: Callable[[Any, Any], NDArray[Any]]) -> Amplitudes:
+    return lambda up, lows: _real(np.hstack([pair_amplitudes(up, low) for low in lows]))
+
+
+def _real(amplitudes: NDArray[Any]) -> Floats:
+    """Amplitudes, their moduli where they are complex."""
+    return np.abs(amplitudes) if np.iscomplexobj(amplitudes) else amplitudes
 
 
 def _existing_blocks(levels: Levels) -> tuple[list[SolvedBlock], bool]:
@@ -264,7 +269,7 @@ def _group_transitions(
     energies: Floats, needed: Floats, group: ManyF, range_mhz: tuple[float, float], cut: IntensityCut, space: Workspace
 ) -> Transitions:
     """Lines between groups of blocks of many F in a range and above a cut (`_selected_lines`); padding of a group has amplitude 0."""
-    up, low, amplitude, alike = group
+    up, low, amplitude, alike = group._replace(amplitudes=_real(group.amplitudes))
     strength = np.multiply(amplitude, amplitude, out=amplitude)
     difference = space.array("difference", *amplitude.shape)
     np.subtract(energies[up][:, :, None], energies[low][:, None, :], out=difference)

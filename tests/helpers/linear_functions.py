@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from coupled_spaces import Space, contracted_elements
 
 from rotor.quantum.basis.elements import Elements, merged
 from rotor.quantum.blocks import blocks_of_elements
 from rotor.quantum.connected import part_numbers
-from rotor.quantum.contraction import Space, contracted_elements
 from rotor.quantum.operators.algebra import shift
 
 NEGLIGIBLE = 1e-12  # of the largest element of an operator between two sectors: round-off of zero
@@ -119,9 +119,8 @@ def linear_blocks_of_coupled(coupled):
     names = ["energy", *coupled.terms]
     for i, entries in enumerate(coupled.terms.values(), 1):
         for (a, b), entry in entries.items():
-            matrix = entry.matrix()
-            r, c = np.nonzero(np.abs(matrix) > NEGLIGIBLE * np.abs(matrix).max(initial=0.0))
-            pieces.append((start[a] + r, start[b] + c, i, matrix[r, c]))
+            r, c = np.nonzero(np.abs(entry) > NEGLIGIBLE * np.abs(entry).max(initial=0.0))
+            pieces.append((start[a] + r, start[b] + c, i, entry[r, c]))
             if a != b:
-                pieces.append((start[b] + c, start[a] + r, i, matrix[r, c].conj()))
+                pieces.append((start[b] + c, start[a] + r, i, entry[r, c].conj()))
     return blocks_of_elements(names, space.labels(), with_real_phases(flat_elements(count, len(names), pieces)))

@@ -7,6 +7,7 @@ from functools import reduce
 
 import numpy as np
 import pytest
+from coupled_spaces import Space, coupled, spin_space
 from linear_functions import (
     NEGLIGIBLE,
     RealFunctions,
@@ -23,7 +24,6 @@ import rotor
 from rotor import units
 from rotor.quantum.basis.labelled import Basis, rotation_labels
 from rotor.quantum.blocks import LinearBlocks, blocks_of_elements, linear_blocks
-from rotor.quantum.contraction import Space, coupled, spin_space
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.in_field import space_factor
 from rotor.quantum.operators.algebra import UNIT, Operator, diagonal, half_anticommutator, shift
@@ -211,9 +211,7 @@ def test_two_nuclei_are_those_of_the_engine_of_spins():
     top = rotor.Top.from_constants(CONSTANTS | CL | N14)
     levels = rotor.api.solve_levels(top, 8, effects=rotor.api.effects_of(top, True))
     space = rotation(8, {"Cl": quadrupole(CL, "35Cl"), "N": quadrupole(N14, "14N")})
-    first = coupled(space, spin_space(3), {"Cl": ("Cl", "Q")}, {"N": ("N", None, 2)}, range(1, 14, 2)).solve(
-        {"Cl": 1.0}
-    )
+    first = coupled(space, spin_space(3), {"Cl": ("Cl", "Q")}, {"N": ("N", 2)}, range(1, 14, 2)).solve({"Cl": 1.0})
     both = coupled(first, spin_space(2), {"N": ("N", "Q")}, {}, range(1, 12, 2)).solve({"N": 1.0})
     assert_same_levels(both, levels, range(1, 12, 2))
 
@@ -255,7 +253,7 @@ def field_blocks(space, twice_m) -> LinearBlocks:
     start, pieces = space.starts(), []
     energies = np.concatenate([sector.energies for sector in space.sectors])
     pieces.append((np.arange(len(space)), np.arange(len(space)), 0, energies))
-    for (a, b), reduced in space.tensors["mu"].blocks.items():
+    for (a, b), reduced in space.tensors["mu"][1].items():
         factor = space_factor(space.sectors[a].twice_j, space.sectors[b].twice_j, 1, twice_m)
         r, c = np.nonzero(np.abs(factor * reduced) > NEGLIGIBLE * np.abs(reduced).max(initial=0.0))
         pieces.append((start[a] + r, start[b] + c, 1, factor * reduced[r, c]))
@@ -304,7 +302,7 @@ def test_a_toy_effect_of_one_operator_reaches_levels_slopes_spins_and_fields():
     assert np.allclose(slopes @ [*values, 2.0], solved.energies, atol=1e-8)  # rounding of 1e6 MHz
     vector = body_tensor(spherical_components([1.0, 0.0, 0.0], 1, "Ir"))
     space = contracted(solved, basis, {"chi": quadrupole(CL, "35Cl"), "mu": (1, vector)})
-    hyperfine = coupled(space, spin_space(3), {"chi": ("chi", "Q")}, {"mu": ("mu", None, 1)}, range(1, 8, 2)).solve(
+    hyperfine = coupled(space, spin_space(3), {"chi": ("chi", "Q")}, {"mu": ("mu", 1)}, range(1, 8, 2)).solve(
         {"chi": 1.0}
     )
     trace = sum(float(s.energies.sum()) for s in hyperfine.sectors if s.twice_j == 3)

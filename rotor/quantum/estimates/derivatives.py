@@ -53,7 +53,11 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
             raise ValueError(f"no parameter {name} here to derive by: the effects have {', '.join(by_name)}")
     rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
 
-    of_species = [block.moments.slopes(block, names) for block in levels.blocks if block.moments is not None]
+    of_species = [
+        block.moments.slopes([(block, np.eye(len(block.energies_mhz)))], names)
+        for block in levels.blocks
+        if block.moments is not None
+    ]
     if of_species:
         return np.asarray(np.concatenate(of_species)[rows])
     if "f" in levels.quanta or are_with_spins(levels):

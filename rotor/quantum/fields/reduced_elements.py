@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,19 +100,25 @@ class ReducedElements:
         elif first.moments is not None:
             return np.asarray(first.moments.reduced(first, second, operator.tensors(self.states, self.representation)))
         elements = self._connections(operator)[1](first, second)
-        return elements / np.sqrt(2.0) if self.paired[up] else elements  # that of one sign of K
+        copies = 2 if first.axial_k else first.components
+        return elements / np.sqrt(copies) if copies > 1 else elements  # that of one sign of K, or of one component
 
     def _moment(self, magnet: Magnet, up: SolvedBlock, low: SolvedBlock) -> Floats | None:
         """Elements of the magnetic moment; None where they are zero."""
         if up.moments is not None:
-            raise ValueError(
-                "internal rotation in a magnetic field is not computed: the turning group adds a moment along its axis, proportional to "
-                "<p - rho·P>, which shifts E levels to first order and whose g value is not among the constants; leave its constants "
-                "out for the moment of the rotation alone"
-            )
+            _refuse_turning_group()
         if up.axial_k != low.axial_k or abs(up.twice_total - low.twice_total) > 2:
             return None
         return _rotational_moment(magnet.g, up, low, self.representation)
+
+
+def _refuse_turning_group() -> NoReturn:
+    """ValueError for internal rotation in a magnetic field."""
+    raise ValueError(
+        "internal rotation in a magnetic field is not computed: the turning group adds a moment along its axis, proportional to "
+        "<p - rho·P>, which shifts E levels to first order and whose g value is not among the constants; leave its constants "
+        "out for the moment of the rotation alone"
+    )
 
 
 def _matrix(g: Floats) -> Any:
@@ -126,6 +132,8 @@ def _magnetic_connections(magnet: Magnet, states: Sequence[int], blocks: Sequenc
     from rotor.quantum.spins.moments import spin_moments
 
     shared = blocks[0].spins.shared
+    if blocks[0].spins.rotor.moments is not None:
+        _refuse_turning_group()
     scheme, g = shared.scheme, _matrix(magnet.g)
     nuclei = [(name, value / scheme.count_of((scheme.place(name),))) for name, value in magnet.nuclei.items()]
     moments = [Moment(1.0, (v, v), tensor=g) for v in states]

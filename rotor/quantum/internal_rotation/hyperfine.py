@@ -1,86 +1,48 @@
-"""Levels of a molecule with an internal rotor and nuclear spins, and dipole moments between their blocks."""
+"""Levels of a molecule with internal rotors and nuclear spins.
+
+The torsion-rotation levels r of a species with v_t ≤ vt_max take the place of the eigenstates of the rotation in `rotor.quantum.spins`,
+
+    ⟨r' p'|H|r p⟩ = E_r δ + Σ_channels c(p', p) ⟨r'‖X‖r⟩,    ⟨r'‖X‖r⟩ = Σ V*_r',J'K't' ⟨J'K'‖X‖J K⟩⟨K't'|K t⟩ V_r,J K t,
+
+(A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, chapter 7, for c; the overlaps of torsional functions are exact for every K).
+Reduced elements are real where a plane of symmetry contains ρ; without one those of E species are complex. Elements with states of
+v_t > vt_max are neglected. They move levels by χ²/ΔE: below 1e-4 MHz for χ of 20 MHz and torsional states 100 cm⁻¹ apart.
+
+Derivatives by coefficients of the torsion-rotation are expectation values: ∂E/∂c = Σ_p ⟨Ψ_p|O_c|Ψ_p⟩, Ψ_p = Σ_r v_rp V_r of each coupling
+pattern p.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rotor.arrays import Floats
-from rotor.quantum.internal_rotation.coupled_spins import CoupledLevels, coupled_levels
+from rotor.arrays import Ints
 from rotor.quantum.internal_rotation.levels import (
-    REPRESENTATION,
     Columns,
-    Degeneracies,
-    TurningTops,
     refuse_axes,
-    species_blocks,
     table_of_pieces,
-    turned_by,
+    torsion_rotation_levels,
     turning_tops,
 )
-from rotor.quantum.internal_rotation.nuclei import Nuclei
-from rotor.quantum.levels import Levels, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
-from rotor.quantum.tensors import BodyTensor, Tensors, cartesian_of
+from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION, leaves_plane
+from rotor.quantum.internal_rotation.several_tops import SeveralTops
+from rotor.quantum.levels import Levels, SolvedBlock, placed
+from rotor.quantum.spins.blocks import plan_of_rotor
+from rotor.quantum.spins.levels import within_n
+from rotor.quantum.spins.operators import Cosines, CosinesWithN
+from rotor.quantum.spins.rotor import Terms, valued_terms
+from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
+from rotor.quantum.spins.solve import solved_blocks
 from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
-
-
-@dataclass(frozen=True, eq=False)
-class HyperfineMoments(SpeciesMoments):
-    """Dipole moments of one species with spins; its blocks have the numbers of sectors."""
-
-    model: TurningTops
-    levels: CoupledLevels
-
-    @property
-    def combined(self) -> bool:
-        """Whether functions of K and -K are combined."""
-        return self.levels.levels.functions.folded
-
-    def connect(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> bool:
-        """Whether a dipole has elements between the states of two blocks."""
-        return any(True for _ in self._pieces(up, low, tensors))
-
-    def reduced(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> NDArray[Any]:
-        """Reduced elements (n_up, n_low) of a dipole."""
-        places = np.ix_(up.basis.states, low.basis.states)
-        total = np.zeros((len(up.energies_mhz), len(low.energies_mhz)))
-        return sum((value * block[places] for value, block in self._pieces(up, low, tensors)), total)
-
-    def _pieces(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> Iterator[tuple[float, NDArray[Any]]]:
-        """Components of a dipole along the axes of the rho-axis frame, each with the elements of its unit vector."""
-        for axis, value in _along_axes(tensors[0, 0], self.model.angle, self.model.has_plane):
-            block = self.levels.space.tensors[f"mu {axis}"].blocks.get((up.basis.number, low.basis.number))
-            if block is not None:
-                yield value, block
-
-    def slopes(self, block: SolvedBlock, names: Sequence[str]) -> Floats:
-        """∂E/∂c (n, names) of the states of a block, by the constants of the top, of the internal rotor and of the nuclei."""
-        rotation, spins = self.levels.slopes(self.levels.space.starts()[block.basis.number] + block.basis.states)
-        constants = [*self.model.values, *self.levels.nuclei.values]
-        slopes = np.hstack([rotation @ self.model.jacobian, spins])
-        none = np.zeros(len(slopes))
-        return np.column_stack([slopes[:, constants.index(name)] if name in constants else none for name in names])
-
-
-@lru_cache(maxsize=16)
-def _along_axes(body: BodyTensor, angle: float, has_plane: bool) -> tuple[tuple[str, float], ...]:
-    """The components of a vector that are not zero, by axis of the rho-axis frame at this angle; ValueError for what is not computed."""
-    if body.rank != 1:
-        raise ValueError("spins beside internal rotation: only dipole moments are computed, no tensors of rank 2")
-    vector = turned_by(cartesian_of(body.components, REPRESENTATION), angle)
-    if has_plane and abs(vector[2]) > 0:
-        raise ValueError("a dipole along c beside internal rotation: the molecule has the plane ab as a mirror")
-    return tuple((axis, value) for axis, value in zip("abc", vector.tolist(), strict=True) if value)
 
 
 def hyperfine_levels(
@@ -91,50 +53,73 @@ def hyperfine_levels(
     Raises ValueError for electron spins, total spins of like nuclei, and constants with powers of N.
     """
     refuse_axes(top)
-    model = turning_tops(top, constants)
-    degeneracies = Degeneracies.from_model(model, constants)
-    nuclei = Nuclei.of(top, effects)
-    if degeneracies.equivalent and len(nuclei.spins) > 1:
+    scheme, model = scheme_of(top, effects), turning_tops(top, constants)
+    refuse_unlike_nuclei(scheme, (term for effect in effects for term in effect.spin_terms(top)))
+    if isinstance(model, SeveralTops) and model.axis and len(scheme.spins) > 1:
         raise ValueError(
-            "spins of several nuclei beside equivalent tops: their exchange is not computed; leave one of them"
+            "spins of several nuclei beside equivalent tops: their exchange is not computed; leave one of them out"
         )
-    blocks, pieces = list[SolvedBlock](), list[Columns]()
-    whole = [name for name in nuclei.sums if name not in nuclei.halves]
-    for name in model.species:
-        species = species_with_spins(model, constants, name, nuclei, nmin, nmax)
-        moments = HyperfineMoments(model, species)
-        for number, quanta in enumerate(species.sectors):
-            here = np.flatnonzero((quanta["n"] >= nmin) & (quanta["n"] <= nmax))
-            if not len(here):
-                continue
-            sector, components = species.space.sectors[number], degeneracies.components(name)
-            columns = {key: column[here] for key, column in quanta.items()}
-            vectors = sector.labels["vectors"][:, here]
-            parts = (Part(0, SpeciesFunctions(sector.twice_j, number, here), 0),)
-            blocks.append(SolvedBlock(parts, sector.energies[here], vectors, moments=moments, components=components))
-            pieces.append(
-                {
-                    "species": np.full(len(here), name),
-                    "components": np.full(len(here), components),
-                    "weight": degeneracies.weights(name, species.levels.functions, columns.pop("row")),
-                    **columns,
-                }
-            )
+    terms = valued_terms(top, effects)
+    if model.has_plane:
+        refuse_across_plane(terms)
+    first = max(2 * nmin - scheme.total, scheme.total % 2)
+    all_f = range(first, 2 * nmax + scheme.total + 1, 2)  # neighbouring N are solved too, since spins mix them in
+    free = torsion_rotation_levels(top, constants, effects, max(0, nmin - scheme.total), nmax + scheme.total)
+    names = np.column_stack([np.arange(len(free)), free.quanta["ka"], free.quanta["kc"]])
+    coupled = coupled_blocks(free.blocks, names, scheme, terms, all_f)
+    blocks = tuple(placed(within_n(block, (nmin, nmax)) for block in coupled))
+    columns = {"components": free.components, "weight": free.weight, **free.quanta}
+    labels = np.concatenate([block.labels for block in blocks])
+    piece: Columns = {("n" if name == "j" else name): column[labels[:, 0]] for name, column in columns.items()}
+    piece |= _sums(labels, scheme) | {"multiplicity": labels[:, -1] + 1}
     energies = np.concatenate([block.energies_mhz for block in blocks])
-    levels = table_of_pieces(top, effects, nmax, pieces, energies, tuple(placed(blocks)), nuclei.halves)
-    return replace(levels, quanta=levels.quanta | {name: levels.quanta[name] // 2 for name in whole})
+    halves = frozenset(name for name, half in zip(scheme.names, scheme.half, strict=True) if half)
+    return table_of_pieces(top, effects, nmax, [piece], energies, blocks, halves)
 
 
-def species_with_spins(
-    model: TurningTops,
-    constants: InternalRotationConstants,
-    species: str,
-    nuclei: Nuclei,
-    nmin: int,
-    nmax: int,
-) -> CoupledLevels:
-    """Levels of one species whose labels have N in a range; neighbouring N are solved too, since spins mix them in."""
-    total = nuclei.twice_total
-    blocks = species_blocks(model, species, max(0, nmin - total), nmax + total, constants.functions)
-    levels = blocks.solve_once(model.coefficients, constants.vt_max, constants.names == "energy")
-    return coupled_levels(levels, nuclei, model.angle, model.has_plane)
+def coupled_blocks(
+    free: Iterable[SolvedBlock], names: Ints, scheme: Scheme, terms: Terms, all_f: Sequence[int]
+) -> list[SolvedBlock]:
+    """The blocks of all doubled F in `all_f` by their first torsion-rotation level, then F.
+
+    names: of each torsion-rotation level (levels, 3), the first columns of the labels that its states get.
+    """
+    rotors = []
+    for block in sorted(free, key=lambda block: block.j):
+        states = range(len(block.energies_mhz))
+        parts = tuple(Part(0, block.basis, i, names[block.start + i : block.start + i + 1]) for i in states)
+        rotors.append(replace(block, parts=parts))
+    solved = solved_blocks(plan_of_rotor(rotors, REPRESENTATION, scheme, terms), all_f)
+    solved.sort(key=lambda block: (min(part.rotor.start for part in block.spins.parts), block.twice_total))
+    return [replace(block, components=block.spins.rotor.components) for block in solved]
+
+
+def _sums(labels: Ints, scheme: Scheme) -> dict[str, Ints]:
+    """The sums f1, ... f of labels of coupled blocks, doubled where they are half-integers."""
+    sums = zip(scheme.names, scheme.half, labels[:, 4:].T, strict=True)
+    return {name: column if half else column // 2 for name, half, column in sums}
+
+
+def refuse_unlike_nuclei(scheme: Scheme, terms: Iterable[SpinTerm]) -> None:
+    """ValueError for electrons, total spins, and terms that are no tensors of one nucleus."""
+    for spin in scheme.spins:
+        if spin.electron or spin.total:
+            raise ValueError(
+                f"spin {spin.name} beside internal rotation: electrons and total spins are not supported; give single nuclei"
+            )
+    for term in terms:
+        powers = term.n2 or term.nz2 or term.ns
+        if not isinstance(term.rotor, Cosines | CosinesWithN) or powers or len(set(term.spins)) != 1:
+            raise ValueError(
+                f"{term.name} beside internal rotation: only quadrupole and spin-rotation tensors of one nucleus are supported"
+            )
+
+
+def refuse_across_plane(terms: Terms) -> None:
+    """ValueError for a tensor with a component that a mirror ab excludes."""
+    for _, term in terms:
+        if leaves_plane(term.rotor):
+            raise ValueError(
+                f"{term.name} beside internal rotation: the molecule has the plane ab as a mirror, which leaves components along "
+                "aa, bb, cc and ab; leave it out"
+            )

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.blocks import Entries
+from rotor.quantum.basis.elements import Elements
+from rotor.quantum.blocks import Entries, expectations
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.exchange import SpinCounts
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
+from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION, spin_operator, turned_components
 from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_tops
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
-from rotor.quantum.levels import Levels, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
+from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
+from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
-from rotor.quantum.tensors import Tensors, cartesian_of, spherical_components
+from rotor.quantum.spins.operators import CosinesWithN, Rotor
+from rotor.quantum.tensors import Tensors
 from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants, sigma_species
 
@@ -33,16 +39,19 @@ Columns = dict[str, NDArray[Any]]
 FEW = 1 << 14  # up to so many elements a dense matrix is faster than a sparse one
 MOST_POPULATED = 2  # products of three tops below the limit of a sum, of which blocks of any size are solved
 MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a whole for a sum
-REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
 
 
 @dataclass(frozen=True, eq=False)
 class TorsionMoments(SpeciesMoments):
-    """Moments of one species without spins; elements between functions are computed at first use."""
+    """Operators of one species; elements between functions are computed at first use.
+
+    further: operators by which levels are derived besides the terms of the Hamiltonian.
+    """
 
     levels: SpeciesLevels
     model: TurningTops
-    _cache: dict[tuple[complex, ...], dict[tuple[int, int], Entries]] = field(default_factory=dict)
+    further: Elements | None = None
+    _cache: dict[Any, dict[tuple[int, int], Entries]] = field(default_factory=dict)
 
     @property
     def combined(self) -> bool:
@@ -55,47 +64,66 @@ class TorsionMoments(SpeciesMoments):
 
     def reduced(self, up: SolvedBlock, low: SolvedBlock, tensors: Tensors) -> NDArray[Any]:
         """Reduced elements (n_up, n_low) of a tensor."""
-        entries = self._between(tensors)[up.basis.number, low.basis.number]
-        bra, ket = up.vectors, low.vectors
-        shape = len(bra), len(ket)
-        if shape[0] * shape[1] <= FEW:
-            matrix: Any = np.zeros(shape, dtype=entries.values.dtype)
-            matrix[entries.rows, entries.columns] = entries.values[0]
-        else:
-            from scipy.sparse import csr_array
+        return _contracted(self._between(tensors)[up.basis.number, low.basis.number], up.vectors, low.vectors)
 
-            matrix = csr_array((entries.values[0], (entries.rows, entries.columns)), shape=shape)
-        return np.asarray(bra.conj().T @ (matrix @ ket))
+    def beside_spins(self, rotor: Rotor, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+        """Reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
+        if rotor not in self._cache:
+            operator = spin_operator(rotor, self.model.angle, self.model.has_plane)
+            self._cache[rotor] = self._entries(operator, rotor.rank, isinstance(rotor, CosinesWithN))
+        entries = self._cache[rotor].get((up.basis.number, low.basis.number))
+        return None if entries is None else _contracted(entries, up.vectors, low.vectors)
 
-    def slopes(self, block: SolvedBlock, names: Sequence[str]) -> Floats:
-        """∂E/∂c (n, names) of the states of a block, by the constants of the top and of the internal rotor."""
+    def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
+        """∂E/∂c (m, names) of mixtures of states, by the constants of the top and of the internal rotor."""
         constants = list(self.model.values)
-        slopes = self.levels.slopes(block.basis.states) @ self.model.jacobian
-        return np.asarray(slopes[:, [constants.index(name) for name in names]])
+        slopes = self.slopes_of_terms(mixtures) @ self.model.jacobian
+        none = np.zeros(len(slopes))
+        return np.column_stack([slopes[:, constants.index(name)] if name in constants else none for name in names])
+
+    def slopes_of_terms(self, mixtures: Mixtures) -> Floats:
+        """∂E/∂c (m, terms and further operators) of mixtures of states, by coefficients of the Hamiltonian."""
+        vectors = {block.basis.number: block.vectors @ coefficients for block, coefficients in mixtures}
+        return np.hstack([expectations(entries, vectors, count) for entries, count in self._terms])
+
+    @cached_property
+    def _terms(self) -> list[tuple[dict[tuple[int, int], Entries], int]]:
+        """Elements of the terms, and of further operators, by pairs of blocks, and the number of operators."""
+        operators = [self.levels.source.elements, *([] if self.further is None else [self.further])]
+        return [(self.levels.solved.linear.between_blocks(each), len(each.values)) for each in operators]
 
     def _between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
         """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
         body = tensors[0, 0]
         components = tuple(body.components)
         if components not in self._cache:
-            turned = _turned(np.array(components), self.model.angle)
-            elements = self.levels.functions.elements([[Product(body_tensor(turned))]], body.rank, half=True)
-            self._cache[components] = self.levels.solved.linear.between_blocks(elements)
+            turned = turned_components(np.array(components), self.model.angle)
+            if self.model.has_plane and np.iscomplexobj(turned):
+                raise ValueError(
+                    "a dipole along c beside internal rotation: the molecule has the plane ab as a mirror"
+                    if body.rank == 1
+                    else "a tensor along ac or bc beside internal rotation: the molecule has the plane ab as a mirror"
+                )
+            self._cache[components] = self._entries(body_tensor(turned), body.rank)
         return self._cache[components]
 
-
-def _turned(components: NDArray[Any], angle: float) -> NDArray[Any]:
-    """Spherical components along the axes of ρ, at an angle (radians, from a towards b) to the tensor's axes; real if possible."""
-    if angle:
-        body = turned_by(cartesian_of(components, REPRESENTATION), angle)
-        components = spherical_components(body, body.ndim, REPRESENTATION)
-    return components.real if not np.abs(components.imag).max() else components
+    def _entries(self, operator: Operator, rank: int, time_odd: bool = False) -> dict[tuple[int, int], Entries]:
+        """Reduced elements of a tensor of the rotation from J to J' ≥ J by pairs of blocks."""
+        elements = self.levels.functions.elements([[Product(operator)]], rank, time_odd, half=True)
+        return self.levels.solved.linear.between_blocks(elements)
 
 
-def turned_by(body: Floats, angle: float) -> Floats:
-    """A vector or tensor along the axes of ρ, which lie at an angle (radians) from a towards b."""
-    turn = np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
-    return np.asarray(turn @ body if body.ndim == 1 else turn @ body @ turn.T)
+def _contracted(entries: Entries, bra: NDArray[Any], ket: NDArray[Any]) -> NDArray[Any]:
+    """V'† X V of elements between the functions of two blocks."""
+    shape = len(bra), len(ket)
+    if shape[0] * shape[1] <= FEW:
+        matrix: Any = np.zeros(shape, dtype=entries.values.dtype)
+        matrix[entries.rows, entries.columns] = entries.values[0]
+    else:
+        from scipy.sparse import csr_array
+
+        matrix = csr_array((entries.values[0], (entries.rows, entries.columns)), shape=shape)
+    return np.asarray(bra.conj().T @ (matrix @ ket))
 
 
 def torsion_rotation_levels(
@@ -114,7 +142,7 @@ def torsion_rotation_levels(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
         components = degeneracies.components(name)
-        blocks += _blocks(species, model, components)
+        blocks += blocks_of_species(TorsionMoments(species, model), components)
         pieces.append(
             {
                 "species": np.full(len(species.rows), name),
@@ -186,10 +214,10 @@ def table_of_pieces(
     top: Top, effects: tuple[QuantumEffect, ...], jmax: int, pieces: Sequence[Columns], energies: Floats,
     blocks: tuple[SolvedBlock, ...] = (), halves: frozenset[str] = frozenset(),
 ) -> Levels:  # fmt: skip
-    """Levels from columns of quantum numbers, components and weights, piece by piece; sums with spins are doubled."""
+    """Levels from columns of quantum numbers, components, weights and, with spins, projections in space, piece by piece."""
     columns = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     components, weight = columns.pop("components"), columns.pop("weight")
-    multiplicity = columns["f"] + 1 if "f" in columns else 2 * columns["j"] + 1
+    multiplicity = columns.pop("multiplicity") if "multiplicity" in columns else 2 * columns["j"] + 1
     return Levels(
         kind=top.kind,
         representation=REPRESENTATION,
@@ -297,16 +325,18 @@ class Degeneracies:
         return np.full(len(rows), weights[species] // int(np.gcd.reduce(list(weights.values()))))
 
 
-def _blocks(species: SpeciesLevels, model: TurningTops, components: int) -> list[SolvedBlock]:
+def blocks_of_species(moments: TorsionMoments, components: int) -> list[SolvedBlock]:
     """Blocks of one species with the states that are levels, in the order of its rows."""
-    moments, linear, blocks = TorsionMoments(species, model), species.solved.linear, list[SolvedBlock]()
+    species, blocks, kinds = moments.levels, list[SolvedBlock](), Counter[int]()
+    linear = species.solved.linear
     number_of = linear.block[species.rows]
     for number in species.blocks:
         rows = species.rows[number_of == number]
         if len(rows):
-            twice_j, energies = 2 * int(linear.labels["J"][rows[0]]), species.solved.energies[rows]
+            j, energies = int(linear.labels["J"][rows[0]]), species.solved.energies[rows]
             vectors = species.solved.vectors(number)[1][:, linear.rank[rows]]
-            parts = (Part(0, SpeciesFunctions(twice_j, number, rows), 0),)
+            parts = (Part(0, SpeciesFunctions(j, number, kinds[j]), 0),)
+            kinds[j] += 1
             blocks.append(SolvedBlock(parts, energies, vectors, moments=moments, components=components))
     return blocks
 

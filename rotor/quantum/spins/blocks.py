@@ -32,6 +32,7 @@ from rotor.quantum.spins.rotor import (
     Channel,
     Channels,
     Exist,
+    Terms,
     channels_of,
     solved_rotor,
     valued_terms,
@@ -92,9 +93,14 @@ class SpinFunctions:
         return self.columns.block_parts(self.number)
 
     @property
+    def rotor(self) -> SolvedBlock:
+        """The first rotational block."""
+        return self.parts[0].rotor
+
+    @property
     def axial_k(self) -> int | None:
         """|K| where K is a good quantum number."""
-        return getattr(self.parts[0].rotor.parts[0].basis, "axial_k", None)
+        return getattr(self.rotor.basis, "axial_k", None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,8 +219,13 @@ def contracted_plan(
     Functions |N K⟩ for which `exist` (see `levels.levels_of_f`) is false are left out.
     """
     without_internal_rotation(top, "levels with spins in a field")
-    scheme, terms = scheme_of(top, effects), valued_terms(top, effects)
+    terms = valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor, exist)
+    return plan_of_rotor(blocks, representation, scheme_of(top, effects), terms)
+
+
+def plan_of_rotor(blocks: list[SolvedBlock], representation: str, scheme: Scheme, terms: Terms) -> Plan:
+    """Contract each channel to the eigenstates of a solved rotation, whose N rise."""
     channels = channels_of(terms, scheme)
     hamiltonians = list[Floats]()
     if scheme.equivalent == 3:

@@ -3,20 +3,22 @@
 Blocks that have the same states v and kinds of Wang functions, and differ only in N, form a stack, padded with zeros to one shape.
 Elements between two stacks with a fixed N' - N are one array, computed for all N by the formulas of `tensors` and `operators` and
 contracted by one matrix product. Functions |N K⟩ of axial tops, K a good quantum number, are blocks of one function; those of a state v
-are one stack.
+are one stack. States of a species of internal rotation bring their elements along (`levels.SpeciesMoments`), which may be complex.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.spins.operators import AxialState, Rotor
+from rotor.quantum.spins.operators import Rotor
 from rotor.quantum.spins.rotor import Piece, acts
 from rotor.quantum.spins.stack_elements import Pairs, Section, rotor_elements, tensor_elements_of_pairs
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
@@ -28,9 +30,9 @@ _LIKE, _SMALL = 1.5, 16  # largest ratio of sizes of blocks that share a stack, 
 class Stack(NamedTuple):
     """Solved blocks of rising N with the same states and kinds of Wang functions.
 
-    kind: number of this combination. numbers, n, sizes: number, N and states of each block. k: K of functions |N K⟩, None for Wang
-    functions. vectors: (blocks, rows, states), zero beyond a block; None where functions take the place of eigenstates. single: blocks
-    that are contracted one by one.
+    kind: number of this combination. numbers, n, sizes: number, N and states of each block. k: K of functions |N K⟩, None for other
+    functions. vectors: (blocks, rows, states), zero beyond a block; None where functions take the place of eigenstates, and for species,
+    which have no sections. single: blocks that are contracted one by one.
     """
 
     kind: int
@@ -49,6 +51,11 @@ class Stack(NamedTuple):
         return self.k is not None
 
     @property
+    def is_species(self) -> bool:
+        """Whether the blocks are states of a species of internal rotation."""
+        return self.blocks[0].moments is not None
+
+    @property
     def places(self) -> tuple[Ints, Ints]:
         """Block and place in it of each state."""
         return numbers_in_runs(np.array(self.sizes))
@@ -64,11 +71,11 @@ class Contracted(NamedTuple):
     up: Stack
     low: Stack
     pairs: Pairs
-    matrices: Floats
+    matrices: NDArray[Any]
 
     def turned(self, sign: float) -> Contracted:
-        """The transposed elements times a sign, from the second stack to the first."""
-        return Contracted(self.low, self.up, self.pairs.turned(), sign * self.matrices.transpose(0, 2, 1))
+        """The adjoint elements times a sign, from the second stack to the first."""
+        return Contracted(self.low, self.up, self.pairs.turned(), sign * self.matrices.conj().transpose(0, 2, 1))
 
 
 def stacks_of(blocks: Sequence[SolvedBlock], contract: bool = True) -> list[Stack]:
@@ -84,27 +91,30 @@ def stacks_of(blocks: Sequence[SolvedBlock], contract: bool = True) -> list[Stac
         rising: Ints = np.array(members)
         rising = rising[np.argsort(all_n[rising], kind="stable")]
         sizes = [len(blocks[number].energies_mhz) for number in rising.tolist()]
-        runs = runs_of_similar_size(sizes, _LIKE, _SMALL) if contract else [slice(None)]
-        make = _axial_stack if isinstance(blocks[members[0]].parts[0].basis, AxialState) else _stack
+        whole = not contract or blocks[members[0]].moments is not None  # tables of species have one size anyway
+        runs = [slice(None)] if whole else runs_of_similar_size(sizes, _LIKE, _SMALL)
+        make = _stack if isinstance(blocks[members[0]].basis, WangBlock) else _stack_of_states
         stacks += [make(blocks, place, rising[run], all_n[rising[run]], sizes[run], contract) for run in runs]
     return stacks
 
 
 def _kinds(blocks: Sequence[SolvedBlock]) -> Iterator[Any]:
-    """The state v of each block of |N K⟩; states v, first K and sign of the Wang functions of each other block."""
+    """The state v of each block of |N K⟩; states v, first K and sign of Wang functions; the place of a block of a species."""
     for block in blocks:
         basis = block.parts[0].basis
         if isinstance(basis, WangBlock):
             yield tuple([(part.v, part.basis.first_k, part.basis.sign) for part in block.parts])
         else:
-            yield block.parts[0].v
+            yield block.parts[0].v if block.moments is None else (id(block.moments), basis.place)
 
 
-def _axial_stack(
+def _stack_of_states(
     blocks: Sequence[SolvedBlock], kind: int, numbers: Ints, n: Ints, sizes: list[int], contract: bool
 ) -> Stack:
-    """The stack of these blocks of |N K⟩."""
+    """The stack of these blocks of |N K⟩ or of a species."""
     members = [blocks[number] for number in numbers.tolist()]
+    if members[0].moments is not None:
+        return Stack(kind, numbers, n, None, (), None, sizes, members, [False] * len(members))
     parts = tuple([block.parts[0] for block in members])
     k = np.array([part.basis.axial_k for part in parts])
     section = Section(parts[0].v, parts[0].basis, slice(0, 1), parts)
@@ -149,6 +159,8 @@ def operators_of_stacks(
     Between blocks whose N differ by at most `reach`, each pair once, the higher number first: c(p', p) = (-1)^(N'-N) c(p, p').
     """
     between = [[piece for piece in pieces if piece.bra != piece.ket] for pieces in operators]
+    if stacks[0].is_species:
+        return [list(_between_species(stacks, reach, partial(_sum_of_pieces, pieces))) for pieces in operators]
     out: list[list[Contracted]] = [[] for _ in operators]
     for up, low, pairs in _near(stacks, reach):
         forward, back = _Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)
@@ -171,7 +183,9 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contrac
     A block with itself occurs in both orders; the last entry counts.
     """
     rank = rank_of(tensors)
-
+    if stacks[0].is_species:
+        forth = list(_between_species(stacks, rank, partial(_tensor_of_species, tensors)))
+        return [e.turned((-1.0) ** (e.pairs.rise + rank * e.up.blocks[0].combined)) for e in forth] + forth
     axial = stacks[0].axial
     alike = not axial and all(tensors.get((v, w), tensor) == tensor for (w, v), tensor in tensors.items())
     forward, back = list[Contracted | None](), list[Contracted | None]()
@@ -184,6 +198,41 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contrac
             turned = pairs.turned()
             back.append(_contracted(low, up, turned, _tensor_elements(tensors, low, up, turned)))
     return [elements for elements in (*back, *forward) if elements is not None]
+
+
+def _between_species(
+    stacks: Sequence[Stack], reach: int, between: Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]
+) -> Iterator[Contracted]:
+    """Elements between states of species whose N differ by at most `reach`, each pair of blocks once, the higher number first."""
+    for up, low, pairs in _near(stacks, reach):
+        if up.blocks[0].moments is not low.blocks[0].moments:
+            continue
+        each = [
+            between(up.blocks[a], low.blocks[b]) for a, b in zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)
+        ]
+        acting = [(place, block) for place, block in enumerate(each) if block is not None]
+        if acting:
+            shape = len(each), max(up.sizes), max(low.sizes)
+            matrices = np.zeros(shape, dtype=np.result_type(*(block.dtype for _, block in acting)))
+            for place, block in acting:
+                matrices[place, : block.shape[0], : block.shape[1]] = block
+            yield Contracted(up, low, pairs, matrices)
+
+
+def _sum_of_pieces(pieces: Sequence[Piece], up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+    """Elements of a sum of pieces between states of a species."""
+    assert up.moments is not None
+    elements = [(piece.value, up.moments.beside_spins(piece.rotor, up, low)) for piece in pieces]
+    acting = [value * block for value, block in elements if block is not None]
+    return np.asarray(sum(acting)) if acting else None
+
+
+def _tensor_of_species(tensors: Tensors, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+    """Elements of a tensor between states of a species, times the root of their number of components."""
+    assert up.moments is not None
+    if not up.moments.connect(up, low, tensors):
+        return None
+    return np.asarray(np.sqrt(up.components) * up.moments.reduced(up, low, tensors))
 
 
 def acting_numbers(contracted: Sequence[Contracted]) -> Ints:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import chain
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Workspace
 from rotor.quantum.spins.blocks import Plan
@@ -18,6 +20,7 @@ from rotor.quantum.spins.many_f import (
     between,
     coefficients_by_f,
     tables_of,
+    type_of,
     write_between,
 )
 from rotor.quantum.spins.pattern_tables import couplings_by_f
@@ -25,7 +28,7 @@ from rotor.quantum.spins.pattern_tables import couplings_by_f
 
 def hamiltonians(
     plan: Plan, grouped: Sequence[tuple[Group, list[int]]], kinds: Sequence[tuple[int, ...]], zeros: Floats
-) -> Iterator[tuple[list[int], Floats]]:
+) -> Iterator[tuple[list[int], NDArray[Any]]]:
     """Numbers of blocks of one kind in a group, and their matrices (blocks, n, n).
 
     kinds: number of functions and further data of each block. Lower triangles count; their energies are relative to `zeros`.
@@ -47,12 +50,12 @@ def hamiltonians(
 def _matrices_of_group(
     group: Group, kinds: Sequence[tuple[int, ...]], acting: Sequence[tuple[Tables, Coefficients]], frame: Frame, zeros: Floats,
     space: Workspace,
-) -> Iterator[tuple[list[int], Floats]]:  # fmt: skip
+) -> Iterator[tuple[list[int], NDArray[Any]]]:  # fmt: skip
     """Places of blocks of one kind in a group, and their matrices."""
     for run in group.runs():
         places, height = np.arange(run.start, run.stop), int(group.heights[run].max())
         shape = len(places), group.columns, height, group.columns, height
-        whole = space.array("whole", *shape)
+        whole = space.array("whole", *shape, dtype=type_of(tables for tables, _ in acting))
         each = (between(group, group, places, 0, *operator, frame, (height, height)) for operator in acting)
         write_between(_lower(group, chain.from_iterable(each)), whole)
         energies = np.zeros(shape[:3])

@@ -54,7 +54,7 @@ def levels_of_f(
     plan = simplified(contracted_plan(top, effects, lowest, highest, executor, exist), effects, all_f)
     solved = solved_blocks(plan, all_f, exist)
     if n_range:
-        solved = [_within(block, n_range) for block in solved]
+        solved = [within_n(block, n_range) for block in solved]
     blocks = tuple(placed(solved))
     return _table(top, effects, plan.shared, blocks, highest if n_range is None else n_range[1])
 
@@ -80,7 +80,7 @@ def _range_of_n(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence[in
     return min(max(0, (f - total) // 2) for f in all_f), max((f + total) // 2 for f in all_f)
 
 
-def _within(block: SolvedBlock, n_range: tuple[int, int]) -> SolvedBlock:
+def within_n(block: SolvedBlock, n_range: tuple[int, int]) -> SolvedBlock:
     """The states of a block whose N lies in a range."""
     n = np.asarray(block.labels)[:, 3] // 2
     chosen = (n >= n_range[0]) & (n <= n_range[1])

@@ -9,9 +9,10 @@ rotation are tables with a row for each N (and K), coupling coefficients are tab
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.frozen import dataclass
@@ -19,7 +20,7 @@ from rotor.quantum.spins.contraction import Contracted, Stack
 from rotor.quantum.spins.parts import PartColumns
 from rotor.quantum.spins.pattern_tables import PatternTable
 
-Tables = dict[tuple[int, int, int], Floats]
+Tables = dict[tuple[int, int, int], NDArray[Any]]
 """Elements (rows, states', states) by the kinds of both blocks and the distance of their rows; a row is that of the second block."""
 
 Coefficients = Callable[[Ints], Callable[[slice, slice], Floats]]
@@ -171,7 +172,7 @@ def tables_of(contracted: Sequence[Contracted], frame: Frame) -> Tables:
         key = (up.kind, low.kind, int(frame.rows[up.numbers[pairs.up[0]]] - rows[0]))
         if key not in out:
             count, right = frame.energies_mhz[low.kind].shape
-            out[key] = np.zeros((count, frame.energies_mhz[up.kind].shape[1], right))
+            out[key] = np.zeros((count, frame.energies_mhz[up.kind].shape[1], right), dtype=matrices.dtype)
         out[key][rows, : matrices.shape[1], : matrices.shape[2]] = matrices
     return out
 
@@ -267,6 +268,11 @@ def _group(
     return Group(tuple(rotations), twice_f, twice_rows, heights[shape_of], shape_of, functions, places)
 
 
+def type_of(all_tables: Iterable[Tables]) -> Any:
+    """The type of elements: complex if some of them are."""
+    return np.result_type(np.float64, *{table.dtype for tables in all_tables for table in tables.values()})
+
+
 def are_connected(up: Group, low: Group, step: int, tables: Tables) -> bool:
     """Whether there are elements between two groups whose doubled rows differ by `step`."""
     return any((a.kind, b.kind, (step + a.rise - b.rise) // 2) in tables for a in up.rotations for b in low.rotations)
@@ -287,7 +293,7 @@ class Between(NamedTuple):
 
     left: RotationColumns
     right: RotationColumns
-    elements: Floats
+    elements: NDArray[Any]
     coefficients: Floats
 
 
@@ -311,7 +317,7 @@ def between(
                 yield Between(left, right, table[places, : states[0], : states[1]], of_columns)
 
 
-def write_between(all_elements: Iterable[Between], out: Floats) -> None:
+def write_between(all_elements: Iterable[Between], out: NDArray[Any]) -> None:
     """Write sums of elements to an array (blocks, columns', states', columns, states)."""
     out.fill(0.0)
     by_columns: dict[tuple[int, int], list[Between]] = {}

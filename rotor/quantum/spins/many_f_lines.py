@@ -12,11 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Indices, Ints, Workspace, runs_of_similar_size
+from rotor.arrays import Indices, Ints, Workspace, runs_of_similar_size
 from rotor.frozen import dataclass
 from rotor.quantum.levels import Connections, SolvedBlock
 from rotor.quantum.spins.blocks import Shared
@@ -31,6 +32,7 @@ from rotor.quantum.spins.many_f import (
     between,
     coefficients_by_f,
     tables_of,
+    type_of,
     write_between,
 )
 from rotor.quantum.spins.pattern_tables import column_tensors, tensors_by_f
@@ -43,7 +45,7 @@ _LARGE = 20_000  # elements of a block whose columns are multiplied one kind aft
 _IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that lie side by side: 32 MB
 
 
-Operator = Callable[[slice, Floats, Floats], Floats]
+Operator = Callable[[slice, NDArray[Any], NDArray[Any]], NDArray[Any]]
 """Elements V' X V (blocks, n', n) of a run of its blocks between vectors (blocks, columns, states, n)."""
 
 
@@ -70,7 +72,7 @@ class Rows(NamedTuple):
 
     up: Indices
     low: Indices
-    amplitudes: Floats
+    amplitudes: NDArray[Any]
     alike: bool
 
 
@@ -98,7 +100,7 @@ class GroupStates:
         """The largest number of states of a rotational block, for each block."""
         return self.group.heights[self.in_group]
 
-    def vectors(self, places: Ints) -> Floats:
+    def vectors(self, places: Ints) -> NDArray[Any]:
         """Vectors (blocks, columns, rotational states, states) of some blocks."""
         if self._whole is None:
             return self._scattered(places)
@@ -107,15 +109,16 @@ class GroupStates:
         return self._whole[chosen, :, : self.heights[chosen].max(), : self.sizes[chosen].max()]
 
     @cached_property
-    def _whole(self) -> Floats | None:
+    def _whole(self) -> NDArray[Any] | None:
         """Vectors of all blocks; None where they are large."""
         numbers = len(self.blocks) * self.group.columns * self.heights.max() * self.sizes.max()
         return self._scattered(np.arange(len(self.blocks))) if numbers <= _IN_MEMORY else None
 
-    def _scattered(self, places: Ints) -> Floats:
+    def _scattered(self, places: Ints) -> NDArray[Any]:
         """Vectors of some blocks over the functions of the group."""
         in_group, sizes = self.in_group[places], self.sizes[places]
-        vectors = np.zeros((len(places), self.group.columns, self.heights[places].max(), sizes.max()))
+        shape = len(places), self.group.columns, self.heights[places].max(), sizes.max()
+        vectors = np.zeros(shape, dtype=self.blocks[0].vectors.dtype)
         kinds = [self.blocks[place].vectors.shape for place in places.tolist()]
         for at, columns, states in self.group.alike(in_group, kinds):
             of_kind = np.concatenate([self.blocks[place].vectors for place in places[at].tolist()])
@@ -133,9 +136,9 @@ def tensor_moments(shared: Shared, tensors: Tensors) -> Moments:
 def amplitudes_of_groups(
     blocks: Sequence[SolvedBlock], moments: Moments, levels: int, both_orders: bool = False
 ) -> Iterator[Rows]:
-    """Real reduced elements between all blocks, many at a time, each pair of blocks once; `levels` is the row of padding.
+    """Reduced elements between all blocks, many at a time, each pair of blocks once; `levels` is the row of padding.
 
-    Amplitudes are zero beyond a block. both_orders: pairs of blocks of one F occur in both orders.
+    Amplitudes are zero beyond a block, complex where those of the rotation are. both_orders: pairs of blocks of one F occur in both orders.
     """
     shared = blocks[0].spins.shared
     frame: Frame = shared.cache["frame"]
@@ -149,21 +152,25 @@ def amplitudes_of_groups(
 
 
 def connections_of(blocks: Sequence[SolvedBlock], moments: Moments) -> Connections:
-    """The pairs of blocks that moments connect, F rising, and the function that returns their reduced elements (n_up, n_low)."""
+    """The pairs of blocks that moments connect, the higher F first, and the function that returns their reduced elements (n_up, n_low)."""
     block_at, count = {block.start: block for block in blocks}, blocks[-1].start + len(blocks[-1].energies_mhz)
-    elements: dict[tuple[int, int], Floats] = {}
+    elements: dict[tuple[int, int], NDArray[Any]] = {}
     for rows in amplitudes_of_groups(blocks, moments, count, both_orders=True):
         acting = np.flatnonzero(rows.amplitudes.any(axis=(1, 2)))
         starts = zip(rows.up[acting, 0].tolist(), rows.low[acting, 0].tolist(), strict=True)
         for place, (up, low) in zip(acting.tolist(), starts, strict=True):
-            if up >= low:
-                sizes = len(block_at[up].energies_mhz), len(block_at[low].energies_mhz)
+            first, second = block_at[up], block_at[low]
+            if up >= low or first.twice_total > second.twice_total:
+                sizes = len(first.energies_mhz), len(second.energies_mhz)
                 elements[up, low] = rows.amplitudes[place, : sizes[0], : sizes[1]].copy()
     pairs = [(block_at[up], block_at[low]) for up, low in sorted(elements, key=lambda pair: pair[::-1])]
     return pairs, partial(_between_blocks, elements)
 
 
-def _between_blocks(elements: Mapping[tuple[int, int], Floats], up: SolvedBlock, low: SolvedBlock) -> Floats:
+def _between_blocks(
+    elements: Mapping[tuple[int, int], NDArray[Any]], up: SolvedBlock, low: SolvedBlock
+) -> NDArray[Any]:
+    """Elements between two blocks."""
     return elements[up.start, low.start]
 
 
@@ -240,23 +247,27 @@ def _operator(
     acting = [each for term in terms for each in between(up, low, chosen, step, *term, frame, states)]
     if up.columns * states[0] * low.columns * states[1] >= _LARGE:  # most columns are not connected
         return partial(_by_columns, acting, space)
-    whole = space.array("whole", len(chosen), up.columns, states[0], low.columns, states[1])
+    shape = len(chosen), up.columns, states[0], low.columns, states[1]
+    whole = space.array("whole", *shape, dtype=type_of(tables for tables, _ in terms))
     write_between(acting, whole)
     return partial(_by_matrices, whole)
 
 
-def _by_matrices(whole: Floats, run: slice, bra: Floats, ket: Floats) -> Floats:
+def _by_matrices(whole: NDArray[Any], run: slice, bra: NDArray[Any], ket: NDArray[Any]) -> NDArray[Any]:
     """V' X V of matrices (blocks, columns', states', columns, states)."""
     matrices = whole[run, :, : bra.shape[2], :, : ket.shape[2]]
     up, low = (vectors.reshape(len(vectors), -1, vectors.shape[3]) for vectors in (bra, ket))
     moved = np.matmul(matrices.reshape(len(up), up.shape[1], low.shape[1]), low)
-    return np.asarray(np.matmul(up.transpose(0, 2, 1), moved))
+    return np.asarray(np.matmul(up.conj().transpose(0, 2, 1), moved))
 
 
-def _by_columns(acting: Sequence[Between], space: Workspace, run: slice, bra: Floats, ket: Floats) -> Floats:
+def _by_columns(
+    acting: Sequence[Between], space: Workspace, run: slice, bra: NDArray[Any], ket: NDArray[Any]
+) -> NDArray[Any]:
     """V' X V, one kind of columns after another: X of the rotation times vectors, then coefficients, then V'."""
     (count, columns, height, _), (_, _, most, n_low) = bra.shape, ket.shape
-    moved = space.array("moved", count, columns, height, n_low)
+    kind = np.result_type(ket, *{each.elements.dtype for each in acting})
+    moved = space.array("moved", count, columns, height, n_low, dtype=kind)
     moved.fill(0.0)
     for left, right, elements, coefficients in acting:
         rotation = elements[run, :height, :most]
@@ -265,4 +276,4 @@ def _by_columns(acting: Sequence[Between], space: Workspace, run: slice, bra: Fl
         added = np.matmul(coefficients[run], of_right.reshape(count, -1, rows * n_low))
         moved[:, left.columns, :rows] += added.reshape(count, -1, rows, n_low)
     in_blocks = bra.any(axis=(0, 3))
-    return np.asarray(np.matmul(bra[:, in_blocks].transpose(0, 2, 1), moved[:, in_blocks]))
+    return np.asarray(np.matmul(bra[:, in_blocks].conj().transpose(0, 2, 1), moved[:, in_blocks]))

@@ -115,7 +115,8 @@ def labels_by_shares(names: Ints, sizes: Ints, vectors: Floats) -> tuple[Ints, F
     (count, subs), n = sizes.shape, names.shape[1]
     block = np.arange(count)[:, None]
     starts = np.cumsum(sizes, axis=1) - sizes + n * block
-    shares = np.add.reduceat((vectors * vectors).reshape(count * n, n), starts.ravel(), axis=0).reshape(count, subs, n)
+    weights = (vectors * vectors.conj()).real
+    shares = np.add.reduceat(weights.reshape(count * n, n), starts.ravel(), axis=0).reshape(count, subs, n)
     sub_block_of_state = assigned_alike(shares, sizes)
     labels = np.empty_like(names)
     labels[block, np.argsort(sub_block_of_state, axis=1, kind="stable")] = names
@@ -140,7 +141,10 @@ def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
     rows = vectors[part.place]
     if len(part.rotor.parts) == 1:
         return rows
-    each = np.matmul(part.rotor.vectors, rows.reshape(part.repeats, len(part.rotor.energies_mhz), -1))
+    each = rows.reshape(part.repeats, len(part.rotor.energies_mhz), -1)
+    if part.rotor.moments is not None:  # states of a species are functions by themselves
+        return each.swapaxes(0, 1).reshape(rows.shape)
+    each = np.matmul(part.rotor.vectors, each)
     return np.concatenate([each[:, wang_part.place].reshape(-1, rows.shape[1]) for wang_part in part.rotor.parts])
 
 

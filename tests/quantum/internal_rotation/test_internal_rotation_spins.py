@@ -6,12 +6,12 @@ import qutip
 from spherical_tensors import spherical, symbol
 
 import rotor
-from rotor.quantum.contraction import contracted_elements, coupled, spin_space
-from rotor.quantum.internal_rotation.contracted import Product
+from rotor.quantum.internal_rotation.hyperfine import coupled_blocks
+from rotor.quantum.internal_rotation.levels import TorsionMoments, blocks_of_species
 from rotor.quantum.internal_rotation.model import RamModel
-from rotor.quantum.operators.algebra import half_anticommutator
-from rotor.quantum.operators.rotation import body_tensor, j_x, j_y, j_z
-from rotor.quantum.tensors import spherical_components
+from rotor.quantum.levels import placed
+from rotor.quantum.spins.operators import Cosines, CosinesWithN
+from rotor.quantum.spins.scheme import Scheme, Spin, SpinTerm
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = rotor.units.MHZ_PER_CM
@@ -36,7 +36,7 @@ def cosines(states, rank):
     return out
 
 
-def direct_product(sigma):
+def direct_product(sigma, constants, chi):
     """Energies of all states with J ≤ 2, all M, all M_I."""
     states = [(j, k, m) for j in range(JMAX + 1) for k in range(-j, j + 1) for m in range(-j, j + 1)]
     n = len(states)
@@ -49,8 +49,9 @@ def direct_product(sigma):
     m = 3.0 * np.arange(-WAVES, WAVES + 1) + sigma
     p, one = np.diag(m), np.eye(len(m))
     cos3 = (np.eye(len(m), k=1) + np.eye(len(m), k=-1)) / 2
-    c = CONSTANTS
+    c = constants
     rotation = c["A"] * pa @ pa + c["B"] * pb @ pb + c["C"] * pc @ pc + c["Dab"] * (pa @ pb + pb @ pa)
+    rotation = rotation + c.get("Dac", 0.0) * (pa @ pc + pc @ pa) + c.get("Dbc", 0.0) * (pb @ pc + pc @ pb)
     slip = np.kron(np.eye(n), p) - c["rho"] * np.kron(pa, one)
     free = np.kron(rotation, one) + c["F"] * slip @ slip + np.kron(np.eye(n), c["V3"] / 2 * (one - cos3))
 
@@ -60,7 +61,7 @@ def direct_product(sigma):
                for i, a in enumerate(spins)]  # fmt: skip
     of_spin = [part / (2 * SPIN * (2 * SPIN - 1)) for part in spherical(product)]
     order = [1, 2, 0]  # x, y, z = b, c, a
-    of_body = spherical(CHI[np.ix_(order, order)])
+    of_body = spherical(chi[np.ix_(order, order)])
     coupling = np.zeros((n * len(ix),) * 2, dtype=complex)
     turned = cosines(states, 2)
     for space in range(-2, 3):
@@ -79,28 +80,28 @@ def direct_product(sigma):
     return np.linalg.eigvalsh(whole + lifted)
 
 
+def coupled_levels(sigma, constants, chi):
+    """Energies of all states, each as often as it has values of M."""
+    ram = RamModel(constants)
+    levels = ram.blocks(sigma, JMAX, count=2 * WAVES + 1, waves=WAVES).solve(ram.coefficients, 2 * WAVES)
+    free = list(placed(blocks_of_species(TorsionMoments(levels, ram), 1)))
+    scheme = Scheme((Spin("14N", 2 * SPIN),))
+    terms = [
+        (1.0, SpinTerm("chi", ("14N", "14N"), Cosines(tuple(map(tuple, chi.tolist()))))),
+        (1.0, SpinTerm("C", ("14N",), CosinesWithN(tuple(map(tuple, ROTATION.tolist()))))),
+    ]
+    names = np.arange(sum(len(block.energies_mhz) for block in free))[:, None] * [1, 0, 0]
+    solved = coupled_blocks(free, names, scheme, terms, range(0, 2 * JMAX + 3, 2))
+    assert all(np.iscomplexobj(block.vectors) != ram.has_plane for block in solved)
+    return np.sort(np.concatenate([np.repeat(block.energies_mhz, block.twice_total + 1) for block in solved]))
+
+
 @pytest.mark.parametrize("sigma", [0, 1])
-def test_a_quadrupole_and_spin_rotation_beside_internal_rotation(sigma):
-    ram = RamModel(CONSTANTS)
-    blocks = ram.blocks(sigma, JMAX, count=2 * WAVES + 1, waves=WAVES)
-    along = {"a": j_z(), "b": j_x(), "c": j_y()}
-    unit = dict(zip("abc", np.eye(3), strict=True))
-    vector = sum(
-        (
-            ROTATION[i, i] * half_anticommutator(body_tensor(spherical_components(unit[g], 1, "Ir")), along[g])
-            for i, g in enumerate("abc")
-        ),
-        start=0.0 * j_z(),
-    )
-    tensors = {
-        "chi": (2, blocks.functions.elements([[Product(body_tensor(spherical_components(CHI, 2, "Ir")))]], 2)),
-        "C": (1, blocks.functions.elements([[Product(vector)]], 1, time_odd=True)),
-    }
-    space = contracted_elements(blocks.linear.solve(ram.coefficients), tensors)
-    both = coupled(space, spin_space(2 * SPIN), {"chi": ("chi", "Q"), "C": ("C", "I")}, {}, range(0, 2 * JMAX + 3, 2))
-    solved = both.solve({"chi": 1.0, "C": 1.0})
-    ours = np.sort(np.concatenate([np.repeat(sector.energies, sector.twice_j + 1) for sector in solved.sectors]))
-    theirs = direct_product(sigma)
+@pytest.mark.parametrize("across", [{}, {"Dac": 300.0, "Dbc": -150.0}])
+def test_a_quadrupole_and_spin_rotation_beside_internal_rotation(sigma, across):
+    """With and without a mirror plane; without it elements between states are complex."""
+    chi = CHI + (np.array([[0, 0, 12], [0, 0, -7], [12, -7, 0]]) if across else 0.0)
+    ours, theirs = coupled_levels(sigma, CONSTANTS | across, chi), direct_product(sigma, CONSTANTS | across, chi)
     assert len(ours) == len(theirs)
     assert np.abs(ours - theirs).max() < 1e-6  # MHz; rounding of energies up to 2e7 MHz is 1e-7
 
