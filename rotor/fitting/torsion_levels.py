@@ -37,9 +37,9 @@ from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.levels import SolvedBlock, placed
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
-from rotor.quantum.spins.linear_blocks import slopes_of_blocks, slopes_of_species, species_tables
 from rotor.quantum.spins.rotor import Terms, channels_of
 from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
+from rotor.quantum.spins.species_slopes import slopes_by_rotation, slopes_by_spins
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional, sigma_species
 
 MOVED = 0.01  # relative change of a torsional constant above which the torsional functions are rebuilt
@@ -180,8 +180,8 @@ def _with_spins(
     needed, places = np.unique(rows, return_inverse=True)
     chosen = list(placed(_states_at(blocks, needed)))
     channels = [channels_of(of_parameter, spins.scheme) for of_parameter in derivatives.values()]
-    by_spins = slopes_of_blocks(species_tables(blocks[0].spins.shared, channels), chosen, len(channels))
-    direct = [slopes_of_species(block, moments.slopes_of_terms) for block in chosen]
+    by_spins = slopes_by_spins(chosen, channels)
+    direct = [slopes_by_rotation(block, moments.slopes_of_terms) for block in chosen]
     energies = np.concatenate([block.energies_mhz for block in chosen])
     slopes = dict(zip(derivatives, by_spins[places].T, strict=True))
     return energies[places], np.concatenate(direct)[places], slopes

@@ -31,6 +31,9 @@ from rotor.quantum.solvers.dominated import dominated_states, is_dominated
 from rotor.quantum.solvers.hermitian import eigenstates, eigenvalues
 
 
+_AT_ONCE = 1 << 16  # numbers computed at a time, so that they stay in the cache of a core
+
+
 class Entries(NamedTuple):
     """Elements of operators between two blocks: row and column in each block, and values (operators, entries)."""
 
@@ -166,7 +169,7 @@ class SolvedBlocks:
         entries = linear.between_blocks(elements, np.unique(blocks))
         for block in {up for up, low in entries if up == low}:  # blocks of H may be finer than those of O
             chosen = np.flatnonzero(blocks == block)
-            vectors = self.vectors(block)[1][:, linear.rank[levels[chosen]]]
+            vectors = self.vectors(block)[1][:, None, linear.rank[levels[chosen]]]
             slopes[chosen] = expectations(entries, {block: vectors}, len(elements.values))
         return slopes
 
@@ -183,12 +186,17 @@ class SolvedBlocks:
 def expectations(
     entries: Mapping[tuple[int, int], Entries], vectors: Mapping[int, NDArray[Any]], operators: int
 ) -> Floats:
-    """⟨ψ|O|ψ⟩ (m, operators) of Hermitian operators; vectors: (functions, m) of ψ in each of its blocks."""
-    total = np.zeros((operators, next(iter(vectors.values())).shape[1]))
+    """Σ_p ⟨ψ_p|O|ψ_p⟩ (n, operators) of Hermitian operators; vectors: (functions, p, n) of ψ in each of its blocks."""
+    _, patterns, n = next(iter(vectors.values())).shape
+    total, at_once = np.zeros((operators, n)), max(1, _AT_ONCE // (patterns * n))
     for up, low in product(vectors, repeat=2):
         if (up, low) in entries:
             rows, columns, values = entries[up, low]
-            total += (values @ (vectors[up][rows].conj() * vectors[low][columns])).real
+            for start in range(0, len(rows), at_once):
+                here = slice(start, start + at_once)
+                weights = vectors[up][rows[here]].conj()
+                weights *= vectors[low][columns[here]]
+                total += (values[:, here] @ weights.sum(axis=1)).real
     return total.T
 
 

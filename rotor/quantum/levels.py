@@ -63,7 +63,7 @@ class SpeciesMoments(ABC):
 
     @abstractmethod
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
-        """∂E/∂c (m, names) of mixtures of the states of blocks by constants of the Hamiltonian without spins."""
+        """∂E/∂c (n, names) of mixtures of the states of blocks by constants of the Hamiltonian without spins."""
 
 
 class SpeciesFunctions(NamedTuple):
@@ -152,7 +152,7 @@ class SolvedBlock:
 
 
 Mixtures = Sequence[tuple[SolvedBlock, NDArray[Any]]]
-"""Blocks of one J, and coefficients (states, m) of their states in m functions."""
+"""Blocks of one J, and coefficients (states, p, n) of their states in n mixtures, sums over p of squares of functions."""
 
 Connections = tuple[list[tuple[SolvedBlock, SolvedBlock]], Callable[[SolvedBlock, SolvedBlock], Floats]]
 """Pairs of blocks that an operator connects, and the function that returns the reduced elements between them."""

@@ -54,7 +54,7 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     rows = np.arange(len(levels)) if rows is None else np.asarray(rows)
 
     of_species = [
-        block.moments.slopes([(block, np.eye(len(block.energies_mhz)))], names)
+        block.moments.slopes([(block, np.eye(len(block.energies_mhz))[:, None])], names)
         for block in levels.blocks
         if block.moments is not None
     ]

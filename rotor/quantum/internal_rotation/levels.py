@@ -75,15 +75,15 @@ class TorsionMoments(SpeciesMoments):
         return None if entries is None else _contracted(entries, up.vectors, low.vectors)
 
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
-        """∂E/∂c (m, names) of mixtures of states, by the constants of the top and of the internal rotor."""
+        """∂E/∂c (n, names) of mixtures of states, by the constants of the top and of the internal rotor."""
         constants = list(self.model.values)
         slopes = self.slopes_of_terms(mixtures) @ self.model.jacobian
         none = np.zeros(len(slopes))
         return np.column_stack([slopes[:, constants.index(name)] if name in constants else none for name in names])
 
     def slopes_of_terms(self, mixtures: Mixtures) -> Floats:
-        """∂E/∂c (m, terms and further operators) of mixtures of states, by coefficients of the Hamiltonian."""
-        vectors = {block.basis.number: block.vectors @ coefficients for block, coefficients in mixtures}
+        """∂E/∂c (n, terms and further operators) of mixtures of states, by coefficients of the Hamiltonian."""
+        vectors = {block.basis.number: np.tensordot(block.vectors, mixture, 1) for block, mixture in mixtures}
         return np.hstack([expectations(entries, vectors, count) for entries, count in self._terms])
 
     @cached_property

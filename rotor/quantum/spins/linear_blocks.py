@@ -9,19 +9,17 @@ of levels use these matrices, `estimates.contracted` for large blocks too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.frozen import dataclass
 from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import Levels, Mixtures, SolvedBlock
+from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
 from rotor.quantum.spins.blocks import Shared, SpinFunctions
 from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, stacks_of
@@ -29,7 +27,7 @@ from rotor.quantum.spins.many_f import Frame, Group
 from rotor.quantum.spins.many_f_lines import groups_of_blocks
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.pattern_tables import couplings_by_f
-from rotor.quantum.spins.rotor import ALONE, Channels, Piece, parameter_channels
+from rotor.quantum.spins.rotor import ALONE, Piece, parameter_channels
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -48,7 +46,7 @@ class UnitElements(NamedTuple):
 
     rows: Ints
     columns: Ints
-    values: NDArray[Any]
+    values: Floats
     parameters: Ints
 
 
@@ -64,7 +62,7 @@ class Acting(NamedTuple):
     twice: float
     coefficients: Floats
     unit: UnitElements
-    values: NDArray[Any]
+    values: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +70,7 @@ class FunctionTables:
     """Elements of all parameters by channel.
 
     functions: by number of a rotational block, its functions as those of the largest block of its kind are counted. vectors: (table rows,
-    functions, states) of solved blocks by kind; empty where functions are states of species. channels: coefficients by F, and elements by
-    kinds.
+    functions, states) of solved blocks by kind. channels: coefficients by F, and elements by kinds.
     """
 
     frame: Frame
@@ -97,17 +94,10 @@ class FunctionTables:
                         between = coefficients_of_f[:, group.rotations[i].patterns, right.patterns]
                         yield Acting(i, k, twice, between, unit, unit.values[rows[k]])
 
-    def over_functions(self, group: Group, at: Ints, vectors: NDArray[Any]) -> list[NDArray[Any]]:
+    def over_functions(self, group: Group, at: Ints, vectors: Floats) -> list[Floats]:
         """Vectors (blocks, columns, states, n) over functions, (blocks, patterns, functions, n) for each rotation of a group."""
         out = []
         for rotation in group.rotations:
-            if not self.vectors:
-                (count, _, height, n), size = vectors.shape, self.frame.energies_mhz[rotation.kind].shape[1]
-                columns = rotation.columns.stop - rotation.columns.start
-                whole = np.zeros((count, columns, max(size, height), n), dtype=vectors.dtype)
-                whole[:, :, :height] = vectors[:, rotation.columns]
-                out.append(whole)
-                continue
             turned = self.vectors[rotation.kind][self.frame.rows_of(group.twice_rows[at], rotation)]
             states = min(turned.shape[2], vectors.shape[2])
             out.append(np.matmul(turned[:, None, :, :states], vectors[:, rotation.columns, :states]))
@@ -133,22 +123,7 @@ def function_tables(top: Top, effects: Sequence[QuantumEffect], names: Sequence[
         vectors = _vectors(blocks, stacks, functions, frame)
         rotation = _rotation_elements(terms, len(names), blocks, functions, shared)
     channels = [(couplings_by_f(shared.scheme, ALONE, first, last), rotation)]
-    channels += _spin_channels(stacks, parameter_channels(top, effects, names, shared.scheme), shared)
-    return FunctionTables(frame, functions, vectors, channels)
-
-
-def species_tables(shared: Shared, by_parameter: Sequence[Channels]) -> FunctionTables:
-    """Elements of the spin terms of parameters over states of species of internal rotation."""
-    return FunctionTables(shared.cache["frame"], [], {}, _spin_channels(shared.stacks, by_parameter, shared))
-
-
-def _spin_channels(
-    stacks: Sequence[Stack], by_parameter: Sequence[Channels], shared: Shared
-) -> list[tuple[Floats, dict[Kinds, UnitElements]]]:
-    """Elements of the spin terms of parameters by channel."""
-    frame: Frame = shared.cache["frame"]
-    first, last = frame.twice_f[0], frame.twice_f[-1]
-    channels = []
+    by_parameter = parameter_channels(top, effects, names, shared.scheme)
     channels_of_spins = dict.fromkeys(channel for by_channel in by_parameter for channel in by_channel)
     for rank in {channel.rank for channel in channels_of_spins}:
         pieces = {
@@ -163,7 +138,7 @@ def _spin_channels(
         for channel, of_channel in pieces.items():
             elements = _spin_elements(of_channel, by_unit, frame)
             channels.append((couplings_by_f(shared.scheme, channel, first, last), elements))
-    return channels
+    return FunctionTables(frame, functions, vectors, channels)
 
 
 def _functions(stacks: Sequence[Stack], count: int) -> list[Ints]:
@@ -263,8 +238,7 @@ def _spin_elements(
     n, out = frame.n_of_rows.astype(float), {}
     for kinds, members in alike.items():
         left, right = np.nonzero(np.any([entry.matrices.any(axis=0) for _, _, entry in members], axis=0))
-        kind = np.result_type(*(entry.matrices.dtype for _, _, entry in members))
-        elements = np.zeros((len(n), len(left), len(units)), dtype=kind)
+        elements = np.zeros((len(n), len(left), len(units)))
         for place, rows, entry in members:
             elements[rows, :, place] = entry.matrices[:, left, right]
         m = n + members[0][2].pairs.rise
@@ -286,53 +260,34 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
     """∂E/∂c (rows, names) of levels with spins, MHz per MHz; ValueError for levels without vectors."""
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")
-    shared: Shared = levels.blocks[0].spins.shared
-    if not shared.stacks[0].is_species:
-        return slopes_of_blocks(function_tables(top, levels.effects, names, shared), levels.blocks, len(names))[rows]
-    tables = species_tables(shared, parameter_channels(top, levels.effects, names, shared.scheme))
-    slopes = slopes_of_blocks(tables, levels.blocks, len(names))
-    for block in levels.blocks:
-        of_rotation = partial(block.spins.rotor.moments.slopes, names=names)
-        slopes[block.start : block.start + len(block.energies_mhz)] += slopes_of_species(block, of_rotation)
-    return slopes[rows]
+    if levels.blocks[0].spins.rotor.moments is not None:
+        from rotor.quantum.spins.species_slopes import derivatives_of_species
 
-
-def slopes_of_species(block: SolvedBlock, slopes_of_mixtures: Callable[[Mixtures], Floats]) -> Floats:
-    """Derivatives (n, coefficients) by coefficients of the torsion-rotation: those of mixtures, summed over the coupling patterns."""
-    n, by_patterns = len(block.energies_mhz), dict[int, list[tuple[SolvedBlock, NDArray[Any]]]]()
-    for part in block.spins.parts:
-        mixed = block.vectors[part.place].reshape(part.repeats, -1, n).swapaxes(0, 1)
-        by_patterns.setdefault(part.patterns.start, []).append((part.rotor, mixed.reshape(-1, part.repeats * n)))
-    each = (slopes_of_mixtures(mixtures) for mixtures in by_patterns.values())
-    return np.asarray(sum(slopes.reshape(-1, n, slopes.shape[1]).sum(axis=0) for slopes in each))
-
-
-def slopes_of_blocks(tables: FunctionTables, blocks: Sequence[SolvedBlock], count: int) -> Floats:
-    """Derivatives (states, count) of the states of blocks by the `count` parameters of tables."""
-    number = blocks[-1].start + len(blocks[-1].energies_mhz)
-    out = np.zeros((number + 1, count))  # the last row takes the padding
-    for states in groups_of_blocks(blocks, number):
+        return derivatives_of_species(top, levels, names)[rows]
+    tables = function_tables(top, levels.effects, names, levels.blocks[0].spins.shared)
+    out = np.zeros((len(levels) + 1, len(names)))  # the last row takes the padding
+    for states in groups_of_blocks(levels.blocks, len(levels)):
         group, sizes = states.group, [len(block.vectors) for block in states.blocks]
         for run in runs_of_similar_size(sizes, _LIKE, _SMALL, _PADDED):
             places = np.arange(run.start, run.stop)
             at, vectors = states.in_group[places], states.vectors(places)
             over_functions = tables.over_functions(group, at, vectors)
-            total = np.zeros((len(places), vectors.shape[3], count))
+            total = np.zeros((len(places), vectors.shape[3], len(names)))
             for acting in tables.acting(group, at):
                 total[:, :, acting.unit.parameters] += acting.twice * _slopes(acting, over_functions)
             out[states.rows[run, : vectors.shape[3]]] = total
-    return out[:-1]
+    return np.asarray(out[:-1][rows])
 
 
-def _slopes(acting: Acting, vectors: Sequence[NDArray[Any]]) -> Floats:
+def _slopes(acting: Acting, vectors: Sequence[Floats]) -> Floats:
     """Σ_p'r'pr V_p'r' c(p', p) X_c(r', r) V_pr of acting elements, (blocks, n, parameters)."""
     bra, ket = vectors[acting.left], vectors[acting.right]
     blocks, _, functions, n = ket.shape
     moved = np.matmul(acting.coefficients, ket.reshape(blocks, -1, functions * n)).reshape(blocks, -1, functions, n)
-    weights = bra.conj()[:, :, acting.unit.rows]
+    weights = bra[:, :, acting.unit.rows]
     weights *= moved[:, :, acting.unit.columns]
     total = weights[:, 0] if weights.shape[1] == 1 else weights.sum(axis=1)
-    return np.asarray(np.matmul(total.transpose(0, 2, 1), acting.values).real)
+    return np.asarray(np.matmul(total.transpose(0, 2, 1), acting.values))
 
 
 def linear_blocks_of_spins(
