@@ -30,7 +30,6 @@ from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.solvers.dominated import dominated_states, is_dominated
 from rotor.quantum.solvers.hermitian import eigenstates, eigenvalues
 
-
 _AT_ONCE = 1 << 16  # numbers computed at a time, so that they stay in the cache of a core
 
 

@@ -19,13 +19,19 @@ from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.exchange import SpinCounts
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
-from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION, spin_operator, turned_components
+from rotor.quantum.internal_rotation.rho_axis_tensors import (
+    REPRESENTATION,
+    Component,
+    components_of,
+    turned_components,
+    unit_operator,
+)
 from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_tops
 from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
 from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
-from rotor.quantum.spins.operators import CosinesWithN, Rotor
+from rotor.quantum.spins.operators import Rotor
 from rotor.quantum.tensors import Tensors
 from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants, sigma_species
@@ -36,6 +42,7 @@ if TYPE_CHECKING:
 
 TurningTops = RamModel | SeveralTops
 Columns = dict[str, NDArray[Any]]
+ByBlocks = dict[tuple[int, int], Entries]  # elements by the numbers of two blocks
 FEW = 1 << 14  # up to so many elements a dense matrix is faster than a sparse one
 MOST_POPULATED = 2  # products of three tops below the limit of a sum, of which blocks of any size are solved
 MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a whole for a sum
@@ -51,7 +58,8 @@ class TorsionMoments(SpeciesMoments):
     levels: SpeciesLevels
     model: TurningTops
     further: Elements | None = None
-    _cache: dict[Any, dict[tuple[int, int], Entries]] = field(default_factory=dict)
+    _cache: dict[tuple[complex, ...], ByBlocks] = field(default_factory=dict)
+    _units: dict[Component, tuple[ByBlocks, dict[tuple[int, int], NDArray[Any]]]] = field(default_factory=dict)
 
     @property
     def combined(self) -> bool:
@@ -68,11 +76,21 @@ class TorsionMoments(SpeciesMoments):
 
     def beside_spins(self, rotor: Rotor, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
         """Reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
-        if rotor not in self._cache:
-            operator = spin_operator(rotor, self.model.angle, self.model.has_plane)
-            self._cache[rotor] = self._entries(operator, rotor.rank, isinstance(rotor, CosinesWithN))
-        entries = self._cache[rotor].get((up.basis.number, low.basis.number))
-        return None if entries is None else _contracted(entries, up.vectors, low.vectors)
+        components = components_of(rotor, self.model.angle, self.model.has_plane)
+        units = [(value, self._unit(component, up, low)) for component, value in components.items()]
+        acting = [value * unit for value, unit in units if unit is not None]
+        return np.asarray(sum(acting)) if acting else None
+
+    def _unit(self, component: Component, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+        """Elements of a component of 1 along the axes of ρ; operators that consist of it share them."""
+        if component not in self._units:
+            entries = self._entries(unit_operator(component), component.rank, component.rank == 1)
+            self._units[component] = entries, {}
+        pair = up.basis.number, low.basis.number
+        entries, known = self._units[component]
+        if pair in entries and pair not in known:
+            known[pair] = _contracted(entries[pair], up.vectors, low.vectors)
+        return known.get(pair)
 
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of mixtures of states, by the constants of the top and of the internal rotor."""
@@ -87,7 +105,7 @@ class TorsionMoments(SpeciesMoments):
         return np.hstack([expectations(entries, vectors, count) for entries, count in self._terms])
 
     @cached_property
-    def _terms(self) -> list[tuple[dict[tuple[int, int], Entries], int]]:
+    def _terms(self) -> list[tuple[ByBlocks, int]]:
         """Elements of the terms, and of further operators, by pairs of blocks, and the number of operators."""
         operators = [self.levels.source.elements, *([] if self.further is None else [self.further])]
         return [(self.levels.solved.linear.between_blocks(each), len(each.values)) for each in operators]
@@ -107,7 +125,7 @@ class TorsionMoments(SpeciesMoments):
             self._cache[components] = self._entries(body_tensor(turned), body.rank)
         return self._cache[components]
 
-    def _entries(self, operator: Operator, rank: int, time_odd: bool = False) -> dict[tuple[int, int], Entries]:
+    def _entries(self, operator: Operator, rank: int, time_odd: bool = False) -> ByBlocks:
         """Reduced elements of a tensor of the rotation from J to J' ≥ J by pairs of blocks."""
         elements = self.levels.functions.elements([[Product(operator)]], rank, time_odd, half=True)
         return self.levels.solved.linear.between_blocks(elements)

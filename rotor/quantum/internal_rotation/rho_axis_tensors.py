@@ -8,8 +8,7 @@ axes, from which ρ lies at an angle, in the PAM. The torsional functions multip
 
 from __future__ import annotations
 
-from functools import reduce
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,29 +53,33 @@ def turned_components(components: NDArray[Any], angle: float) -> NDArray[Any]:
     return _real(components)
 
 
-def spin_operator(rotor: Rotor, angle: float, has_plane: bool) -> Operator:
-    """The operator of the rotation that closes with a spin: T²(c), or Σ_gh c_gh ½{Φ_g, N_h}.
+class Component(NamedTuple):
+    """A component along two axes (0, 1, 2 for a, b, c): T²_gh (rank 2) or ½{Φ_g, N_h} (rank 1)."""
 
-    has_plane: without the elements that a mirror ab excludes.
-    """
+    rank: int
+    g: int
+    h: int
+
+
+def components_of(rotor: Rotor, angle: float, has_plane: bool) -> dict[Component, float]:
+    """T²(c) or Σ_gh c_gh ½{Φ_g, N_h} by components along the axes of ρ; has_plane: without those that a mirror ab excludes."""
     assert isinstance(rotor, Cosines | CosinesWithN)
     matrix = turned_by(np.array(rotor.components, dtype=float), angle)
     if has_plane:
         matrix[:2, 2] = matrix[2, :2] = 0.0
-    if isinstance(rotor, CosinesWithN):
-        return _cosines_with_n(matrix)
+    if isinstance(rotor, Cosines):  # symmetric; the sum of aa, bb and cc is 0
+        matrix = np.triu(matrix + matrix.T) - np.diag(np.diag(matrix) + matrix[2, 2])
+    return {Component(rotor.rank, g, h): float(matrix[g, h]) for g, h in np.argwhere(matrix).tolist()}
+
+
+def unit_operator(component: Component) -> Operator:
+    """The operator of the rotation of a component of 1."""
+    rank, g, h = component
+    unit, along = np.eye(3), (j_z(), j_x(), j_y())
+    if rank == 1:
+        return half_anticommutator(body_tensor(_real(spherical_components(unit[g], 1, REPRESENTATION))), along[h])
+    matrix = (np.outer(unit[g], unit[h]) + np.outer(unit[h], unit[g])) / 2
     return body_tensor(_real(spherical_components(matrix, 2, REPRESENTATION)))
-
-
-def _cosines_with_n(matrix: Floats) -> Operator:
-    """Σ_gh c_gh ½{Φ_g, N_h} along a, b, c."""
-    along, unit = (j_z(), j_x(), j_y()), np.eye(3)
-    terms = [
-        float(matrix[i, k])
-        * half_anticommutator(body_tensor(_real(spherical_components(unit[i], 1, REPRESENTATION))), along[k])
-        for i, k in zip(*np.nonzero(matrix), strict=True)
-    ]
-    return reduce(lambda x, y: x + y, terms, Operator())
 
 
 def _real(components: NDArray[Any]) -> NDArray[Any]:

@@ -4,7 +4,8 @@ States r of a species take the place of functions: for a constant of a spin,
 
     ∂E/∂c = Σ c(p', p) v*_r'p' ⟨r'‖X_c‖r⟩ v_rp,
 
-of many blocks at once (`many_f`); for a coefficient of the torsion-rotation the species derives the mixtures Σ_r v_rp |r⟩ of its states, summed over p.
+of many blocks at once (`many_f`); for a coefficient of the torsion-rotation the species derives mixtures Σ_r v_rp |r⟩ of its states, and
+sums over p.
 """
 
 from __future__ import annotations
