@@ -88,8 +88,9 @@ class Spins:
         """Derivatives of the terms by each constant, and by the angle of ρ, with which all tensors turn."""
         names = dict.fromkeys(term.name for term in self.terms)
         out: dict[str, Terms] = {name: [(t.factor, t) for t in self.terms if t.name == name] for name in names}
-        turning = [(value, replace(term, rotor=slope_by_angle(term.rotor))) for value, term in self.valued(values)]
-        return out | ({ANGLE: turning} if by_angle else {})
+        if by_angle:
+            out[ANGLE] = [(value, replace(t, rotor=slope_by_angle(t.rotor))) for value, t in self.valued(values)]
+        return out
 
 
 @dataclass(frozen=True, eq=False)

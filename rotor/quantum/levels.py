@@ -58,8 +58,8 @@ class SpeciesMoments(ABC):
         """Reduced elements (n_up, n_low) of one component; those of odd rank without their factor i where functions are `combined`."""
 
     @abstractmethod
-    def beside_spins(self, rotor: Rotor, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
-        """Reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
+    def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
+        """The function of the reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
 
     @abstractmethod
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -52,14 +52,15 @@ MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a who
 class TorsionMoments(SpeciesMoments):
     """Operators of one species; elements between functions are computed at first use.
 
-    further: operators by which levels are derived besides the terms of the Hamiltonian.
+    further: operators by which levels are derived besides the terms of the Hamiltonian. _units: elements between states of components of 1
+    along the axes of ρ, which operators beside spins share.
     """
 
     levels: SpeciesLevels
     model: TurningTops
     further: Elements | None = None
     _cache: dict[tuple[complex, ...], ByBlocks] = field(default_factory=dict)
-    _units: dict[Component, tuple[ByBlocks, dict[tuple[int, int], NDArray[Any]]]] = field(default_factory=dict)
+    _units: dict[Component, dict[tuple[int, int], NDArray[Any] | None]] = field(default_factory=dict)
 
     @property
     def combined(self) -> bool:
@@ -74,23 +75,26 @@ class TorsionMoments(SpeciesMoments):
         """Reduced elements (n_up, n_low) of a tensor."""
         return _contracted(self._between(tensors)[up.basis.number, low.basis.number], up.vectors, low.vectors)
 
-    def beside_spins(self, rotor: Rotor, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
-        """Reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
+    def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
+        """The function of the reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
         components = components_of(rotor, self.model.angle, self.model.has_plane)
-        units = [(value, self._unit(component, up, low)) for component, value in components.items()]
-        acting = [value * unit for value, unit in units if unit is not None]
-        return np.asarray(sum(acting)) if acting else None
+        entries = dict[Component, ByBlocks]()  # large; not needed again where units are known
 
-    def _unit(self, component: Component, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
-        """Elements of a component of 1 along the axes of ρ; operators that consist of it share them."""
-        if component not in self._units:
-            entries = self._entries(unit_operator(component), component.rank, component.rank == 1)
-            self._units[component] = entries, {}
-        pair = up.basis.number, low.basis.number
-        entries, known = self._units[component]
-        if pair in entries and pair not in known:
-            known[pair] = _contracted(entries[pair], up.vectors, low.vectors)
-        return known.get(pair)
+        def unit(component: Component, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+            known, pair = self._units.setdefault(component, {}), (up.basis.number, low.basis.number)
+            if pair not in known:
+                if component not in entries:
+                    entries[component] = self._entries(unit_operator(component), component.rank, component.rank == 1)
+                acting = entries[component].get(pair)
+                known[pair] = None if acting is None else _contracted(acting, up.vectors, low.vectors)
+            return known[pair]
+
+        def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+            units = [(value, unit(component, up, low)) for component, value in components.items()]
+            acting = [value * matrix for value, matrix in units if matrix is not None]
+            return np.asarray(sum(acting)) if acting else None
+
+        return between
 
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of mixtures of states, by the constants of the top and of the internal rotor."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
-from rotor.quantum.levels import SolvedBlock
+from rotor.quantum.levels import SolvedBlock, SpeciesMoments
 from rotor.quantum.spins.operators import Rotor
 from rotor.quantum.spins.rotor import Piece, acts
 from rotor.quantum.spins.stack_elements import Pairs, Section, rotor_elements, tensor_elements_of_pairs
@@ -63,6 +63,10 @@ class Stack(NamedTuple):
 
 Element = tuple[Section, Section, Floats]
 """Elements (pairs, functions', functions) between two sections."""
+
+
+BetweenStates = Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]
+"""Elements between the states of two blocks, None where there are none."""
 
 
 class Contracted(NamedTuple):
@@ -160,7 +164,7 @@ def operators_of_stacks(
     """
     between = [[piece for piece in pieces if piece.bra != piece.ket] for pieces in operators]
     if stacks[0].is_species:
-        return [list(_between_species(stacks, reach, partial(_sum_of_pieces, pieces))) for pieces in operators]
+        return [list(_between_species(stacks, reach, partial(_pieces_of_species, pieces))) for pieces in operators]
     out: list[list[Contracted]] = [[] for _ in operators]
     for up, low, pairs in _near(stacks, reach):
         forward, back = _Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)
@@ -201,12 +205,14 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contrac
 
 
 def _between_species(
-    stacks: Sequence[Stack], reach: int, between: Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]
+    stacks: Sequence[Stack], reach: int, operator: Callable[[SpeciesMoments], BetweenStates]
 ) -> Iterator[Contracted]:
     """Elements between states of species whose N differ by at most `reach`, each pair of blocks once, the higher number first."""
     for up, low, pairs in _near(stacks, reach):
-        if up.blocks[0].moments is not low.blocks[0].moments:
+        moments = up.blocks[0].moments
+        if moments is None or moments is not low.blocks[0].moments:
             continue
+        between = operator(moments)
         each = [
             between(up.blocks[a], low.blocks[b]) for a, b in zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)
         ]
@@ -219,20 +225,25 @@ def _between_species(
             yield Contracted(up, low, pairs, matrices)
 
 
-def _sum_of_pieces(pieces: Sequence[Piece], up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+def _pieces_of_species(pieces: Sequence[Piece], moments: SpeciesMoments) -> BetweenStates:
     """Elements of a sum of pieces between states of a species."""
-    assert up.moments is not None
-    elements = [(piece.value, up.moments.beside_spins(piece.rotor, up, low)) for piece in pieces]
-    acting = [value * block for value, block in elements if block is not None]
-    return np.asarray(sum(acting)) if acting else None
+    operators = [(piece.value, moments.beside_spins(piece.rotor)) for piece in pieces]
+
+    def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+        acting = [value * block for value, of_piece in operators if (block := of_piece(up, low)) is not None]
+        return np.asarray(sum(acting)) if acting else None
+
+    return between
 
 
-def _tensor_of_species(tensors: Tensors, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+def _tensor_of_species(tensors: Tensors, moments: SpeciesMoments) -> BetweenStates:
     """Elements of a tensor between states of a species, times the root of their number of components."""
-    assert up.moments is not None
-    if not up.moments.connect(up, low, tensors):
-        return None
-    return np.asarray(np.sqrt(up.components) * up.moments.reduced(up, low, tensors))
+
+    def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
+        acts = moments.connect(up, low, tensors)
+        return np.asarray(np.sqrt(up.components) * moments.reduced(up, low, tensors)) if acts else None
+
+    return between
 
 
 def acting_numbers(contracted: Sequence[Contracted]) -> Ints:

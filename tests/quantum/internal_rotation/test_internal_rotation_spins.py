@@ -1,5 +1,7 @@
 """Internal rotation with a nuclear spin, against the direct product |J K M⟩|m⟩|I M_I⟩ written out here."""
 
+from collections import defaultdict
+
 import numpy as np
 import pytest
 import qutip
@@ -10,8 +12,10 @@ from rotor.quantum.internal_rotation.hyperfine import coupled_blocks
 from rotor.quantum.internal_rotation.levels import TorsionMoments, blocks_of_species
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.levels import placed
+from rotor.quantum.reduced import connections
 from rotor.quantum.spins.operators import Cosines, CosinesWithN
 from rotor.quantum.spins.scheme import Scheme, Spin, SpinTerm
+from rotor.quantum.tensors import BodyTensor, spherical_components
 from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = rotor.units.MHZ_PER_CM
@@ -149,6 +153,36 @@ def test_without_coupling_to_the_rotation_both_species_have_the_hyperfine_struct
             np.sort(found[1]), np.sort(known[1]), rtol=1e-4, atol=1e-6
         )  # levels a few Hz apart mix by rounding
         assert sorted(map(tuple, found[2].tolist())) == sorted(map(tuple, known[2].tolist()))
+
+
+def strengths(levels, name, tensor):
+    """Sums of squares of reduced elements by pairs of torsion-rotation levels."""
+    keys = list(zip(*(levels.quanta[key].tolist() for key in ("species", "vt", name, "ka", "kc")), strict=True))
+    pairs, between = connections(levels.blocks, {(0, 0): tensor})
+    sums = defaultdict(float)
+    for up, low in pairs:
+        for (i, k), element in np.ndenumerate(between(up, low)):
+            first, second = keys[up.start + i], keys[low.start + k]
+            if first == second:
+                copies = 1 if up is low else 2
+            else:
+                copies = 0.5 if up is low else 1
+            sums[min(first, second), max(first, second)] += copies * abs(element) ** 2
+    return sums
+
+
+@pytest.mark.parametrize("body", [[1.5, 0.8, 0.0], [[3.0, 0.7, 0.0], [0.7, -1.0, 0.0], [0.0, 0.0, -2.0]]])
+def test_a_spin_without_coupling_leaves_the_sum_of_strengths_of_a_vector_and_of_a_matrix(body):
+    body = np.array(body)
+    tensor = BodyTensor(body.ndim, tuple(spherical_components(body, body.ndim, "Ir").tolist()))
+    top = turning_top("chi_aa(14N)=1e-3 chi_bb-cc(14N)=2e-4 MHz")
+    plain, beside = (
+        rotor.api.solve_levels(top, 2, effects=rotor.api.effects_of(top, spins)) for spins in (False, True)
+    )
+    expected, found = strengths(plain, "j", tensor), strengths(beside, "n", tensor)
+    strong = [pair for pair, strength in expected.items() if strength > 1e-6 * max(expected.values())]
+    assert len(strong) > 20
+    assert [found[pair] for pair in strong] == pytest.approx([3 * expected[pair] for pair in strong], rel=1e-8)
 
 
 def test_what_is_not_computed_beside_internal_rotation_is_refused():
