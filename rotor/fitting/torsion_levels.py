@@ -27,8 +27,8 @@ from rotor.quantum.internal_rotation.hyperfine import (
 from rotor.quantum.internal_rotation.levels import (
     TorsionMoments,
     TurningTops,
-    blocks_of_species,
     species_blocks,
+    species_rotors,
     turning_model,
 )
 from rotor.quantum.internal_rotation.model import RamModel
@@ -172,7 +172,7 @@ def _with_spins(
         refuse_across_plane(terms)
     quanta = moments.levels.quanta
     names = np.column_stack([np.arange(len(quanta["vt"])), quanta["ka"], quanta["kc"]])
-    free = placed(blocks_of_species(moments, 1))
+    free = placed(species_rotors(moments, 1))
     blocks = list(placed(coupled_blocks(free, names, spins.scheme, terms, part.twice_f.tolist())))
     labels = np.concatenate([block.labels for block in blocks])
     keys = [quanta["j"][labels[:, 0]], quanta["vt"][labels[:, 0]], labels[:, 1:3], labels[:, 4:]]
@@ -182,7 +182,7 @@ def _with_spins(
     chosen = list(placed(_states_at(blocks, needed)))
     channels = [channels_of(of_parameter, spins.scheme) for of_parameter in derivatives.values()]
     by_spins = slopes_by_spins(chosen, channels)
-    direct = [slopes_by_rotation(block, moments.slopes_of_terms) for block in chosen]
+    direct = [slopes_by_rotation(block, moments.term_slopes) for block in chosen]
     energies = np.concatenate([block.energies_mhz for block in chosen])
     slopes = dict(zip(derivatives, by_spins[places].T, strict=True))
     return energies[places], np.concatenate(direct)[places], slopes

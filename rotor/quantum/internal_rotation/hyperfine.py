@@ -31,7 +31,7 @@ from rotor.quantum.internal_rotation.levels import (
 from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION, leaves_plane
 from rotor.quantum.internal_rotation.several_tops import SeveralTops
 from rotor.quantum.levels import Levels, SolvedBlock, placed
-from rotor.quantum.spins.blocks import plan_of_rotor
+from rotor.quantum.spins.blocks import rotor_plan
 from rotor.quantum.spins.levels import within_n
 from rotor.quantum.spins.operators import Cosines, CosinesWithN
 from rotor.quantum.spins.rotor import Terms, valued_terms
@@ -89,7 +89,7 @@ def coupled_blocks(
         states = range(len(block.energies_mhz))
         parts = tuple(Part(0, block.basis, i, names[block.start + i : block.start + i + 1]) for i in states)
         rotors.append(replace(block, parts=parts))
-    solved = solved_blocks(plan_of_rotor(rotors, REPRESENTATION, scheme, terms), all_f)
+    solved = solved_blocks(rotor_plan(rotors, REPRESENTATION, scheme, terms), all_f)
     solved.sort(key=lambda block: (min(part.rotor.start for part in block.spins.parts), block.twice_total))
     return [replace(block, components=block.spins.rotor.components) for block in solved]
 

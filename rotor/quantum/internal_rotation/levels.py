@@ -22,7 +22,7 @@ from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_a
 from rotor.quantum.internal_rotation.rho_axis_tensors import (
     REPRESENTATION,
     Component,
-    components_of,
+    tensor_components,
     turned_components,
     unit_operator,
 )
@@ -77,7 +77,7 @@ class TorsionMoments(SpeciesMoments):
 
     def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
         """The function of the reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
-        components = components_of(rotor, self.model.angle, self.model.has_plane)
+        components = tensor_components(rotor, self.model.angle, self.model.has_plane)
         entries = dict[Component, ByBlocks]()  # large; not needed again where units are known
 
         def unit(component: Component, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
@@ -99,11 +99,11 @@ class TorsionMoments(SpeciesMoments):
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of mixtures of states, by the constants of the top and of the internal rotor."""
         constants = list(self.model.values)
-        slopes = self.slopes_of_terms(mixtures) @ self.model.jacobian
+        slopes = self.term_slopes(mixtures) @ self.model.jacobian
         none = np.zeros(len(slopes))
         return np.column_stack([slopes[:, constants.index(name)] if name in constants else none for name in names])
 
-    def slopes_of_terms(self, mixtures: Mixtures) -> Floats:
+    def term_slopes(self, mixtures: Mixtures) -> Floats:
         """∂E/∂c (n, terms and further operators) of mixtures of states, by coefficients of the Hamiltonian."""
         vectors = {block.basis.number: np.tensordot(block.vectors, mixture, 1) for block, mixture in mixtures}
         return np.hstack([expectations(entries, vectors, count) for entries, count in self._terms])
@@ -164,7 +164,7 @@ def torsion_rotation_levels(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
         components = degeneracies.components(name)
-        blocks += blocks_of_species(TorsionMoments(species, model), components)
+        blocks += species_rotors(TorsionMoments(species, model), components)
         pieces.append(
             {
                 "species": np.full(len(species.rows), name),
@@ -347,7 +347,7 @@ class Degeneracies:
         return np.full(len(rows), weights[species] // int(np.gcd.reduce(list(weights.values()))))
 
 
-def blocks_of_species(moments: TorsionMoments, components: int) -> list[SolvedBlock]:
+def species_rotors(moments: TorsionMoments, components: int) -> list[SolvedBlock]:
     """Blocks of one species with the states that are levels, in the order of its rows."""
     species, blocks, kinds = moments.levels, list[SolvedBlock](), Counter[int]()
     linear = species.solved.linear

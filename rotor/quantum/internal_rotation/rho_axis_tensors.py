@@ -61,7 +61,7 @@ class Component(NamedTuple):
     h: int
 
 
-def components_of(rotor: Rotor, angle: float, has_plane: bool) -> dict[Component, float]:
+def tensor_components(rotor: Rotor, angle: float, has_plane: bool) -> dict[Component, float]:
     """T²(c) or Σ_gh c_gh ½{Φ_g, N_h} by components along the axes of ρ; has_plane: without those that a mirror ab excludes."""
     assert isinstance(rotor, Cosines | CosinesWithN)
     matrix = turned_by(np.array(rotor.components, dtype=float), angle)

@@ -221,10 +221,10 @@ def contracted_plan(
     without_internal_rotation(top, "levels with spins in a field")
     terms = valued_terms(top, effects)
     blocks, representation = solved_rotor(top, effects, terms, nmin, nmax, executor, exist)
-    return plan_of_rotor(blocks, representation, scheme_of(top, effects), terms)
+    return rotor_plan(blocks, representation, scheme_of(top, effects), terms)
 
 
-def plan_of_rotor(blocks: list[SolvedBlock], representation: str, scheme: Scheme, terms: Terms) -> Plan:
+def rotor_plan(blocks: list[SolvedBlock], representation: str, scheme: Scheme, terms: Terms) -> Plan:
     """Contract each channel to the eigenstates of a solved rotation, whose N rise."""
     channels = channels_of(terms, scheme)
     hamiltonians = list[Floats]()

@@ -97,7 +97,7 @@ def stacks_of(blocks: Sequence[SolvedBlock], contract: bool = True) -> list[Stac
         sizes = [len(blocks[number].energies_mhz) for number in rising.tolist()]
         whole = not contract or blocks[members[0]].moments is not None  # tables of species have one size anyway
         runs = [slice(None)] if whole else runs_of_similar_size(sizes, _LIKE, _SMALL)
-        make = _stack if isinstance(blocks[members[0]].basis, WangBlock) else _stack_of_states
+        make = _stack if isinstance(blocks[members[0]].basis, WangBlock) else _state_stack
         stacks += [make(blocks, place, rising[run], all_n[rising[run]], sizes[run], contract) for run in runs]
     return stacks
 
@@ -112,7 +112,7 @@ def _kinds(blocks: Sequence[SolvedBlock]) -> Iterator[Any]:
             yield block.parts[0].v if block.moments is None else (id(block.moments), basis.place)
 
 
-def _stack_of_states(
+def _state_stack(
     blocks: Sequence[SolvedBlock], kind: int, numbers: Ints, n: Ints, sizes: list[int], contract: bool
 ) -> Stack:
     """The stack of these blocks of |N K⟩ or of a species."""
@@ -164,7 +164,7 @@ def operators_of_stacks(
     """
     between = [[piece for piece in pieces if piece.bra != piece.ket] for pieces in operators]
     if stacks[0].is_species:
-        return [list(_between_species(stacks, reach, partial(_pieces_of_species, pieces))) for pieces in operators]
+        return [list(_between_species(stacks, reach, partial(_species_pieces, pieces))) for pieces in operators]
     out: list[list[Contracted]] = [[] for _ in operators]
     for up, low, pairs in _near(stacks, reach):
         forward, back = _Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)
@@ -188,7 +188,7 @@ def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contrac
     """
     rank = rank_of(tensors)
     if stacks[0].is_species:
-        forth = list(_between_species(stacks, rank, partial(_tensor_of_species, tensors)))
+        forth = list(_between_species(stacks, rank, partial(_species_tensor, tensors)))
         return [e.turned((-1.0) ** (e.pairs.rise + rank * e.up.blocks[0].combined)) for e in forth] + forth
     axial = stacks[0].axial
     alike = not axial and all(tensors.get((v, w), tensor) == tensor for (w, v), tensor in tensors.items())
@@ -225,7 +225,7 @@ def _between_species(
             yield Contracted(up, low, pairs, matrices)
 
 
-def _pieces_of_species(pieces: Sequence[Piece], moments: SpeciesMoments) -> BetweenStates:
+def _species_pieces(pieces: Sequence[Piece], moments: SpeciesMoments) -> BetweenStates:
     """Elements of a sum of pieces between states of a species."""
     operators = [(piece.value, moments.beside_spins(piece.rotor)) for piece in pieces]
 
@@ -236,7 +236,7 @@ def _pieces_of_species(pieces: Sequence[Piece], moments: SpeciesMoments) -> Betw
     return between
 
 
-def _tensor_of_species(tensors: Tensors, moments: SpeciesMoments) -> BetweenStates:
+def _species_tensor(tensors: Tensors, moments: SpeciesMoments) -> BetweenStates:
     """Elements of a tensor between states of a species, times the root of their number of components."""
 
     def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:

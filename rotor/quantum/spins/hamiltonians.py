@@ -19,8 +19,8 @@ from rotor.quantum.spins.many_f import (
     Tables,
     between,
     coefficients_by_f,
+    element_type,
     tables_of,
-    type_of,
     write_between,
 )
 from rotor.quantum.spins.pattern_tables import couplings_by_f
@@ -55,7 +55,7 @@ def _matrices_of_group(
     for run in group.runs():
         places, height = np.arange(run.start, run.stop), int(group.heights[run].max())
         shape = len(places), group.columns, height, group.columns, height
-        whole = space.array("whole", *shape, dtype=type_of(tables for tables, _ in acting))
+        whole = space.array("whole", *shape, dtype=element_type(tables for tables, _ in acting))
         each = (between(group, group, places, 0, *operator, frame, (height, height)) for operator in acting)
         write_between(_lower(group, chain.from_iterable(each)), whole)
         energies = np.zeros(shape[:3])

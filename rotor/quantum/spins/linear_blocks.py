@@ -261,9 +261,9 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")
     if levels.blocks[0].spins.rotor.moments is not None:
-        from rotor.quantum.spins.species_slopes import derivatives_of_species
+        from rotor.quantum.spins.species_slopes import species_derivatives
 
-        return derivatives_of_species(top, levels, names)[rows]
+        return species_derivatives(top, levels, names)[rows]
     tables = function_tables(top, levels.effects, names, levels.blocks[0].spins.shared)
     out = np.zeros((len(levels) + 1, len(names)))  # the last row takes the padding
     for states in groups_of_blocks(levels.blocks, len(levels)):

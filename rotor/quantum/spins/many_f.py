@@ -268,7 +268,7 @@ def _group(
     return Group(tuple(rotations), twice_f, twice_rows, heights[shape_of], shape_of, functions, places)
 
 
-def type_of(all_tables: Iterable[Tables]) -> Any:
+def element_type(all_tables: Iterable[Tables]) -> Any:
     """The type of elements: complex if some of them are."""
     return np.result_type(np.float64, *{table.dtype for tables in all_tables for table in tables.values()})
 

@@ -31,8 +31,8 @@ from rotor.quantum.spins.many_f import (
     are_connected,
     between,
     coefficients_by_f,
+    element_type,
     tables_of,
-    type_of,
     write_between,
 )
 from rotor.quantum.spins.pattern_tables import column_tensors, tensors_by_f
@@ -248,7 +248,7 @@ def _operator(
     if up.columns * states[0] * low.columns * states[1] >= _LARGE:  # most columns are not connected
         return partial(_by_columns, acting, space)
     shape = len(chosen), up.columns, states[0], low.columns, states[1]
-    whole = space.array("whole", *shape, dtype=type_of(tables for tables, _ in terms))
+    whole = space.array("whole", *shape, dtype=element_type(tables for tables, _ in terms))
     write_between(acting, whole)
     return partial(_by_matrices, whole)
 

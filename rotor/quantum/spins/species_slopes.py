@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _LIKE, _SMALL = 1.5, 24  # largest ratio of sizes of blocks in one array, and sizes that all share one
 
 
-def derivatives_of_species(top: Top, levels: Levels, names: Sequence[str]) -> Floats:
+def species_derivatives(top: Top, levels: Levels, names: Sequence[str]) -> Floats:
     """∂E/∂c (levels, names) of levels by constants of the spins and of the torsion-rotation."""
     scheme = levels.blocks[0].spins.shared.scheme
     slopes = slopes_by_spins(levels.blocks, parameter_channels(top, levels.effects, names, scheme))
@@ -42,13 +42,13 @@ def derivatives_of_species(top: Top, levels: Levels, names: Sequence[str]) -> Fl
     return slopes
 
 
-def slopes_by_rotation(block: SolvedBlock, slopes_of_mixtures: Callable[[Mixtures], Floats]) -> Floats:
+def slopes_by_rotation(block: SolvedBlock, mixture_slopes: Callable[[Mixtures], Floats]) -> Floats:
     """Derivatives (n, coefficients) by coefficients of the torsion-rotation: those of mixtures of the states of each N."""
     n, by_patterns = len(block.energies_mhz), dict[int, list[tuple[SolvedBlock, NDArray[Any]]]]()
     for part in block.spins.parts:
         mixture = block.vectors[part.place].reshape(part.repeats, -1, n).swapaxes(0, 1)
         by_patterns.setdefault(part.patterns.start, []).append((part.rotor, mixture))
-    return np.asarray(sum(slopes_of_mixtures(mixtures) for mixtures in by_patterns.values()))
+    return np.asarray(sum(mixture_slopes(mixtures) for mixtures in by_patterns.values()))
 
 
 def slopes_by_spins(blocks: Sequence[SolvedBlock], by_parameter: Sequence[Channels]) -> Floats:

@@ -9,7 +9,7 @@ from spherical_tensors import spherical, symbol
 
 import rotor
 from rotor.quantum.internal_rotation.hyperfine import coupled_blocks
-from rotor.quantum.internal_rotation.levels import TorsionMoments, blocks_of_species
+from rotor.quantum.internal_rotation.levels import TorsionMoments, species_rotors
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.levels import placed
 from rotor.quantum.reduced import connections
@@ -88,7 +88,7 @@ def coupled_levels(sigma, constants, chi):
     """Energies of all states, each as often as it has values of M."""
     ram = RamModel(constants)
     levels = ram.blocks(sigma, JMAX, count=2 * WAVES + 1, waves=WAVES).solve(ram.coefficients, 2 * WAVES)
-    free = list(placed(blocks_of_species(TorsionMoments(levels, ram), 1)))
+    free = list(placed(species_rotors(TorsionMoments(levels, ram), 1)))
     scheme = Scheme((Spin("14N", 2 * SPIN),))
     terms = [
         (1.0, SpinTerm("chi", ("14N", "14N"), Cosines(tuple(map(tuple, chi.tolist()))))),
