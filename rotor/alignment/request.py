@@ -54,7 +54,7 @@ def _looser(sought: Sought) -> list[float]:
     return [value for value in tolerances if value >= FINEST_TOLERANCE] or [FINEST_TOLERANCE]
 
 
-def _error_of_tolerance(_: Sought, request: AlignRequest, tolerance: float) -> Estimate:
+def _tolerance_error(_: Sought, request: AlignRequest, tolerance: float) -> Estimate:
     """The error that a run of the quantum gas finds."""
     trace = answer_align(replace(request, classical_molecules=0)).trace
     return Estimate(trace.error_estimate, trace)
@@ -71,7 +71,7 @@ TOLERANCE = Knob(
     # a given J max may be too small for a finer tolerance
     swept=lambda request, value: replace(request, jmax=None, tolerance=value),
     prepare=lambda request: replace(request, classical_molecules=0),
-    tried=_looser, error=_error_of_tolerance,
+    tried=_looser, error=_tolerance_error,
     cost=Growth(
         (1.0 / PILOT_TOLERANCE,), lambda request: 1.0 / request.tolerance, _coarser,
         prepare=lambda request: replace(request, classical_molecules=0),

@@ -79,7 +79,7 @@ def likely_decade(allowed: float) -> int:
     return min(max(round(-math.log10(allowed)), LOOSEST) + FINER, FINEST)
 
 
-def error_of_tolerance(sought: Sought, _: object, tolerance: float) -> Estimate:
+def tolerance_error(sought: Sought, _: object, tolerance: float) -> Estimate:
     """The error of the whole motion, in radians."""
     error = sought.known.setdefault("motions", Motions(sought.request)).error(tolerance)
     return Estimate(error, remark="" if error <= sought.accuracy else f": {CHAOS}")

@@ -20,7 +20,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.fitting.top_constants import DIPOLES, TopConstants
 from rotor.quantum.basis.state_elements import linear_blocks_of
-from rotor.quantum.effects.stark import dipole_derivative, map_request
+from rotor.quantum.effects.stark import StarkRequest, dipole_derivative
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.fields.block_states import BlockStates, basis_order, solve_block
 from rotor.quantum.fields.blocks import FieldBlock, FreeLevels
@@ -154,7 +154,8 @@ class StarkLevels(LevelModel):
 def _request(constants: TopConstants, labels: Ints) -> MapRequest:
     """A Stark map at the fields of the labels."""
     fields = np.unique(labels[:, -1]) * FIELD_STEP_KV_PER_CM
-    return map_request(constants.top, fields, j_highest=int(labels[:, 0].max()), tolerance_mhz=TOLERANCE_MHZ)
+    highest = int(labels[:, 0].max())
+    return StarkRequest(constants.top, tuple(fields.tolist()), j_highest=highest, tolerance_mhz=TOLERANCE_MHZ).map
 
 
 def stark_levels(constants: TopConstants, labels: Ints) -> StarkLevels:

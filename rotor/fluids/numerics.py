@@ -94,7 +94,7 @@ def _shorter_steps(sought: Sought) -> Iterator[float]:
         step = math.floor(95.0 * step) / 100.0
 
 
-def _error_of_step(_: Sought, request: FluidRequest, step_fs: float) -> Estimate:
+def _step_error(_: Sought, request: FluidRequest, step_fs: float) -> Estimate:
     """Bound of the deviation of the conserved energy, in K."""
     return Estimate(
         conserved_bound_k(request, step_fs), remark="; root mean square of the conserved energy about its mean"
@@ -216,7 +216,7 @@ STEP = Knob(
     swept=followed,
     answer=answer_followed,
     tried=_shorter_steps,
-    error=_error_of_step,
+    error=_step_error,
     coarsest=(LONGEST_STEP_FS, "longest"),
     text="a step of {:g} fs",
 )
@@ -304,7 +304,7 @@ def _short_run(request: Any, steps: int) -> Any:
     return replace(_with_setting(request, "steps", int(steps)), box=request.box.copy(), box_equilibration_ps=0.0)
 
 
-def _box_of_plan(request: Any) -> Any:
+def _planned_box(request: Any) -> Any:
     """The request with its box."""
     if request.engine != "rotor":
         raise ValueError(f"numerics.engine {request.engine}: a plan is of the engine rotor alone")
@@ -318,7 +318,7 @@ LENGTH = Knob(
         SHORT_STEPS,
         _steps,
         _short_run,
-        _box_of_plan,
+        _planned_box,
         largest=lambda request: _short_run(request, min(SETTLING_STEPS, request.settings.steps)),
     ),
 )

@@ -95,7 +95,7 @@ class Accuracy:
 
     def knobs(self, request: Any) -> list[Knob]:
         """The knobs of a request that are chosen for the accuracy."""
-        return [knob for knob in self.numerics.knobs_of(request) if self.unit in knob.units]
+        return [knob for knob in self.numerics.all_knobs(request) if self.unit in knob.units]
 
     @property
     def text(self) -> str:

@@ -206,7 +206,7 @@ class Knob:
         """Keys that exclude an accuracy."""
         return (self.key, *self.instead) if self.exclusive else ()
 
-    def value_of(self, request: Any) -> Any:
+    def present(self, request: Any) -> Any:
         """The value that a request has."""
         return getattr(request, self.attribute) if self.value is None else self.value(request)
 
@@ -221,7 +221,7 @@ class Knob:
     def sweep(self, request: Any, answer: Answering) -> Sweep:
         """The settings of this knob for a request, including the request's value."""
         plain = self.prepare(request)
-        present = self.value_of(plain)
+        present = self.present(plain)
         steps = self.steps(plain) if callable(self.steps) else self.steps
         finest = self.finest(plain) if callable(self.finest) else self.finest
         swept = self.changed if self.swept is None else self.swept

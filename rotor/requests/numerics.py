@@ -54,14 +54,14 @@ class Numerics:
     describe: Callable[[Any, Cost], Mapping[str, Any]] | None = None
     rounding: Callable[[Any], float] | None = None
 
-    def knobs_of(self, request: Any) -> Iterator[Knob]:
+    def all_knobs(self, request: Any) -> Iterator[Knob]:
         """All knobs that affect a request: those of its fields first."""
         yield from knobs_of_fields(request)
         yield from (knob for knob in self.knobs if knob.used(request))
 
     def cost(self, request: Any, run: Run) -> Cost:
         """The cost of a request by the first knob that decides on it, else that of a complete run."""
-        for knob in self.knobs_of(request):
+        for knob in self.all_knobs(request):
             if knob.cost is not None:
-                return knob.cost(request, run, knob.value_of, knob.changed)
+                return knob.cost(request, run, knob.present, knob.changed)
         return complete_cost(request, run)

@@ -134,7 +134,7 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
     verb, choice = calculation.verb, calculation.choice
     request = calculation.request if choice is None else choice.request
     numerics = verb.load_numerics()
-    knobs = [(knob, knob.reason(request)) for knob in numerics.knobs_of(request)]
+    knobs = [(knob, knob.reason(request)) for knob in numerics.all_knobs(request)]
     prepared = numerics.prepare(request)
     sweeps = [
         knob.sweep(prepared if knob.field is None else request, verb.compute) for knob, why in knobs if why is None

@@ -74,7 +74,7 @@ def _enough_molecules(sought: Sought) -> list[int]:
     return [min(max(math.ceil((deviation / sought.accuracy) ** 2), 2), MOST_MOLECULES)]
 
 
-def _error_of_molecules(sought: Sought, request: Any, count: int) -> Estimate:
+def _count_error(sought: Sought, request: Any, count: int) -> Estimate:
     error = sought.known["deviation"] / math.sqrt(count)
     return Estimate(error, remark=f", at a confidence of {request.confidence:g}")
 
@@ -170,7 +170,7 @@ def _molecules(**more: Any) -> Knob:
         change=with_whole,
         label="{:.0f}".format,
         tried=_enough_molecules,
-        error=_error_of_molecules,
+        error=_count_error,
         text="{} molecules",
         stated=True,
         cost=Growth(SHORT_GAS, memory=_held),

@@ -62,16 +62,10 @@ def stark_map(
     top: Top,
     fields_kv_per_cm: ArrayLike,
     *,
-    j_highest: int = 2,
-    m_values: Sequence[float] | None = None,
-    intensity_w_per_cm2: float = 0.0,
-    direction: Sequence[float] = Z,
     effects: Sequence[QuantumEffect] = (),
-    jmax: int | None = None,
     tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
-    diabatic_gap_mhz: float | None = None,
-    most_at_edge: float = MOST_AT_EDGE,
     executor: Executor | None = None,
+    **settings: Any,
 ) -> FieldMap:
     """Energies, effective dipoles and cosines of a top against a static field.
 
@@ -81,32 +75,21 @@ def stark_map(
         Top with `dipole_abc_debye`, and with `polarizability_abc_angstrom3` for light.
     fields_kv_per_cm : (n,)
         Field strengths; the map has each once, in rising order.
-    j_highest : int
-        Highest J of the free levels in the map.
-    m_values : sequence of numbers, optional
-        |M|; by default 0 ... `j_highest`. With spins it is |M_F|, a multiple of ½.
-    intensity_w_per_cm2 : float
-        Intensity of a laser far from resonance, polarized along Z.
-    direction : (3,)
-        Direction of the static field, of any length; at an angle with Z it mixes M, and the column m is -1.
     effects : sequence of QuantumEffect
         Effects of a top with spins, the semi-rigid ones included; states are then |F M_F⟩.
-    jmax : int, optional
-        Highest J of the basis; by default what the tolerance needs.
     tolerance_mhz : float
         Largest truncation error of an energy.
-    diabatic_gap_mhz : float, optional
-        Avoided crossings with a smaller gap are passed diabatically in the column `diabatic_label`.
-    most_at_edge : float
-        Largest population of a state in the two highest J of the basis.
     executor : Executor, optional
         Solves blocks in parallel.
+    **settings
+        Further fields of a `StarkRequest`: `j_highest`, `m_values`, `intensity_w_per_cm2`, `direction` (of any length), `jmax`,
+        `diabatic_gap_mhz` and `most_at_edge`.
 
     Returns
     -------
     FieldMap
-        Columns field_kv_per_cm, m, rank, energy_mhz, label, mu_eff_debye, costheta (with the field), cos2theta (with Z), block,
-        edge_population, copies.
+        Columns field_kv_per_cm, m (-1 where M is mixed), rank, energy_mhz, label, mu_eff_debye, costheta (with the field), cos2theta
+        (with Z), block, edge_population, copies; with a gap `diabatic_label`.
 
     Raises
     ------
@@ -117,63 +100,9 @@ def stark_map(
     -----
     Neglected: the polarizability in the static field (0.5 Δα E², below 1e-3 of the dipole's part), hyperfine coupling.
     """
-    request = map_request(
-        top,
-        fields_kv_per_cm,
-        j_highest=j_highest,
-        m_values=m_values,
-        intensity_w_per_cm2=intensity_w_per_cm2,
-        direction=direction,
-        effects=effects,
-        tolerance_mhz=tolerance_mhz,
-        diabatic_gap_mhz=diabatic_gap_mhz,
-        most_at_edge=most_at_edge,
-    )
-    return field_map(request, jmax, executor)
-
-
-def map_request(
-    top: Top,
-    fields_kv_per_cm: ArrayLike,
-    *,
-    j_highest: int,
-    m_values: Sequence[float] | None = None,
-    intensity_w_per_cm2: float = 0.0,
-    direction: Sequence[float] = Z,
-    effects: Sequence[QuantumEffect] = (),
-    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
-    diabatic_gap_mhz: float | None = None,
-    most_at_edge: float = MOST_AT_EDGE,
-) -> MapRequest:
-    """The Hamiltonian, fields and states of a map, from the parameters of `stark_map`, with its errors.
-
-    ValueError also for `m_values` with a field at an angle with Z.
-    """
-    unit = checked_direction(direction)
-    dipole, light = acting(top, intensity_w_per_cm2, unit, effects)
-    tilted = not dipole.along_z
-    if tilted and m_values is not None:
-        raise ValueError("a field at an angle with Z mixes M: its states have no M to choose; leave m_values out")
-    terms = [FieldTerm(1, -units.MHZ_PER_DEBYE_KV_PER_CM, dipole)]
-    if light is not None:
-        terms.append(FieldTerm(0, -MHZ_ANGSTROM3_W_PER_CM2 * intensity_w_per_cm2, light))
-    axis = np.eye(3)[figure_axis(top)]
-    cosines = {"costheta": Contraction(axis, unit), "cos2theta": Contraction(np.outer(axis, axis), np.outer(Z, Z))}
-    if top.internal_rotation is not None and any(effect.spins(top) for effect in effects):
-        del cosines["cos2theta"]  # no elements of rank 2 with spins and internal rotation
-    return MapRequest(
-        top=top,
-        effects=tuple(effects),
-        terms=tuple(terms),
-        observables=cosines,
-        kind=ELECTRIC,
-        fields=ELECTRIC.checked(fields_kv_per_cm),
-        j_highest=checked_j(j_highest),
-        m_values=(0,) if tilted else projections(top, effects, m_values, j_highest),
-        tolerance_mhz=tolerance_mhz,
-        diabatic_gap_mhz=diabatic_gap_mhz,
-        most_at_edge=most_at_edge,
-    )
+    fields = tuple(ELECTRIC.checked(fields_kv_per_cm).tolist())
+    request = StarkRequest(top, fields, tolerance_mhz=tolerance_mhz, hamiltonian=tuple(effects), **settings)
+    return answer_stark(request, executor).states
 
 
 def projections(
@@ -282,6 +211,7 @@ class StarkRequest:
     intensity_w_per_cm2: of a laser along Z. direction: of the field. jmax: highest J of the basis; None for what tolerance_mhz needs.
     diabatic_gap_mhz: None for no diabatic labels. hyperfine: include the spins of the top's constants; m_values are then |M_F|.
     most_at_edge: largest population of a state in the two highest J of the basis; the error of cosines is about as large.
+    hamiltonian: effects of a top with spins, instead of those that hyperfine means.
     """
 
     top: Top
@@ -311,6 +241,7 @@ class StarkRequest:
     )  # fmt: skip
     hyperfine: bool = spins_field()
     most_at_edge: float = MOST_AT_EDGE
+    hamiltonian: tuple[QuantumEffect, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -325,24 +256,35 @@ class StarkRequest:
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
         """Effects with spins if these are requested; empty for the default Hamiltonian."""
-        return effects_of(self.top, True) if self.hyperfine else ()
+        return effects_of(self.top, True) if self.hyperfine else self.hamiltonian
 
     @property
     def tilted(self) -> bool:
         """Whether the field is at an angle with Z."""
-        return bool(self.direction[0] or self.direction[1])
+        x, y, _ = checked_direction(self.direction)
+        return bool(x or y)
 
     @property
     def map(self) -> MapRequest:
         """Hamiltonian, fields and states of the map."""
-        return map_request(
-            self.top,
-            self.fields_kv_per_cm,
+        top, effects, unit = self.top, self.effects, checked_direction(self.direction)
+        dipole, light = acting(top, self.intensity_w_per_cm2, unit, effects)
+        terms = [FieldTerm(1, -units.MHZ_PER_DEBYE_KV_PER_CM, dipole)]
+        if light is not None:
+            terms.append(FieldTerm(0, -MHZ_ANGSTROM3_W_PER_CM2 * self.intensity_w_per_cm2, light))
+        axis = np.eye(3)[figure_axis(top)]
+        cosines = {"costheta": Contraction(axis, unit), "cos2theta": Contraction(np.outer(axis, axis), np.outer(Z, Z))}
+        if top.internal_rotation is not None and any(effect.spins(top) for effect in effects):
+            del cosines["cos2theta"]  # no elements of rank 2 with spins and internal rotation
+        return MapRequest(
+            top=top,
+            effects=effects,
+            terms=tuple(terms),
+            observables=cosines,
+            kind=ELECTRIC,
+            fields=ELECTRIC.checked(self.fields_kv_per_cm),
             j_highest=self.j_highest,
-            m_values=self.m_values,
-            intensity_w_per_cm2=self.intensity_w_per_cm2,
-            direction=self.direction,
-            effects=self.effects,
+            m_values=(0,) if self.tilted else projections(top, effects, self.m_values, self.j_highest),
             tolerance_mhz=self.tolerance_mhz,
             diabatic_gap_mhz=self.diabatic_gap_mhz,
             most_at_edge=self.most_at_edge,

@@ -57,13 +57,9 @@ def zeeman_map(
     fields_tesla: ArrayLike,
     g: ArrayLike,
     *,
-    magnetisability: ArrayLike | None = None,
-    effects: Sequence[QuantumEffect] = (),
-    nuclear_g: Mapping[str, float] | None = None,
-    j_highest: int = 2,
     jmax: int | None = None,
-    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
     executor: Executor | None = None,
+    **settings: Any,
 ) -> FieldMap:
     """Energies of a top against a magnetic field along Z.
 
@@ -75,20 +71,12 @@ def zeeman_map(
         Field strengths; the map has each once, in rising order.
     g : float, (3,) or (3, 3)
         Rotational g tensor along a, b, c; one number or three for a linear top, whose g_aa has no effect.
-    magnetisability : (3,) or (3, 3), optional
-        χ along a, b, c in 1e-6 erg/(G² mol), with its sign (diamagnetic: negative).
-    effects : sequence of QuantumEffect
-        Effects of a linear or asymmetric top with spins, the semi-rigid ones included; states are then |F M_F⟩.
-    nuclear_g : mapping, optional
-        g = μ/(μ_N I) of nuclei by the names of their spins; other nuclei do not interact with the field.
-    j_highest : int
-        Highest J of the free levels in the map.
     jmax : int, optional
         Highest J of the basis; by default what the tolerance needs.
-    tolerance_mhz : float
-        Largest truncation error of an energy.
     executor : Executor, optional
         Solves blocks in parallel.
+    **settings
+        `magnetisability`, `effects`, `nuclear_g`, `j_highest` and `tolerance_mhz`, see `magnetic_map_request`.
 
     Returns
     -------
@@ -109,17 +97,7 @@ def zeeman_map(
     >>> (states.energy_mhz[rows] - 12000).round(4).tolist()  # 0.03 μ_N B
     [0.0, 0.2287]
     """
-    request = magnetic_map_request(
-        top,
-        fields_tesla,
-        g,
-        magnetisability=magnetisability,
-        effects=effects,
-        nuclear_g=nuclear_g,
-        j_highest=j_highest,
-        tolerance_mhz=tolerance_mhz,
-    )
-    return field_map(request, jmax, executor)
+    return field_map(magnetic_map_request(top, fields_tesla, g, **settings), jmax, executor)
 
 
 def magnetic_map_request(
@@ -127,13 +105,19 @@ def magnetic_map_request(
     fields_tesla: ArrayLike,
     g: ArrayLike,
     *,
-    magnetisability: ArrayLike | None,
-    effects: Sequence[QuantumEffect],
-    nuclear_g: Mapping[str, float] | None,
-    j_highest: int,
-    tolerance_mhz: float,
+    magnetisability: ArrayLike | None = None,
+    effects: Sequence[QuantumEffect] = (),
+    nuclear_g: Mapping[str, float] | None = None,
+    j_highest: int = 2,
+    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
 ) -> MapRequest:
-    """The Hamiltonian, fields and states of a map, from the parameters of `zeeman_map`, with its errors."""
+    """The Hamiltonian, fields and states of a map, with the errors of `zeeman_map`.
+
+    magnetisability: χ (3,) or (3, 3) along a, b, c in 1e-6 erg/(G² mol), with its sign (diamagnetic: negative). effects: of a linear or
+    asymmetric top with spins, the semi-rigid ones included; states are then |F M_F⟩. nuclear_g: g = μ/(μ_N I) of nuclei by the names of
+    their spins; other nuclei do not interact with the field. j_highest: highest J of the free levels in the map. tolerance_mhz: largest
+    truncation error of an energy.
+    """
     tensor, nuclei = checked_g(top, g), dict(nuclear_g or {})
     if nuclei and not effects:
         raise ValueError("nuclear_g: give the effects that have these spins too")

@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 from rotor.arrays import Floats, Ints
 from rotor.checks import require_choice, require_positive
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.effects.stark import Z, acting, checked_direction, map_request
+from rotor.quantum.effects.stark import ELECTRIC, StarkRequest, Z, acting, checked_direction
 from rotor.quantum.fields.block_states import BlockStates
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.field_map import each_block, smallest_jmax
@@ -198,15 +198,15 @@ def field_lines(
     seen, unit = light_components(light), checked_direction(direction)
     require_positive("temperature_k", temperature_k, "K")
     require_choice("populations", populations, POPULATIONS)
-    request = map_request(
+    request = StarkRequest(
         top,
-        fields_kv_per_cm,
+        tuple(ELECTRIC.checked(fields_kv_per_cm).tolist()),
         j_highest=j_highest,
         intensity_w_per_cm2=intensity_w_per_cm2,
-        direction=direction,
-        effects=effects,
+        direction=unit,
         tolerance_mhz=tolerance_mhz,
-    )
+        hamiltonian=tuple(effects),
+    ).map
     jmax = smallest_jmax(request, executor) if jmax is None else jmax
     both = each_block(request, jmax, partial(states_of_both_signs, request, fields=request.fields, jmax=jmax), executor)
     solved = [states for pair in both for states in pair]

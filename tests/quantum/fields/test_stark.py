@@ -322,7 +322,7 @@ def test_two_crossings_between_two_fields_are_seen():
         ({"intensity_w_per_cm2": -1.0}, "intensity_w_per_cm2: -1"),
         ({"intensity_w_per_cm2": 1e10}, "polarizability"),
         ({"tolerance_mhz": 0.0}, "tolerance"),
-        ({"diabatic_gap_mhz": -1.0}, "diabatic gap"),
+        ({"diabatic_gap_mhz": -1.0}, "diabatic_gap_mhz: -1"),
         ({"top": Top.from_constants("B=6000 MHz")}, "dipole"),
         ({"top": Top.from_constants("B=6000 MHz", dipole_abc_debye=(0, 0, 0))}, "no dipole"),
     ],
