@@ -23,8 +23,8 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.quantum.internal_rotation.levels import (
     Columns,
+    joined_levels,
     refuse_axes,
-    table_of_pieces,
     torsion_rotation_levels,
     turning_tops,
 )
@@ -74,7 +74,7 @@ def hyperfine_levels(
     piece |= _sums(labels, scheme) | {"multiplicity": labels[:, -1] + 1}
     energies = np.concatenate([block.energies_mhz for block in blocks])
     halves = frozenset(name for name, half in zip(scheme.names, scheme.half, strict=True) if half)
-    return table_of_pieces(top, effects, nmax, [piece], energies, blocks, halves)
+    return joined_levels(top, effects, nmax, [piece], energies, blocks, halves)
 
 
 def coupled_blocks(

@@ -174,7 +174,7 @@ def torsion_rotation_levels(
             }
         )
     energies = np.concatenate([block.energies_mhz for block in blocks])
-    return table_of_pieces(top, effects, jmax, pieces, energies, tuple(placed(blocks)))
+    return joined_levels(top, effects, jmax, pieces, energies, tuple(placed(blocks)))
 
 
 def energies_alone(
@@ -220,7 +220,7 @@ def energies_alone(
             "kc": kc,
         }
         pieces.append(columns)
-    return table_of_pieces(top, effects, jmax, pieces, np.concatenate(energies))
+    return joined_levels(top, effects, jmax, pieces, np.concatenate(energies))
 
 
 def _refuse_long_sums(size: int) -> None:
@@ -232,7 +232,7 @@ def _refuse_long_sums(size: int) -> None:
         )
 
 
-def table_of_pieces(
+def joined_levels(
     top: Top, effects: tuple[QuantumEffect, ...], jmax: int, pieces: Sequence[Columns], energies: Floats,
     blocks: tuple[SolvedBlock, ...] = (), halves: frozenset[str] = frozenset(),
 ) -> Levels:  # fmt: skip
