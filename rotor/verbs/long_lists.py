@@ -90,12 +90,30 @@ def _streamed(files: Mapping[str, tuple[Path, ...]]) -> list[Path]:
     return [path for name, paths in files.items() if name in STREAMED for path in paths]
 
 
-def refuse_long_json(request: SpectrumRequest, files: Mapping[str, Any], resolution: float | None) -> None:
-    """Refuse JSON of a list on disk without range and cut, before any work."""
+def refuse_long_output(request: SpectrumRequest, files: Mapping[str, Any], resolution: float | None) -> None:
+    """Refuse JSON of a list on disk without range and cut, and its table on standard output, before any work."""
+    if _on_screen(files) and is_long(request, files, resolution) and not _is_short_above_cut(request, files):
+        raise ValueError(_no_screen(files))
     if "json" in files and request.min_lgint is None and is_long(request, files, resolution):
         first, last = request.range_mhz
         if first <= 0 and last == float("inf"):
             raise ValueError(_no_json(f"some {_count(request):.0e}"))
+
+
+def _on_screen(files: Mapping[str, Any]) -> bool:
+    return "csv" in files and not files["csv"]
+
+
+def _no_screen(files: Mapping[str, Any]) -> str:
+    return (
+        f"--csv -: more than {_most_lines(files)} lines are sorted on disk, beside a file: name it (--csv lines.csv), or give --range or "
+        "a higher --min-lgint"
+    )
+
+
+def _is_short_above_cut(request: SpectrumRequest, files: Mapping[str, Any]) -> bool:
+    """Whether the lines above the cut may be few enough for memory."""
+    return request.min_lgint is not None and _count(request) <= BEFORE_CUT * _most_lines(files)
 
 
 def _no_json(count: str) -> str:
@@ -128,9 +146,11 @@ def answer_long(
     Where few lines are above a cut, they are made in memory after all: three times as fast.
     """
     most = _most_lines(files)
-    if request.min_lgint is not None and _count(request) <= BEFORE_CUT * most:
+    if _is_short_above_cut(request, files):
         with suppress(TooManyLinesError):
             return answer_spectrum(request, most_lines=min(most, JSON_LINES) if "json" in files else most)
+    if _on_screen(files):
+        raise ValueError(_no_screen(files))
     paths = _streamed(files)
     with _bar("pieces", progress) as advance:
         whole = _sorted(request, Path(f"{paths[0]}.pieces"), advance)

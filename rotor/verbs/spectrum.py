@@ -18,7 +18,7 @@ from rotor.requests.fill import Entries, NamedError, read_fields, read_instance
 from rotor.requests.readers import Custom, Flag, Quantity, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.verbs import int_files
-from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_json
+from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_output
 from rotor.verbs.molecule import POLARIZABILITY, range_without_unit, with_some_dipole
 from rotor.verbs.outputs import PICTURES, Output, Report, draw_answer, picture
 from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
@@ -141,7 +141,7 @@ def check(request: SpectrumRequest, outputs: Mapping[str, Any], shown: SpectrumS
             "{outputs.profile_csv}: sticks have no profile; give {fwhm_mhz} or {profile} gaussian, lorentzian or voigt"
         )
     if not isinstance(request, int_files.PredictedRequest):
-        refuse_long_json(request, outputs, shown.resolution)
+        refuse_long_output(request, outputs, shown.resolution)
 
 
 def content(answer: SpectrumAnswer, shown: SpectrumShown) -> Mapping[str, Any]:

@@ -115,6 +115,14 @@ def test_few_lines_above_a_cut_are_made_in_memory(call, folder, monkeypatch, sho
         assert Path(f"{disk}.cat").read_bytes() == Path("a.cat").read_bytes()
 
 
+def test_a_list_on_disk_needs_a_file(call, folder, short):
+    typed = ("spectrum", "--constants", CONSTANTS, "--dipole-abc", "1.2,1.9,0.4", "--jmax", "20", "--min-lgint", "none")
+    code, out, err = call(*typed, "--csv", "-")
+    assert (code, out) == (2, "")
+    assert "--csv -: more than 1000 lines are sorted on disk, beside a file: name it" in err
+    assert not list(folder.iterdir())
+
+
 SPINS = {  # constants, spins, dipole, J max, cut
     "14N": (CONSTANTS, "chi_aa(14N)=-40 chi_bb(14N)=20", "1.2,1.9,0.4", 9, "none"),
     "14N, chi_ab": (CONSTANTS, "chi_aa(14N)=-40 chi_bb(14N)=20 chi_ab(14N)=900", "1.2,1.9,0", 8, "-9"),
