@@ -19,11 +19,8 @@ from rotor.quantum.stacked_blocks import Product, Sector, Vector, stacked
 from rotor.quantum.tensors import BodyTensor
 
 SMALLEST_MHZ = 1e-30  # replaces 0 between states of equal energy
-ALIKE, SMALL, AT_ONCE = (
-    1.15,
-    8,
-    12_000,
-)  # sizes of blocks of several J in one array: ratio, small ones, elements of a pair of blocks
+ALIKE, SMALL = 1.3, 16  # ratio of the sizes of blocks of several J in one array; smaller ones are alike
+AT_ONCE = 30_000  # elements between such blocks of one kind
 ROUND_OFF = 1e-9  # relative margin of a threshold for lines that are compared exactly later
 
 StrongLines = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²

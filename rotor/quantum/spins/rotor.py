@@ -128,7 +128,7 @@ def _axial_blocks(v: Ints, n: Ints, k: Ints, energies_mhz: Floats) -> list[Solve
 
 def _named(block: SolvedBlock, names: Ints) -> SolvedBlock:
     """A solved block whose parts have the names (size, 3) of their functions."""
-    parts = tuple(part._replace(names=names[part.place]) for part in block.parts)
+    parts = tuple(Part(part.v, part.basis, part.start, names[part.place]) for part in block.parts)
     return SolvedBlock(parts, block.energies_mhz, block.vectors)
 
 

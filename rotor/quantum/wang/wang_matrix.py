@@ -25,6 +25,7 @@ AT_ONCE = 32  # matrices of one size with at most so many rows are solved togeth
 J_AT_ONCE = 32  # number of J whose matrix elements are computed together
 _NONE: Floats = np.zeros((0, 0))
 _ROOT_2 = float(np.sqrt(2))
+_OVERFLOW = "a block of the Hamiltonian overflows: J max is too high for these distortion constants"
 SMALL = 100  # tridiagonal blocks with at most so many rows do not justify loading scipy.linalg (0.2 s)
 
 
@@ -136,7 +137,7 @@ def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floa
     if size == 1:
         return bands[0], np.ones((1, 1))
     if not _are_finite(bands):
-        raise ValueError("a block of the Hamiltonian overflows: J max is too high for these distortion constants")
+        raise ValueError(_OVERFLOW)
     if len(bands) == 1:
         return _diagonal(bands[0], vectors)
     if len(bands) > 2 or (size <= SMALL and "scipy.linalg" not in sys.modules):
@@ -155,7 +156,7 @@ def diagonalise_all(matrices: Sequence[list[Floats]], vectors: bool = True) -> l
     alike: dict[tuple[int, int], list[int]] = {}
     out: list[tuple[Floats, Floats]] = []
     for number, bands in enumerate(matrices):
-        small = vectors and len(bands) > 1 and len(bands[0]) <= AT_ONCE and _are_finite(bands)
+        small = vectors and len(bands) > 1 and len(bands[0]) <= AT_ONCE
         out.append((bands[0], _NONE) if small else diagonalise(bands, vectors))
         if small:
             alike.setdefault((len(bands[0]), len(bands)), []).append(number)
@@ -165,6 +166,8 @@ def diagonalise_all(matrices: Sequence[list[Floats]], vectors: bool = True) -> l
             stacked[:, n * size :: size + 1] = [
                 matrices[number][n] for number in numbers
             ]  # eigh reads the lower triangle
+        if not _are_finite([stacked]):
+            raise ValueError(_OVERFLOW)
         energies, states = np.linalg.eigh(stacked.reshape(-1, size, size))
         states = np.ascontiguousarray(states.transpose(0, 2, 1)).transpose(0, 2, 1)  # a state's components side by side
         for place, number in enumerate(numbers):
