@@ -12,7 +12,7 @@ import numpy as np
 
 from rotor.classical.integrators import splitting
 from rotor.plots.work_precision import Panel, Point
-from rotor.requests.knob import Measure, Setting, Sweep
+from rotor.requests.knob import Knob, Measure, Setting, Sweep
 from rotor.scenes.accuracy_sweep import in_rounds, knobs_of, points_of, sweep, timed, without_scatter
 from rotor.scenes.scene import (
     FluidScene,
@@ -55,7 +55,7 @@ def curves(scene: Scene, knob: str) -> list[tuple[str, str, list[Point]]]:
     rows, against, _, _ = sweep(computed, LIMIT_SECONDS)
     if "time limit" in against:
         raise ValueError(f"{knob}: {against}; the page needs the whole sweep")
-    return [(m.of, m.unit, points_of([row for row in rows if row.error_of == m.of])) for m in computed.measures]
+    return [(m.of, m.unit, points_of([row for row in rows if row.error_of == m.of])) for m in computed.knob.measures]
 
 
 def spectra() -> dict[str, SpectrumScene]:
@@ -248,7 +248,7 @@ def samples(_: Path | None) -> list[Panel]:
     panels = []
     for knob in knobs:
         rows, _, _, _ = sweep(knob, LIMIT_SECONDS)
-        for m in knob.measures:
+        for m in knob.knob.measures:
             points = points_of([row for row in rows if row.error_of == m.of])
             label = f"{m.of} ({m.unit})" if m.unit else m.of
             panels.append(Panel("molecules of a gas of water, 300 K", label, {"molecules": points}))
@@ -282,7 +282,7 @@ def fit(_: Path | None) -> list[Panel]:
         for count in (1, 3, 5, 6, 7, 8, 9)
     )
     measures = (Measure("constants", "standard errors", error),)
-    knob = Sweep("iterations", measures, settings, FitOptions(tolerance=1e-12), "1e-12", answer)
+    knob = Sweep(Knob(key="iterations", measures=measures), settings, FitOptions(tolerance=1e-12), "1e-12", answer)
     rows, _, _, _ = sweep(knob, LIMIT_SECONDS)
     return [
         Panel("iterations of a fit, 500 lines, 15 constants", "a constant (standard errors)", {"fit": points_of(rows)})

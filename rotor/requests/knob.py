@@ -51,21 +51,20 @@ class Measure:
 class Sweep:
     """The settings of a knob for one request.
 
-    name: the key of the scene. title: in words. measures: errors of each answer. settings: coarsest first. reference: the request that
-    errors are measured against; None if the true value is known. against: the reference in words. answer: computes a request; its
-    processor time is the cost of a setting. repeats: number of calculations in one answer; reported times are for one of them. series:
-    whether the settings are values of one quantity, which a picture joins.
+    settings: coarsest first. reference: the request that errors are measured against; None if the true value is known. against: the
+    reference in words. answer: computes a request; its processor time is the cost of a setting.
     """
 
-    name: str
-    measures: tuple[Measure, ...]
+    knob: Knob
     settings: tuple[Setting, ...]
     reference: Any
     against: str
     answer: Callable[[Any], Any]
-    repeats: int = 1
-    title: str = ""
-    series: bool = True
+
+    @property
+    def name(self) -> str:
+        """The key of the scene."""
+        return self.knob.key
 
 
 @dataclass(frozen=True)
@@ -235,61 +234,52 @@ class Knob:
             settings += (Setting(self.field.none or "none", plain, True),)
         against = self.against(finest) if callable(self.against) else self.against.format(finest)
         reference = swept(plain, finest) if self.reference is None else self.reference(plain)
-        title = self.title or in_words(self.key)
-        return Sweep(
-            self.key, self.measures, settings, reference, against, self.answer or answer, self.repeats, title, self.series
-        )  # fmt: skip
+        return Sweep(self, settings, reference, against, self.answer or answer)
 
     def choose(self, sought: Sought, confirmed: bool) -> Choice | None:
         """The first value, coarsest first, whose error is within an accuracy, else the last one tried; None without values.
 
         confirmed: whether the error of a predicted value, which takes a run, is estimated.
         """
-        values, missed = self._values(sought), ""
+        missed, values = "", self.tried(sought) if callable(self.tried) else self.tried
+        if self.least is not None:
+            values = (max(sought.accuracy, self.least),)
         if (predicted := self.predicted(sought)) is not None:
-            request = self.changed(sought.request, predicted.value)
-            words = self._words(sought, predicted.value) + predicted.remark
-            error = self._estimate(sought, request, predicted.value).error if confirmed else 0.0
-            finer = tuple(value for value in values if value < predicted.value)
-            if error <= sought.accuracy or not finer:
-                return Choice(request, words, error, confirming=predicted.runs)
-            values, missed = finer, f", finer than the plan's {predicted.value:g}, which missed"
+            choice = replace(
+                self._attempt(sought, predicted.value, predicted.remark, confirmed)[0], confirming=predicted.runs
+            )
+            values = tuple(value for value in values if value < predicted.value)
+            if choice.error <= sought.accuracy or not values:
+                return choice
+            missed = f", finer than the plan's {predicted.value:g}, which missed"
         if self.proportional:
-            attempt = partial(self._attempt, sought, missed=missed)
+            attempt = partial(self._attempt, sought, remark=missed)
             return first_by_proportion(tuple(values), lambda value: attempt(value)[0], sought.accuracy)[1]
-        choice = None
+        last = None
         for value in values:
-            choice, least = self._attempt(sought, value, missed)
-            if choice.error <= sought.accuracy or least > sought.accuracy:
+            last, least = self._attempt(sought, value, missed)
+            if last.error <= sought.accuracy or least > sought.accuracy:
                 break
-        return choice
+        return last
 
-    def _values(self, sought: Sought) -> Iterable[Any]:
-        if self.least is not None:
-            return (max(sought.accuracy, self.least),)
-        return self.tried(sought) if callable(self.tried) else self.tried
-
-    def _estimate(self, sought: Sought, request: Any, value: Any) -> Estimate:
-        if self.error is not None:
-            return self.error(sought, request, value)
-        if self.least is not None:
-            return Estimate(value)
-        answer = sought.compute(request)
-        return Estimate(sought.error(answer), answer)
-
-    def _words(self, sought: Sought, value: Any) -> str:
+    def _attempt(self, sought: Sought, value: Any, remark: str, confirmed: bool = True) -> tuple[Choice, float]:
+        """A value as a choice, and what no finer value lowers of its error. confirmed: whether the error is estimated."""
+        request = self.change(sought.request, self.attribute, value)
+        if not confirmed:
+            estimate = Estimate(0.0)
+        elif self.error is not None:
+            estimate = self.error(sought, request, value)
+        elif self.least is not None:
+            estimate = Estimate(value)
+        else:
+            answer = sought.compute(request)
+            estimate = Estimate(sought.error(answer), answer)
         text = self.text or f"{in_words(self.key)} {{:g}}"
         coarsest, word = self.coarsest
         alone = f", nothing cheaper: the {word} there is" if word and value == coarsest else ""
-        return (text(sought, value) if callable(text) else text.format(value)) + alone
-
-    def _attempt(self, sought: Sought, value: Any, missed: str) -> tuple[Choice, float]:
-        """A value as a choice, and what no finer value lowers of its error."""
-        request = self.changed(sought.request, value)
-        estimate = self._estimate(sought, request, value)
-        error = 0.0 if (self.stated or self.least is not None) and estimate.error <= sought.accuracy else estimate.error
-        how = self._words(sought, value) + missed + estimate.remark
-        return Choice(request, how, error, estimate.answer), estimate.least
+        how = (text(sought, value) if callable(text) else text.format(value)) + alone + remark + estimate.remark
+        is_stated = (self.stated or self.least is not None) and estimate.error <= sought.accuracy
+        return Choice(request, how, 0.0 if is_stated else estimate.error, estimate.answer), estimate.least
 
 
 def first_by_proportion(values: Sequence[float], attempt: Callable[[float], T], accuracy: float) -> tuple[float, T]:

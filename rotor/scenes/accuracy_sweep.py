@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.frozen import dataclass
-from rotor.requests.knob import Setting, Sweep, Sweeps
+from rotor.requests.knob import Setting, Sweep, Sweeps, in_words
 from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import Scene
 from rotor.table import Table
@@ -164,38 +164,38 @@ def work_precision(
     (['order J^2', 'order J^4', 'order J^6', 'order J^8'], True)
     """
     knobs, left = knobs_of(scene, folder), limit_seconds
-    titles = {knob.name.partition(",")[0]: knob.title for knob in knobs.knobs}
-    methods = frozenset(knob.name for knob in knobs.knobs if not knob.series)
+    titles = {swept.name.partition(",")[0]: swept.knob.title or in_words(swept.name) for swept in knobs.knobs}
+    methods = frozenset(swept.name for swept in knobs.knobs if not swept.knob.series)
     table = WorkPrecision(scene.kind, (), {}, knobs.remarks, titles, methods)
-    for number, knob in enumerate(knobs.knobs):
-        rows, against, remarks, spent = sweep(knob, left / (len(knobs.knobs) - number), progress)
+    for number, swept in enumerate(knobs.knobs):
+        rows, against, remarks, spent = sweep(swept, left / (len(knobs.knobs) - number), progress)
         left = max(left - spent, 0.0)
-        references = {**table.references, f"{knob.name}: {knob.measures[0].of}": against}
+        references = {**table.references, f"{swept.name}: {swept.knob.measures[0].of}": against}
         table = replace(table, rows=(*table.rows, *rows), references=references, remarks=(*table.remarks, *remarks))
         on_knob(table)
     return table
 
 
 def sweep(
-    knob: Sweep, limit_seconds: float, progress: Progress = lambda knob, setting: None
+    swept: Sweep, limit_seconds: float, progress: Progress = lambda knob, setting: None
 ) -> tuple[list[Row], str, list[str], float]:
     """Rows of one knob, the reference in words, remarks on omitted settings, and the seconds spent.
 
     A setting is omitted if it would exceed the limit, judged by how the time grew from setting to setting.
     """
-    settings = [*knob.settings, *([] if knob.reference is None else [Setting("the reference", knob.reference)])]
+    settings = [*swept.settings, *([] if swept.reference is None else [Setting("the reference", swept.reference)])]
     done: list[tuple[Setting, Any, float]] = []
     remarks: list[str] = []
     refused: list[str] = []
     spent = 0.0
     for setting in settings:
         if spent + _next_seconds([seconds for _, _, seconds in done]) > limit_seconds:
-            remarks.append(f"{knob.name}: {setting.label} and finer ones are beyond the time limit")
+            remarks.append(f"{swept.name}: {setting.label} and finer ones are beyond the time limit")
             break
-        progress(knob.name, setting.label)
+        progress(swept.name, setting.label)
         try:
             usual = done[-1][2] if done else None
-            answer, seconds, both = timed(lambda request=setting.request: knob.answer(request), usual)  # type: ignore[misc]
+            answer, seconds, both = timed(lambda request=setting.request: swept.answer(request), usual)  # type: ignore[misc]
         except ValueError as error:
             refused.append(setting.label)
             why = str(error)
@@ -203,21 +203,27 @@ def sweep(
         spent += both
         done.append((setting, answer, seconds))
     if refused:
-        remarks.append(f"{knob.name}: {', '.join(refused)}: refused, the last of them with: {why}")
+        remarks.append(f"{swept.name}: {', '.join(refused)}: refused, the last of them with: {why}")
     if not done:
-        return [], knob.against, remarks, spent
+        return [], swept.against, remarks, spent
     last, reference, _ = done[-1]
-    reached = knob.reference is None or last.label == "the reference"
-    against = knob.against if reached else f"the finest within the time limit, {last.label}"
-    shown = done if knob.reference is None else done[:-1]
-    calls = [lambda request=setting.request: knob.answer(request) for setting, _, _ in shown]
+    reached = swept.reference is None or last.label == "the reference"
+    against = swept.against if reached else f"the finest within the time limit, {last.label}"
+    shown = done if swept.reference is None else done[:-1]
+    calls = [lambda request=setting.request: swept.answer(request) for setting, _, _ in shown]
     times, more = in_rounds(calls, [seconds for _, _, seconds in shown], limit_seconds - spent)
     spent += more
     rows = [
         Row(
-            knob.name, setting.label, setting.in_scene, m.of, m.error(answer, reference), m.unit, seconds / knob.repeats
+            swept.name,
+            setting.label,
+            setting.in_scene,
+            m.of,
+            m.error(answer, reference),
+            m.unit,
+            seconds / swept.knob.repeats,
         )
-        for m in knob.measures
+        for m in swept.knob.measures
         for (setting, answer, _), seconds in zip(shown, times, strict=True)
     ]
     return rows, against, remarks, spent

@@ -215,7 +215,7 @@ def slow_knob(seconds: list[float], clock: list[float]) -> Sweep:
 
     measure = Measure("nothing", "", lambda first, other: abs(first - other))
     settings = tuple(Setting(f"{duration:g}", duration) for duration in seconds)
-    return Sweep("time", (measure,), settings, 1000.0, "a long one", answer)
+    return Sweep(Knob(key="time", measures=(measure,)), settings, 1000.0, "a long one", answer)
 
 
 def test_what_is_beyond_the_limit_is_left_out_and_said(monkeypatch):
@@ -246,7 +246,7 @@ def test_settings_of_highest_j_rise_and_hold_that_of_the_scene():
     assert [setting.label for setting in reach.settings] == ["14", "22", "31", "39", "48", "56"]
     assert [setting.request.jmax for setting in reach.settings] == [14, 22, 31, 39, 48, 56]
     assert [setting.in_scene for setting in reach.settings] == [False] * 5 + [True]
-    assert (reach.reference.jmax, reach.against, reach.title) == (74, "J max 74", "highest J of the basis")
+    assert (reach.reference.jmax, reach.against, reach.knob.title) == (74, "J max 74", "highest J of the basis")
 
 
 @dataclass(frozen=True)
