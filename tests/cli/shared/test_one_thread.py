@@ -1,4 +1,4 @@
-"""One thread of BLAS for small blocks: in a process of the command alone, to J = 100, where the user has not chosen."""
+"""One thread of BLAS for small blocks: in a process of the command alone, to J = 200, where the user has not chosen."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from rotor.verbs.names import has_small_blocks
     ("threads", "loaded", "jmax", "before", "after"),
     [
         (True, False, None, None, "1"),
-        (True, False, 100, None, "1"),
-        (True, False, 101, None, None),
+        (True, False, 200, None, "1"),
+        (True, False, 201, None, None),
         (True, False, 10, "4", "4"),
         (True, True, 10, None, None),
         (False, False, 10, None, None),
@@ -25,7 +25,7 @@ from rotor.verbs.names import has_small_blocks
 )
 def test_one_thread_is_set_before_numpy_is_loaded(monkeypatch, threads, loaded, jmax, before, after):
     monkeypatch.setattr(process, "_OWN", threads)
-    monkeypatch.setattr(sys, "modules", {"numpy": sys.modules["numpy"]} if loaded else {})
+    monkeypatch.setattr(sys, "modules", {"numpy": os} if loaded else {})
     monkeypatch.setattr(os, "environ", {"OPENBLAS_NUM_THREADS": before} if before else {})
     process.one_thread_of_blas(jmax)
     assert os.environ.get("OPENBLAS_NUM_THREADS") == after
