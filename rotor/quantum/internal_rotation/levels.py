@@ -60,7 +60,7 @@ class TorsionMoments(SpeciesMoments):
     model: TurningTops
     further: Elements | None = None
     _cache: dict[tuple[complex, ...], ByBlocks] = field(default_factory=dict)
-    _units: dict[Component, dict[tuple[int, int], NDArray[Any] | None]] = field(default_factory=dict)
+    _units: dict[Component, dict[tuple[int, int], NDArray[Any]]] = field(default_factory=dict)
 
     @property
     def combined(self) -> bool:
@@ -78,23 +78,33 @@ class TorsionMoments(SpeciesMoments):
     def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
         """The function of the reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
         components = tensor_components(rotor, self.model.angle, self.model.has_plane)
-        entries = dict[Component, ByBlocks]()  # large; not needed again where units are known
-
-        def unit(component: Component, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
-            known, pair = self._units.setdefault(component, {}), (up.basis.number, low.basis.number)
-            if pair not in known:
-                if component not in entries:
-                    entries[component] = self._entries(unit_operator(component), component.rank, component.rank == 1)
-                acting = entries[component].get(pair)
-                known[pair] = None if acting is None else _contracted(acting, up.vectors, low.vectors)
-            return known[pair]
 
         def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
-            units = [(value, unit(component, up, low)) for component, value in components.items()]
+            units = [(value, self._unit(c).get((up.basis.number, low.basis.number))) for c, value in components.items()]
             acting = [value * matrix for value, matrix in units if matrix is not None]
             return np.asarray(sum(acting)) if acting else None
 
         return between
+
+    def _unit(self, component: Component) -> dict[tuple[int, int], NDArray[Any]]:
+        """Elements between states of a component of 1, by pairs of blocks."""
+        if component not in self._units:
+            entries, states = self._entries(unit_operator(component), component.rank, component.rank == 1), self.states
+            self._units[component] = {
+                (up, low): _contracted(elements, states[up][1], states[low][1])
+                for (up, low), elements in entries.items()
+                if up in states and low in states
+            }
+        return self._units[component]
+
+    @cached_property
+    def states(self) -> dict[int, tuple[Ints, NDArray[Any]]]:
+        """Rows of the levels of each block, and their vectors over its functions."""
+        species, linear = self.levels, self.levels.solved.linear
+        number_of = linear.block[species.rows]
+        rows = {number: species.rows[number_of == number] for number in species.blocks}
+        vectors = species.solved.vectors
+        return {number: (r, vectors(number)[1][:, linear.rank[r]]) for number, r in rows.items() if len(r)}
 
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of mixtures of states, by the constants of the top and of the internal rotor."""
@@ -349,17 +359,12 @@ class Degeneracies:
 
 def species_rotors(moments: TorsionMoments, components: int) -> list[SolvedBlock]:
     """Blocks of one species with the states that are levels, in the order of its rows."""
-    species, blocks, kinds = moments.levels, list[SolvedBlock](), Counter[int]()
-    linear = species.solved.linear
-    number_of = linear.block[species.rows]
-    for number in species.blocks:
-        rows = species.rows[number_of == number]
-        if len(rows):
-            j, energies = int(linear.labels["J"][rows[0]]), species.solved.energies[rows]
-            vectors = species.solved.vectors(number)[1][:, linear.rank[rows]]
-            parts = (Part(0, SpeciesFunctions(j, number, kinds[j]), 0),)
-            kinds[j] += 1
-            blocks.append(SolvedBlock(parts, energies, vectors, moments=moments, components=components))
+    solved, blocks, places = moments.levels.solved, list[SolvedBlock](), Counter[int]()
+    for number, (rows, vectors) in moments.states.items():
+        j = int(solved.linear.labels["J"][rows[0]])
+        parts = (Part(0, SpeciesFunctions(j, number, places[j]), 0),)
+        places[j] += 1
+        blocks.append(SolvedBlock(parts, solved.energies[rows], vectors, moments=moments, components=components))
     return blocks
 
 
