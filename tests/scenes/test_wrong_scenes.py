@@ -27,7 +27,7 @@ WRONG = {
     "an accuracy below rounding": (SPECTRUM + 'accuracy = "1e-9 Hz"', "accuracy: 1e-15 MHz cannot be given"),
     "an accuracy after a table": (SPECTRUM + '[numerics]\naccuracy = "1 kHz"', "it stands before the first table"),
     "a J below 0": (SPECTRUM + "[numerics]\njmax = -1", "numerics.jmax: -1"),
-    "a J beyond all lists": (SPECTRUM.replace("CO", "water") + "[numerics]\njmax = 100000", "ask for fewer, in ranges of J"),
+    "a J beyond all lists": (SPECTRUM.replace("CO", "SO2") + "[numerics]\njmax = 100000", "ask for fewer, in ranges of J"),
     "a mixed list": (STARK + '[conditions]\nfield = [0, "1 kV/cm", true]', "conditions.field[1]: expected a number, found a text"),
     "a field of no molecule": (STARK + '[conditions]\nfield = "0:1e12kV/cm:3"', "conditions.field: a field of 1e+12 kV/cm"),
     "an M above J": (STARK + "[observables]\nm = [7]\n[conditions]\nfield = [1.0]", "observables.m: [7.0]: expected whole numbers"),

@@ -104,7 +104,7 @@ def test_cold_levels_alone_are_multiplied(monkeypatch):
     lines = line_list(top, temperature_k=2.0, jmax=45, q=20.0, min_lgint=-9.0)
     monkeypatch.undo()
     value = line_list(top, temperature_k=2.0, jmax=45, q=20.0, min_lgint=None)
-    assert sum(sizes) < 0.15 * len(value)
+    assert sum(sizes) < 0.25 * len(value)  # with the padding of blocks of several J
     assert_equal(lines, value[value.lgint >= -9.0], 1.2**2 + 1.9**2 + 0.4**2)
 
 

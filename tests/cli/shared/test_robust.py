@@ -118,7 +118,7 @@ def test_a_cut_that_no_double_holds_is_refused(call, value):
     "words",
     [
         ["info", "NH3", "--temperature", "1e300"],
-        ["spectrum", "water", "--jmax", "1000000"],
+        ["spectrum", "SO2", "--jmax", "1000000"],
         ["stark", "H2O", "--field", "0:10kV/cm:3", "--jmax", "1000"],
         ["fluid", "water", "--molecules", "27", "--steps", "4", "--cutoff", "1e300"],
     ],
