@@ -252,9 +252,9 @@ def test_starts_up_to_ten_per_cent_off(tmp_path, name, share):
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.03, 0.1])
 def test_most_searches_for_three_states_in_resonance_find_the_way_and_the_others_say_so(tmp_path, share):
-    """Of sixty sets of lines 60 did at 3 % and 56 at 10 %; which of them depends on the last digits of the lines."""
+    """Of 260 sets of lines at 10 % 250 did, and 255 with sums in another order: which of them depends on last digits."""
     converged = 0
-    for seed in range(1, 9):
+    for seed in range(1, 25):
         write_case(tmp_path, "case", KINDS[FAST[0]], share, seed)
         fit_input = read_fit(tmp_path / "case.par")
         fit = fit_lines(
@@ -266,7 +266,7 @@ def test_most_searches_for_three_states_in_resonance_find_the_way_and_the_others
         else:
             assert "weighted rms" in fit.reason
             assert fit.weighted_rms > 10  # far from a minimum that would pass for the true one
-    assert converged >= 7
+    assert converged >= 18  # 23 expected
 
 
 @pytest.mark.slow
