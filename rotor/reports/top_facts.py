@@ -112,7 +112,7 @@ def constants_text(top: Top) -> str:
     constants, errors = top.constants, top.estimated_errors_mhz
     text, more = constants.rigid_text(errors), constants.distortion_count
     if errors:
-        text += f" (good to about {max(100 * errors[name] / constants[name] for name in errors):.2g} %)"
+        text += f" (good to about {100 * top.estimated_error:.2g} %)"
     text += f", and {more} of distortion" if more else ", rigid"
     return text + (f" ({form_text(constants)})" if more and constants.reduction else "")
 

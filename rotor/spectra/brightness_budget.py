@@ -99,8 +99,9 @@ def _model(answer: Any, number: int, per_mhz: float, opaque: float) -> ErrorTerm
 
 def _estimated(top: Top, peak: Any) -> list[Limit]:
     """The shift of the brightest line by errors of estimated A, B, C, which it shares with them: δν/ν = δB/B."""
-    relative = max((error / top.constants[name] for name, error in top.estimated_errors_mhz.items()), default=0.0)
-    return [Limit(ESTIMATED, relative * peak.observed_mhz, "")] if relative and peak is not None else []
+    if peak is None or not top.estimated_errors_mhz:
+        return []
+    return [Limit(ESTIMATED, top.estimated_error * peak.observed_mhz, "")]
 
 
 def _shifted(term: ErrorTerm, per_mhz: float, brightness: float) -> ErrorTerm:

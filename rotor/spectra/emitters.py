@@ -210,9 +210,9 @@ def _top_lines(
 
 def _geometry_notes(top: Top) -> Iterator[str]:
     """Note that frequencies from a geometry are too inaccurate to find lines with a telescope."""
-    if top.molecule is not None and top.molecule.uncertainty and top.source == top.molecule.source:
+    if top.source_geometry is not None and top.estimated_error:
         yield (
-            f"{top.name}: constants are from a geometry with an error of {100 * top.molecule.uncertainty:.2g} %, frequencies have "
+            f"{top.name}: constants are from a geometry with an error of {100 * top.estimated_error:.2g} %, frequencies have "
             "this error: a catalogue of JPL or CDMS (.cat) has measured frequencies"
         )
 

@@ -42,8 +42,7 @@ def _data(tops: Sequence[Top]) -> ErrorTerm:
     known = max((error for error in errors if error is not None), default=0.0)
     top, estimate = max(estimates.items(), key=lambda pair: pair[1], default=(None, 0.0))
     if top is not None and estimate > known:
-        from_geometry = top.molecule is not None and top.source == top.molecule.source
-        source = "error of the geometry" if from_geometry else "scaling from another isotopologue"
+        source = "error of the geometry" if top.source_geometry else "scaling from another isotopologue"
         return ErrorTerm(estimate, source, "measured constants")
     if not errors or None in errors:
         return ErrorTerm(None, "no uncertainties of the constants are known")

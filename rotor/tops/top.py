@@ -133,10 +133,19 @@ class Top:
         return f"<p>{html.escape(repr(self))}</p>{self.constants.html_table(self.estimated_errors_mhz)}"
 
     @property
+    def source_geometry(self) -> Molecule | None:
+        """The geometry from which A, B, C follow; None if they are given or scaled."""
+        return self.molecule if self.molecule is not None and self.source == self.molecule.source else None
+
+    @property
+    def estimated_error(self) -> float:
+        """Relative error of A, B, C that follow from a geometry or another isotopologue; 0 if none is estimated."""
+        return (self.source_geometry.uncertainty if self.source_geometry else self.scaling_error) or 0.0
+
+    @property
     def estimated_errors_mhz(self) -> dict[str, float]:
         """Estimated errors of A, B, C by name if not measured: from a geometry, or from scaling of another isotopologue."""
-        guess, names = self.molecule, self.constants.values.keys() - self.constants.uncertainties
-        relative = guess.uncertainty if guess and self.source == guess.source else self.scaling_error
+        names, relative = self.constants.values.keys() - self.constants.uncertainties, self.estimated_error
         return {name: relative * self.constants[name] for name in "ABC" if name in names} if relative else {}
 
     @property

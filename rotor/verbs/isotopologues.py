@@ -55,11 +55,9 @@ def _table(parent: Top, family: tuple[Isotopologue, ...]) -> Table:
 
 def _rigid_texts(top: Top) -> list[str]:
     """A, B, C rounded to their estimated error, and that error in per cent."""
-    errors = top.estimated_errors_mhz
-    if not errors:
+    if not top.estimated_errors_mhz:
         return [f"{x:.3f}" if x < float("inf") else "-" for x in top.rotational_constants_mhz] + [""]
-    name = next(iter(errors))
-    relative = errors[name] / top.constants[name]
+    relative = top.estimated_error
     texts = [known_digits(x, relative * x) if x < float("inf") else "-" for x in top.rotational_constants_mhz]
     return [*texts, f"{100 * relative:.2g}"]
 

@@ -204,7 +204,7 @@ class StateElements:
             up, low = wang[functions[link.bra]], wang[functions[link.ket]]
             if (id(up), id(low)) not in between:
                 between[id(up), id(low)] = BetweenStates(up, low)
-            elements = _of_link(link, between[id(up), id(low)])
+            elements = _link_elements(link, between[id(up), id(low)])
             j_up, number_up = np.array([(j, number) for j, number, _ in members[link.bra]]).T
             number_low = np.array([number for _, number, _ in members[link.ket]])
             vertices = j_up[elements.up], number_up[elements.up], number_low[elements.low]
@@ -220,7 +220,7 @@ class StateElements:
         }
 
 
-def _of_link(link: Link, between: BetweenStates) -> WangElements:
+def _link_elements(link: Link, between: BetweenStates) -> WangElements:
     """Elements of a link; ValueError with the name of the coupling, of those added up, that has an imaginary one."""
     elements, imaginary = between.elements(link.operator, link.factors)
     for coupling in link.couplings if imaginary else ():

@@ -133,9 +133,8 @@ def _constant_limits(top: Top, j: int) -> list[Limit]:
     """Zero-point vibration of a geometry, and the distortion that rigid constants neglect."""
     limits, b = [], _largest(top)
     rigid = not any(name not in "ABC" for name in top.constants.values)
-    from_geometry = top.molecule is not None and top.source == top.molecule.source
-    if from_geometry and top.molecule is not None:
-        limits += _zero_point(top.molecule, 2 * b * (j + 1))
+    if top.source_geometry is not None:
+        limits += _zero_point(top.source_geometry, 2 * b * (j + 1))
     if rigid and top.kind != "spherical":
         vibration_cm = VIBRATION_CM * (b / units.MHZ_PER_CM) ** VIBRATION_POWER
         d = 4 * b**3 / (vibration_cm * units.MHZ_PER_CM) ** 2

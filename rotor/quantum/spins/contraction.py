@@ -230,7 +230,7 @@ def _species_pieces(pieces: Sequence[Piece], moments: SpeciesMoments) -> Between
     operators = [(piece.value, moments.beside_spins(piece.rotor)) for piece in pieces]
 
     def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
-        acting = [value * block for value, of_piece in operators if (block := of_piece(up, low)) is not None]
+        acting = [value * block for value, elements in operators if (block := elements(up, low)) is not None]
         return np.asarray(sum(acting)) if acting else None
 
     return between
