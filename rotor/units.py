@@ -154,9 +154,18 @@ def parse_quantity(value: float | str, unit: str) -> float:
     return float(value)
 
 
+_BETWEEN = re.compile(r"\s*((?:\d+\.?\d*|\.\d+)\s*(?:[kMGT]?Hz|[kM]?V/cm|K|ps)?)\s*[-–]\s*(\d\S*(?:\s[^:]*)?)")
+
+
+def _with_colon(text: str) -> str:
+    """A range written with a hyphen between two numbers without signs, `90-100GHz`, as `90:100GHz`; any other text as it is."""
+    match = _BETWEEN.fullmatch(text)
+    return f"{match[1]}:{match[2]}" if match else text
+
+
 def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
     """Both ends of `start:stop` in `unit`, and the text of the count; a unit at one end serves both."""
-    parts = text.split(":")
+    parts = _with_colon(text).split(":")
     if len(parts) not in (2, 3) or not all(part.strip() for part in parts):
         raise ValueError(f"{text!r} is not a range; write start:stop or start:stop:count, such as '2:18GHz'")
 
@@ -173,8 +182,8 @@ def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
 def parse_range(text: str, unit: str) -> tuple[float, float]:
     """Both ends of `start:stop` in `unit`; a unit at one end serves both.
 
-    >>> parse_range("2:18GHz", "MHz")
-    (2000.0, 18000.0)
+    >>> parse_range("2:18GHz", "MHz"), parse_range("2-18 GHz", "MHz")
+    ((2000.0, 18000.0), (2000.0, 18000.0))
     """
     first, last, count = _bounds(text, unit)
     if count is not None:
@@ -192,7 +201,7 @@ def parse_grid(text: str, unit: str, points: int | None = None) -> NDArray[np.fl
     >>> parse_grid("1,2,5 GHz", "MHz")
     array([1000., 2000., 5000.])
     """
-    if ":" not in text:
+    if ":" not in _with_colon(text):
         numbers = [_number(item) for item in text.split(",")]
         shared = numbers[-1][1]
         return np.array([n * _factor(u or shared, unit, text) for n, u in numbers])

@@ -14,9 +14,12 @@ def guess_values(guess: Any) -> tuple[float, ...]:
     """A, B, C (MHz) of one or several guesses, concatenated: numbers, or the constants of the conformers of `SMILES:...`."""
     if isinstance(guess, str) and guess.startswith(PREFIX):
         return conformer_constants(guess.removeprefix(PREFIX))
-    values = Numbers("MHz", (), "2458,490,409").read(guess)
-    if len(values) % 3:
-        raise ValueError(f"{guess!r}: expected three numbers for each guess, such as 2458,490,409, or SMILES:...")
+    try:
+        values = Numbers("MHz", (), "2458,490,409").read(guess)
+    except ValueError:
+        values = ()
+    if not values or len(values) % 3:
+        raise ValueError(f"{guess!r}: expected three numbers for each guess, such as 2458,490,409 (MHz), or SMILES:...")
     return values
 
 

@@ -234,8 +234,11 @@ def _usage_text(error: Exception, arguments: list[str]) -> str:
     text = str(error.format_message())  # type: ignore[attr-defined]
     if text.startswith("No such command") and text.endswith("."):  # with a guess, the text ends with a question mark
         return f"{text.rstrip('.')}; --help lists the commands"
-    if text.startswith("No such option: --constants"):
-        return "No such option: --constants; this verb needs the atoms: a name, a file, or 'SMILES:...'"
+    without_guesses = text.partition(" (")[0]
+    if without_guesses == "No such option: --constants":
+        return f"{without_guesses}; this verb needs the atoms: a name, a file, or 'SMILES:...'"
+    if without_guesses == "No such option: --temperature" and "emission" in arguments[:2]:
+        return f"{without_guesses}; the temperature of the molecules is --excitation"
     extra = text.removeprefix("Got unexpected extra argument(s) ").removeprefix("Got unexpected extra argument ")
     if extra == text:
         return text

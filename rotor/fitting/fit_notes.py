@@ -69,8 +69,9 @@ def fit_notes(fit: Fit) -> list[str]:
     if twice:
         notes.append(repeated_text(lines, twice))
     notes += unlikely_lines(lines)
+    # within a fifth: a reversed line spoils the constants
     reversed_ = np.flatnonzero(
-        fit.used & (np.abs(lines.frequency_mhz + fit.calculated_mhz) < 1e-3 * np.abs(lines.frequency_mhz))
+        fit.used & (np.abs(lines.frequency_mhz + fit.calculated_mhz) < 0.2 * np.abs(lines.frequency_mhz))
     )
     for i in reversed_.tolist():
         notes.append(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -110,11 +110,27 @@ def _meaning(word: str) -> Path | str:
         alike = [name for name in known if name.casefold() == typed]
         near = dict.fromkeys([*alike, *difflib.get_close_matches(word, known, n=3)])
         meant = f"did you mean {', '.join(list(near)[:3])}? " if near else ""
+        meant = next((f"did you mean {hint}? " for hint in _isotopologues(word, known)), meant)
         raise ValueError(
             f"{word!r} is no file here, no molecule of the library ('rotor molecules' lists it) and none of ASE's g2 set; "
             f"{meant}a SMILES is written 'SMILES:...'"
         )
     return library_path or word
+
+
+_ISOTOPE = re.compile(r"D(?![a-z])|(1[358]|17|3[346]|37|81)(C|N|O|S|Cl|Br)(?![a-z])")
+
+
+def _isotopologues(word: str, known: Iterable[str]) -> Iterable[str]:
+    """The known parents of a formula with isotopes such as DCl or 13CO, with their options; each element is replaced as a whole.
+
+    >>> list(_isotopologues("DCl", ["HCl"])), list(_isotopologues("13C18O", ["CO"])), list(_isotopologues("CH2DOH", ["CH3OH"]))
+    (['HCl --isotope H=2H'], ['CO --isotope C=13C --isotope O=18O'], [])
+    """
+    isotopes = dict.fromkeys((match[2] or "H", match[1] or "2") for match in _ISOTOPE.finditer(word))
+    parent = _ISOTOPE.sub(lambda match: match[2] or "H", word)
+    if isotopes and parent in known and all(len(re.findall(rf"{e}(?![a-z])", parent)) == 1 for e, _ in isotopes):
+        yield " ".join([parent, *(f"--isotope {element}={mass}{element}" for element, mass in isotopes)])
 
 
 _SMILES = re.compile(r"(?=.*[=#()\[\]])[A-Za-z0-9@+\-\[\]()=#]+")  # letters with a bond or a branch among them

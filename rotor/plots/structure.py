@@ -89,16 +89,19 @@ def _draw_bonds(axes: Any, molecule: Molecule, values: Sequence[Value], across: 
 def _write_at_bond(axes: Any, ends: Floats, radii: Sequence[float], centre: Floats, text: str) -> None:
     """Write a text at the middle of the visible part of a bond: above the circles of both atoms if it is flat, else beside it.
 
-    The side is that away from the centre of the molecule; for bonds through the centre, the upper one.
+    The side is that away from the centre of the molecule; for bonds towards the centre, the side away from it along the line of the
+    text; else the upper one.
     """
     along = (ends[1] - ends[0]) / (np.linalg.norm(ends[1] - ends[0]) or 1.0)
     normal = np.array([-along[1], along[0]])
     middle = (ends[0] + radii[0] * along + ends[1] - radii[1] * along) / 2
-    outward = float((middle - centre) @ normal)
-    up = normal[1] > 0 or (normal[1] == 0 and normal[0] > 0)
-    normal = normal if (outward > 0 if abs(outward) > _OUTSIDE else up) else -normal
-    side = "left" if normal[0] > 0 else "right"
     stands = abs(normal[0]) > _STANDS
+    off = middle - centre
+    outward, sideways = float(off @ normal), float(off[0] * np.sign(normal[0])) if stands else 0.0
+    up = normal[1] > 0 or (normal[1] == 0 and normal[0] > 0)
+    away = next((distance > 0 for distance in (outward, sideways) if abs(distance) > _OUTSIDE), up)
+    normal = normal if away else -normal
+    side = "left" if normal[0] > 0 else "right"
     place = middle + normal * (_BESIDE if stands else max(radii) + _BESIDE)
     axes.text(*place, text, ha=side if stands else "center", va="center", fontsize=9, zorder=4)
 

@@ -396,6 +396,11 @@ MISTAKES = {
     "two files of one name": ("spectrum water --csv a.csv --profile-csv ./a.csv --fwhm 1", "another output writes the same file"),
     "tag too long": ("spectrum water --tag 1234567", "--tag"),
     "negative count": ("spectrum water --top -1", "--top"),
+    "temperature of emission": ("emission CO --temperature 20", "--temperature; the temperature of the molecules is --excitation"),
+    "guess of a file": ("assign water.csv --guess water.toml", "'water.toml': expected three numbers for each guess"),
+    "name of an isotopologue": ("info DCl", "did you mean HCl --isotope H=2H?"),
+    "hyphen before a negative number": ("spectrum water --range=-5-3GHz", "--range: '-5-3GHz' is not a range"),
+    "wavenumber is no range": ("spectrum water --range 5cm-1", "--range: '5cm-1' is not a range"),
     "unknown option": ("spectrum water --colour red", "--colour"),
     "unknown verb": ("spektrum water", "spektrum"),
     "option without value": ("spectrum water --jmax", "--jmax"),
@@ -448,6 +453,7 @@ def test_help_shows_examples_and_every_option_is_documented(call):
         assert code == 0
         assert f"rotor {verb} water\n" in out
         assert undocumented(verb, call(verb, "--help-all")[1] if "--help-all" in out else out) == set()
+    assert call("identify", "--help-all") == call("identify", "--help")  # few options: --help shows all
     assert call()[1] == call("--help")[1]
 
 

@@ -147,3 +147,8 @@ def test_a_list_without_a_pulse(call, folder):
     assert code == 2
     assert err.startswith("error: pulses: expected one or more, such as")
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("typed", ["20-600GHz", "20 - 600 GHz", "20GHz-600GHz", "20–600 GHz"])
+def test_a_range_with_a_hyphen_between_two_numbers(call, folder, typed):
+    assert call("spectrum", "water", "--range", typed)[:2] == call("spectrum", "water", "--range", "20:600GHz")[:2]

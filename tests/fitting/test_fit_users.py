@@ -339,6 +339,30 @@ def test_lengths_beside_bonds_do_not_lie_on_atoms():
     assert not any(text.get_window_extent().overlaps(circle) for text in texts for circle in circles)
 
 
+def test_lengths_of_two_bonds_of_one_atom_do_not_overlap():
+    from rotor.molecules.molecule import Molecule
+    from rotor.plots.structure import structure_figure
+    from rotor.structures.substitution import Value
+
+    places = [[0, 0, 0.602], [0, 0, -0.605], [0.943, 0, 1.181], [-0.943, 0, 1.181]]  # formaldehyde
+    values = [Value("CO", (1, 2), 1.2069, 4e-4, "Å"), Value("CH", (1, 3), 1.1057, 8e-4, "Å")]
+    figure = structure_figure(Molecule(("C", "O", "H", "H"), places), values=values)
+    figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in figure.axes[0].texts if "(" in text.get_text()]
+    assert len(boxes) == 3
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
+def test_a_line_with_exchanged_levels_is_named_though_it_spoils_the_constants(seen):
+    upper, lower = seen.upper.copy(), seen.lower.copy()
+    upper[84], lower[84] = seen.lower[84], seen.upper[84]
+    fit = fit_lines(replace(seen, upper=upper, lower=lower), TRUE, parameters(TRUE, ["A", "B", "C", "DeltaJ"]))
+    assert not fit.converged
+    named = [text for text in fit.notes if "are upper and lower exchanged?" in text]
+    assert len(named) == 1
+    assert named[0].startswith("line 85, ")
+
+
 @pytest.mark.parametrize(
     ("sign", "words"), [(";", "its columns are separated by ';'; expected commas"), ("\t", "separated by '\\\\t'")]
 )

@@ -68,9 +68,9 @@ def command_of(verb: Verb, run: Callable[[Verb, typer.Context, Mapping[str, Any]
 
     defaults: dict[str, tuple[Any, Any]] = {"context": (inspect.Parameter.empty, typer.Context)}
     defaults |= {name: _parameter_of(options[identity]) for name, identity in identities.items()}
-    if not all(field.common for field in options.values()):
-        show = typer.Option(False, "--help-all", is_eager=True, callback=_show_all, help="Show all options.")
-        defaults["help_all"] = show, bool
+    few = all(field.common for field in options.values())  # --help shows them all, and --help-all the same
+    show = typer.Option(False, "--help-all", is_eager=True, callback=_show_all, help="Show all options.", hidden=few)
+    defaults["help_all"] = show, bool
     parameters = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
         for name, (default, kind) in defaults.items()
