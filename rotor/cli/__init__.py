@@ -117,11 +117,10 @@ def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer
             app.command(verb, short_help=VERBS[verb])(_listed)
             continue
         from rotor.cli.shared.command import VerbCommand, command_of
-        from rotor.cli.shared.runner import run_verb
 
         declared = declaration(verb)
         app.command(verb, cls=VerbCommand, short_help=VERBS[verb] or declared.about, epilog=folded(declared.examples))(
-            command_of(declared, run_verb)
+            command_of(declared)
         )
     return app
 
