@@ -1,11 +1,15 @@
-"""TOML text as tables; all faults raise ValueError."""
+"""TOML text as tables, whose faults all raise ValueError, and keys and values as TOML text."""
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import tomllib
+from collections.abc import Mapping
 from typing import Any
 
+_BARE = re.compile(r"[A-Za-z0-9_-]+")  # keys without quotation marks
 MOST_DEPTH = 50  # deepest nesting of lists and tables; the files here have four levels
 
 
@@ -40,3 +44,31 @@ def _refuse_extremes(thing: Any, where: str, depth: int) -> None:
             raise ValueError(
                 f"{where}: a whole number of {len(str(thing))} digits is too large; write it as 1e99"
             ) from None
+
+
+def toml_key(key: str) -> str:
+    """A key, in quotation marks if it needs them."""
+    return key if _BARE.fullmatch(key) else _quoted(key)
+
+
+def toml_value(value: Any, *, by_row: bool = False) -> str:
+    """A value; a number reads back as the same double. by_row: whether a list of lists has a line for each.
+
+    >>> toml_value({"a": [1.5, True], "b c": "\\n"})
+    '{ a = [1.5, true], "b c" = "\\\\n" }'
+    """
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return _quoted(value)
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{toml_key(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
+    if isinstance(value, list):
+        if by_row and value and isinstance(value[0], list):
+            return "[\n" + "".join(f"    {toml_value(row)},\n" for row in value) + "]"
+        return f"[{', '.join(map(toml_value, value))}]"
+    return repr(value)
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -6,10 +6,7 @@ computes a scene is imported by name when it runs.
 
 from __future__ import annotations
 
-import json
-import math
 import os
-import re
 import tomllib
 from collections.abc import Mapping
 from concurrent.futures import Executor
@@ -18,6 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.formats.toml import toml_key, toml_value
 from rotor.frozen import dataclass
 from rotor.requests.accuracy import Stated
 from rotor.requests.choices import nearest
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
     from rotor.requests.plan import Plan
 
 SCHEMA = 1
-_BARE = re.compile(r"[A-Za-z0-9_-]+")  # keys of TOML without quotation marks
 
 
 @dataclass(frozen=True)
@@ -211,10 +208,10 @@ def scene_text(scene: Scene) -> str:
 def _lines_of(table: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
     """Lines of a table: values first, then inner tables."""
     plain = {key: value for key, value in table.items() if not _is_table(value)}
-    lines = [f"{_key(key)} = {toml_value(value)}\n" for key, value in plain.items() if value is not None]
+    lines = [f"{toml_key(key)} = {toml_value(value)}\n" for key, value in plain.items() if value is not None]
     for key, value in table.items():
         inner = (*path, key)
-        name = ".".join(_key(part) for part in inner)
+        name = ".".join(toml_key(part) for part in inner)
         if isinstance(value, Mapping) and _is_table(value):
             lines += [f"\n[{name}]\n", *_lines_of(value, inner)]
         elif _is_table(value):
@@ -227,25 +224,6 @@ def _is_table(value: Any) -> bool:
     if isinstance(value, Mapping):
         return True
     return isinstance(value, list) and bool(value) and all(isinstance(item, Mapping) for item in value)
-
-
-def _key(key: str) -> str:
-    return key if _BARE.fullmatch(key) else json.dumps(key, ensure_ascii=False)
-
-
-def toml_value(value: Any) -> str:
-    """A value in TOML; a float reads back as the same double."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, float):
-        return repr(value) if math.isfinite(value) else {math.inf: "inf", -math.inf: "-inf"}.get(value, "nan")
-    if isinstance(value, list):
-        return f"[{', '.join(map(toml_value, value))}]"
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {toml_value(item)}" for key, item in value.items()) + " }"
-    return str(value)
 
 
 def write_scene(scene: Scene, path: str | os.PathLike[str]) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from rotor.formats.toml import toml_value
 from rotor.requests.field import Field
 from rotor.scenes.keys import Keys, about, declared_keys, inner_tables, is_list, shown_default, tables_of
-from rotor.scenes.scene import SCHEMA, toml_value
+from rotor.scenes.scene import SCHEMA
 from rotor.verbs.verb import SCENE_VERBS, Verb, verb_of
 
 TAGS = {

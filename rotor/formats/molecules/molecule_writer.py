@@ -13,6 +13,7 @@ from rotor.formats.molecules.internal_rotation_table import internal_rotation_ta
 from rotor.formats.molecules.level_table import write_level_table
 from rotor.formats.molecules.molecule_file import MoleculeFile
 from rotor.formats.molecules.spin_table import spin_tables, uncertain_entry
+from rotor.formats.toml import toml_key, toml_value
 from rotor.tops.states.state_constants import StateConstants
 
 
@@ -69,7 +70,7 @@ def molecule_file_text(molecule: MoleculeFile, levels_file: str = "") -> str:
             parts.append("\n".join([f"[{name}]", *_lines({**marks, **table})]))
     spins = spin_tables(molecule.spin_constants, molecule.unverified, molecule.molecule is not None)
     for name, table in spins.items():
-        heading = name if name == "spins" else f"spins.{_key(name)}"
+        heading = name if name == "spins" else f"spins.{toml_key(name)}"
         parts.append("\n".join([f"[{heading}]", *_lines(table)]))
     return "\n\n".join(parts) + "\n"
 
@@ -146,30 +147,6 @@ def _catalogue(molecule: MoleculeFile) -> dict[str, Any]:
 
 
 def _lines(table: Mapping[str, Any]) -> list[str]:
-    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None and value != []]
-
-
-def _key(key: str) -> str:
-    bare = key.isascii() and key.replace("_", "").replace("-", "").isalnum()
-    return key if bare else _quoted(key)
-
-
-def _value(value: Any) -> str:
-    """A TOML value; a list of lists has a line for each."""
-    if isinstance(value, str):
-        return _quoted(value)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, list):
-        if value and isinstance(value[0], list):
-            return "[\n" + "".join(f"    {_value(row)},\n" for row in value) + "]"
-        return "[" + ", ".join(map(_value, value)) + "]"
-    return repr(value)
-
-
-def _quoted(text: str) -> str:
-    """A basic TOML string: quotes, backslashes and control characters escaped."""
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() or c == " " else f"\\U{ord(c):08X}" for c in escaped) + '"'
+    """The entries of a table; a list of lists has a line for each."""
+    filled = {key: value for key, value in table.items() if value is not None and value != []}
+    return [f"{toml_key(key)} = {toml_value(value, by_row=True)}" for key, value in filled.items()]
