@@ -159,7 +159,7 @@ class SweepRun:
 
 def answer(options: Options, _: Work) -> SceneRun | SweepRun:
     """Run a scene, or the points of its sweep that are not done."""
-    from rotor.scenes.outputs import refuse_outside
+    from rotor.scenes.run import refuse_outside
     from rotor.scenes.scene import read_scene
     from rotor.scenes.sweep import is_sweep
 

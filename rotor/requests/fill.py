@@ -164,31 +164,3 @@ def equal(value: Any, default: Any) -> bool:
         and not isinstance(value, bool)
         and value == default
     )
-
-
-def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested tables from values by dotted key.
-
-    >>> nested({"a.b": 1, "c": 2, "a.d": 3})
-    {'a': {'b': 1, 'd': 3}, 'c': 2}
-    """
-    tables: dict[str, Any] = {}
-    for key, value in flat.items():
-        *path, last = key.split(".")
-        inner = tables
-        for name in path:
-            inner = inner.setdefault(name, {})
-        inner[last] = value
-    return tables
-
-
-def flattened(tables: Mapping[str, Any], keys: Iterable[str]) -> dict[str, Any]:
-    """Values by dotted key, for those keys that the tables have."""
-    flat: dict[str, Any] = {}
-    for key in keys:
-        inner: Any = tables
-        for name in key.split("."):
-            inner = inner.get(name) if isinstance(inner, Mapping) else None
-        if inner is not None:
-            flat[key] = inner
-    return flat

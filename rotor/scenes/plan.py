@@ -10,8 +10,7 @@ from rotor.requests.accuracy import Accuracy
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, Run, timed
-from rotor.scenes.outputs import Where, files_of
-from rotor.scenes.run import scene_calculation
+from rotor.scenes.run import Where, files_of, scene_calculation
 from rotor.scenes.scene import Scene
 from rotor.verbs.calculation import Calculation, NoResultError
 from rotor.verbs.verb import Verb

@@ -1,19 +1,20 @@
-"""Run a scene: make its request, answer it, and write the files that the scene names; and back, the scene of an answer."""
+"""Run a scene: make its request, answer it, and write the files that it names in [outputs]; and back, the scene of an answer."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from rotor.requests.fill import Entries, flattened, nested
-from rotor.scenes.keys import keyed
-from rotor.scenes.outputs import Where, files_of, paths_of
-from rotor.scenes.scene import SCHEMA, Scene, SceneResult, scene_of, scene_text
+from rotor.scenes.scene import SCHEMA, Scene, SceneResult, keyed, scene_of, scene_text, within
 from rotor.verbs.calculation import Calculation, Outcome
+from rotor.verbs.outputs import Files
 from rotor.verbs.verb import Work, verb_of
+
+Where = str | os.PathLike[str]
 
 
 def run_scene(
@@ -64,11 +65,7 @@ def run_scene(
 
 def scene_calculation(scene: Scene, folder: Where = ".", out: Where = ".") -> Calculation:
     """The calculation of a scene. folder: of the files that it reads. out: of those that it writes."""
-    verb = verb_of(scene.kind)  # no other verb is imported
-    molecule = scene.content.get("molecule")
-    named = {"molecule": {"source": molecule}} if isinstance(molecule, str) else {}
-    entries = Entries(flattened({**scene.content, **named}, keyed(verb)), "key")
-    files = paths_of(scene, out)
+    verb, entries, files = verb_of(scene.kind), scene.entries, paths_of(scene, out)  # no other verb is imported
     provenance = {"scene": scene_text(scene)} if files else {}
     work = Work(shown=verb.read_shown(entries), files=files, provenance=provenance, from_scene=True)
     return Calculation(verb, entries, work, folder, scene.accuracy)
@@ -85,3 +82,66 @@ def saved_scene(outcome: Outcome, folder: Path, outputs: Mapping[str, Any]) -> S
         if field.table == "outputs" and entries.has(field):
             flat[key] = field.write(field.read(entries.of(field), entries.style))
     return scene_of({"schema": SCHEMA, "kind": verb.name, **nested(flat)})
+
+
+def nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables from values by dotted key.
+
+    >>> nested({"a.b": 1, "c": 2, "a.d": 3})
+    {'a': {'b': 1, 'd': 3}, 'c': 2}
+    """
+    tables: dict[str, Any] = {}
+    for key, value in flat.items():
+        *path, last = key.split(".")
+        inner = tables
+        for name in path:
+            inner = inner.setdefault(name, {})
+        inner[last] = value
+    return tables
+
+
+def suffixes_of(kind: str) -> dict[str, tuple[str, ...]]:
+    """Allowed suffixes of the outputs of a kind of scene."""
+    outputs = verb_of(kind).outputs
+    return {output.name: output.suffixes for output in outputs if output.scene} | {"json": (".json",)}
+
+
+def names_of(scene: Scene) -> dict[str, list[str]]:
+    """The names of files in a scene, by output."""
+    outputs = scene.content.get("outputs", {})
+    named = {name: outputs[name] for name in suffixes_of(scene.kind) if name in outputs}
+    return {name: value if isinstance(value, list) else [value] for name, value in named.items()}
+
+
+def paths_of(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
+    """The files that a scene names, in the folder `out`."""
+    return {name: tuple(Path(within(out, text)) for text in texts) for name, texts in names_of(scene).items()}
+
+
+def files_of(scene: Scene, out: Where) -> Files:
+    """The files that a scene writes; ValueError for a wrong suffix, a missing folder, and one file for two outputs."""
+    files = Files(growing={output.name for output in verb_of(scene.kind).outputs if output.grows})
+    suffixes = suffixes_of(scene.kind)
+    for name, paths in paths_of(scene, out).items():
+        for path in paths:
+            files.add(name, f"outputs.{name}:", path, suffixes[name])
+    return files
+
+
+def refuse_outside(scene: Scene, out: Where) -> None:
+    """Refuse outputs outside the folder `out`, so that a scene from elsewhere cannot replace other files.
+
+    >>> from rotor.scenes.scene import LevelsScene
+    >>> refuse_outside(LevelsScene(molecule="CO", outputs={"csv": "../a.csv"}), "results")
+    Traceback (most recent call last):
+        ...
+    ValueError: outputs.csv: ../a.csv: lies outside the folder results; name a file inside it, or give another folder as --out
+    """
+    inside = Path(os.path.abspath(out))
+    for name, texts in names_of(scene).items():
+        for text in texts:
+            if not Path(os.path.abspath(within(out, text))).is_relative_to(inside):
+                raise ValueError(
+                    f"outputs.{name}: {text}: lies outside the folder {os.fspath(out)}; name a file inside it, or give "
+                    "another folder as --out"
+                )

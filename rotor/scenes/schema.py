@@ -8,8 +8,7 @@ from typing import Any, get_args, get_origin
 
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, Field
-from rotor.scenes.keys import Keys, about, declared_keys, kinds_in, shown_default, tables_of, value_kinds
-from rotor.scenes.scene import SCHEMA
+from rotor.scenes.scene import SCHEMA, Keys, about, declared_keys, kinds_in, shown_default, tables_of, value_kinds
 from rotor.verbs.verb import SCENE_VERBS, verb_of
 
 TITLES = {

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, get_origin
 
 from rotor.formats.toml import toml_value
+from rotor.requests.choices import Choices
 from rotor.requests.field import Field
-from rotor.scenes.keys import Keys, about, declared_keys, inner_tables, is_list, shown_default, tables_of
-from rotor.scenes.scene import SCHEMA
+from rotor.scenes.scene import SCHEMA, Keys, about, declared_keys, inner_tables, shown_default, tables_of
 from rotor.verbs.verb import SCENE_VERBS, Verb, verb_of
 
 TAGS = {
@@ -51,13 +51,18 @@ def _lines(verb: Verb) -> Iterator[str]:
             inner[key] = field
     for key, field in inner.items():
         keys = declared_keys(next(iter(inner_tables(field).values())))
-        is_example = is_list(field) and shown_default(field) is not None
+        is_example = _is_list(field) and shown_default(field) is not None
         tag = [TAGS[key]] if key in TAGS else []
         yield from _table(
-            f"[[{key}]]" if is_list(field) else f"[{key}]", [*tag, *_key_lines(keys, key, start)], is_example
+            f"[[{key}]]" if _is_list(field) else f"[{key}]", [*tag, *_key_lines(keys, key, start)], is_example
         )
     for name, keys in tables.items():
         yield from _table(f"[{name}]", _key_lines(keys, name, start), name == "body")
+
+
+def _is_list(field: Field) -> bool:
+    """Whether a field holds a list of tables."""
+    return isinstance(field.reader, Choices) or get_origin(field.reader.scene_type) is list
 
 
 def _table(heading: str, lines: list[str], is_example: bool) -> Iterator[str]:

@@ -14,15 +14,16 @@ from hypothesis import strategies as st
 
 from rotor.requests.field import Field
 from rotor.requests.readers import Whole
-from rotor.scenes.keys import checked_table, tables_of
 from rotor.scenes.scene import (
     AlignScene,
     LevelsScene,
     SpectrumScene,
     StarkScene,
+    checked_table,
     parse_scene,
     read_scene,
     scene_text,
+    tables_of,
     write_scene,
 )
 from rotor.scenes.schema import json_schema, table_schema

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rotor.frozen import dataclass
-from rotor.scenes.outputs import files_of, suffixes_of
+from rotor.scenes.run import files_of, suffixes_of
 from rotor.scenes.scene import SCHEMA, Scene, scene_of
 from rotor.scenes.sweep.molecule_list import is_list, list_entries
 
