@@ -1,9 +1,9 @@
-"""Elements of operators of the rotation between Wang functions of two states, of all J at once.
+"""Elements of operators of the rotation between Wang functions, of all J at once.
 
-    |K s) = φ (|K⟩ + s |-K⟩)/√2 for K > 0,    φ |0⟩ for K = 0,    φ of `wang.basis.phase`
+    |J K s)) = i^J φ (|K⟩ + s |-K⟩)/√2 for K > 0,    i^J φ |0⟩ for K = 0,    φ of `wang.basis.phase`
 
-A shift of K by q leads from K to K + q and from -K to -K + q, functions of K' = |K + q| and |K - q|. Where both lead to one function, and
-where several shifts do, the elements are added.
+(`quantum.tensors`). A shift of K by q leads from K to K + q and from -K to -K + q, functions of K' = |K + q| and |K - q|. Where both lead to
+one function, and where several shifts do, the elements are added.
 """
 
 from __future__ import annotations
@@ -19,6 +19,10 @@ from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.wang.basis import NOTHING, SPECIES, SpeciesFactors, WangBlock, phase
 
 
+Steps = tuple[tuple[int, int], ...]  # of J and K, of each shift of an operator
+_POWERS_OF_I = np.array([1, 1j, -1, -1j])
+
+
 class WangFunctions:
     """The functions of Wang blocks, one block behind the other, in order of J: block, place in it, J, K, and factors of |K⟩ and |-K⟩."""
 
@@ -32,7 +36,8 @@ class WangFunctions:
         self.j = self.j_of_block[self.block]
         self.k = np.array([block.first_k for block in blocks])[self.block] + 2 * self.place
         self.sign = np.array([block.sign for block in blocks])[self.block]
-        self.plus = np.array([phase(block) for block in blocks])[self.block] * np.where(self.k == 0, 1.0, np.sqrt(0.5))
+        phases = _POWERS_OF_I[self.j_of_block % 4] * np.array([phase(block) for block in blocks])
+        self.plus = phases[self.block] * np.where(self.k == 0, 1.0, np.sqrt(0.5))
         occurring, number = np.unique(self.j, return_inverse=True)
         self._number_of_j = np.full(int(occurring[-1]) + 1, -1)
         self._number_of_j[occurring] = np.arange(len(occurring))
@@ -41,7 +46,7 @@ class WangFunctions:
 
     def rows(self, j: Ints, k: Ints, sign: int) -> Ints:
         """Rows of the functions |J K sign), -1 where there is none."""
-        inside = (j < len(self._number_of_j)) & (k < self._rows.shape[1])
+        inside = (j >= 0) & (j < len(self._number_of_j)) & (k < self._rows.shape[1])
         number = np.where(inside, self._number_of_j[np.where(inside, j, 0)], -1)
         return np.where(number < 0, -1, self._rows[number, np.where(inside, k, 0), int(sign > 0)])
 
@@ -82,11 +87,17 @@ class BetweenStates:
         self._columns = np.concatenate([np.arange(len(low.k)), negative])
         self._labels = {"J": low.j[self._columns], "K": np.concatenate([low.k, -low.k[negative]])}
         self._amplitudes = np.concatenate([low.plus, (low.sign * low.plus)[negative]])
-        self._paths: dict[tuple[int, ...], _Paths] = {}
+        self._paths: dict[Steps, _Paths] = {}
 
-    def elements(self, operator: Operator, factors: SpeciesFactors | None) -> tuple[WangElements, bool]:
-        """Elements without round-off of zero, in order of the blocks of the bra, and whether some are imaginary."""
-        shifts = {dict(each.change).get("K", 0): each.factor for each in operator.merged().shifts}
+    def elements(self, operator: Operator, factors: SpeciesFactors | None = None) -> tuple[WangElements, bool]:
+        """Real elements without round-off of zero, in order of the blocks of the bra, and whether some have an imaginary part.
+
+        factors: of pairs of species, which multiply the elements.
+        """
+        shifts = {}
+        for each in operator.merged().shifts:
+            steps = dict(each.change)
+            shifts[steps.get("J", 0), steps.get("K", 0)] = each.factor
         paths = self._paths_of(tuple(shifts))
         if not len(paths.rows):
             none = np.zeros(0, dtype=np.int64)
@@ -94,34 +105,33 @@ class BetweenStates:
         count = len(self._columns)
         evaluated = np.array([np.broadcast_to(factor(self._labels), count) for factor in shifts.values()])
         contributions = evaluated.ravel()[paths.source] * paths.weight
-        values = np.bincount(paths.place, contributions.real, len(paths.rows)) + 0j
-        values.imag = np.bincount(paths.place, contributions.imag, len(paths.rows))
+        parts = [np.bincount(paths.place, part, len(paths.rows)) for part in (contributions.real, contributions.imag)]
         largest = np.zeros(int(self._labels["J"].max()) + 1)
         np.maximum.at(largest, self._labels["J"], np.abs(evaluated).max(axis=0))
         least = NOTHING * np.nan_to_num(largest, posinf=0.0)[self._low.j_of_block[paths.low]]
-        acting = ~(np.maximum.reduceat(np.abs(values), paths.starts) <= least)
         if factors is not None:
             scale = np.array(factors)[self._up.species[paths.up], self._low.species[paths.low]]
-            acting &= scale != 0
-            values *= scale[paths.pair]
-        imaginary = acting & (np.maximum.reduceat(np.abs(values.imag), paths.starts) > least)
-        chosen = np.flatnonzero(acting[paths.pair] & (values != 0))
+            parts = [part * scale[paths.pair] for part in parts]
+        real, imaginary = (np.maximum.reduceat(np.abs(part), paths.starts) for part in parts)
+        acting = ~(real <= least)
+        chosen = np.flatnonzero(acting[paths.pair] & (parts[0] != 0))
         pair, rows, columns = paths.pair[chosen], paths.rows[chosen], paths.columns[chosen]
         places = self._up.place[rows], self._low.place[columns]
-        return WangElements(paths.up[pair], paths.low[pair], *places, np.real(values[chosen])), bool(imaginary.any())
+        values = np.asarray(parts[0][chosen], dtype=float)
+        return WangElements(paths.up[pair], paths.low[pair], *places, values), bool((imaginary > least).any())
 
-    def _paths_of(self, steps: tuple[int, ...]) -> _Paths:
+    def _paths_of(self, steps: Steps) -> _Paths:
         if steps not in self._paths:
             self._paths[steps] = self._new_paths(steps)
         return self._paths[steps]
 
-    def _new_paths(self, steps: tuple[int, ...]) -> _Paths:
+    def _new_paths(self, steps: Steps) -> _Paths:
         up, low, none = self._up, self._low, np.zeros(0, dtype=np.int64)
         pieces = [(none, none, none, np.zeros(0, dtype=np.complex128))]
-        for number, step in enumerate(steps):
+        for number, (rise, step) in enumerate(steps):
             target = self._labels["K"] + step
             for sign in (1, -1):
-                rows = up.rows(self._labels["J"], np.abs(target), sign)
+                rows = up.rows(self._labels["J"] + rise, np.abs(target), sign)
                 at = np.flatnonzero(rows >= 0)
                 back = up.plus[rows[at]].conj() * np.where(target[at] < 0, sign, 1)
                 pieces.append((number * len(target) + at, rows[at], self._columns[at], back * self._amplitudes[at]))

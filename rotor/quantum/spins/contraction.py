@@ -369,7 +369,8 @@ class _Pieces:
         m, n = self._pairs.m[:, :, None].astype(float), self._pairs.n[:, :, None].astype(float)
         factor = piece.value * ((m * (m + 1.0)) ** piece.n2 + (n * (n + 1.0)) ** piece.n2) / 2
         if piece.nz2 and self._pairs.k is not None:
-            factor = factor * (self._pairs.k[1] ** (2.0 * piece.nz2))[:, None, None]
+            bra, ket = (k ** (2.0 * piece.nz2) for k in self._pairs.k)
+            factor = factor * ((bra + ket) / 2)[:, None, None]
         elif piece.nz2:
             bra, ket = (section.basis.k.astype(float) ** (2 * piece.nz2) for section in (left, right))
             factor = factor * ((bra[:, None] + ket) / 2)

@@ -9,7 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.quantum.basis.wang_functions import BetweenStates, WangFunctions
 from rotor.quantum.label_blocks import unit_diagonals
+from rotor.quantum.operators.algebra import Operator, change_of
 from rotor.quantum.spins.operators import (
     ByElements,
     BySpecies,
@@ -23,7 +25,7 @@ from rotor.quantum.spins.operators import (
 )
 from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.tensors import BodyTensor, overlap
-from rotor.quantum.wang.basis import Part, WangBlock
+from rotor.quantum.wang.basis import SPECIES, Part, SpeciesFactors, WangBlock
 
 MOST_RANK = 2  # highest rank with closed forms for many N at once
 
@@ -73,7 +75,7 @@ def power_matrices(section: Section, units: Sequence[tuple[int, int]]) -> Floats
 def rotor_elements(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
     """Elements (pairs, functions', functions) of an operator between two sections; None where it does not act."""
     if pairs.k is not None:
-        return _axial_elements(rotor, pairs, pairs.k[1], representation)
+        return _axial_elements(rotor, pairs, *pairs.k, representation)
     if isinstance(rotor, Cosines):
         tensor = tensor_of(rotor.components, rotor.rank, representation)
         elements = None if tensor is None else tensor_elements_of_pairs(tensor, left.basis, right.basis, pairs)
@@ -82,7 +84,34 @@ def rotor_elements(rotor: Rotor, left: Section, right: Section, pairs: Pairs, re
         return _elements_with_n(rotor, left, right, pairs, representation)
     if isinstance(rotor, Scalar):
         return _scalar_elements(rotor, left, right, pairs)
-    return _one_by_one(rotor, left, right, pairs, representation)
+    if isinstance(rotor, BySpecies):
+        elements = rotor_elements(rotor.operator, left, right, pairs, representation)
+        return None if elements is None else elements * _factors_of_pairs(rotor.factors, left, right, pairs)
+    return _elements_of_operator(rotor, left, right, pairs)
+
+
+def _factors_of_pairs(factors: SpeciesFactors, left: Section, right: Section, pairs: Pairs) -> Floats:
+    """The factor of the species of each pair of blocks, (pairs, 1, 1)."""
+    up, low = (
+        np.array([SPECIES.index(section.parts[place].basis.species) for place in places.tolist()])
+        for section, places in ((left, pairs.up), (right, pairs.low))
+    )
+    return np.asarray(np.array(factors)[up, low][:, None, None])
+
+
+def _elements_of_operator(rotor: ByElements, left: Section, right: Section, pairs: Pairs) -> Floats | None:
+    """Elements of any operator between two sections."""
+    up, low = (
+        WangFunctions([section.parts[place].basis for place in places.tolist()])
+        for section, places in ((left, pairs.up), (right, pairs.low))
+    )
+    shifts = [each for each in rotor.operator.shifts if dict(each.change).get("J", 0) == pairs.rise]
+    elements, _ = BetweenStates(up, low).elements(Operator(tuple(shifts)))
+    if not len(elements.rows):
+        return None
+    out = np.zeros((len(pairs.up), left.basis.size, right.basis.size))
+    out[elements.up, elements.rows, elements.columns] = elements.values
+    return out
 
 
 def _elements_with_n(
@@ -126,27 +155,14 @@ def _scalar_elements(rotor: Scalar, left: Section, right: Section, pairs: Pairs)
     return elements
 
 
-def _one_by_one(
-    rotor: ByElements | BySpecies, left: Section, right: Section, pairs: Pairs, representation: str
-) -> Floats | None:
-    """Elements of any operator, pair by pair."""
-    total: Floats | None = None
-    for place, (a, b) in enumerate(zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)):
-        element = rotor.elements(left.parts[a].basis, right.parts[b].basis, representation)
-        if element is not None:
-            if total is None:
-                total = np.zeros((len(pairs.up), left.basis.size, right.basis.size))
-            total[place, : element.shape[0], : element.shape[1]] = element
-    return total
-
-
 def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) -> Floats | None:
     """`tensors.block_elements` for all pairs: (pairs, up.size, low.size)."""
     rank, rise = tensor.rank, pairs.rise
     if rank > MOST_RANK:
         raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
     if pairs.k is not None:
-        return _axial_tensor_elements(tensor, pairs, *pairs.k)
+        elements = _of_one_sign(tensor, pairs, *pairs.k)
+        return None if elements is None else elements * both_signs(pairs)
     steps, parts_of_n = _signed_parts(tensor, up, low, rise)
     if abs(rise) > rank or not steps:
         return None
@@ -208,41 +224,58 @@ def _add_folded(
                 elements[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]
 
 
-def _axial_elements(rotor: Rotor, pairs: Pairs, k: Ints, representation: str) -> Floats | None:
-    """⟨N'K‖X‖N K⟩ of an operator that leaves K good, (pairs, 1, 1)."""
-    n, rise = pairs.n[:, 0].astype(float), pairs.rise
+def _axial_elements(rotor: Rotor, pairs: Pairs, k_up: Ints, k: Ints, representation: str) -> Floats | None:
+    """⟨N'K'‖X‖N K⟩ (pairs, 1, 1) of an operator for one sign of K, in the phases of Wang functions; factors of species do not occur."""
+    n, rise, same_k = pairs.n[:, :, None].astype(float), pairs.rise, not (k_up != k).any()
+    if isinstance(rotor, BySpecies):
+        return _axial_elements(rotor.operator, pairs, k_up, k, representation)
+    if isinstance(rotor, ByElements):
+        return _axial_elements_of_operator(rotor, pairs, k_up, k)
     if isinstance(rotor, Scalar):
-        x = n * (n + 1)
-        along = [factor * x**p * k ** (2.0 * q) for (p, q, _), factor in rotor.operators]
-        return np.sum(along, axis=0)[:, None, None] if not rise else None
-    assert isinstance(rotor, Cosines | CosinesWithN)
-    tensor = tensor_of(rotor.components, 2, representation)
-    along_axis = tensor.components[2].real if tensor else 0.0
-    closes = 2 * n + rise >= 2
-    elements = np.zeros(len(n))
-    if along_axis and abs(rise) <= 2:
-        elements[closes] = along_axis * closed_coupling(n[closes], rise, 2, 0, k[closes].astype(float))
+        x, squared = n * (n + 1), (k**2.0)[:, None, None]
+        along = [factor * x**p * squared**q for (p, q, _), factor in rotor.operators]
+        return np.sum(along, axis=0) if same_k and not rise else None
     if isinstance(rotor, Cosines):
-        return elements[:, None, None]
-    stretch, _, length = factors_with_n(n + rise, n)
-    trace = float(np.trace(np.array(rotor.components))) / 3
+        elements = _of_one_sign(tensor_of(rotor.components, rotor.rank, representation), pairs, k_up, k)
+        return -elements if elements is not None and rotor.rank == 1 else elements
     if abs(rise) > 1:
         return None
-    return np.asarray(stretch * elements + (0 if rise else trace * length))[:, None, None]
+    stretch, change, length = factors_with_n(n + rise, n)
+    trace = float(np.trace(np.array(rotor.components))) / 3
+    parts = [
+        (stretch, _of_one_sign(tensor_of(rotor.components, 2, representation), pairs, k_up, k)),
+        (change, _of_one_sign(axis_tensor(rotor.components, representation), pairs, k_up, k)),
+        (trace, length if same_k and not rise and trace else None),
+    ]
+    acting = [factor * elements for factor, elements in parts if elements is not None]
+    return np.asarray(sum(acting)) if acting else None
 
 
-def _axial_tensor_elements(tensor: BodyTensor, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
-    """⟨N'K'‖T‖N K⟩ times √(number of components), so that squares count both signs of K, (pairs, 1, 1).
+def _axial_elements_of_operator(rotor: ByElements, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
+    """Elements of any operator between functions with K = 0; ValueError for others, which stand for -K too."""
+    if k.any() or k_up.any():
+        raise ValueError(
+            f"functions |N K⟩ with K = {max(*k, *k_up)}, which stand for -K too: Wang functions are needed"
+        )
+    labels, change = {"J": pairs.n[:, 0], "K": k}, change_of({"J": pairs.rise})
+    alike = [np.broadcast_to(each.factor(labels), len(k)) for each in rotor.operator.shifts if each.change == change]
+    total = np.sum(alike, axis=0)
+    return np.asarray(total.real - total.imag)[:, None, None] if np.any(total) else None
 
-    A component across the axis enters with its absolute value.
-    """
+
+def _of_one_sign(tensor: BodyTensor | None, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
+    """⟨N'K'‖T‖N K⟩ (pairs, 1, 1) of one sign of K; a component across the axis enters with its absolute value."""
     q = int(k_up[0] - k[0])
-    part = tensor.components[tensor.rank + q]
-    closes = (pairs.m + pairs.n)[:, 0] >= tensor.rank
-    if not part or not closes.any():
+    if tensor is None or max(abs(q), abs(pairs.rise)) > tensor.rank or not (part := tensor.components[tensor.rank + q]):
         return None
-    out, n = np.zeros((len(k), 1, 1)), pairs.n[closes, 0].astype(float)
-    values = closed_coupling(n, pairs.rise, tensor.rank, q, k[closes].astype(float))
-    both_signs = np.where((k[closes] > 0) | (k_up[closes] > 0), np.sqrt(2.0), 1.0)
-    out[closes, 0, 0] = (abs(part) if q else part.real) * values * both_signs
-    return out
+    closes = (pairs.m + pairs.n)[:, 0] >= tensor.rank
+    out = np.zeros((len(k), 1, 1))
+    values = closed_coupling(pairs.n[closes, 0].astype(float), pairs.rise, tensor.rank, q, k[closes].astype(float))
+    out[closes, 0, 0] = (abs(part) if q else part.real) * values
+    return out if closes.any() else None
+
+
+def both_signs(pairs: Pairs) -> Floats:
+    """√(number of components) of functions |N K⟩ (pairs, 1, 1), so that squares of elements count both signs of K."""
+    k_up, k = pairs.k if pairs.k is not None else (np.zeros(1), np.zeros(1))
+    return np.where((k_up > 0) | (k > 0), np.sqrt(2.0), 1.0)[:, None, None]
