@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from plain_elements import tensor_elements
 
 from rotor.quantum.spins.coupling import moment_coefficients
-from rotor.quantum.spins.operators import AxialState, tensor_elements
+from rotor.quantum.spins.operators import AxialState
 
 
 def elements_of_parts(up, low, tensors):

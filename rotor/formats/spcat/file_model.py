@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, CodedLine
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_of
-from rotor.formats.spcat.hamiltonian.dipole_codes import EVEN_ORDER, DipoleCode, Dipoles, line_moment, split_dipoles
+from rotor.formats.spcat.hamiltonian.dipole_codes import (
+    EVEN_ORDER,
+    DipoleCode,
+    Dipoles,
+    is_vector,
+    line_moment,
+    split_dipoles,
+)
 from rotor.formats.spcat.hamiltonian.file_effect import FileEffect
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by, refuse_other_functions, without_diagonalization
@@ -282,8 +289,12 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     turned = _turned(usable, light, doubled)
     if light.phases.odd:
         fixed = light.phases._replace(odd=turned_odd_axes(turned)) if turned else light.phases
+        axes_of_vectors = [code.axis if is_vector(code) else 0 for _, code in acting]
         moments, beside = turned_moments(
-            moments, beside, turned, with_dipoles(fixed, light.axes_within_states, oblate, False)
+            moments,
+            list(zip(beside, axes_of_vectors, strict=True)),
+            turned,
+            with_dipoles(fixed, light.axes_within_states, oblate, False),
         )
     elif light.phases.between_i:
         moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])

@@ -2,8 +2,8 @@
 
     |J K s)) = i^J φ (|K⟩ + s |-K⟩)/√2 for K > 0,    i^J φ |0⟩ for K = 0,    φ of `wang.basis.phase`
 
-(`quantum.tensors`). A shift of K by q leads from K to K + q and from -K to -K + q, functions of K' = |K + q| and |K - q|. Where both lead to
-one function, and where several shifts do, the elements are added.
+(`quantum.tensors`). A shift of K by q leads from K to K + q and from -K to -K + q, functions of K' = |K + q| and |K - q|. Where both lead
+to one function, and where several shifts do, the elements are added.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats, Ints
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.wang.basis import NOTHING, SPECIES, SpeciesFactors, WangBlock, phase
-
 
 Steps = tuple[tuple[int, int], ...]  # of J and K, of each shift of an operator
 _POWERS_OF_I = np.array([1, 1j, -1, -1j])

@@ -7,18 +7,16 @@ g_I I of the spins.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import Connections, Levels, SolvedBlock
 from rotor.quantum.moments import Moment
-from rotor.quantum.reduced import connections, no_elements, pairs_where
+from rotor.quantum.reduced import connections, no_elements
 
 Pair = tuple[int, int]  # numbers of blocks, the higher or equal F first
 
@@ -56,28 +54,16 @@ class ReducedElements:
     def connected(self, operator: FieldOperator) -> list[Pair]:
         """Pairs of blocks that an operator connects, each once."""
         if operator.key not in self._pairs:
-            self._pairs[operator.key] = list(self._connected(operator))
-        return self._pairs[operator.key]
-
-    def _connected(self, operator: FieldOperator) -> Iterator[Pair]:
-        """Pairs of blocks between which the operator has elements."""
-        number = {block.start: i for i, block in enumerate(self.blocks)}
-
-        def acts(up: SolvedBlock, low: SolvedBlock) -> bool:
-            return self.between(operator, number[up.start], number[low.start]) is not None
-
-        if isinstance(operator, Contraction) or self.blocks[0].spins is not None:
+            number = {block.start: i for i, block in enumerate(self.blocks)}
             pairs, _ = self._connections(operator)
-        else:
-            pairs = list(pairs_where(self.blocks, operator.rank, acts))
-        for up, low in pairs:
-            yield number[up.start], number[low.start]
+            self._pairs[operator.key] = [(number[up.start], number[low.start]) for up, low in pairs]
+        return self._pairs[operator.key]
 
     def _connections(self, operator: FieldOperator) -> Connections:
         """Pairs of blocks that an operator connects, and the function that returns the elements between them, computed once."""
         if operator.key not in self._acting:
             if isinstance(operator, Magnet):
-                self._acting[operator.key] = _magnetic_connections(operator, self.states, self.blocks)
+                self._acting[operator.key] = self._magnetic_connections(operator)
             else:
                 tensors = operator.tensors(self.states, self.representation)
                 self._acting[operator.key] = connections(self.blocks, tensors) if tensors else ([], no_elements)
@@ -93,23 +79,34 @@ class ReducedElements:
     def _computed(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
         """Elements of a pair of blocks, computed anew."""
         first, second = self.blocks[up], self.blocks[low]
-        if isinstance(operator, Magnet):
-            if second.spins is None:
-                moment = self._moment(operator, first, second)
-                return moment if moment is not None and moment.any() else None
-        elif first.moments is not None:
+        if first.moments is not None and isinstance(operator, Contraction):
             return np.asarray(first.moments.reduced(first, second, operator.tensors(self.states, self.representation)))
         elements = self._connections(operator)[1](first, second)
         copies = 2 if first.axial_k else first.components
         return elements / np.sqrt(copies) if copies > 1 else elements  # that of one sign of K, or of one component
 
-    def _moment(self, magnet: Magnet, up: SolvedBlock, low: SolvedBlock) -> Floats | None:
-        """Elements of the magnetic moment; None where they are zero."""
-        if up.moments is not None:
+    def _magnetic_connections(self, magnet: Magnet) -> Connections:
+        """`connections` of ½ Σ g_ij {Φ_i, N_j} in each state, and of g_I I of the spins."""
+        from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of
+        from rotor.quantum.spins.many_f_lines import connections_of, connections_of_stacks
+        from rotor.quantum.spins.moments import spin_moments
+        from rotor.quantum.spins.operators import EVERY_STATE, CosinesWithN, Scalar
+        from rotor.quantum.spins.rotor import Piece
+
+        first = self.blocks[0]
+        if first.moments is not None or (first.spins is not None and first.spins.rotor.moments is not None):
             _refuse_turning_group()
-        if up.axial_k != low.axial_k or abs(up.twice_total - low.twice_total) > 2:
-            return None
-        return _rotational_moment(magnet.g, up, low, self.representation)
+        of_rotation, every = CosinesWithN(_matrix(magnet.g)), (EVERY_STATE, EVERY_STATE)
+        if first.spins is None:
+            piece = Piece(1.0, of_rotation, *every, 0, 0)
+            (contracted,) = operators_of_stacks(stacks_of(self.blocks), 1, [[piece]], self.representation)
+            return connections_of_stacks(self.blocks, contracted)
+        scheme = first.spins.shared.scheme
+        moments = [Moment(1.0, every, of_rotation, electric=False)]
+        for name, value in magnet.nuclei.items():
+            share = value / scheme.count_of((scheme.place(name),))
+            moments.append(Moment(share, every, Scalar(), name, electric=False))
+        return connections_of(self.blocks, spin_moments(first.spins.shared, moments))
 
 
 def _refuse_turning_group() -> NoReturn:
@@ -121,33 +118,6 @@ def _refuse_turning_group() -> NoReturn:
     )
 
 
-def _matrix(g: Floats) -> Any:
+def _matrix(g: NDArray[Any]) -> Any:
     """A matrix as nested tuples."""
     return tuple(tuple(row) for row in g.tolist())
-
-
-def _magnetic_connections(magnet: Magnet, states: Sequence[int], blocks: Sequence[SolvedBlock]) -> Connections:
-    """`connections` of ½ Σ g_ij {Φ_i, N_j} and g_I I of each state, of levels with spins."""
-    from rotor.quantum.spins.many_f_lines import connections_of
-    from rotor.quantum.spins.moments import spin_moments
-
-    shared = blocks[0].spins.shared
-    if blocks[0].spins.rotor.moments is not None:
-        _refuse_turning_group()
-    scheme, g = shared.scheme, _matrix(magnet.g)
-    nuclei = [(name, value / scheme.count_of((scheme.place(name),))) for name, value in magnet.nuclei.items()]
-    moments = [Moment(1.0, (v, v), tensor=g) for v in states]
-    moments += [Moment(value, (v, v), spin=name) for v in states for name, value in nuclei]
-    return connections_of(blocks, spin_moments(shared, moments))
-
-
-def _rotational_moment(g: Floats, up: SolvedBlock, low: SolvedBlock, representation: str) -> Floats | None:
-    """Elements of ½ Σ g_ij {Φ_i, N_j} between solved blocks of the rotation."""
-    from rotor.quantum.spins.operators import CosinesWithN
-
-    rotor = CosinesWithN(_matrix(g))
-
-    def between(left: Any, right: Any) -> Floats | None:
-        return rotor.elements(left.basis, right.basis, representation) if left.v == right.v else None
-
-    return up.elements(low, between)

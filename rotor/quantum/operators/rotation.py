@@ -9,12 +9,12 @@ J_m∓ raises and lowers k). In a left-handed representation the frame x, -y, z 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache, lru_cache, reduce
+from functools import cache, reduce
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rotor.arrays import Ints
 from rotor.quantum.operators.algebra import UNIT, Factor, Labels, Operator, Shift, Values, diagonal, shift
@@ -62,7 +62,8 @@ def components(representation: str) -> Mapping[str, Operator]:
     """Ja, Jb, Jc on |J K⟩ of a representation.
 
     >>> a, b, c = (components("IIIr")[axis] for axis in "abc")
-    >>> bool(abs(matrix_of_j(a @ b - b @ a + 1j * c, 2)).max() < 1e-15)
+    >>> commutators = {s.change: s.factor({"J": np.array([2]), "K": np.array([1])}) for s in (a @ b - b @ a + 1j * c).merged().shifts}
+    >>> bool(max(abs(factor).item() for factor in commutators.values()) < 1e-15)
     True
     """
     sense = -1.0 if representation.endswith("l") else 1.0
@@ -109,37 +110,6 @@ def powers(p: int, q: int, n: int) -> Operator:
 def sum_of_powers(operators: Mapping[Powers, float]) -> Operator:
     """Σ c J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ over a table {(p, q, n): c}."""
     return reduce(lambda x, y: x + y, (c * powers(*pqn) for pqn, c in operators.items()), Operator())
-
-
-def matrix_of_j(operator: Operator, low: int, up: int | None = None) -> NDArray[np.complex128]:
-    """⟨J'K'|O|J K⟩ over all K' and K, both rising, from J = low to J' = up, by default the same.
-
-    >>> matrix_of_j(ladder(1), 1).real.round(3).tolist()
-    [[0.0, 0.0, 0.0], [1.414, 0.0, 0.0], [0.0, 1.414, 0.0]]
-    """
-    above, first = low if up is None else up, low - low % _BESIDE
-    k, here = np.arange(-low, low + 1), slice(low**2 - first**2, (low + 1) ** 2 - first**2)
-    out = np.zeros((2 * above + 1, 2 * low + 1), dtype=np.complex128)
-    for step, values in _bands(operator, first, above - low):
-        inside = np.flatnonzero(np.abs(k + step) <= above)
-        out[k[inside] + step + above, inside] = values[here][inside]
-    return out
-
-
-_BESIDE = 8  # J whose elements are evaluated together: calls cost more than elements
-
-
-@lru_cache(maxsize=512)
-def _bands(operator: Operator, first: int, rise: int) -> list[tuple[int, Values]]:
-    """The shifts to J + rise: steps of K, and factors over |J K⟩ of neighbouring J from `first` on, K rising in each."""
-    j = np.repeat(np.arange(first, first + _BESIDE), 2 * np.arange(first, first + _BESIDE) + 1)
-    labels = {"J": j, "K": np.arange(len(j)) + first**2 - j**2 - j}  # there are J² functions of lower J
-    shifts = [(dict(each.change), each.factor) for each in operator.merged().shifts]
-    return [
-        (steps.get("K", 0), np.broadcast_to(factor(labels), len(j)))
-        for steps, factor in shifts
-        if steps.get("J", 0) == rise
-    ]
 
 
 def body_tensor(components: ArrayLike) -> Operator:

@@ -20,10 +20,11 @@ from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
 from rotor.quantum.levels import SolvedBlock, SpeciesMoments
 from rotor.quantum.spins.operators import Rotor
 from rotor.quantum.spins.rotor import Piece, acts
-from rotor.quantum.spins.stack_elements import Pairs, Section, rotor_elements, tensor_elements_of_pairs
+from rotor.quantum.spins.stack_elements import Pairs, Section, both_signs, rotor_elements, tensor_elements_of_pairs
 from rotor.quantum.tensors import Tensors, rank_of, tensor_between
 from rotor.quantum.wang.basis import WangBlock
 
+_REACH, _RISES_OF_K = 2, range(-2, 3)  # largest differences of N and of K that an operator connects
 _LIKE, _SMALL = 1.5, 16  # largest ratio of sizes of blocks that share a stack, and sizes that all do
 
 
@@ -172,13 +173,34 @@ def operators_of_stacks(
             elements = forward.contracted(pieces)
             turned = back.contracted(others) if others else None
             if turned is not None:
-                turned = turned.turned((-1.0) ** pairs.rise)
-                elements = (
-                    turned if elements is None else elements._replace(matrices=elements.matrices + turned.matrices)
-                )
+                elements = _added(elements, turned.turned((-1.0) ** pairs.rise))
             if elements is not None:
                 contracted.append(elements)
     return out
+
+
+def pieces_in_both_orders(stacks: Sequence[Stack], piece: Piece, sign: float, representation: str) -> list[Contracted]:
+    """⟨r'‖X‖r⟩ between blocks for both orders of each pair, squares of those of |N K⟩ for both signs of K.
+
+    Between different states the conjugate is added: `sign` times (-1)^(N'-N) times the transpose.
+    """
+    out = list[Contracted]()
+    for up, low, pairs in _near(stacks, min(piece.rotor.rank, _REACH), _RISES_OF_K if stacks[0].axial else range(1)):
+        orders = [_Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)]
+        elements = [order.contracted([piece]) for order in orders]
+        if piece.bra != piece.ket:
+            turned = [None if each is None else each.turned(sign * (-1.0) ** pairs.rise) for each in elements]
+            elements = [_added(each, other) for each, other in zip(elements, turned[::-1], strict=True)]
+        factor = both_signs(pairs)
+        out += [each._replace(matrices=each.matrices * factor) for each in elements[::-1] if each is not None]
+    return out
+
+
+def _added(elements: Contracted | None, others: Contracted | None) -> Contracted | None:
+    """The sum of elements between the same blocks."""
+    if elements is None or others is None:
+        return others if elements is None else elements
+    return elements._replace(matrices=elements.matrices + others.matrices)
 
 
 def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contracted]:

@@ -21,7 +21,7 @@ from rotor.arrays import Indices, Ints, Workspace, runs_of_similar_size
 from rotor.frozen import dataclass
 from rotor.quantum.levels import Connections, SolvedBlock
 from rotor.quantum.spins.blocks import Shared
-from rotor.quantum.spins.contraction import tensors_of_stacks
+from rotor.quantum.spins.contraction import Contracted, tensors_of_stacks
 from rotor.quantum.spins.many_f import (
     Between,
     Coefficients,
@@ -163,6 +163,21 @@ def connections_of(blocks: Sequence[SolvedBlock], moments: Moments) -> Connectio
             if up >= low or first.twice_total > second.twice_total:
                 sizes = len(first.energies_mhz), len(second.energies_mhz)
                 elements[up, low] = rows.amplitudes[place, : sizes[0], : sizes[1]].copy()
+    return _connections(block_at, elements)
+
+
+def connections_of_stacks(blocks: Sequence[SolvedBlock], contracted: Sequence[Contracted]) -> Connections:
+    """The pairs of blocks of the rotation between which an operator has elements, and the function that returns these."""
+    elements: dict[tuple[int, int], NDArray[Any]] = {}
+    for up, low, pairs, matrices in contracted:
+        for matrix, a, b in zip(matrices, pairs.up.tolist(), pairs.low.tolist(), strict=True):
+            if matrix.any():
+                elements[up.blocks[a].start, low.blocks[b].start] = matrix[: up.sizes[a], : low.sizes[b]]
+    return _connections({block.start: block for block in blocks}, elements)
+
+
+def _connections(block_at: Mapping[int, SolvedBlock], elements: Mapping[tuple[int, int], NDArray[Any]]) -> Connections:
+    """The pairs and the function of elements by the rows at which both blocks start."""
     pairs = [(block_at[up], block_at[low]) for up, low in sorted(elements, key=lambda pair: pair[::-1])]
     return pairs, partial(_between_blocks, elements)
 

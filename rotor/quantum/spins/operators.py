@@ -11,6 +11,10 @@ X^K contains N and the direction cosines φ_pi between space-fixed p and molecul
 | `Cosines` of a matrix | T² of the symmetric traceless c_ij, K = 2 | quadrupole, dipolar spin-spin |
 | `CosinesWithN` | Σ_ij c_ij ½{φ_pi, N_j}, K = 1 | spin-rotation |
 | `ByElements` | any, by its elements over |N k⟩ | higher orders, series |
+| `BySpecies` | one of these times a factor for each pair of species | phases |
+
+Real elements over the functions of `tensors` are those of X, of vectors (`Cosines`) those of i X, which is Hermitian and invariant under
+time reversal.
 
 `CosinesWithN` is not a tensor of the molecule alone. With c = c0 1 + c_s + c_a, where c_s is symmetric and traceless and c_a antisymmetric
 with the vector v_k = c_ij,
@@ -31,10 +35,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.operators.algebra import Operator
-from rotor.quantum.operators.rotation import matrix_of_j
-from rotor.quantum.symmetric_top_elements import coupling
-from rotor.quantum.tensors import BodyTensor, Complexes, block_elements, body_tensor, phase_exponent
-from rotor.quantum.wang.basis import SPECIES, SpeciesFactors, WangBlock
+from rotor.quantum.tensors import BodyTensor, body_tensor
+from rotor.quantum.wang.basis import SpeciesFactors
 from rotor.tops.operators import Powers
 
 EVERY_STATE = -1  # in place of v: a term that is diagonal in the states and equal in all of them
@@ -54,31 +56,6 @@ class AxialState(NamedTuple):
     def k(self) -> Ints:
         """K, (1,)."""
         return np.array([self.axial_k])
-
-
-Basis = WangBlock | AxialState
-
-
-def tensor_elements(up: Basis, low: Basis, tensor: BodyTensor | None) -> Floats | None:
-    """Real reduced elements of a tensor between two blocks; None where it does not act.
-
-    Between axial states this is the element of one sign of K, with the absolute value of a component across the axis.
-    """
-    if tensor is None:
-        return None
-    if isinstance(up, AxialState) and isinstance(low, AxialState):
-        q = up.axial_k - low.axial_k
-        if abs(q) > tensor.rank or not abs(up.j - low.j) <= tensor.rank <= up.j + low.j:
-            return None
-        part = tensor.components[tensor.rank + q]
-        return (
-            (abs(part) if q else part.real) * coupling(low.j, up.j, tensor.rank, q, [low.axial_k])[:, None]
-            if part
-            else None
-        )
-    assert isinstance(up, WangBlock)
-    assert isinstance(low, WangBlock)
-    return None if tensor.between(up, low) is None else block_elements(up, low, tensor)
 
 
 @dataclass(frozen=True)
@@ -106,11 +83,6 @@ class Cosines:
         """Whether time reversal changes the sign of the operator after contraction with spins."""
         return self.rank == 1
 
-    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
-        """The real reduced matrix; for a vector that of i times it, which is Hermitian and invariant under time reversal."""
-        matrix = tensor_elements(up, low, tensor_of(self.components, self.rank, representation))
-        return -matrix if matrix is not None and self.rank == 1 else matrix  # i · (i E)
-
 
 def factors_with_n(m: float | Floats, n: float | Floats) -> tuple[Floats, float | Floats, Floats]:
     """Factors in the elements of `CosinesWithN` from N = n to N' = m, |m - n| ≤ 1, as in the formula of this module.
@@ -129,20 +101,6 @@ class CosinesWithN:
     rank = 1
     odd = False
 
-    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
-        """The real reduced matrix between two blocks, None where it is zero."""
-        c, n, m = np.array(self.components), low.j, up.j
-        if abs(m - n) > 1 or not m + n:
-            return None
-        stretch, change, length = factors_with_n(float(m), float(n))
-        terms = [
-            (stretch, tensor_elements(up, low, tensor_of(self.components, 2, representation))),
-            (change, tensor_elements(up, low, axis_tensor(self.components, representation))),
-            (float(np.trace(c)) / 3, length * np.eye(low.size) if up == low else None),
-        ]
-        acting = [factor * matrix for factor, matrix in terms if matrix is not None and factor]
-        return np.asarray(sum(acting)) if acting else None
-
 
 @dataclass(frozen=True)
 class ByElements:
@@ -155,36 +113,6 @@ class ByElements:
     rank: int
     operator: Operator
     odd: bool = False
-
-    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
-        """The real reduced matrix between two blocks, None where it is zero."""
-        if not abs(up.j - low.j) <= self.rank <= up.j + low.j:
-            return None
-        between = matrix_of_j(self.operator, low.j, up.j)
-        reduced = (functions_of(up).conj().T @ between @ functions_of(low)).real
-        return reduced if np.abs(reduced).max(initial=0.0) > _NOTHING * np.abs(between).max(initial=0.0) else None
-
-
-_NOTHING = 1e-13  # round-off of a product of a few numbers, relative to the largest element over |N k⟩
-
-
-@lru_cache(maxsize=256)
-def functions_of(basis: Basis) -> Complexes:
-    """The functions of a basis over |N k⟩ (k rising from -N) in columns.
-
-    Raises ValueError for an axial state |N K⟩ with K > 0, which stands for -K too.
-    """
-    if isinstance(basis, AxialState):
-        if basis.axial_k:
-            raise ValueError(
-                f"functions |N K⟩ with K = {basis.axial_k}, which stand for -K too: Wang functions are needed"
-            )
-        return np.asarray(np.eye(2 * basis.j + 1, dtype=np.complex128)[:, [basis.j]])
-    out = np.zeros((2 * basis.j + 1, basis.size), dtype=np.complex128)
-    for column, k in enumerate(basis.k.tolist()):
-        out[basis.j + k, column] = np.sqrt(0.5) if k else 1.0
-        out[basis.j - k, column] = basis.sign * np.sqrt(0.5) if k else 1.0
-    return np.asarray(out * 1j ** phase_exponent(basis))
 
 
 @dataclass(frozen=True)
@@ -204,14 +132,6 @@ class BySpecies:
     def rank(self) -> int:
         """Rank of the operator."""
         return self.operator.rank
-
-    def elements(self, up: Basis, low: Basis, representation: str) -> Floats | None:
-        """The real reduced matrix between two blocks, None where it is zero."""
-        assert isinstance(up, WangBlock)
-        assert isinstance(low, WangBlock)
-        factor = self.factors[SPECIES.index(up.species)][SPECIES.index(low.species)]
-        elements = self.operator.elements(up, low, representation) if factor else None
-        return None if elements is None else factor * elements
 
 
 Rotor = Scalar | Cosines | CosinesWithN | ByElements | BySpecies

@@ -90,6 +90,15 @@ def rotor_elements(rotor: Rotor, left: Section, right: Section, pairs: Pairs, re
     return _elements_of_operator(rotor, left, right, pairs)
 
 
+def elements_of_pair(rotor: Rotor, up: WangBlock, low: WangBlock, representation: str) -> Floats | None:
+    """Elements (functions', functions) of an operator between two Wang blocks; None where it does not act."""
+    left, right = (Section(0, basis, slice(0, basis.size), (Part(0, basis, 0),)) for basis in (up, low))
+    first = np.zeros(1, dtype=np.int64)
+    pairs = Pairs(first, first, np.array([[up.j]]), np.array([[low.j]]))
+    elements = rotor_elements(rotor, left, right, pairs, representation)
+    return None if elements is None else elements[0]
+
+
 def _factors_of_pairs(factors: SpeciesFactors, left: Section, right: Section, pairs: Pairs) -> Floats:
     """The factor of the species of each pair of blocks, (pairs, 1, 1)."""
     up, low = (

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from plain_elements import rotor_elements, tensor_elements
 
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.operators.rotation import matrix_of_j, sum_of_powers
+from rotor.quantum.operators.rotation import components, direction_cosine
 from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of, tensors_of_stacks
-from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar, functions_of, tensor_elements
+from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Scalar
 from rotor.quantum.spins.rotor import Piece, acts, solved_rotor
 from rotor.quantum.tensors import body_tensor, tensor_between
 from rotor.tops.constants import Constants
@@ -41,23 +42,13 @@ def _blocks(effects: tuple) -> tuple[list, str]:
     return solved_rotor(TOP, (*SEMI_RIGID, *effects), [], 0, 7, None)
 
 
-def elements_of(rotor, up, low, representation: str) -> np.ndarray | None:
-    """The elements between two Wang blocks; of powers of N from the algebra."""
-    if not isinstance(rotor, Scalar):
-        return rotor.elements(up, low, representation)
-    if up != low:
-        return None
-    functions = functions_of(low)
-    return (functions.conj().T @ matrix_of_j(sum_of_powers(dict(rotor.operators)), low.j) @ functions).real
-
-
 def one_way(up, low, pieces: list, representation: str) -> np.ndarray | None:
     """Σ value ⟨r'‖X‖r⟩ between the states of two blocks, part by part."""
     total = None
     for piece in pieces:
         for left in up.parts:
             for right in low.parts:
-                computed = elements_of(piece.rotor, left.basis, right.basis, representation)
+                computed = rotor_elements(piece.rotor, left.basis, right.basis, representation)
                 if acts(piece, left.v, right.v) and computed is not None and computed.any():
                     m, n = left.basis.j, right.basis.j
                     bra, ket = (part.basis.k.astype(float) ** (2 * piece.nz2) for part in (left, right))
@@ -90,6 +81,7 @@ def plain_tensor(up, low, tensors: dict) -> np.ndarray | None:
     return total
 
 
+PRODUCT = direction_cosine("a", "Ir") @ components("Ir")["b"] @ components("Ir")["c"]
 PIECES = {
     "quadrupole with every element": [Piece(-57.0, Cosines(_matrix()), -1, -1, 0, 0)],
     "spin-rotation, antisymmetric part too": [Piece(3.0, CosinesWithN(_matrix()), -1, -1, 0, 0)],
@@ -98,6 +90,10 @@ PIECES = {
         Piece(1.0, Cosines(_matrix()), 0, 0, 1, 0),
     ],
     "operators of N": [Piece(1.5, Scalar((((1, 1, 0), 2.0), ((0, 0, 1), 0.3))), -1, -1, 0, 0)],
+    "an operator of the algebra": [
+        Piece(0.7, ByElements(1, PRODUCT), -1, -1, 0, 0),
+        Piece(0.3, ByElements(1, PRODUCT), 0, 1, 1, 1),
+    ],
     "between states": [Piece(7.0, Cosines(_matrix()), 0, 1, 0, 0), Piece(5.0, Cosines((0.3, 0.5, 0.7)), 0, 1, 0, 0)],
 }
 

@@ -16,14 +16,18 @@ from rotor.quantum.effects.spin_spin import SpinSpin
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.moments import Moment
+from rotor.quantum.operators.algebra import half_anticommutator
+from rotor.quantum.operators.rotation import direction_cosine, j_squared
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.coupling import patterns, patterns_of_total, recoupling
+from rotor.quantum.spins.operators import ByElements, CosinesWithN, Scalar
 from rotor.spectra.transitions import all_transitions
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
 TOP = Top(Constants(A=9400.0, B=3100.0, C=2500.0), dipole_abc_debye=(1.2, 0.0, 0.0))
+UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -175,7 +179,13 @@ def test_sums_that_are_kept():
     assert np.abs(np.sort(mixed.energy_mhz) - np.sort(levels.energy_mhz)).max() > 100.0
 
 
-@pytest.mark.parametrize(("moment", "operator"), [(Moment(1.0, spin="S"), "S"), (Moment(1.0), "N")])
+@pytest.mark.parametrize(
+    ("moment", "operator"),
+    [
+        (Moment(1.0, (0, 0), Scalar(), "S", electric=False), "S"),
+        (Moment(1.0, (0, 0), CosinesWithN(UNIT), electric=False), "N"),
+    ],
+)
 def test_magnetic_strengths_are_those_of_the_direct_product(moment, operator):
     """Σ |⟨i|V_p|k⟩|² over p and all M of two levels."""
     hamiltonian, operators, _ = _direct_triplet()
@@ -197,7 +207,9 @@ def test_magnetic_strengths_are_those_of_the_direct_product(moment, operator):
 
 def test_moments_need_levels_with_spins():
     with pytest.raises(ValueError, match="solved with spins"):
-        all_transitions(solve_levels(TOP, 3), (1.0, 0.0, 0.0), moments=[Moment(1.0)])
+        all_transitions(
+            solve_levels(TOP, 3), (1.0, 0.0, 0.0), moments=[Moment(1.0, (0, 0), CosinesWithN(UNIT), electric=False)]
+        )
 
 
 def test_powers_of_a_dipole():
@@ -205,19 +217,22 @@ def test_powers_of_a_dipole():
     linear = Top.from_constants("B=57635.968 MHz", dipole_abc_debye=(0.11, 0, 0))
     nucleus = NuclearQuadrupole({"chi_aa(N)": 0.0}, (Spin("N", 2),))
     levels = solve_levels(linear, 6, effects=(*SEMI_RIGID, nucleus))
-    along = (1.0, 0.0, 0.0)
+    cosine, n2 = direction_cosine("a", "Ir"), j_squared()
+    commutator = 0.5 * (n2 @ cosine - cosine @ n2)
     plain = all_transitions(levels, {(0, 0): (0.11, 0.0, 0.0)})
-    for powers, factor in (
-        ("J", lambda n: n**2),
-        ("JJ", lambda n: n**2 * (n**2 + 1)),
-        ("[[J]]", lambda n: n**2),
-        ("[J]", lambda n: -n),
+    for operator, factor in (
+        (half_anticommutator(n2, cosine), lambda n: n**2),
+        (half_anticommutator(j_squared(2), cosine), lambda n: n**2 * (n**2 + 1)),
+        (0.5 * (n2 @ commutator - commutator @ n2), lambda n: n**2),
+        (-1.0 * commutator, lambda n: -n),
     ):
-        transitions = all_transitions(levels, {(0, 0): (0.11, 0.0, 0.0)}, moments=[Moment(1e-4, (0, 0), along, powers)])
+        transitions = all_transitions(
+            levels, {(0, 0): (0.11, 0.0, 0.0)}, moments=[Moment(1e-4, (0, 0), ByElements(1, 1j * operator))]
+        )
         order = [np.lexsort((each.lower, each.upper)) for each in (transitions, plain)]
         n, f = (levels.quanta[name][plain.upper[order[1]]] for name in ("n", "f"))
         rises = f > levels.quanta["f"][plain.lower[order[1]]]
         expected = plain.strength_debye2[order[1]] * (1 + 1e-4 / 0.11 * factor(n)) ** 2
-        chosen = rises if powers == "[J]" else np.ones(len(n), dtype=bool)  # a commutator's sign goes by F
+        chosen = rises if factor(1) < 0 else np.ones(len(n), dtype=bool)  # a commutator's sign goes by F
         ours = transitions.strength_debye2[order[0]]
         np.testing.assert_allclose(ours[chosen], expected[chosen], rtol=1e-10)  # products of a few numbers

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+import numpy as np
+
+from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.code_table import state_digits
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.hamiltonian.moment_operators import (
-    commutator_with_n2,
     imaginary,
     moment_operator,
     moment_tensor,
 )
-from rotor.formats.spcat.hamiltonian.series import Series, angles_by_k, k_factor
+from rotor.formats.spcat.hamiltonian.series import Series, k_factor
 from rotor.formats.spcat.text.int_file import Dipole
-from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment, Written
-from rotor.quantum.operators.algebra import Operator, half_anticommutator
-from rotor.quantum.operators.rotation import j_squared, j_z, weighted
+from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
+from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.operators.rotation import Weight, direction_cosine, j_squared, j_z, weighted
+from rotor.quantum.spins.operators import ByElements, Cosines
 
 Dipoles = dict[tuple[int, int], tuple[float, float, float]]
 
@@ -69,8 +72,14 @@ def split_dipoles(dipoles: Iterable[Dipole], states: int) -> tuple[Dipoles, list
 
 FOURIER = (7, 8)
 EVEN_ORDER = (1, 2, 5, 8)  # TYP of electric moments of even order in angular momenta: {φ, N}, [N², φ], i sine
-_POWERS = {3: "J", 5: "[J]", 9: "JJ", 10: "[[J]]"}  # TYP with powers of N² of TYP 0
-_WRITTEN = (0, 1, 2, 3, 4, 6, 9, 10, 11, 12)
+# TYP with powers of N² of TYP 0: ½{N², }, ½[N², ], ½{N⁴, }, ¼[N², [N², ]]
+_POWERS: Mapping[int, Weight] = {
+    3: lambda m, n, above, below: (m * (m + 1.0) + n * (n + 1.0)) / 2,
+    5: lambda m, n, above, below: (m * (m + 1.0) - n * (n + 1.0)) / 2,
+    9: lambda m, n, above, below: ((m * (m + 1.0)) ** 2 + (n * (n + 1.0)) ** 2) / 2,
+    10: lambda m, n, above, below: (m * (m + 1.0) - n * (n + 1.0)) ** 2 / 4,
+}
+_OPERATORS = (0, 1, 2, 3, 4, 6, 9, 10, 11, 12)
 
 
 def line_moment(
@@ -118,14 +127,19 @@ def line_moment(
         value = 0.0
     if as_spcat and code.typ == 12 and code.axis == (3 if oblate else 1) and states[0] == states[1]:
         value = 0.0
-    powers = _POWERS.get(code.typ, "")
-    if code.axis and powers and (powers != "[J]" or states[0] == states[1]):
-        return Moment(value, states, _along(code.axis), powers)
-    if (code.typ == 5 and code.axis) or code.typ in _WRITTEN:
-        operator = moment_operator(0 if powers else code.typ, code.axis, oblate, as_spcat=as_spcat)
-        operator = commutator_with_n2(operator) if code.typ == 5 else _with_n2(operator, powers)
-        return Moment(value, states[::-1], written=Written(operator, bool(code.axis)))
-    raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
+    if code.typ not in _OPERATORS and not (code.typ == 5 and code.axis):
+        raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
+    if (
+        code.typ == 5 and states[0] == states[1]
+    ):  # not Hermitian: the elements from the higher F to the lower are those of ½[N², φ]
+        value = -value
+    operator = moment_operator(0 if code.typ in _POWERS else code.typ, code.axis, oblate, as_spcat=as_spcat)
+    return _without_spin(value, states, _with_n2(operator, code.typ), bool(code.axis))
+
+
+def _without_spin(value: float, states: tuple[int, int], operator: Operator, electric: bool) -> Moment:
+    """The moment of an operator on |N K⟩ from the state of the higher number in the file, the first one here, to the other."""
+    return Moment(value, states[::-1], ByElements(1, (1j if electric else 1.0) * operator), electric=electric)
 
 
 def deviates_in_spcat(code: DipoleCode, oblate: bool) -> bool:
@@ -150,16 +164,20 @@ def _is_turned(code: DipoleCode) -> bool:
     return code.typ in (8, 11) or (code.typ in (1, 2) and code.axis > 0) or (code.typ == 12 and code.axis == 0)
 
 
-def _along(axis: int) -> tuple[float, float, float]:
-    """Unit vector along an axis 1, 2 or 3."""
-    return (float(axis == 1), float(axis == 2), float(axis == 3))
+def is_vector(code: DipoleCode) -> bool:
+    """Whether a moment is a vector along an axis, times numbers that no half turn changes."""
+    between_states = code.states[0] != code.states[1]
+    return bool(code.axis) and not code.spin and code.typ in (3, 5, 7, 9, 10) and not (code.typ == 5 and between_states)
 
 
-def _with_n2(operator: Operator, powers: str) -> Operator:
-    """½{N², O}, ½{N⁴, O} or ¼[N², [N², O]] by the name of the powers; O for none."""
-    if powers == "[[J]]":
-        return commutator_with_n2(commutator_with_n2(operator))
-    return half_anticommutator(j_squared(len(powers)), operator) if powers else operator
+def _with_n2(operator: Operator, typ: int) -> Operator:
+    """The operator with the powers of N² of a TYP."""
+    return weighted(operator, _POWERS[typ]) if typ in _POWERS else operator
+
+
+def _rank_two_with_n(m: Ints, n: Ints, above: Ints, below: Ints) -> Floats:
+    """Factor of the elements of φ in those of {φ, N} of rank 2; zero between N = 0 and 1."""
+    return np.sqrt(np.maximum(0.375 * ((m + n + 1) ** 2 - 4) * (1 - (m - n) ** 2 / 4), 0.0))
 
 
 def _spin_moment(
@@ -169,18 +187,18 @@ def _spin_moment(
     spin = f"I{code.spin}"
     if code.axis == 0 and code.typ in (0, 3, 4, 6, 9):
         operator = moment_operator(0 if code.typ in _POWERS else code.typ, 0, oblate, with_spin=True)
-        operator = _with_n2(operator, _POWERS.get(code.typ, ""))
-        return Moment(value, states, spin=spin, written=Written(operator, False))
+        return Moment(value, states, ByElements(0, _with_n2(operator, code.typ)), spin, electric=False)
     if code.typ == 0 and code.axis == (3 if oblate else 1):
-        return Moment(value, states[::-1], _along(code.axis), spin=spin)
+        cosine = direction_cosine("abc"[code.axis - 1], "IIIl" if oblate else "Ir")
+        return Moment(value, states[::-1], ByElements(2, 1j * weighted(cosine, _rank_two_with_n)), spin)
     if code.typ in (1, 2):
         if code.axis == 0 and as_spcat:
             operator = (
                 1.5 * j_z(2) - 0.5 * j_squared() if code.typ == 1 else moment_operator(6, 0, oblate, with_spin=True)
             )
-            return Moment(value, states, spin=spin, written=Written(operator, False))
-        tensor = moment_tensor(code.typ, code.axis, oblate)
-        return Moment(value, states[::-1], tensor=tensor, spin=spin, with_i=code.axis > 0)
+            return Moment(value, states, ByElements(0, operator), spin, electric=False)
+        tensor = Cosines(moment_tensor(code.typ, code.axis, oblate))  # times i along an axis, hence i² in elements
+        return Moment(-value if code.axis else value, states[::-1], tensor, spin, electric=code.axis > 0)
     raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
 
 
@@ -193,15 +211,11 @@ def _fourier_moment(
         raise ValueError(
             f"dipole {dipole.code}: SYM = {code.axis}; expected 0 for magnetic moments, 1, 2, 3 for a, b, c"
         )
-    plain = code.axis and not sine and not series.nofc and not (series.g12 and n % 2)
-    if plain:
-        low, high = angles_by_k(n, series, code.states)
-        return Moment(dipole.value, states, _along(code.axis), cosine=(high, low))
     in_debye = bool(code.axis) or (sine and not as_spcat)
     value = dipole.value * (1.0 if in_debye else DEBYE_PER_BOHR_MAGNETON)
     plain_operator = (imaginary(oblate) if sine else 1.0) * moment_operator(0, code.axis, oblate, as_spcat=as_spcat)
     operator = weighted(plain_operator, k_factor(n, sine, series, code.states))
-    return Moment(value, states[::-1], written=Written(operator, bool(code.axis)))
+    return _without_spin(value, states, operator, bool(code.axis))
 
 
 def _meaning(code: DipoleCode) -> str:

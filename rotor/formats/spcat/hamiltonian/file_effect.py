@@ -19,6 +19,7 @@ from rotor.quantum.moments import Moment
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.operators import EVERY_STATE, ByElements, BySpecies, Cosines, CosinesWithN, Scalar
 from rotor.quantum.spins.scheme import SpinTerm
+from rotor.quantum.spins.stack_elements import elements_of_pair
 from rotor.quantum.states import Coupling, State
 from rotor.quantum.wang.basis import SpeciesFactors, factors_of_pairs, wang_blocks
 from rotor.tops.operators import Operators
@@ -167,7 +168,10 @@ class FileEffect(QuantumEffect):
         basis = basis_of(self.axes)
         blocks = wang_blocks(_LOOKED_AT, basis)
         beyond = (
-            rotor.elements(up, low, basis) for up in blocks for low in blocks if (up.species, low.species) not in pairs
+            elements_of_pair(rotor, up, low, basis)
+            for up in blocks
+            for low in blocks
+            if (up.species, low.species) not in pairs
         )
         forbidden = any(elements is not None and elements.any() for elements in beyond)
         return replace(term, rotor=BySpecies(rotor, factors_of_pairs(pairs), rotor.odd)) if forbidden else term

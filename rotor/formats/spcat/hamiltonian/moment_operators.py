@@ -19,9 +19,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import sqrt
 
-from rotor.quantum.moments import Matrix
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import components, direction_cosine, weighted
+from rotor.quantum.spins.operators import Matrix
 
 
 def moment_axes(oblate: bool) -> tuple[str, str, str]:

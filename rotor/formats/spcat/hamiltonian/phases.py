@@ -27,7 +27,8 @@ import numpy as np
 from rotor.formats.spcat.hamiltonian.code_table import Digits
 from rotor.formats.spcat.hamiltonian.codes import PLURAL_NOT_YET
 from rotor.formats.spcat.text.par import Options
-from rotor.quantum.moments import Moment, Vector
+from rotor.quantum.moments import Moment
+from rotor.quantum.spins.operators import BySpecies, Cosines, Vector
 from rotor.quantum.wang.basis import SpeciesFactors, half_turn
 
 AXES_OF_PHASE = {False: "cba", True: "abc"}  # axes of PHASE 1, 2, 4; the key is whether the basis is oblate
@@ -135,45 +136,56 @@ def by_order(
         back = {(w, v): (-a, -b, -c) for (v, w), (a, b, c) in moments.items() if v != w}
         return moments | back, ()
     within_states = {states: along for states, along in moments.items() if states[0] == states[1]}
-    between = [Moment(1.0, states, along) for states, along in moments.items() if states[0] != states[1]]
+    between = [Moment(1.0, states, Cosines(along)) for states, along in moments.items() if states[0] != states[1]]
     signed = [(moment, False) for moment in between] + list(zip(beside, reverse, strict=True))
-    return within_states, tuple(_with_i(moment, back) for moment, back in signed)
+    return within_states, tuple(
+        moment
+        if not moment.electric or moment.states[0] == moment.states[1]
+        else _in_phases(moment._replace(value_debye=-moment.value_debye) if back else moment, True)
+        for moment, back in signed
+    )
 
 
-def _with_i(moment: Moment, reverse: bool) -> Moment:
-    """A moment with the factor i, or -i if reversed."""
-    if not moment.electric or moment.states[0] == moment.states[1]:
-        return moment
-    return moment._replace(value_debye=-moment.value_debye if reverse else moment.value_debye, by_order=True)
+def _in_phases(moment: Moment, by_order: bool, turned: str = "") -> Moment:
+    """An electric moment with the factor i, -i in the other order of its states, where `by_order`, and with a half turn C2g.
+
+    turned: the axis g. With C2g a moment is i times what it is in functions of other phases; together i² = -1.
+    """
+    rotor = BySpecies(moment.rotor, half_turn(turned), False) if turned else moment.rotor  # type: ignore[arg-type]
+    back = by_order and (moment.states[0] < moment.states[1]) == bool(turned)
+    value = -moment.value_debye if back else moment.value_debye
+    return moment._replace(value_debye=value, rotor=rotor, imaginary=bool(turned) != by_order)
 
 
 def turned_moments(
-    moments: dict[tuple[int, int], Vector], beside: tuple[Moment, ...], turned: str, phases: Phases
+    moments: dict[tuple[int, int], Vector], beside: Sequence[tuple[Moment, int]], turned: str, phases: Phases
 ) -> tuple[dict[tuple[int, int], Vector], tuple[Moment, ...]]:
     """The moments in functions that time reversal with half a turn about an axis leaves as they are: those along it, and the others
     apart, each component by itself.
 
-    moments: plain dipoles by pairs of states. beside: other moments. turned: the axis whose half turn accompanies time reversal; "" if
-    there is none. phases: phases that decide which components have the factor i.
+    moments: plain dipoles by pairs of states. beside: other moments with their axes, 1 to 3, 0 for those that are no vectors along an axis.
+    turned: the axis whose half turn accompanies time reversal; "" if there is none. phases: phases that decide which components have the
+    factor i.
     Returns: unchanged plain dipoles; all other moments.
     """
-    if any(moment.written or moment.with_i or (moment.along_abc and moment.spin) for moment in beside):
+    if any(not axis and (moment.electric or not isinstance(moment.rotor, Cosines)) for moment, axis in beside):
         raise ValueError(
             "moments of second and third order, of a sine and of a spin with operators that are odd under time reversal within one "
             f"state, or PHASE, {PLURAL_NOT_YET}; leave one of them out"
         )
-    all_moments = [*(Moment(1.0, states, along) for states, along in moments.items()), *beside]
-    plain, others = dict[tuple[int, int], Vector](), list[Moment]()
-    for moment in all_moments:
-        if moment.along_abc is None:
-            others.append(moment)
-            continue
-        for axis, value in enumerate(moment.along_abc, 1):
-            along = (value * (axis == 1), value * (axis == 2), value * (axis == 3))
-            ordered = moment.states[0] != moment.states[1] and phases.has_i(axis)
-            across = "" if "abc"[axis - 1] == turned else turned
-            if value and not across and not ordered and moment in all_moments[: len(moments)]:
-                plain[moment.states] = tuple(np.add(along, plain.get(moment.states, (0.0, 0.0, 0.0))).tolist())
+    plain, others = dict[tuple[int, int], Vector](), [moment for moment, axis in beside if not axis]
+    for states, along in moments.items():
+        for axis, value in enumerate(along, 1):
+            alone = (value * (axis == 1), value * (axis == 2), value * (axis == 3))
+            moment = _turned(Moment(1.0, states, Cosines(alone)), axis, turned, phases)
+            if value and moment.rotor == Cosines(alone) and not moment.imaginary:
+                plain[states] = tuple(np.add(alone, plain.get(states, (0.0, 0.0, 0.0))).tolist())
             elif value:
-                others.append(moment._replace(along_abc=along, turned=across, by_order=ordered))
-    return plain, tuple(others)
+                others.append(moment)
+    return plain, (*others, *(_turned(moment, axis, turned, phases) for moment, axis in beside if axis))
+
+
+def _turned(moment: Moment, axis: int, turned: str, phases: Phases) -> Moment:
+    """A moment along an axis (1 to 3) in functions that time reversal with a half turn leaves as they are."""
+    between = moment.states[0] != moment.states[1]
+    return _in_phases(moment, between and phases.has_i(axis), "" if "abc"[axis - 1] == turned else turned)

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from plain_elements import matrix_of_j
 
 import rotor.formats.spcat
 from rotor.formats.spcat.hamiltonian.code_table import TABLE, Kind, axis_product, split_code
 from rotor.formats.spcat.hamiltonian.codes import AXES
 from rotor.formats.spcat.hamiltonian.operators import code_operator
 from rotor.quantum.operators.algebra import half_anticommutator
-from rotor.quantum.operators.rotation import components, matrix_of_j
+from rotor.quantum.operators.rotation import components
 from rotor.quantum.wang.basis import character, wang_blocks
 
 J = 6

@@ -152,9 +152,10 @@ def test_moments_that_do_not_compute_are_named(code, says):
 
 def test_operators_of_n_are_hermitian_and_obey_time_reversal():
     """All of TYP 12 to 79: Hermitian (with i where odd), and even ones real, odd ones imaginary, as J of the table of phases."""
+    from plain_elements import matrix_of_j
+
     from rotor.formats.spcat.hamiltonian.code_table import split_code
     from rotor.formats.spcat.hamiltonian.codes import AXES
-    from rotor.quantum.operators.rotation import matrix_of_j
 
     for axes in AXES.values():
         for typ in (*range(12, 18), *range(20, 28), *range(40, 48), *range(60, 68)):
@@ -169,10 +170,12 @@ def test_operators_of_n_are_hermitian_and_obey_time_reversal():
 
 def test_low_orders_are_cartesian_products():
     """TYP 21, 41, 61 are NbNc + NcNb, ...; 20, 40, 60 i times Na, Nb, Nc, -i in the oblate basis (as SPCAT's levels say)."""
+    from plain_elements import matrix_of_j
+
     from rotor.formats.spcat.hamiltonian.code_table import split_code
     from rotor.formats.spcat.hamiltonian.codes import AXES
     from rotor.quantum.operators.algebra import half_anticommutator
-    from rotor.quantum.operators.rotation import components, matrix_of_j
+    from rotor.quantum.operators.rotation import components
 
     for axes, representation in ((AXES["Ir"], "Ir"), (AXES["IIIl"], "IIIl")):
         of = components(representation)
