@@ -19,7 +19,7 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.observed.model import Component, Sight, model
-from rotor.observed.spectrum import KELVIN, ObservedSpectrum
+from rotor.observed.spectrum import KELVIN, ObservedSpectrum, band_text
 from rotor.observed.variables import DEFAULT_FREE, Variables, variables
 from rotor.statistics.least_squares import Iteration, Minimum
 from rotor.statistics.regression import Regression, regression
@@ -272,7 +272,7 @@ def _refuse(spectrum: ObservedSpectrum, components: Sequence[Component], sight: 
     first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
     for component in components:
         if not len(component.species.between(first, last)):
-            raise ValueError(f"{component.species.name}: no lines from {first:.10g} to {last:.10g} MHz")
+            raise ValueError(f"{component.species.name}: no lines {band_text(first, last)}")
 
 
 def total_noise(
@@ -312,13 +312,14 @@ class Contribution:
     """Contribution of a component to a fit: gain of χ² (Δχ²), whether it is needed, and an upper limit if not.
 
     signal: increase of χ² when the component is left out and the others are fitted again. limit_per_cm2: upper limit of the column density
-    at 3 standard deviations, for the temperature, velocity and width of the component; None if it is needed.
+    at 3 standard deviations, for the velocity and width of the component and the temperature limit_excitation_k; None if it is needed.
     """
 
     species: str
     signal: float
     needed: bool
     limit_per_cm2: float | None
+    limit_excitation_k: float | None
 
 
 def contributions(fit: SourceFit) -> list[Contribution]:
@@ -331,9 +332,8 @@ def contributions(fit: SourceFit) -> list[Contribution]:
         signal = (float(residuals @ residuals) - fit.chi_squared) / fit.scale**2
         parameters = sum(variable.components == (k,) for variable in fit.variables.items)
         needed = signal > NEEDED + 2 * parameters
-        out.append(
-            Contribution(component.species.name, signal, needed, None if needed else upper_limit(fit, k, others))
-        )
+        limit = (None, None) if needed else (upper_limit(fit, k, others), fit.start[k].excitation_k)
+        out.append(Contribution(component.species.name, signal, needed, *limit))
     return out
 
 

@@ -20,7 +20,7 @@ from rotor.arrays import Floats
 from rotor.observed.fit import FitChoices, SourceFit
 from rotor.observed.model import KM_PER_S, Component, Sight, component_depth
 from rotor.observed.species import SpeciesLines
-from rotor.observed.spectrum import ABSORBANCE, ObservedSpectrum
+from rotor.observed.spectrum import ABSORBANCE, ObservedSpectrum, band_text
 from rotor.observed.variables import variables
 from rotor.statistics.regression import regression
 
@@ -170,4 +170,4 @@ def _refuse(spectrum: ObservedSpectrum, species: Sequence[SpeciesLines]) -> None
     first, last = spectrum.frequency_mhz[0], spectrum.frequency_mhz[-1]
     for each in species:
         if not len(each.between(first, last)):
-            raise ValueError(f"{each.name}: no lines from {first:.10g} to {last:.10g} MHz")
+            raise ValueError(f"{each.name}: no lines {band_text(first, last)}")

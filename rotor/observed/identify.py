@@ -13,7 +13,7 @@ from rotor.observed.fit import SourceFit
 from rotor.observed.model import KM_PER_S, Component, Sight, model
 from rotor.observed.selection import VISIBLE, IdentifyChoices, Selection, Templates
 from rotor.observed.species import SpeciesLines
-from rotor.observed.spectrum import ObservedSpectrum
+from rotor.observed.spectrum import ObservedSpectrum, band_text
 from rotor.observed.start import velocity_and_width
 from rotor.table import Table
 
@@ -149,7 +149,7 @@ def identify(
     first, last = (spectrum.frequency_mhz[i] * (1 + sight.redshift) for i in (0, -1))
     known = [candidate for candidate in candidates if len(candidate.between(first, last))]
     if not known:
-        raise ValueError(f"none of {len(candidates)} candidates has a line from {first:.10g} to {last:.10g} MHz")
+        raise ValueError(f"none of {len(candidates)} candidates has a line {band_text(first, last)}")
     velocity, width = velocity_and_width(spectrum, known, choices.velocity_km_s, choices.fwhm_km_s, sight)
     bank = Templates(spectrum, known, choices, velocity, width, sight)
     search = Selection(spectrum, known, sight, choices, bank, progress)

@@ -24,6 +24,7 @@ KELVIN, JANSKY_PER_BEAM, ABSORBANCE, VOLT = "K", "Jy/beam", "absorbance", "V"
 UNITS = (KELVIN, JANSKY_PER_BEAM, ABSORBANCE, VOLT)
 ARCSEC = math.pi / 180 / 3600
 _CLIP = 3.0
+_LOW_MHZ = 1000.0  # a band below has hardly a rotational line; in GHz it is that of most telescopes
 _MAD = 1.4826
 _LEAST_CHANNELS = 16
 
@@ -145,7 +146,7 @@ def observed_spectrum(
         raise ValueError(f"{source or 'spectrum'}: unit {facts['unit']!r}: known are {', '.join(UNITS)}")
     if spread is None:
         level = noise_level(y)
-        notes += (f"noise of {level:.4g} estimated from line-free channels",)
+        notes += (f"noise of {level:.4g} {facts.get('unit', KELVIN)} estimated from line-free channels",)
         sigma = np.full(len(x), level)
     else:
         sigma = spread[order].copy()
@@ -163,6 +164,16 @@ def _refuse_bad_axis(frequency: Floats, source: str) -> None:
     if (np.diff(frequency) == 0).any():
         twice = frequency[:-1][np.diff(frequency) == 0][0]
         raise ValueError(f"{name}: two channels at {twice:.10g} MHz; expected each frequency once")
+
+
+def band_text(first_mhz: float, last_mhz: float) -> str:
+    """The ends of a band in words; of a band that is low for rotational lines, with the unit that may be meant.
+
+    >>> band_text(84e3, 116e3), band_text(84.0, 116.0)
+    ('from 84000 to 116000 MHz', 'from 84 to 116 MHz; for a file in GHz give --axis-unit GHz')
+    """
+    hint = "; for a file in GHz give --axis-unit GHz" if last_mhz < _LOW_MHZ else ""
+    return f"from {first_mhz:.10g} to {last_mhz:.10g} MHz{hint}"
 
 
 def line_free(intensity: Floats, widen: int = 2) -> NDArray[np.bool_]:

@@ -44,7 +44,7 @@ def emission_figure(
     mhz = UNITS[unit or "GHz"]
     first, last = range_mhz or answer.request.range_mhz
     names = [
-        top_title(molecule) if isinstance(molecule, Top) and molecule.name else name
+        top_title(molecule) + name.removeprefix(molecule.name) if isinstance(molecule, Top) and molecule.name else name
         for molecule, name in zip(answer.request.molecules, answer.request.names, strict=True)
     ]
     with styled():

@@ -137,7 +137,7 @@ def _table(prefix: str, lines: Catalogue, shown: int) -> Table:
     records = [line_record(lines, row) | {"frequency": frequency[row], "error": error[row]} for row in strongest]
     columns = {
         "frequency (MHz)": "{frequency:.4f}",
-        "error": "{error:.4f}",
+        "error (MHz)": "{error:.4f}",
         "lgint": "{lgint:.4f}",
         'E" (cm-1)': "{energy_lower_cm:.4f}",
         "g'": "{g_upper}",

@@ -205,7 +205,7 @@ def _table(lines: StoredLines, shown: int) -> Table:
     columns = {
         "species": "{species}",
         "frequency (MHz)": "{frequency_mhz:.4f}",
-        "error": "{error_mhz:.4f}",
+        "error (MHz)": "{error_mhz:.4f}",
         "lg I(300 K)": "{log_intensity_300k:.4f}",
         "E_l (K)": "{energy_lower_k:.2f}",
         "g_u": "{g_upper:g}",

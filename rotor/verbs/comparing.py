@@ -253,7 +253,7 @@ def comparison_facts(record: dict[str, Any]) -> list[tuple[str, str]]:
     units = {"frequency_mhz": "MHz", "lgint": "", "energy_lower_cm": "cm-1"}
     for name in DIFFERENCES:
         if record[name]:
-            text = "median |difference| {median:.6g}, largest {largest:.6g}, mean difference {mean:.6g}"
+            text = "median |difference| {median:.6g}, largest {largest:.6g}, mean there - here {mean:.6g}"
             facts.append((name, f"{text.format(**record[name])} {units[name]}".rstrip()))
     if record["degeneracies_that_differ"] is not None:
         facts.append(("degeneracy", f"differs in {counted(record['degeneracies_that_differ'], 'line')}"))

@@ -194,12 +194,16 @@ def lost_options(top: Top, request: ConvertRequest, target: str) -> list[str]:
     kmax = 0 if kind == "linear" else request.kmax
     written = {"DIAG": 3 if kind == "asymmetric" else 0, "KNMAX": kmax, "NLINE": 1}
     knmax = min(line.knmax for line in file.options)
-    stated = {"DIAG": file.options[0].diag, "KNMAX": knmax, "NLINE": file.header.nline}
+    # more lines than 1 are only a count of measured lines
+    stated = {"DIAG": file.options[0].diag, "KNMAX": knmax, "NLINE": min(file.header.nline, 1)}
     lost = [f"{name} = {value}" for name, value in stated.items() if value != written[name]]
     if not lost:
         return []
     others = ", ".join(f"{name} = {value}" for name, value in written.items())
-    what = "have no place in a .toml" if target.lower().endswith(".toml") else "are not converted"
+    several = len(lost) > 1
+    what = f"{'have' if several else 'has'} no place in a .toml"
+    if not target.lower().endswith(".toml"):
+        what = f"{'are' if several else 'is'} not converted"
     return [
         f"{', '.join(lost)} of {path.name} {what}: a .par or .var written from these constants has {others}; "
         "SPCAT omits K above KNMAX (--kmax)"

@@ -74,7 +74,7 @@ class Observed:
             name = "rms_k" if self.spectrum.unit == "K" else "rms"
             return content | {name: float(np.sqrt(np.mean((self.spectrum.intensity - seen) ** 2)))}
         content |= self.fit.facts()
-        names = ("species", "signal", "needed", "limit_per_cm2")
+        names = ("species", "signal", "needed", "limit_per_cm2", "limit_excitation_k")
         content["contributions"] = [
             {name: getattr(contribution, name) for name in names} for contribution in self.needed
         ]
@@ -242,6 +242,7 @@ _NEEDED = {
     "Δχ²": "{0.signal:.1f}",
     "needed": lambda part: "yes" if part.needed else "no",
     "limit, 3σ (1/cm²)": "{0.limit_per_cm2:.3g}",
+    "at T_ex (K)": "{0.limit_excitation_k:.4g}",
 }
 
 

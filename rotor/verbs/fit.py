@@ -320,7 +320,7 @@ def _suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
     columns = {
         "upper - lower": lambda suggestion: f"{label(suggestion.upper)} - {label(suggestion.lower)}",
         "frequency (MHz)": "{0.frequency_mhz:.4f}",
-        "error": "{0.error_mhz:.4f}",
+        "error (MHz)": "{0.error_mhz:.4f}",
         "error of the constant, after/before": "{0.error_ratio:.4f}",
     }
     return record_table("lines that would help most", columns, suggestions, {"upper - lower"})

@@ -98,6 +98,7 @@ def test_a_catalogue_is_shown_and_filtered(call, tmp_path):
     code, out, _ = call("cat", OCS, "--range", "0:50GHz", "--top", "2", "--out", "part.cat")
     assert code == 0
     assert "the 2 strongest of 4 lines" in out
+    assert "frequency (MHz)  error (MHz)" in out
     whole = read_cat(OCS)
     assert read_cat(tmp_path / "part.cat").frequency_mhz.tolist() == whole.frequency_mhz[:4].tolist()
     _, out, _ = call("cat", OCS, "--min-lgint", "-3", "--json", "-")
@@ -130,6 +131,7 @@ def test_a_comparison_counts_and_measures(call, tmp_path):
     assert [line["quanta_upper"] for line in content["missing_lines"]] == [[1], [2]]
     _, out, _ = call("cat", "less.cat", "--compare", OCS)
     assert "only there: all lines" in out
+    assert "mean there - here 0 MHz" in out
 
 
 def test_a_catalogue_meets_its_prediction(call):

@@ -216,3 +216,10 @@ def test_the_report_ends_with_what_is_left_out_of_each_molecule(call):
     assert "structure of the source in the beam" in last
     assert "inversion" not in last  # both states of ammonia are in the list
     assert "CH3OH: vibration-rotation difference: about " in last  # the largest of what is known
+
+
+def test_components_of_one_species_have_names_of_their_own_in_the_legend():
+    answer = rotor.emission(["CO", "CO"], range_mhz="115:116GHz", excitation_k=[10.0, 50.0])
+    legend = answer.plot().axes[0].figure.legends or [answer.plot().axes[0].get_legend()]
+    names = [text.get_text() for text in legend[0].get_texts()]
+    assert names == ["together", "carbon monoxide, CO", "carbon monoxide, CO (2)"]

@@ -143,6 +143,9 @@ def test_fit_of_a_source(call, folder):
     first, second = content["contributions"]
     assert (first["needed"], second["needed"]) == (True, False)
     assert second["limit_per_cm2"] < 2e15
+    assert first["limit_excitation_k"] is None
+    assert second["limit_excitation_k"] == 10.0  # of the start, which has no lines of this species to go by
+    assert any("K estimated from line-free channels" in note for note in content["spectrum"]["notes"])
     assert content["reduced_chi_squared"] == pytest.approx(1.0, abs=0.1)
     assert all(Path(file).stat().st_size > 100 for file in files)
     assert (

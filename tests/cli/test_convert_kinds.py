@@ -130,6 +130,9 @@ def test_what_of_the_option_line_is_lost_is_noted(tmp_path, capsys):
     same = replace(file, header=replace(file.header, nline=1), options=(replace(file.options[0], diag=3),))
     (tmp_path / "y.var").write_bytes(format_par(same))
     again = ConvertRequest(str(tmp_path / "y.var"), 20)
+    many = replace(same, header=replace(file.header, nline=55))
+    (tmp_path / "many.var").write_bytes(format_par(many))
+    assert lost_options(rotor.read(tmp_path / "x.toml"), ConvertRequest(str(tmp_path / "many.var"), 20), "z.toml") == []
     assert lost_options(rotor.read(tmp_path / "x.toml"), again, "z.toml") == []  # all three come back
 
 

@@ -1,5 +1,7 @@
 """Identification: species that are there are named, those that are not are left out, lines of unknown species are listed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from observed_cases import artificial, injected
@@ -66,6 +68,8 @@ def test_candidates_outside_the_range_are_refused(case: tuple) -> None:
     far = artificial("far", np.random.default_rng(1), 5e5, 6e5)
     with pytest.raises(ValueError, match="none of 1 candidates"):
         identify(spectrum, [far])
+    with pytest.raises(ValueError, match="for a file in GHz give --axis-unit GHz"):
+        identify(replace(spectrum, frequency_mhz=spectrum.frequency_mhz / 1e3), [far])
 
 
 @pytest.mark.parametrize("seed", [6, 8])  # 6 ran away

@@ -35,7 +35,7 @@ _VELOCITY_UNITS = {
     "km s^-1": 1.0,
 }
 _LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "nm": 1e-9, "angstrom": 1e-10}
-_INTENSITY = {
+INTENSITIES = {
     "k": (KELVIN, 1.0), "mk": (KELVIN, 1e-3), "k(ta*)": (KELVIN, 1.0), "k(tmb)": (KELVIN, 1.0), "ta*": (KELVIN, 1.0), "tmb": (KELVIN, 1.0),
     "jy/beam": (JANSKY_PER_BEAM, 1.0), "mjy/beam": (JANSKY_PER_BEAM, 1e-3), "jybeam-1": (JANSKY_PER_BEAM, 1.0),
     "mjybeam-1": (JANSKY_PER_BEAM, 1e-3), "beam-1jy": (JANSKY_PER_BEAM, 1.0),
@@ -106,6 +106,6 @@ def intensity_unit(text: str | None, where: str) -> tuple[str, float]:
         raise ValueError(f"{where}: no unit of intensity; state it, such as --unit K")
     key = re.sub(r"[\s*]+", "", text.lower().replace("ta*", "ta")).replace("(ta)", "").replace("(tmb)", "")
     key = {"ta": "k", "tmb": "k", "ktmb": "k", "kta": "k"}.get(key, key)
-    if key not in _INTENSITY:
+    if key not in INTENSITIES:
         raise ValueError(f"{where}: intensity in {text!r}; known units are K, mK, Jy/beam, mJy/beam, absorbance, V, mV")
-    return _INTENSITY[key]
+    return INTENSITIES[key]

@@ -2,7 +2,8 @@
 
 Read are frequency (or velocity) and intensity, and the noise from a third column where the heading calls it so. Units stand in the heading:
 `#xLabel: frequency [MHz]` and `#yLabel: (Jy/beam) Mean` as CASA and CASSIS write them, or a line of names such as
-`frequency_mhz,intensity_k` or `freq (GHz), T (K)`. Without a heading the choices of the user count, MHz and K by default, with a note.
+`frequency_mhz,intensity_k`, `freq (GHz)  T (K)` or `f/GHz, T/K`. Without a heading the choices of the user count, MHz and K by default,
+with a note.
 """
 
 from __future__ import annotations
@@ -15,11 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.packed import load
-from rotor.formats.spectra.axis import ReadChoices, axis_mhz, intensity_unit
+from rotor.formats.spectra.axis import AXIS_UNITS, INTENSITIES, ReadChoices, axis_mhz, intensity_unit
 from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
 
 COMMENTS = ("#", "!", "//", ";", "%")
 _SEPARATOR = re.compile(r"[,;\s]+")
+_NAME_AND_BRACKET = re.compile(r"[^\[\]()]+[\[(][^\])]+[\])]")
+_AFTER_SLASH = re.compile(r"[^/]+/\s*([^/\s]+)")
 _IN_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]")
 _LABEL = re.compile(r"\s*([xy])\s*label\s*:\s*(.*)", re.IGNORECASE)
 _SUFFIX = re.compile(r"_(hz|khz|mhz|ghz|k|mk|km_s|jy_beam)$", re.IGNORECASE)
@@ -139,7 +142,9 @@ def _names_and_labels(heading: list[str]) -> tuple[list[str], dict[str, str]]:
                 labels[match.group(1).lower()] = bracket[-1] if match.group(1).lower() == "x" else bracket[0]
         elif ("," in line or ";" in line) and ":" not in line:
             names = [item.strip() for item in re.split("[,;]", line)]
-        elif _SUFFIX.search(line.split()[0] if line.split() else ""):
+        elif len(named := _NAME_AND_BRACKET.findall(line)) > 1 and str(_unit_in(named[0])).lower() in AXIS_UNITS:
+            names = named
+        elif line.strip() and _unit_in(line.split()[0]):
             names = line.split()
     for axis, name in zip("xy", names[:2], strict=False):
         if unit := _unit_in(name):
@@ -148,9 +153,12 @@ def _names_and_labels(heading: list[str]) -> tuple[list[str], dict[str, str]]:
 
 
 def _unit_in(name: str) -> str | None:
-    """`freq (GHz)` and `frequency_mhz` state a unit."""
+    """`freq (GHz)`, `frequency_mhz` and `f / GHz` state a unit."""
     if bracket := _IN_BRACKETS.search(name):
         return bracket.group(1)
     if suffix := _SUFFIX.search(name):
         return _UNIT_OF_SUFFIX.get(suffix.group(1).lower(), suffix.group(1))
+    slash = _AFTER_SLASH.fullmatch(name.strip())
+    if slash and slash.group(1).lower() in (AXIS_UNITS | INTENSITIES):
+        return slash.group(1)
     return None

@@ -153,6 +153,11 @@ def test_table_of_channels_as_specutils_writes_it(tmp_path: Path) -> None:
             [100, 101, 102],
             "Jy/beam",
         ),
+        ("# frequency (GHz)  T_B (K)\n0.100 1\n0.101 2\n0.102 3\n", [100, 101, 102], "K"),
+        ("freq(GHz)\tS(mJy/beam)\n0.100\t1000\n0.101\t2000\n0.102\t3000\n", [100, 101, 102], "Jy/beam"),
+        ("Frequency / GHz, T / mK\n0.100,1000\n0.101,2000\n0.102,3000\n", [100, 101, 102], "K"),
+        ("f/GHz T/K\n0.100 1\n0.101 2\n0.102 3\n", [100, 101, 102], "K"),
+        ("# Orion (KL) taken in May (2020)\n100 1\n101 2\n102 3\n", [100, 101, 102], "K"),
         ("! MHz K\n100.0D0  1.0E0 \n101.0   2\n102 3\n", [100, 101, 102], "K"),
     ],
 )
