@@ -13,7 +13,7 @@ import numpy as np
 from rotor.classical.integrators import splitting
 from rotor.plots.work_precision import Panel, Point
 from rotor.requests.knob import Knob, Measure, Setting, Sweep
-from rotor.scenes.accuracy_sweep import in_rounds, knobs_of, points_of, sweep, timed, without_scatter
+from rotor.scenes.accuracy_sweep import in_rounds, points_of, sweep, sweeps_of, timed, without_scatter
 from rotor.scenes.scene import (
     FluidScene,
     GasScene,
@@ -51,7 +51,7 @@ def curve(scene: Scene, knob: str, error_of: str | None = None) -> list[Point]:
 
 def curves(scene: Scene, knob: str) -> list[tuple[str, str, list[Point]]]:
     """The points of one knob of a scene for every error: what it is of, its unit, the points."""
-    computed = next(item for item in knobs_of(scene, SCENES).knobs if item.name == knob)
+    computed = next(item for item in sweeps_of(scene, SCENES)[0] if item.name == knob)
     rows, against, _, _ = sweep(computed, LIMIT_SECONDS)
     if "time limit" in against:
         raise ValueError(f"{knob}: {against}; the page needs the whole sweep")
@@ -244,7 +244,7 @@ def ewald(_: Path | None) -> list[Panel]:
 def samples(_: Path | None) -> list[Panel]:
     times = {"times": "0:0.5:51"}
     scene = GasScene(molecule="water", observables=times, numerics={"molecules": 10_000})
-    knobs = [knob for knob in knobs_of(scene).knobs if knob.name == "numerics.molecules"]
+    knobs = [knob for knob in sweeps_of(scene)[0] if knob.name == "numerics.molecules"]
     panels = []
     for knob in knobs:
         rows, _, _, _ = sweep(knob, LIMIT_SECONDS)

@@ -75,7 +75,7 @@ BASIS = Knob(
     tried=_smaller_bases,
     error=_basis_error,
     text=_basis_text,
-    exclusive=False,
+    refuses=(),
 )
 
 

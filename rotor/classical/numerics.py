@@ -104,7 +104,7 @@ TOLERANCE = Knob(
     proportional=True,
     coarsest=(search.TOLERANCES[0], "loosest"),
     text="tolerance {:g} of a step",
-    instead=("numerics.step",),
+    refuses=("numerics.tolerance", "numerics.step"),
     cost=Growth(
         _short_steps,
         lambda motion: motion.steps,

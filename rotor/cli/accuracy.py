@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.cli.shared.scene_file import SceneAnswer, SceneFile
 from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, record_table, show_parts
-from rotor.requests.field import REQUIRED, declared
-from rotor.requests.readers import Quantity, Text
+from rotor.requests.field import declared
+from rotor.requests.readers import Quantity
 from rotor.verbs.outputs import PICTURES, Output, Report
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import Work
 
 if TYPE_CHECKING:
     from rotor.scenes.accuracy_sweep import WorkPrecision
-    from rotor.scenes.scene import Scene
 
 WIDTH = 70  # of the line that shows the setting
 EXAMPLES = """\b
@@ -29,10 +28,9 @@ Examples:
 
 
 @dataclass(frozen=True)
-class AccuracyRequest:
+class AccuracyRequest(SceneFile):
     """A scene, and the processor time that its sweeps may take."""
 
-    scene: str = declared(REQUIRED, Text(), "A scene file", option="SCENE")
     seconds: float = declared(
         120.0,
         Quantity("s", above=0, metavar="S"),
@@ -40,62 +38,48 @@ class AccuracyRequest:
     )
 
 
-@dataclass(frozen=True)
-class AccuracyAnswer:
-    """A scene, and errors and times of its knobs."""
-
-    path: str
-    scene: Scene
-    table: WorkPrecision
-
-    def facts(self) -> dict[str, Any]:
-        """All settings, by the keys of docs/verbs."""
-        return {"scene": self.path, **self.table.provenance, "settings": [asdict(row) for row in self.table.rows]}
-
-
-def answer(request: AccuracyRequest, work: Work) -> AccuracyAnswer:
+def answer(request: AccuracyRequest, work: Work) -> SceneAnswer:
     """The complete table; an interrupt prints the knobs swept so far before it ends the command."""
     from rotor.scenes.accuracy_sweep import work_precision
-    from rotor.scenes.scene import read_scene
 
-    scene, folder = read_scene(request.scene), Path(request.scene).parent
+    scene = request.read()
     so_far: list[WorkPrecision] = []
     try:
         with rewritten_line(WIDTH) as write:
             table = work_precision(
-                scene, folder=folder, limit_seconds=request.seconds, on_knob=so_far.append,
+                scene, folder=request.folder, limit_seconds=request.seconds, on_knob=so_far.append,
                 progress=lambda knob, setting: write(f"{knob}: {setting}"),
             )  # fmt: skip
     except KeyboardInterrupt:
         work.note("interrupted: the knobs swept so far follow, no file is written")
         if so_far:
-            show_parts(show(AccuracyAnswer(request.scene, scene, so_far[-1]), None))
+            show_parts(show(SceneAnswer(request, scene, so_far[-1]), None))
         raise
     if "plot" in work.files and not table.rows:
         raise ValueError(f"--plot: there is nothing to draw: {'; '.join(table.remarks)}")
-    return AccuracyAnswer(request.scene, scene, table)
+    return SceneAnswer(request, scene, table)
 
 
-def draw(answer: AccuracyAnswer, path: Path, report: Report) -> None:
+def draw(answer: SceneAnswer, path: Path, report: Report) -> None:
     """Error against time, one panel for each knob."""
     from rotor.plots.work_precision import plot_work_precision
     from rotor.scenes.accuracy_sweep import panels_of
 
     facts = {name: report.content[name] for name in ("command", "scene", "references")}
     title = answer.scene.title or f"Accuracy and time: {answer.scene.kind}"
-    plot_work_precision(panels_of(answer.table), path, title=title, facts=facts)
+    plot_work_precision(panels_of(answer.result), path, title=title, facts=facts)
 
 
-def write_rows(answer: AccuracyAnswer, path: Path, report: Report) -> None:
+def write_rows(answer: SceneAnswer, path: Path, report: Report) -> None:
     """The table as a file."""
     from rotor.formats import write
 
-    write(answer.table, path)
+    write(answer.result, path)
 
 
-def show(answer: AccuracyAnswer, _: Any) -> Iterable[Part | None]:
+def show(answer: SceneAnswer, _: Any) -> Iterable[Part | None]:
     """A table for each knob, then the references and remarks."""
-    table = answer.table
+    table: WorkPrecision = answer.result
     yield answer.scene.heading
     for (knob, error_of, unit), rows in table.curves().items():
         columns = {

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.frozen import dataclass
+from rotor.cli.shared.scene_file import SceneAnswer, SceneFile
 from rotor.reports.screen import Part
 from rotor.reports.top_facts import left_out_facts
-from rotor.requests.field import REQUIRED, declared
-from rotor.requests.readers import Text
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Work, verb_of
+from rotor.verbs.verb import verb_of
 
 if TYPE_CHECKING:
     from rotor.requests.plan import LeftOut, Plan
-    from rotor.scenes.scene import Scene
 
 EXAMPLES = """\b
 Examples:
@@ -24,39 +20,17 @@ Examples:
   rotor plan s.toml --json -"""
 
 
-@dataclass(frozen=True)
-class PlanRequest:
-    """The scene."""
-
-    scene: str = declared(REQUIRED, Text(), "A scene file", option="SCENE")
-
-
-@dataclass(frozen=True)
-class PlanAnswer:
-    """A scene and its plan."""
-
-    path: str
-    scene: Scene
-    plan: Plan
-
-    def facts(self) -> dict[str, Any]:
-        """The plan, by the keys of docs/verbs."""
-        return {"scene": self.path, **self.plan.facts()}
-
-
-def answer(request: PlanRequest, work: Work) -> PlanAnswer:
+def answer(request: SceneFile, _: Any) -> SceneAnswer:
     """The plan of the scene."""
-    from rotor.scenes.scene import read_scene
-
-    scene = read_scene(request.scene)
-    return PlanAnswer(request.scene, scene, scene.plan(folder=Path(request.scene).parent))
+    scene = request.read()
+    return SceneAnswer(request, scene, scene.plan(folder=request.folder))
 
 
-def show(answer: PlanAnswer, _: Any) -> Iterable[Part | None]:
+def show(answer: SceneAnswer, _: Any) -> Iterable[Part | None]:
     """The plan."""
     from rotor.requests.plan import larger_items
 
-    plan = answer.plan
+    plan: Plan = answer.result
     yield answer.scene.heading
     facts: list[tuple[str, str]] = [
         ("effects", "; ".join(plan.effects)),
@@ -80,7 +54,7 @@ VERB = Tool(
     name="plan",
     about="Plan of a scene: method, basis, counts, seconds, memory, and neglected effects by size.",
     examples=EXAMPLES,
-    request=PlanRequest,
+    request=SceneFile,
     of="scene",
     answer=answer,
     show=show,

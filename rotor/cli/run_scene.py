@@ -12,12 +12,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.cli.shared.scene_file import SceneFile
 from rotor.cli.shared.workers import MOST_WORKERS
 from rotor.frozen import dataclass
 from rotor.reports.error_table import error_parts
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.reports.screen import Part, Table, evenly, json_with_rows
-from rotor.requests.field import NUMERICS, OUTPUT, REQUIRED, Rule, declared
+from rotor.requests.field import NUMERICS, OUTPUT, Rule, declared
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
 from rotor.verbs.outputs import Report
@@ -48,10 +49,9 @@ SWEEP = "Sweep"
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(SceneFile):
     """The scene, the folder of its files, and the processes that share the work."""
 
-    scene: str = declared(REQUIRED, Text(), "A scene file", option="SCENE")
     out: str = declared(
         ".", Text(metavar="FOLDER"), "Folder of the files that the scene names in [outputs]", panel=OUTPUT
     )
@@ -160,13 +160,12 @@ class SweepRun:
 def answer(options: Options, _: Work) -> SceneRun | SweepRun:
     """Run a scene, or the points of its sweep that are not done."""
     from rotor.scenes.run import refuse_outside
-    from rotor.scenes.scene import read_scene
     from rotor.scenes.sweep import is_sweep
 
     if not Path(options.out).is_dir():
         raise ValueError(f"--out {options.out}: there is no such folder; make it first")
-    scene = read_scene(options.scene)
-    swept = is_sweep(scene, _folder(options))
+    scene = options.read()
+    swept = is_sweep(scene, options.folder)
     for name, set_by_user in (("--record", options.record is not None), ("--retry-failed", options.retry_failed)):
         if set_by_user and not swept:
             raise ValueError(f"{name}: this scene has no sweep")
@@ -204,15 +203,11 @@ def _dask_pool(address: str, certificates: str | None) -> Iterator[Executor]:
         yield pool
 
 
-def _folder(options: Options) -> Path:
-    return Path(options.scene).parent
-
-
 def _single(scene: Scene, options: Options, pool: Executor | None) -> SceneRun:
     from rotor.scenes.run import run_scene
 
     with elapsed_time("computing"):
-        return SceneRun(options, run_scene(scene, folder=_folder(options), out=options.out, executor=pool))
+        return SceneRun(options, run_scene(scene, folder=options.folder, out=options.out, executor=pool))
 
 
 def _accuracy(result: SceneResult) -> list[tuple[str, str]]:
@@ -248,7 +243,7 @@ def _sweep(scene: Scene, options: Options, pool: Executor | None) -> SweepRun:
     with progress_bar("points") as advance:
         result = run_sweep(
             scene,
-            folder=_folder(options),
+            folder=options.folder,
             out=options.out,
             record=record,
             executor=pool,

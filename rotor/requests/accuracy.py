@@ -26,7 +26,7 @@ from typing import Any
 
 from rotor.frozen import dataclass
 from rotor.requests.budget import ErrorBudget, ErrorTerm
-from rotor.requests.field import REQUIRED, Field, declared
+from rotor.requests.field import REQUIRED, declared
 from rotor.requests.fill import Entries
 from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Sought
 from rotor.requests.numerics import Numerics
@@ -78,7 +78,7 @@ class Accuracy:
         goal, knobs = self.numerics.goals[self.unit], self.knobs(request)
         if reason := goal.unfit(request):
             raise ValueError(f"accuracy: {self.text}: {reason}")
-        refused = (key for knob in knobs for key in knob.refuses)
+        refused = (key for knob in knobs for key in ((knob.key,) if knob.refuses is None else knob.refuses))
         if stated := next((key for key in refused if entries.values.get(key) is not None), ""):
             raise ValueError(f"accuracy and {stated}: give one of them")
         chosen, words = Choice(goal.prepare(request), NOTHING_CHEAPER), list[str]()
@@ -142,8 +142,10 @@ def read_accuracy(stated: Stated, numerics: Numerics, entries: Entries = Entries
         raise ValueError(f"accuracy: {plain!r}: expected a unit: {units}")
     if percent and unit not in ("", "%"):
         raise ValueError(f"accuracy: {plain!r}: expected {unit}, not a percentage")
-    reader = Quantity(unit if unit in CONVERTED else "")
-    number: float = Field(reader, "", "accuracy").read(text.removesuffix("%").removesuffix("rad").strip(), "key")
+    try:
+        number = Quantity(unit if unit in CONVERTED else "").read(text.removesuffix("%").removesuffix("rad").strip())
+    except ValueError as error:
+        raise ValueError(f"accuracy: {error}") from None
     if not number > 0.0:
         raise ValueError(f"accuracy: {plain!r}: expected more than 0")
     return Accuracy(0.01 * number if percent and not unit else number, unit, total, numerics)

@@ -68,14 +68,6 @@ class Sweep:
 
 
 @dataclass(frozen=True)
-class Sweeps:
-    """All sweeps of a scene. remarks: approximations that have no sweep, each with the reason."""
-
-    knobs: tuple[Sweep, ...]
-    remarks: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Choice:
     """Settings for an accuracy.
 
@@ -155,8 +147,8 @@ class Knob:
     request, by default of its answer. bounds: units of the accuracies it is chosen for, by default those of the measures.
     stated: whether the answer states the error, so that the estimate serves the choice alone. proportional: whether the values are
     decades, and the error about proportional to them. predicted: a value that is tried first. coarsest: value that nothing can be
-    coarser than, and the word for it. text: a value in words. exclusive: whether an accuracy excludes a value of the user;
-    instead: further keys that it excludes.
+    coarser than, and the word for it. text: a value in words. refuses: keys of the user that exclude an accuracy, by default that of
+    the knob.
 
     Plan. cost: of a request, such as a `Growth`; None if the knob does not decide on it.
     """
@@ -188,8 +180,7 @@ class Knob:
     predicted: Callable[[Sought], Prediction | None] = lambda sought: None
     coarsest: tuple[Any, str] = (None, "")
     text: str | Callable[[Sought, Any], str] = ""
-    exclusive: bool = True
-    instead: tuple[str, ...] = ()
+    refuses: tuple[str, ...] | None = None
     cost: Callable[[Any, Run, Callable[[Any], Any], Callable[[Any, Any], Any]], Cost] | None = None
     field: Field | None = None
 
@@ -199,11 +190,6 @@ class Knob:
         if self.bounds is not None:
             return self.bounds
         return tuple(measure.unit for measure in self.measures) if self.tried or self.least is not None else ()
-
-    @property
-    def refuses(self) -> tuple[str, ...]:
-        """Keys that exclude an accuracy."""
-        return (self.key, *self.instead) if self.exclusive else ()
 
     def present(self, request: Any) -> Any:
         """The value that a request has."""

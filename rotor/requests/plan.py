@@ -137,7 +137,7 @@ class Growth:
             rate = max(most - least(), 0.0) / max(work(ready, second) - work(ready, first), 1e-300)
             return most + rate * (work(ready, amount) - work(ready, second))
 
-        seconds = extrapolated(taken, lambda: timed(partial(call, first)), self.work)
+        seconds = extrapolated(taken, lambda: timed(partial(call, first))[1], self.work)
         if self.largest is not None:
             largest = self.largest(ready)
             answer, peak = traced(lambda: run.complete(largest))
@@ -149,28 +149,30 @@ class Growth:
 def _short_calls(call: Callable[[float], Any], amount: float, short: tuple[float, ...]) -> tuple[float, float, float]:
     """Two small amounts, grown until the second call takes long enough (constant parts dominate shorter ones), and its time."""
     first, second = (min(part, amount) for part in (short[0], short[-1]))
-    while (taken := timed(partial(call, second))) < ENOUGH_SECONDS and second < amount and len(short) > 1:
+    while (taken := timed(partial(call, second))[1]) < ENOUGH_SECONDS and second < amount and len(short) > 1:
         first, second = min(LARGER * first, amount), min(LARGER * second, amount)
     return first, second, taken
 
 
 def complete_cost(request: Any, run: Run) -> Cost:
     """The cost of a complete run."""
-    answers: list[Any] = []
-    seconds = timed(lambda: answers.append(run.complete(request)))
-    return Cost(seconds, traced(lambda: run.complete(request))[1], answers[-1])
+    call = partial(run.complete, request)
+    seconds = timed(call)[1]
+    answer, peak = traced(call)
+    return Cost(seconds, peak, answer)
 
 
-def timed(call: Callable[[], Any], long: float = 3.0) -> float:
-    """Processor time (s) of the second call, without imports and compilation; of the first if that takes longer than `long`."""
+def once(call: Callable[[], T]) -> tuple[T, float]:
+    """The answer of a call and its processor time (s)."""
     start = time.process_time()
-    call()
-    first = time.process_time() - start
-    if first > long:
-        return first
-    start = time.process_time()
-    call()
-    return time.process_time() - start
+    answer = call()
+    return answer, time.process_time() - start
+
+
+def timed(call: Callable[[], T], long: float = 3.0) -> tuple[T, float]:
+    """`once` of the second call, without imports and compilation; of the first if that takes longer than `long`."""
+    first = once(call)
+    return first if first[1] > long else once(call)
 
 
 def traced(call: Callable[[], T]) -> tuple[T, float]:

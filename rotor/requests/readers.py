@@ -11,10 +11,9 @@ from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from rotor.frozen import dataclass
-from rotor.units import LEAST_KELVIN, MOST_KELVIN, parse_grid, parse_quantity, parse_range
+from rotor.units import LEAST_KELVIN, MOST_KELVIN, MOST_POINTS, parse_grid, parse_quantity, parse_range
 
 MOST_WHOLE = 10**15  # up to here a double holds every whole number
-MOST_POINTS = 10_000_000  # of a grid on the command line or in a scene
 INFINITE = (0.0, math.inf)
 
 
@@ -100,15 +99,12 @@ class Whole(Reader):
     def read(self, raw: Any) -> int:
         """The number."""
         value = raw
-        if isinstance(raw, str):
-            if not re.fullmatch(r"\s*[+-]?[0-9]+\s*", raw):  # int() takes 1_000 and digits of other scripts, too
-                raise ValueError(f"{raw!r:.60}: expected a whole number")
-            try:
-                value = int(raw)
-            except ValueError:  # of thousands of digits
-                raise ValueError(f"{raw!r:.60}: expected a whole number") from None
+        if isinstance(raw, str) and re.fullmatch(
+            r"\s*[+-]?[0-9]{1,4000}\s*", raw
+        ):  # int() takes 1_000 and other scripts, too
+            value = int(raw)
         if isinstance(value, bool) or not hasattr(value, "__index__"):
-            raise ValueError(f"{raw!r}: expected a whole number")
+            raise ValueError(f"{raw!r:.60}: expected a whole number")
         if abs(value) > MOST_WHOLE:
             raise ValueError(f"a number of {len(str(abs(value)))} digits; expected at most {MOST_WHOLE}")
         self.check(value)
@@ -149,7 +145,7 @@ class Quantity(Reader):
     @property
     def is_fraction(self) -> bool:
         """Whether the value is a dimensionless number between 0 and 1, which may be given in percent."""
-        low, high = self.least if self.above is None else self.above, self.most if self.below is None else self.below
+        low, high = self._ends
         return not self.unit and low is not None and high is not None and 0 <= low < high <= 1
 
     def check(self, value: float, typed: Any = None) -> None:
@@ -157,30 +153,32 @@ class Quantity(Reader):
         text = typed if isinstance(typed, str) else f"{value:g}"
         if not math.isfinite(value):
             raise ValueError(f"{text}: expected a finite number")
-        if (self.above is not None and not value > self.above) or (self.below is not None and not value < self.below):
-            raise ValueError(f"{text}: expected {self._rule()}")
-        if (self.least is not None and value < self.least) or (self.most is not None and value > self.most):
+        low, high = self._ends
+        if (low is not None and (value < low or value == self.above)) or (
+            high is not None and (value > high or value == self.below)
+        ):
             raise ValueError(f"{text}: expected {self._rule()}")
         if self.unit == "K" and value > MOST_KELVIN:
             raise ValueError(f"{text!r}: expected a temperature up to {MOST_KELVIN:g} K; no molecule lasts beyond")
         if self.unit == "K" and 0 < value < LEAST_KELVIN:  # 0 is left to the bounds of the field
             raise ValueError(f"{text!r}: expected a temperature of {LEAST_KELVIN:g} K or more")
 
+    @property
+    def _ends(self) -> tuple[float | None, float | None]:
+        """Both bounds, inclusive or not."""
+        return self.least if self.above is None else self.above, self.most if self.below is None else self.below
+
     def _rule(self) -> str:
-        unit = f" {self.unit}" if self.unit else ""
-        if self.above is not None and self.below is not None:
-            return f"a number between {self.above:g} and {self.below:g}{unit}"
-        if self.above is not None and self.most is None:
-            return f"a finite number above {self.above:g}{unit}"
+        (low, high), unit = self._ends, f" {self.unit}" if self.unit else ""
+        if low is None:
+            return f"a number up to {high:g}{unit}"
+        if high is None:
+            return f"a finite number {f'above {low:g}{unit}' if self.least is None else f'of {low:g}{unit} or more'}"
         if self.above is not None:
-            return f"a number above {self.above:g} and up to {self.most:g}{unit}"
-        if self.least is not None and self.below is not None:
-            return f"a number from {self.least:g} to below {self.below:g}{unit}"
-        if self.least is not None and self.most is None:
-            return f"a finite number of {self.least:g}{unit} or more"
-        if self.least is not None:
-            return f"a number from {self.least:g} to {self.most:g}{unit}"
-        return f"a number up to {self.most if self.below is None else self.below:g}{unit}"
+            return (
+                f"a number {f'between {low:g} and' if self.most is None else f'above {low:g} and up to'} {high:g}{unit}"
+            )
+        return f"a number from {low:g} to {'' if self.below is None else 'below '}{high:g}{unit}"
 
     def write(self, value: float) -> Any:
         """The number with its unit; the same double is read back."""
@@ -216,13 +214,14 @@ class Grid(Listed):
             values = tuple(map(float, raw))
         if not all(map(math.isfinite, values)):
             raise ValueError(f"{raw!r:.60}: expected finite numbers")
-        for value in values if self.each is not None else ():
-            assert self.each is not None
-            try:
-                self.each.check(value)
-            except ValueError as error:
-                rule = str(error).partition(": ")[2]
-                raise ValueError(f"{raw!r:.60}: {rule}" if isinstance(raw, str) else str(error)) from None
+        if (each := self.each) is None:
+            return values
+        try:
+            for value in values:
+                each.check(value)
+        except ValueError as error:
+            rule = str(error).partition(": ")[2]
+            raise ValueError(f"{raw!r:.60}: {rule}" if isinstance(raw, str) else str(error)) from None
         return values
 
     def show(self, value: Any) -> str:

@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import math
 import os
-import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import field, replace
+from dataclasses import asdict, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.frozen import dataclass
-from rotor.requests.knob import Setting, Sweep, Sweeps, in_words
+from rotor.requests.knob import Knob, Setting, Sweep, in_words
+from rotor.requests.plan import once
 from rotor.scenes.run import scene_calculation
 from rotor.scenes.scene import Scene
 from rotor.table import Table
@@ -58,16 +58,14 @@ class WorkPrecision(Table):
     """Errors and times of all settings of all knobs.
 
     kind: of the scene. rows: coarse settings first. references: what errors are measured against, by knob. remarks: approximations
-    without a knob, and sweeps left out, with the reason. titles: knobs in words, by the key of each. methods: knobs whose settings are
-    no series.
+    without a knob, and sweeps left out, with the reason. knobs: by the key without a variant.
     """
 
     kind: str
     rows: tuple[Row, ...]
     references: Mapping[str, str]
     remarks: tuple[str, ...] = ()
-    titles: Mapping[str, str] = field(default_factory=dict)
-    methods: frozenset[str] = frozenset()
+    knobs: Mapping[str, Knob] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -87,6 +85,10 @@ class WorkPrecision(Table):
             "remarks": list(self.remarks),
             "rows": len(self),
         }
+
+    def facts(self) -> dict[str, Any]:
+        """All settings as plain records."""
+        return {**self.provenance, "settings": [asdict(row) for row in self.rows]}
 
     def curves(self) -> dict[tuple[str, str, str], list[Row]]:
         """The rows by knob, observable and unit."""
@@ -111,7 +113,7 @@ def panels_of(table: WorkPrecision) -> list[Panel]:
         label = f"{error_of} ({unit})" if unit else error_of
         grouped.setdefault((name, label), {})[variant or name] = points_of(rows)
     return [
-        Panel(table.titles.get(name, name), label, curves, joined=name not in table.methods)
+        Panel(table.knobs[name].title or in_words(name), label, curves, joined=table.knobs[name].series)
         for (name, label), curves in grouped.items()
     ]
 
@@ -123,8 +125,10 @@ def points_of(rows: list[Row]) -> list[Point]:
     return [Point(row.setting, row.seconds, row.error, row.own) for row in rows]
 
 
-def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
-    """All numerical knobs of a scene in a folder; a requested accuracy first chooses the settings around which they are swept.
+def sweeps_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> tuple[list[Sweep], tuple[str, ...]]:
+    """Sweeps of all numerical knobs of a scene in a folder, and remarks on approximations without one, each with the reason.
+
+    A requested accuracy first chooses the settings around which the knobs are swept.
 
     Raises ValueError for a scene with a sweep, and for any scene that a run refuses.
     """
@@ -139,7 +143,7 @@ def knobs_of(scene: Scene, folder: str | os.PathLike[str] = ".") -> Sweeps:
     sweeps = [
         knob.sweep(prepared if knob.field is None else request, verb.compute) for knob, why in knobs if why is None
     ]
-    return Sweeps(tuple(sweeps), tuple(f"{knob.key}: {why}" for knob, why in knobs if why))
+    return sweeps, tuple(f"{knob.key}: {why}" for knob, why in knobs if why)
 
 
 def work_precision(
@@ -163,15 +167,13 @@ def work_precision(
     >>> [row.setting for row in table.rows], table.rows[0].error > table.rows[-1].error == 0.0
     (['order J^2', 'order J^4', 'order J^6', 'order J^8'], True)
     """
-    knobs, left = knobs_of(scene, folder), limit_seconds
-    titles = {swept.name.partition(",")[0]: swept.knob.title or in_words(swept.name) for swept in knobs.knobs}
-    methods = frozenset(swept.name for swept in knobs.knobs if not swept.knob.series)
-    table = WorkPrecision(scene.kind, (), {}, knobs.remarks, titles, methods)
-    for number, swept in enumerate(knobs.knobs):
-        rows, against, remarks, spent = sweep(swept, left / (len(knobs.knobs) - number), progress)
+    (sweeps, remarks), left = sweeps_of(scene, folder), limit_seconds
+    table = WorkPrecision(scene.kind, (), {}, remarks, {each.name.partition(",")[0]: each.knob for each in sweeps})
+    for number, swept in enumerate(sweeps):
+        rows, against, more, spent = sweep(swept, left / (len(sweeps) - number), progress)
         left = max(left - spent, 0.0)
         references = {**table.references, f"{swept.name}: {swept.knob.measures[0].of}": against}
-        table = replace(table, rows=(*table.rows, *rows), references=references, remarks=(*table.remarks, *remarks))
+        table = replace(table, rows=(*table.rows, *rows), references=references, remarks=(*table.remarks, *more))
         on_knob(table)
     return table
 
@@ -195,7 +197,7 @@ def sweep(
         progress(swept.name, setting.label)
         try:
             usual = done[-1][2] if done else None
-            answer, seconds, both = timed(lambda request=setting.request: swept.answer(request), usual)  # type: ignore[misc]
+            answer, seconds, both = timed(partial(swept.answer, setting.request), usual)
         except ValueError as error:
             refused.append(setting.label)
             why = str(error)
@@ -210,7 +212,7 @@ def sweep(
     reached = swept.reference is None or last.label == "the reference"
     against = swept.against if reached else f"the finest within the time limit, {last.label}"
     shown = done if swept.reference is None else done[:-1]
-    calls = [lambda request=setting.request: swept.answer(request) for setting, _, _ in shown]
+    calls = [partial(swept.answer, setting.request) for setting, _, _ in shown]
     times, more = in_rounds(calls, [seconds for _, _, seconds in shown], limit_seconds - spent)
     spent += more
     rows = [
@@ -221,10 +223,10 @@ def sweep(
             m.of,
             m.error(answer, reference),
             m.unit,
-            seconds / swept.knob.repeats,
+            taken / swept.knob.repeats,
         )
         for m in swept.knob.measures
-        for (setting, answer, _), seconds in zip(shown, times, strict=True)
+        for (setting, answer, _), taken in zip(shown, times, strict=True)
     ]
     return rows, against, remarks, spent
 
@@ -244,11 +246,11 @@ def timed(call: Callable[[], Any], usual: float | None = 0.0) -> tuple[Any, floa
     usual: seconds of the coarser setting; None for the first setting; 0 if a single call is enough. The first call, and one that takes
     JUMP times as long as the coarser setting, may load modules or compile; it is then repeated, and only the second time counts.
     """
-    answer, first = _once(call)
+    answer, first = once(call)
     compiles = usual is None or (usual > 0 and first > max(JUMP * usual, KNOWN_SECONDS))
     if not compiles or first >= COMPILING_SECONDS:
         return answer, first, first
-    answer, again = _once(call)
+    answer, again = once(call)
     return answer, again, first + again
 
 
@@ -269,7 +271,7 @@ def in_rounds(
     taken: dict[int, list[float]] = {n: [] for n in counts}
     for _ in range(rounds):
         for n, count in counts.items():
-            taken[n].append(_once(partial(_repeat, calls[n], count))[1] / count)
+            taken[n].append(once(partial(_repeat, calls[n], count))[1] / count)
     samples = [taken.get(n) or [seconds] for n, seconds in enumerate(first)]
     spent = math.fsum(counts[n] * math.fsum(times) for n, times in taken.items())
     return without_scatter(samples), spent
@@ -298,9 +300,3 @@ def without_scatter(samples: Sequence[Sequence[float]]) -> list[float]:
             joined = (mean * count + other * others) / (count + others)
             groups.append((joined, max(scatter, other_scatter), count + others))
     return [mean for mean, _, count in groups for _ in range(count)]
-
-
-def _once(call: Callable[[], Any]) -> tuple[Any, float]:
-    start = time.process_time()
-    answer = call()
-    return answer, time.process_time() - start

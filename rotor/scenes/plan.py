@@ -98,10 +98,9 @@ def _plan(calculation: Calculation) -> tuple[Plan, Choice | None]:
     verb, request, goal = calculation.verb, calculation.request, calculation.accuracy
     if goal is None:
         return plan_of_request(verb, request), None
-    numerics, choices = goal.numerics, list[Choice]()
+    numerics = goal.numerics
     choose = partial(goal.chosen, request, calculation.entries, verb.compute, confirmed=False)
-    search = timed(lambda: choices.append(choose()), LONG_SEARCH)
-    choice = choices[-1]
+    choice, search = timed(choose, LONG_SEARCH)
     plan, parts = plan_of_request(verb, choice.request), [("accuracy", choice.how)]
     if numerics.rounding is not None:
         parts.append(("orders of distortion", "all that the constants have: fewer save milliseconds at the most"))

@@ -29,7 +29,6 @@ _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 _STARTING = threading.Lock()  # guards os.environ, which all threads share
 _METHOD = "forkserver" if sys.platform == "linux" else "spawn"  # a fork after imports is not safe on macOS
 _COMMON = (
-    "rotor.scenes.structures",
     "rotor.scenes.sweep.run",
     "rotor.formats.read_write",
     "rotor.formats.tables",

@@ -50,5 +50,5 @@ def cut_knob(
 
     return Knob(
         steps, finest, (measure,), lambda finest: "no cut" if finest is None else f"a cut at {finest:g}", title=title,
-        tried=lower_cuts, error=error, text=f"{name} {{:g}}", exclusive=False,
+        tried=lower_cuts, error=error, text=f"{name} {{:g}}", refuses=(),
     )  # fmt: skip

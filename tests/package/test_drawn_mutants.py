@@ -357,7 +357,7 @@ def test_a_cost_proportional_to_the_work_is_extrapolated_exactly(monkeypatch):
         return Growth((4, 8))(size, run, lambda size: size, lambda size, n: n).seconds
 
     calls = []
-    monkeypatch.setattr("rotor.requests.plan.timed", lambda call: call())
+    monkeypatch.setattr("rotor.requests.plan.timed", lambda call: (None, call()))
     monkeypatch.setattr("rotor.requests.plan.traced", lambda call: (None, 0.0))
 
     measured = taken(lambda n: 10.0 + 3.0 * n, 100)

@@ -22,7 +22,7 @@ from rotor.requests.knob import Choice, Knob, Measure, Setting, Sweep, with_whol
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, Run
 from rotor.scenes import accuracy_sweep
-from rotor.scenes.accuracy_sweep import Row, WorkPrecision, knobs_of, panels_of, sweep, work_precision
+from rotor.scenes.accuracy_sweep import Row, WorkPrecision, panels_of, sweep, sweeps_of, work_precision
 from rotor.scenes.scene import (
     AlignScene,
     EmissionScene,
@@ -145,9 +145,9 @@ def test_kinds_without_a_knob_say_so():
     assert len(table) == 0
     assert "exact: nothing cheaper" in table.remarks[0]
     drag = [{"effect": "linear drag", "coefficients": [0.1, 0.1, 0.1]}]
-    driven = knobs_of(TumbleScene(body=racket, effects=drag, conditions={"times": [0.0, 1.0]}))
-    assert [knob.name for knob in driven.knobs] == ["numerics.tolerance"]
-    assert "a splitting holds no torque of the angular velocity" in driven.remarks[0]
+    driven, remarks = sweeps_of(TumbleScene(body=racket, effects=drag, conditions={"times": [0.0, 1.0]}))
+    assert [knob.name for knob in driven] == ["numerics.tolerance"]
+    assert "a splitting holds no torque of the angular velocity" in remarks[0]
 
 
 @pytest.mark.slow
@@ -220,7 +220,7 @@ def slow_knob(seconds: list[float], clock: list[float]) -> Sweep:
 
 def test_what_is_beyond_the_limit_is_left_out_and_said(monkeypatch):
     clock = [0.0]
-    monkeypatch.setattr(accuracy_sweep.time, "process_time", lambda: clock[0])
+    monkeypatch.setattr(time, "process_time", lambda: clock[0])
     rows, against, remarks, spent = sweep(slow_knob([1.0, 2.0, 4.0, 8.0, 16.0], clock), 20.0)
     assert [row.setting for row in rows] == [
         "1",
@@ -234,7 +234,9 @@ def test_what_is_beyond_the_limit_is_left_out_and_said(monkeypatch):
 
 def test_a_panel_a_knob():
     rows = [Row(f"numerics.step, order {n}", "1", False, "attitude", 1e-3 / n, "rad", 0.1) for n in (2, 4)]
-    panels = panels_of(WorkPrecision("tumble", tuple(rows), {}, titles={"numerics.step": "length of a step"}))
+    panels = panels_of(
+        WorkPrecision("tumble", tuple(rows), {}, knobs={"numerics.step": Knob(title="length of a step")})
+    )
     assert [(panel.title, panel.of, list(panel.curves)) for panel in panels] == [
         ("length of a step", "attitude (rad)", ["order 2", "order 4"])
     ]
@@ -242,7 +244,7 @@ def test_a_panel_a_knob():
 
 def test_settings_of_highest_j_rise_and_hold_that_of_the_scene():
     scene = SpectrumScene(molecule="CO", conditions=JET, numerics={"jmax": 56})
-    (reach,) = (knob for knob in knobs_of(scene).knobs if knob.name == "numerics.jmax")
+    (reach,) = (knob for knob in sweeps_of(scene)[0] if knob.name == "numerics.jmax")
     assert [setting.label for setting in reach.settings] == ["14", "22", "31", "39", "48", "56"]
     assert [setting.request.jmax for setting in reach.settings] == [14, 22, 31, 39, 48, 56]
     assert [setting.in_scene for setting in reach.settings] == [False] * 5 + [True]

@@ -336,14 +336,14 @@ def test_the_command_states_the_error(call):
 @pytest.mark.parametrize("accuracy", ["1 kHz", None])
 def test_spins_bring_no_distortion_back(accuracy):
     """Of a top that is rigid by choice, the treatment of spins was chosen and swept with distortion."""
-    from rotor.scenes.accuracy_sweep import knobs_of
+    from rotor.scenes.accuracy_sweep import sweeps_of
 
     effects = {"distortion": False} if accuracy else {"distortion": False, "hyperfine": True}
     scene = LevelsScene(molecule="HCN", effects=effects, accuracy=accuracy)
     requests = (
         [scene_calculation(scene).choice.request]
         if accuracy
-        else [setting.request for knob in knobs_of(scene).knobs for setting in knob.settings]
+        else [setting.request for knob in sweeps_of(scene)[0] for setting in knob.settings]
     )
     names = [{effect.name for effect in request.effects} for request in requests]
     assert "nuclear quadrupole" in names[-1]

@@ -194,7 +194,7 @@ def hyperfine(measure: Measure) -> Knob:
         tried=_treatments,
         error=_treatment_error,
         text=_treatment_text,
-        exclusive=False,
+        refuses=(),
     )
 
 
