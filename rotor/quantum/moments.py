@@ -12,9 +12,10 @@ strengths are added.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from rotor.quantum.spins.operators import Rotor
+if TYPE_CHECKING:
+    from rotor.quantum.spins.operators import Rotor
 
 DEBYE_PER_BOHR_MAGNETON = 0.009274  # as SPCAT has it; 9.2740101e-3 by CODATA 2018
 
