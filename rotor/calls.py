@@ -65,6 +65,13 @@ EXAMPLES = {
 }  # fmt: skip  # an example of each function and its value; a test evaluates them
 
 
+class _Notes(list[str]):
+    """Remarks of a calculation, in the order in which it makes them."""
+
+    def __call__(self, text: str) -> None:
+        self.append(text)
+
+
 class Result(Outcome):
     """Result of a verb: tables, errors, pictures and files. Attributes of the answer are also attributes of the result."""
 
@@ -78,6 +85,12 @@ class Result(Outcome):
         if not isinstance(budget, ErrorBudget):
             raise AttributeError(f"{self.verb.name}: states no error budget; facts() has the errors that are known")
         return budget
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks that the command prints as `note:`, such as what was estimated."""
+        made = self.calculation.work.note
+        return tuple(dict.fromkeys([*(made if isinstance(made, _Notes) else ()), *self.verb.notes(self.answer)]))
 
     def facts(self) -> Mapping[str, Any]:
         """All content except the table, by the keys of the JSON."""
@@ -149,7 +162,7 @@ def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Re
         others = f"; it takes {', '.join(fields)}"
         raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{did_you_mean(unknown[0], fields) or others}")
     entries = Entries({fields[name].identity: value for name, value in values.items() if value is not None}, "name")
-    work = Work(shown=verb.read_shown(entries), provenance={"command": f"rotor.{verb.name}"})
+    work = Work(shown=verb.read_shown(entries), note=_Notes(), provenance={"command": f"rotor.{verb.name}"})
     return Result.extending(Calculation(verb, entries, work).run(executor))
 
 
@@ -200,7 +213,7 @@ def documentation(verb: Verb) -> str:
     return (
         f"{verb.about}\n\nNumbers are in the unit of the argument; a text may carry another unit.\n\n"
         f"Parameters\n----------\n{rows}\nexecutor : concurrent.futures.Executor, optional\n    Shares the work.\n\n"
-        f"Returns\n-------\nResult\n    Table, errors, plot(), write(), to_pandas(), plan(), scene().{example}\n"
+        f"Returns\n-------\nResult\n    Table, errors, notes, plot(), write(), to_pandas(), plan(), scene().{example}\n"
     )
 
 

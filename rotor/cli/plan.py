@@ -12,7 +12,7 @@ from rotor.verbs.tool import Tool
 from rotor.verbs.verb import verb_of
 
 if TYPE_CHECKING:
-    from rotor.requests.plan import LeftOut, Plan
+    from rotor.requests.plan import Plan
 
 EXAMPLES = """\b
 Examples:
@@ -32,22 +32,9 @@ def show(answer: SceneAnswer, _: Any) -> Iterable[Part | None]:
 
     plan: Plan = answer.result
     yield answer.scene.heading
-    facts: list[tuple[str, str]] = [
-        ("effects", "; ".join(plan.effects)),
-        (verb_of(plan.kind).invariants, ", ".join(plan.good) or "none"),
-        *plan.parts,
-        *((name, f"{count:,}") for name, count in plan.counts.items()),
-        ("seconds", f"{plan.seconds:.2g} processor time, without start-up and compilation"),
-        ("memory", f"{plan.memory_mb:.2g} MB peak"),
-    ]
     larger, others = larger_items(plan.left_out, lambda part: part.size, lambda part: part.name)
-    texts = [_text(part) for part in larger] + ([others] if others else [])
-    yield [*facts, *left_out_facts(texts)]
-
-
-def _text(part: LeftOut) -> str:
-    size: Any = "not estimated" if part.size is None else f"about {part.size:.1g} {part.unit}"
-    return f"{part.name}: {size}; {part.basis}"
+    texts = [str(part) for part in larger] + ([others] if others else [])
+    yield [*plan.rows(verb_of(plan.kind).invariants), *left_out_facts(texts)]
 
 
 VERB = Tool(

@@ -32,6 +32,10 @@ class LeftOut:
     unit: str
     basis: str
 
+    def __str__(self) -> str:
+        size = "not estimated" if self.size is None else f"about {self.size:.1g} {self.unit}"
+        return f"{self.name}: {size}; {self.basis}"
+
 
 def largest_first(parts: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
     """By size; effects without an estimate come last."""
@@ -69,6 +73,21 @@ class Plan:
     seconds: float = 0.0
     memory_mb: float = 0.0
     left_out: tuple[LeftOut, ...] = ()
+
+    def rows(self, conserved: str = "good quantum numbers") -> list[tuple[str, str]]:
+        """The plan as pairs of name and text, without what is left out. conserved: what `good` is called."""
+        return [
+            ("effects", "; ".join(self.effects)),
+            (conserved, ", ".join(self.good) or "none"),
+            *self.parts,
+            *((name, f"{count:,}") for name, count in self.counts.items()),
+            ("seconds", f"{self.seconds:.2g} processor time, without start-up and compilation"),
+            ("memory", f"{self.memory_mb:.2g} MB peak"),
+        ]
+
+    def __str__(self) -> str:
+        left = (f"left out: {part}" for part in self.left_out)
+        return "\n".join([*(f"{name}: {text}" for name, text in self.rows()), *left])
 
     def facts(self) -> dict[str, Any]:
         """The plan as plain records."""

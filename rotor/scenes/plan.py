@@ -12,6 +12,7 @@ from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, Run, timed
 from rotor.scenes.run import Where, files_of, scene_calculation
 from rotor.scenes.scene import Scene
+from rotor.scenes.sweep.points import is_sweep
 from rotor.verbs.calculation import Calculation, NoResultError
 from rotor.verbs.verb import Verb
 
@@ -48,6 +49,8 @@ def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
     """
     if scene.sweep:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
+    if is_sweep(scene, folder):
+        raise ValueError("molecule: a list of molecules; a plan is of one: name a molecule of the list in its place")
     files_of(scene, out)
     calculation = scene_calculation(scene, folder)
     with calculation.verb.naming("key"):

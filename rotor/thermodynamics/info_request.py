@@ -97,7 +97,9 @@ def abc_columns(top: Top) -> dict[str, float]:
     columns = {}
     for name, value in zip("ABC", top.rotational_constants_mhz, strict=True):
         unknown = not math.isfinite(value)
-        same = "B" if name == "C" and "C" not in errors and "C" not in top.constants.values else name
+        same = (
+            "B" if name not in errors and name not in top.constants.values else name
+        )  # of symmetric and spherical tops
         error = math.nan if unknown else errors.get(same, math.nan)
         digits = 1 - math.floor(math.log10(estimated[same])) if same in estimated and not unknown else 15
         columns[f"{name.lower()}_mhz"] = math.nan if unknown else round(value, digits)

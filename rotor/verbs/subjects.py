@@ -107,7 +107,7 @@ def saved_molecule(molecule: MoleculeInput, folder: Path) -> dict[str, Any]:
         raise ValueError("--save-scene: the molecule came from standard input, which a scene cannot read; give a file")
     if molecule.source is not None and not isinstance(molecule.source, str):
         raise ValueError(
-            f"a scene cannot hold a {type(molecule.source).__name__}; give a name, a file, SMILES:... or constants"
+            f"a scene cannot hold an object of type {type(molecule.source).__name__}; give a name, a file, SMILES:... or constants"
         )
     if molecule.source is not None and molecule.source.endswith(".int"):
         raise ValueError(

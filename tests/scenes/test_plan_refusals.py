@@ -73,3 +73,12 @@ def test_a_plan_says_that_a_fit_reaches_no_result(call, folder):
     assert code == 0, err
     assert "no result: not converged" in " ".join(out.split())
     assert call("run", "s.toml")[0] == 1
+
+
+def test_a_plan_of_a_list_of_molecules_says_that_it_is_of_one(call, folder):
+    (folder / "list.csv").write_text("name\nCO\nHCl\n")
+    (folder / "s.toml").write_text(HEAD.format("levels") + 'molecule = "list.csv"\n')
+    code, _, err = call("plan", "s.toml")
+    assert (code, err) == (
+        2, "error: molecule: a list of molecules; a plan is of one: name a molecule of the list in its place\n",
+    )  # fmt: skip

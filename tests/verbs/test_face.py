@@ -81,6 +81,25 @@ def test_wrong_arguments_are_named():
         rotor.levels()
 
 
+def test_notes_of_the_command_are_those_of_the_result(call):
+    told = [line.removeprefix("note: ") for line in call("spectrum", "water")[2].splitlines()]
+    assert (
+        list(rotor.spectrum("water").notes)
+        == told
+        == ["15 lines of levels beyond the reach of the distortion constants are left out"]
+    )
+    assert rotor.spectrum("SMILES:C=O", jmax=1).notes[0].startswith("geometry from MMFF94, not measured")
+    assert rotor.levels("CO").notes == ()
+
+
+@pytest.mark.parametrize("smiles", ["SMILES:C", "SMILES:N", "SMILES:CC#C"])  # spherical, oblate, prolate
+def test_equal_constants_have_equal_digits_and_errors(smiles):
+    row = rotor.info(smiles, temperatures_k=300).table.to_pandas().iloc[0]
+    constants = {row[f"{name}_mhz"]: row[f"{name}_error_mhz"] for name in "abc"}
+    assert len(constants) == (1 if smiles == "SMILES:C" else 2)
+    assert np.isfinite(list(constants.values())).all()
+
+
 def test_one_number_is_a_list_of_one():
     """TypeError before: 'float' object is not iterable."""
     given, typed = (rotor.zeeman("OCS", fields_tesla=(0.0, 1.0), g=g).table.energy_mhz for g in (-0.03, "-0.03"))
@@ -109,6 +128,10 @@ def test_a_result_has_tables_files_pictures_and_its_scene(folder):
     again = rotor.run_scene(spectrum.scene())
     assert np.array_equal(again.table.frequency_mhz, spectrum.table.frequency_mhz)
     assert list(spectrum.plan().counts.values()) == [5]
+    text = str(spectrum.plan())
+    assert text.startswith("effects: rigid rotor, ")
+    assert "\nseconds: " in text
+    assert "\nleft out: Doppler width: about " in text
     assert spectrum.errors.numerical < 1e-6
     assert spectrum.plot() is not None
 

@@ -170,8 +170,14 @@ def from_rdkit(mol: Any, conformer: int = -1, name: str = "") -> Molecule:
             charge=sum(atom.GetFormalCharge() for atom in mol.GetAtoms()),
             name=name,
             source="RDKit molecule",
+            notes=_conformer_notes(mol.GetNumConformers()) if conformer < 0 else (),
         )
         return _with_dipole(molecule, mmff_dipole(mol, molecule))
+
+
+def _conformer_notes(count: int) -> tuple[str, ...]:
+    text = f"RDKit molecule of {count} conformers: the first is taken; another is Chem.Mol(molecule, confId=N)"
+    return (text,) if count > 1 else ()
 
 
 def parse_sdf(text: str, where: str = "sdf text") -> Molecule:

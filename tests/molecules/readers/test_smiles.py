@@ -68,6 +68,16 @@ def test_other_conformers_are_told_of():
         conformers("CC", 0)
 
 
+def test_the_conformer_that_is_taken_of_an_rdkit_molecule_is_told():
+    from rdkit import Chem
+    from rdkit.Chem import AllChem
+
+    mol = Chem.AddHs(Chem.MolFromSmiles("OCC=O"))
+    AllChem.EmbedMultipleConfs(mol, 2, randomSeed=1)
+    assert from_rdkit(mol).notes[0].startswith("RDKit molecule of 2 conformers: the first is taken")
+    assert not any("conformers" in note for note in from_rdkit(Chem.Mol(mol, confId=1)).notes)
+
+
 def test_the_lowest_of_ten_conformers_is_taken():
     butane = from_smiles("CCCC").positions_angstrom
     ends = np.linalg.norm(butane[0] - butane[3])
