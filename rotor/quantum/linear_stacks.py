@@ -44,15 +44,27 @@ class LinearBlock(NamedTuple):
         lower[:, self.rows, self.columns] = (self.factors @ self.mix).T
         return symmetric_from_lower(lower)
 
-    def elements(self, values_mhz: Floats) -> Floats:
+    def elements(self, values_mhz: Floats) -> NDArray[Any]:
         """The elements of H, lower triangle, at values (parameters,)."""
         return np.asarray(self.factors @ (self.mix @ values_mhz[self.parameters]))
 
-    def lower(self, values_mhz: Floats) -> Floats:
+    def lower(self, values_mhz: Floats) -> NDArray[Any]:
         """The lower triangle of H at values (parameters,)."""
-        lower = np.zeros((self.size, self.size))
+        lower = np.zeros((self.size, self.size), dtype=self.factors.dtype)
         lower[self.rows, self.columns] = self.elements(values_mhz)
         return lower
+
+    def diagonal(self, values_mhz: Floats) -> Floats:
+        """The diagonal of H at values (parameters,)."""
+        diagonal, alone = np.zeros(self.size), self.rows == self.columns
+        diagonal[self.rows[alone]] = self.elements(values_mhz)[alone].real
+        return diagonal
+
+    def sparse(self, values_mhz: Floats) -> Any:
+        """The lower triangle of H at values (parameters,) as a sparse matrix."""
+        from scipy.sparse import csr_array
+
+        return csr_array((self.elements(values_mhz), (self.rows, self.columns)), shape=(self.size, self.size))
 
     def slopes(self, vectors: Floats) -> Floats:
         """⟨n|O_i|n⟩ (n, parameters of the block) of vectors (size, n)."""

@@ -93,7 +93,7 @@ def _moved(entries, part_of, vectors):
 def contracted_elements(solved, tensors):
     """The eigenfunctions of linear blocks of one J each as a space; tensors: rank and reduced elements by name."""
     linear = solved.linear
-    present = [int(n) for n in np.unique(linear.block) if n >= 0]
+    present = list(linear.members)
     states = [solved.vectors(block) for block in present]
     sectors = [Sector(2 * int(linear.labels["J"][rows[0]]), solved.energies[rows]) for rows, _ in states]
     number = {block: i for i, block in enumerate(present)}

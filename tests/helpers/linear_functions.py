@@ -123,4 +123,4 @@ def linear_blocks_of_coupled(coupled):
             pieces.append((start[a] + r, start[b] + c, i, entry[r, c]))
             if a != b:
                 pieces.append((start[b] + c, start[a] + r, i, entry[r, c].conj()))
-    return blocks_of_elements(names, space.labels(), with_real_phases(flat_elements(count, len(names), pieces)))
+    return blocks_of_elements(space.labels(), with_real_phases(flat_elements(count, len(names), pieces)))

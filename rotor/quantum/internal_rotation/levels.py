@@ -213,7 +213,7 @@ def energies_alone(
             populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
             if constants.tops > 2 and populated > MOST_POPULATED:
                 _refuse_long_sums((2 * jmax + 1) * constants.functions)
-            each = linear.solve_dominated([1.0], linear.labels["t"] < populated).energies
+            each = linear.solve([1.0], linear.labels["t"] < populated).energies
             solved = ~np.isnan(each)
         energies.append(each[solved])
         labels = {key: column[solved] for key, column in linear.labels.items()}

@@ -45,7 +45,7 @@ class SpeciesBlocks:
     @cached_property
     def linear(self) -> LinearBlocks:
         """The connected blocks of all terms."""
-        return blocks_of_elements(tuple(self.terms), self.functions.labels, self.elements, self.needed)
+        return blocks_of_elements(self.functions.labels, self.elements, self.needed)
 
     def solve(self, coefficients: ArrayLike, vt_max: int, by_energy: bool = False) -> SpeciesLevels:
         """Levels with v_t up to `vt_max`; `by_energy` counts Ka and Kc by energy inside v_t."""
@@ -65,11 +65,11 @@ class SpeciesBlocks:
             low = np.bincount(elements.rows, value, elements.count) <= below_mhz
             elements = elements.between(low)
             needed = low if needed is None else low & needed
-        return blocks_of_elements(("H",), self.functions.labels, elements, needed)
+        return blocks_of_elements(self.functions.labels, elements, needed)
 
     def _solved(self, linear: LinearBlocks, coefficients: ArrayLike, vt_max: int, by_energy: bool) -> SpeciesLevels:
         values = np.asarray(coefficients, dtype=float)
-        solved = linear.solve_dominated(values, linear.labels["t"] <= vt_max)
+        solved = linear.solve(values, linear.labels["t"] <= vt_max)
         return SpeciesLevels(self, solved, _zeroth_order(linear, values), vt_max, by_energy)
 
 
@@ -86,8 +86,8 @@ def _merged(terms: Terms, coefficients: Floats) -> list[Product]:
 def _zeroth_order(linear: LinearBlocks, coefficients: Floats) -> Floats:
     """⟨J K t|H|J K t⟩ of the functions; s = ±1 share their mean, which leaves out the coupling of K and -K."""
     diagonal = np.zeros(len(linear.block))
-    here = np.flatnonzero(linear.rows == linear.columns)
-    diagonal[linear.rows[here]] = (coefficients @ linear.values[:, here]).real
+    for number, block in linear.blocks.items():
+        diagonal[linear.members[number]] = block.diagonal(coefficients)
     labels = linear.labels
     minus = np.flatnonzero((labels["s"] < 0) & (labels["K"] > 0))
     plus = np.flatnonzero((labels["s"] > 0) & (labels["K"] > 0))
@@ -129,11 +129,10 @@ class SpeciesLevels:
             names.append(members[name[retained]])
         return np.concatenate(rows), np.concatenate(numbers), np.concatenate(names)
 
-    @cached_property
+    @property
     def blocks(self) -> list[int]:
         """Numbers of the blocks."""
-        present = np.unique(self.solved.linear.block)
-        return [int(block) for block in present if block >= 0]
+        return list(self.solved.linear.members)
 
     @property
     def rows(self) -> Ints:

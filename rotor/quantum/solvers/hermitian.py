@@ -1,9 +1,8 @@
-"""Eigenvalues and eigenvectors of many Hermitian matrices of one size, by the solver that their shape calls for.
+"""Eigenvalues and eigenvectors of a Hermitian matrix, by the solver that its shape calls for.
 
 | shape | solver |
 |---|---|
 | size 1 | the element itself |
-| small matrices, many of them | one stacked call |
 | large, banded, energies alone | LAPACK's banded reduction |
 | other | LAPACK's divide and conquer |
 """
@@ -21,32 +20,27 @@ LARGE = 100  # size from which shapes are looked at
 NARROW = 15  # bandwidths in a size from which a banded solver is faster
 
 
-def eigenstates(matrices: NDArray[Any]) -> tuple[Floats, NDArray[Any]]:
-    """Energies (blocks, size), rising, and eigenvectors (blocks, size, size) in columns, of the lower triangles."""
-    if matrices.shape[1] == 1:
-        return matrices[:, 0].real.copy(), np.ones_like(matrices)
-    energies, vectors = np.linalg.eigh(matrices)
+def eigenstates(lower: NDArray[Any]) -> tuple[Floats, NDArray[Any]]:
+    """Energies (size,), rising, and eigenvectors (size, size) in columns, of a lower triangle."""
+    if len(lower) == 1:
+        return lower[0].real.copy(), np.ones_like(lower)
+    energies, vectors = np.linalg.eigh(lower)
     return energies, vectors
 
 
-def eigenvalues(matrices: NDArray[Any]) -> Floats:
-    """Energies (blocks, size), rising."""
-    size = matrices.shape[1]
+def eigenvalues(lower: NDArray[Any]) -> Floats:
+    """Energies (size,), rising, of a lower triangle, as a banded matrix where its elements lie near the diagonal."""
+    size = len(lower)
     if size == 1:
-        return matrices[:, 0].real.copy()
+        return np.asarray(lower[0].real)
     if size < LARGE:
-        return np.linalg.eigvalsh(matrices)
-    return np.stack([_eigenvalues_of_large(matrix) for matrix in matrices])
-
-
-def _eigenvalues_of_large(matrix: NDArray[Any]) -> Floats:
-    """Energies (size,) of one matrix, as a banded one where its elements lie near the diagonal."""
-    rows, columns = np.nonzero(np.tril(matrix))
+        return np.asarray(np.linalg.eigvalsh(lower))
+    rows, columns = np.nonzero(np.tril(lower))
     width = int((rows - columns).max(initial=0))
-    if NARROW * width > len(matrix):
-        return np.linalg.eigvalsh(matrix)
+    if NARROW * width > size:
+        return np.asarray(np.linalg.eigvalsh(lower))
     from scipy.linalg import eigvals_banded
 
-    bands = np.zeros((width + 1, len(matrix)), dtype=matrix.dtype)
-    bands[rows - columns, columns] = matrix[rows, columns]
+    bands = np.zeros((width + 1, size), dtype=lower.dtype)
+    bands[rows - columns, columns] = lower[rows, columns]
     return np.asarray(eigvals_banded(bands, lower=True, check_finite=False))

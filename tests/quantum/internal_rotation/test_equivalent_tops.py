@@ -118,7 +118,8 @@ def test_functions_with_a_sign_give_the_levels_of_plain_ones(case, species):
     linear = blocks.summed(model.coefficients)
     energies = np.sort(linear.energies([1.0]))
     assert np.abs(energies - np.sort(plain.linear.energies(model.coefficients))).max() < 1e-6  # MHz, of up to 1e8
-    assert max(stack.shape[1] for stack in linear.stacks) < 0.75 * max(stack.shape[1] for stack in plain.linear.stacks)
+    largest, of_plain = (max(block.size for block in each.blocks.values()) for each in (linear, plain.linear))
+    assert largest < 0.75 * of_plain
     every = blocks.functions.elements(list(blocks.terms.values()))
     x = blocks.functions.labels["x"]
     whole = model.coefficients @ every.values
