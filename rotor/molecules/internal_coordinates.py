@@ -56,27 +56,6 @@ def linear_bend(i: int, apex: int, k: int, across: ArrayLike) -> Coordinate:
     return angle
 
 
-def out_of_plane(end: int, apex: int, j: int, k: int) -> Coordinate:
-    """The angle of the bond apex-end with the plane of apex, j and k.
-
-    Parameters
-    ----------
-    end, apex, j, k : int
-        Atoms, counted from 0.
-
-    Returns
-    -------
-    callable
-        Positions (n, 3) in Å to radian.
-    """
-
-    def angle(x: NDArray[Any]) -> Any:
-        normal = _unit(np.cross(x[j] - x[apex], x[k] - x[apex]))
-        return np.arcsin(_unit(x[end] - x[apex]) @ normal)
-
-    return angle
-
-
 def torsion(i: int, j: int, k: int, m: int) -> Coordinate:
     """The change of the dihedral angle i-j-k-m near its present value.
 

@@ -23,7 +23,7 @@ from rotor.observed.spectrum import KELVIN, ObservedSpectrum, band_text
 from rotor.observed.variables import DEFAULT_FREE, Variables, variables
 from rotor.statistics.least_squares import Iteration, Minimum
 from rotor.statistics.regression import Regression, regression
-from rotor.table import Table, counted
+from rotor.table import Table
 
 PRIORS = {"column_per_cm2": 5.0, "excitation_k": 1.5, "velocity_km_s": 2.0, "fwhm_km_s": 1.0, "size_arcsec": 1.5}
 """Standard deviations of the priors: of logarithms, and of velocities in widths."""
@@ -413,9 +413,3 @@ def _thick_limit(
         middle = math.sqrt(low * high)
         low, high = (middle, high) if chi_squared(middle) - least <= deviations**2 else (low, middle)
     return float(low)
-
-
-def fit_text(fit: SourceFit) -> str:
-    """A fit in a few lines, for notebooks."""
-    head = f"{counted(len(fit.components), 'component')}, {counted(len(fit.spectrum), 'channel')}, χ²/ν = {fit.reduced_chi_squared:.3g}"
-    return "\n".join([head, *(f"{row['name']}: {row['value']:.4g} ± {row['error']:.2g}" for row in fit.parameters)])

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from rotor import units
 from rotor.arrays import Floats
 from rotor.spectra.lines import Lines
@@ -100,10 +98,3 @@ def optical_depth(spectrum: Spectrum, pressure_bar: float, path_cm: float) -> Sp
         spectrum.outside,
         spectrum.lines,
     )
-
-
-def absorbed_fraction(depth: Spectrum) -> Floats:
-    """Absorbed fraction 1 - exp(-τ) on the grid of an optical depth, accurate for small τ."""
-    if depth.unit != OPTICAL_DEPTH:
-        raise ValueError(f"a spectrum in {depth.unit}: expected an optical depth")
-    return -np.expm1(-depth.intensity)

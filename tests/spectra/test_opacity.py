@@ -12,7 +12,7 @@ import rotor
 from rotor.formats.hitran import cm_per_molecule, read_hitran
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ, LGINT_NM2_MHZ
 from rotor.spectra.lines import line_list
-from rotor.spectra.opacity import absorbed_fraction, column_density_per_cm2, line_optical_depth, optical_depth
+from rotor.spectra.opacity import column_density_per_cm2, line_optical_depth, optical_depth
 from rotor.spectra.spectrum import Spectrum, resolving_grid
 from rotor.tops.top import Top
 
@@ -90,8 +90,6 @@ def test_area_and_saturation():
     assert area == pytest.approx(
         column * 1e-14 * lines.intensity_nm2_mhz[0], rel=2e-3, abs=0
     )  # straight lines between points
-    assert absorbed_fraction(thin) == pytest.approx(thin.intensity, rel=1e-6, abs=0)
-    assert absorbed_fraction(thick).max() == 1.0
     assert thick.intensity == pytest.approx(thin.intensity * 1e15, rel=1e-12, abs=0)  # Lambert and Beer
 
 
@@ -106,5 +104,3 @@ def test_optical_depth_refuses_wrong_input():
     plain = Spectrum(np.array([1.0, 2.0]), np.array([1.0, 1.0]), "a.u.")
     with pytest.raises(ValueError, match="expected a cross section in nm"):
         optical_depth(plain, 1.0, 1.0)
-    with pytest.raises(ValueError, match="expected an optical depth"):
-        absorbed_fraction(plain)

@@ -100,12 +100,6 @@ class Assembly:
         """Molecules of each kind."""
         return np.bincount(self.kinds, minlength=len(self.models))
 
-    @cached_property
-    def atom_sites(self) -> Integers:
-        """The indices of the real atoms among the sites."""
-        steps = np.arange(self.first_atom[-1]) - np.repeat(self.first_atom[:-1], np.diff(self.first_atom))
-        return np.asarray(steps + np.repeat(self.first_site[:-1], np.diff(self.first_atom)))
-
     def check_geometry(self, sites_angstrom: Floats) -> None:
         """Raise ValueError if the distances in a molecule differ from those of its model."""
         for kind, model in enumerate(self.models):

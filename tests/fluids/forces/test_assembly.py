@@ -68,7 +68,6 @@ def test_labels_and_symbols_find_the_same_molecules() -> None:
     assert by_symbols.kinds.tolist() == by_labels.kinds.tolist() == [2, 2, 2, 1, 1, 0, 0]
     assert by_labels.first_atom.tolist() == [0, 3, 6, 9, 11, 13, 14, 15]
     assert by_labels.first_site.tolist() == [0, 3, 6, 9, 12, 15, 16, 17]
-    assert by_labels.atom_sites.tolist() == [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 13, 15, 16]
 
 
 def test_atoms_that_do_not_match_are_named() -> None:
