@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -29,12 +30,13 @@ class Workspace:
         return self._arrays[key][:size].reshape(shape)
 
 
+@cache
 def hold_freed_memory() -> None:
     """Let the C library reuse up to 32 MB of freed memory instead of returning it to the system.
 
     glibc returns free memory above twice the size of the largest array freed so far (mallopt(3), M_MMAP_THRESHOLD and
     M_TRIM_THRESHOLD), and the system clears each page that it hands out again. Freeing one array, even untouched, raises that size,
-    as any large calculation does. Other systems are unaffected.
+    as any large calculation does, for the rest of the process. Other systems are unaffected.
     """
     np.empty(1 << 24, dtype=np.uint8)
 

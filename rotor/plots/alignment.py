@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,6 +18,7 @@ from rotor.plots.view import WHOLE, View, show_part
 
 SIZE_INCHES = (WIDTH_INCHES, 4.2)
 NAMES = {"cos2theta": "⟨cos²θ⟩", "costheta": "⟨cosθ⟩", "cos2theta_2d": "⟨cos²θ$_{2D}$⟩"}
+SQUARE = re.compile(r"cos(2?)_([abc][XYZ])")
 NARROW = 1 / 100  # of the time range: shorter pulses are drawn as a line
 PER_TW = 1e12  # W/cm² in 1 TW/cm²
 
@@ -86,20 +88,30 @@ def _scale(trace: AlignmentTrace) -> tuple[str, float | None]:
     return "Intensity\n(TW/cm²)", PER_TW * RAD_PER_PS_ANGSTROM3_W_PER_CM2
 
 
+def _name(cosine: str) -> str:
+    """A cosine as a formula.
+
+    >>> _name("cos2_aX"), _name("costheta")
+    ('⟨cos²θ$_{aX}$⟩', '⟨cosθ⟩')
+    """
+    axes = SQUARE.fullmatch(cosine)
+    return f"⟨cos{'²' if axes[1] else ''}θ$_{{{axes[2]}}}$⟩" if axes else NAMES.get(cosine, cosine)
+
+
 def _cosines(axes: Any, trace: AlignmentTrace, classical: Mapping[str, Floats]) -> None:
     for place, (name, values) in enumerate(trace.cosines.items()):
         colour = PALETTE[place % len(PALETTE)]
-        axes.plot(trace.t_ps, values, color=colour, linewidth=1.0, label=NAMES.get(name, name))
+        axes.plot(trace.t_ps, values, color=colour, linewidth=1.0, label=_name(name))
         if name in classical:
-            label = f"{NAMES.get(name, name)}, classical"
+            label = f"{_name(name)}, classical"
             axes.plot(
                 trace.t_ps, classical[name], color=colour, linewidth=1.0, linestyle=(0, (4, 2)), alpha=0.8, label=label
             )
     if len(trace.cosines) == 1 and "cos2theta" in trace.cosines:
         axes.axhline(1 / 3, color=GREY, linewidth=0.6, linestyle=":")
-    axes.set_ylabel(", ".join(NAMES.get(name, name) for name in trace.cosines))
+    axes.set_ylabel(", ".join(map(_name, trace.cosines)))
     axes.set_xlabel("Time (ps)")
     # a margin shows a pulse at the first time
     axes.set_xlim(trace.t_ps[0] - 0.01 * (trace.t_ps[-1] - trace.t_ps[0]), trace.t_ps[-1])
     if len(trace.cosines) > 1 or classical:
-        axes.legend(frameon=False, fontsize=9)
+        axes.figure.legend(*axes.get_legend_handles_labels(), loc="outside lower right", ncols=4, fontsize=9)

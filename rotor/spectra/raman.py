@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 ANGSTROM6_IN_CM6 = 1e-48
 NM_PER_CM = 1e7
+LEAST_LASER_NM = 50.0  # shorter waves ionize every molecule; a smaller number is mostly in another unit
 DEFAULT_LASER_NM = 532.0  # the doubled line of a Nd:YAG laser
 DEFAULT_MIN_RELATIVE = 1e-6
 

@@ -26,6 +26,7 @@ from rotor.spectra.intensity_accuracy import cut_knob
 from rotor.spectra.raman import (
     DEFAULT_LASER_NM,
     DEFAULT_MIN_RELATIVE,
+    LEAST_LASER_NM,
     RamanLines,
     anisotropy_angstrom3,
     band_cross_section,
@@ -73,7 +74,7 @@ class RamanRequest:
     )
     laser_nm: float = declared(
         DEFAULT_LASER_NM,
-        Quantity("nm", above=0, metavar="W"),
+        Quantity("nm", above=LEAST_LASER_NM, metavar="W"),
         "Wavelength of the laser in vacuum (nm)",
         "conditions.laser",
         common=True,

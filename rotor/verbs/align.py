@@ -9,8 +9,9 @@ from rotor.alignment.pulse import SHAPES, Axis, Pulse, read_axis
 from rotor.alignment.request import AlignAnswer, AlignRequest, answer_align
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, record_table
-from rotor.requests.field import CONDITIONS, REQUIRED, all_fields
+from rotor.requests.field import CONDITIONS, REQUIRED, all_fields, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_fields
+from rotor.requests.readers import Quantity
 from rotor.table import counted
 from rotor.verbs.molecule import NUCLEI, REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.outputs import Report, picture, tables
@@ -215,7 +216,13 @@ def beyond_samples(times: Floats, values: Floats) -> float:
 
 def _pulse_text(pulse: Pulse) -> str:
     first, last = pulse.window_ps
-    return f"{type(pulse).__name__} on the {pulse.acts_on}, {first:g} to {last:g} ps"
+    values = {name: (field.reader, getattr(pulse, name)) for name, field in declared_fields(type(pulse)).items()}
+    text = ", ".join(
+        f"{name.partition('_')[0]} {reader.show(value)}"
+        for name, (reader, value) in values.items()
+        if isinstance(reader, Quantity)
+    )
+    return f"{type(pulse).__name__} on the {pulse.acts_on}, {first:g} to {last:g} ps" + (f" ({text})" if text else "")
 
 
 def results(answer: Any) -> dict[str, Any]:

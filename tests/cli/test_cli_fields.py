@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rotor.alignment.pulse import GaussianPulse
+import rotor
+from rotor.alignment.pulse import GaussianPulse, Kick
 from rotor.alignment.request import AlignRequest, answer_align
 from rotor.cli.shared.workers import Counted, working
 from rotor.formats import read
@@ -407,3 +408,22 @@ def test_m_and_its_negative_are_one_row_with_three_dipole_components(call):
     assert "mixed" not in out
     assert not any(line.split()[3:4] == ["-1"] for line in out.splitlines())
     assert "mixed" in call(*options, "--tilt", "30")[1]
+
+
+def test_the_report_of_align_has_the_numbers_of_each_pulse(call):
+    pulses = ("--pulse", "1e12 W/cm2, 1 ps", "--kick", "0.1 J/cm2, 30", "--thz", "200 kV/cm, 1 ps, 0.3 THz, 20")
+    code, out, _ = call("align", "OCS", *pulses, "--points", "11", "--tolerance", "1e-3")
+    text = " ".join(out.split())
+    assert code == 0
+    assert "GaussianPulse on the polarizability, -3.5 to 3.5 ps (peak 1e+12 W/cm2, fwhm 1 ps, centre 0 ps)" in text
+    assert "Kick on the polarizability, 30 to 30 ps (fluence 0.1 J/cm2, time 30 ps)" in text
+    assert "(peak 200 kV/cm, fwhm 1 ps, frequency 0.3 THz, phase 0, centre 20 ps)" in text
+
+
+def test_cosines_of_named_axes_are_formulas_below_the_picture():
+    answer = rotor.align("OCS", pulses=[Kick(0.1)], observables=["cos2_aX", "cos_bZ"], points=11, tolerance=1e-3)
+    figure = answer.plot()
+    figure.canvas.draw()
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["⟨cos²θ$_{aX}$⟩", "⟨cosθ$_{bZ}$⟩"]
+    assert legend.get_window_extent().y1 < figure.axes[1].bbox.y0

@@ -92,7 +92,7 @@ def test_no_lines_is_an_answer_and_a_picture_of_none_is_not(call):
         (("raman", "SO2"), "error: the polarizability is not known: give --polarizability"),
         (("raman", "SO2", "--polarizability", "2,1"), "error: --polarizability: '2,1': expected aa,bb,cc or"),
         (("raman", "N2", "--polarizability", "2 D,1 D"), "error: --polarizability: '2 D,1 D': unit 'D' does not measure"),
-        (("raman", "N2", "--laser", "0"), "error: --laser: 0: expected a finite number above 0 nm"),
+        (("raman", "N2", "--laser", "0.532"), "error: --laser: 0.532: expected a finite number above 50 nm"),
         (("raman", "N2", "--laser", "532 K"), "error: --laser: '532 K': unit 'K'"),
         (("raman", "N2", "--min-relative", "2"), "error: --min-relative: 2: expected a number between 0 and 1"),
         (("raman", "N2", "--jmax", "-1"), "error: --jmax: -1: expected a whole number of 0 or more"),
