@@ -20,7 +20,8 @@ import numpy as np
 from rotor.arrays import Floats, Indices
 from rotor.frozen import dataclass
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.tensors import BodyTensor, wang_coupling
+from rotor.quantum.symmetric_top_elements import coupling_of_existing
+from rotor.quantum.tensors import BodyTensor
 from rotor.quantum.wang.basis import WangBlock
 
 Sector = tuple[int, int]  # parity of K and sign of a Wang block
@@ -30,8 +31,8 @@ Sector = tuple[int, int]  # parity of K and sign of a Wang block
 class ParityStates:
     """The states of the blocks of successive J with K even (parity 0) or odd (1), padded to those of the last J.
 
-    columns: (J, size, 2 m) eigenvectors over K = parity, parity + 2, ..., those of sign + before those of sign -. rows: (J, 2 m) of the
-    states in the levels; -1, with columns of zeros, where there is no state.
+    columns: (J, m, 2 m) eigenvectors over K = parity, parity + 2, ..., those of sign + before those of sign -, m the same for both
+    parities. rows: (J, 2 m) of the states in the levels; -1, with columns of zeros, where there is no state.
     """
 
     js: range
@@ -50,11 +51,15 @@ class ParityStates:
 
 
 class Product(NamedTuple):
-    """What a vector makes of upper states, (J, low size, n_up), the lower states (J, low size, n_low) and their rows (J, n_low)."""
+    """What a vector makes of upper states, (J, m, n_up), the lower states (J, m, n_low) and their rows (J, n_low)."""
 
     moved: Floats
     low: Floats
     rows: Indices
+
+    def part(self, up: slice, low: slice) -> Product:
+        """That of some of the states."""
+        return Product(self.moved[:, :, up], self.low[:, :, low], self.rows[:, low])
 
 
 def are_whole(blocks: Iterable[SolvedBlock]) -> bool:
@@ -68,9 +73,8 @@ def are_whole(blocks: Iterable[SolvedBlock]) -> bool:
 
 def stacked(blocks: Mapping[tuple[int, Sector], SolvedBlock], js: range) -> dict[int, ParityStates]:
     """The states of successive J by their parity; blocks that are not there have no states."""
-    stacks = {}
+    stacks, size = {}, js[-1] // 2 + 1
     for parity in (0, 1):
-        size = (js[-1] - parity) // 2 + 1
         columns, rows = np.zeros((len(js), size, 2 * size)), np.full((len(js), 2 * size), -1, dtype=np.int32)
         for place, j in enumerate(js):
             for sign, at in ((1, 0), (-1, size)):
@@ -85,9 +89,10 @@ def stacked(blocks: Mapping[tuple[int, Sector], SolvedBlock], js: range) -> dict
 
 @dataclass(frozen=True)
 class Vector:
-    """A vector by what its components along z, x and y make of stacked blocks."""
+    """A vector by what its components along z, x and y make of stacked blocks up to a J."""
 
     tensor: BodyTensor
+    jmax: int
 
     @cached_property
     def sizes(self) -> tuple[float, float, float]:
@@ -110,59 +115,67 @@ class Vector:
                     out[rise, parity, stays] = real, -real
         return out
 
-    def products(
-        self, ups: Mapping[int, ParityStates], lows: Mapping[int, ParityStates]
-    ) -> Iterator[tuple[Sector, Product]]:
-        """Every pair of blocks that the vector connects, by the sector of the upper one, each pair once.
+    @cached_property
+    def couplings(self) -> dict[tuple[int, int], Floats]:
+        """c(K) of each lower J from -1 on, (J + 1, K), by rise of J and step of K."""
+        return {(rise, step): _couplings(self.jmax, rise, step) for rise in (0, 1) for step in (-1, 0, 1)}
 
-        ups, lows: the stacks of some J and of J - 1, or twice those of J.
+    def products(self, up: ParityStates, lows: Mapping[int, ParityStates]) -> Iterator[tuple[int, Product]]:
+        """Every pair of blocks that the vector connects, by the sign of the upper one; over both parities each pair once.
+
+        lows: the stacks of J - 1, or those of the same J.
         """
-        rise = ups[0].js[0] - lows[0].js[0]
-        for parity, up in ups.items():
-            if self.sizes[0]:
-                yield from self._along(up, lows[parity], rise)
-            if any(self.sizes[1:]) and (rise or parity):  # E with O is O with E
-                yield from self._across(up, lows[1 - parity], rise)
+        rise = up.js[0] - lows[0].js[0]
+        if self.sizes[0]:
+            yield from self._along(up, lows[up.parity], rise)
+        if any(self.sizes[1:]) and (rise or up.parity):  # E with O is O with E
+            yield from self._across(up, lows[1 - up.parity], rise)
 
-    def _along(self, up: ParityStates, low: ParityStates, rise: int) -> Iterator[tuple[Sector, Product]]:
+    def _along(self, up: ParityStates, low: ParityStates, rise: int) -> Iterator[tuple[int, Product]]:
         partner, _ = self.partners[rise, up.parity, True]
-        moved = _shifted(up, low, 0)
-        moved *= self.sizes[0]
+        moved = self._shifted(up, low, 0, self.sizes[0])
         yield from _pairs(up, low, moved, partner, (1, -1) if rise else (1,))  # + with - is - with +
 
-    def _across(self, up: ParityStates, low: ParityStates, rise: int) -> Iterator[tuple[Sector, Product]]:
+    def _across(self, up: ParityStates, low: ParityStates, rise: int) -> Iterator[tuple[int, Product]]:
         real_partner, imaginary_partner = self.partners[rise, up.parity, False]
-        raised, lowered = _shifted(up, low, 1), _shifted(up, low, -1)
         _, real, imaginary = self.sizes
+        raised, lowered = (self._shifted(up, low, step, real or imaginary) for step in (1, -1))
         if real:
-            moved = raised - lowered
-            moved *= real
-            yield from _pairs(up, low, moved, real_partner, (1, -1))
+            yield from _pairs(up, low, raised - lowered, real_partner, (1, -1))
         if imaginary:
             raised += lowered
-            raised *= imaginary
+            if real:
+                raised *= imaginary / real
             yield from _pairs(up, low, raised, imaginary_partner, (1, -1))
+
+    def _shifted(self, up: ParityStates, low: ParityStates, step: int, size: float) -> Floats:
+        """size c(K) U(K + step) over the K of the lower stack, (J, m, n_up); 0 where K + step is beyond the upper one."""
+        offset, count = (low.parity + step - up.parity) // 2, low.columns.shape[1]
+        first, last = max(0, -offset), min(count, count - offset)
+        out = np.empty(up.columns.shape)
+        out[:, :first], out[:, last:] = 0.0, 0.0
+        coupling = self.couplings[up.js[0] - low.js[0], step][low.js.start + 1 : low.js.stop + 1, low.parity :: 2]
+        scaled = size * coupling[:, first:last, None]
+        np.multiply(up.columns[:, first + offset : last + offset], scaled, out=out[:, first:last])
+        return out
 
 
 def _pairs(
     up: ParityStates, low: ParityStates, moved: Floats, partner: int, signs: tuple[int, ...]
-) -> Iterator[tuple[Sector, Product]]:
+) -> Iterator[tuple[int, Product]]:
     for sign in signs:
         there = low.sign_slice(partner * sign)
         product = Product(moved[:, :, up.sign_slice(sign)], low.columns[:, :, there], low.rows[:, there])
-        yield (up.parity, sign), product
+        yield sign, product
 
 
-def _shifted(up: ParityStates, low: ParityStates, step: int) -> Floats:
-    """c(K) U(K + step) over the K of the lower stack, (J, low size, n_up); 0 where K + step is beyond the upper one."""
-    offset, size = (low.parity + step - up.parity) // 2, low.columns.shape[1]
-    first, last = max(0, -offset), min(size, up.columns.shape[1] - offset)
-    coupling = np.zeros((len(up.js), size, 1))
-    for row, (upper_j, lower_j) in enumerate(zip(up.js, low.js, strict=True)):
-        if upper_j > 0 and lower_j >= 0:  # a vector has no elements within J = 0
-            values = wang_coupling(lower_j, upper_j, 1, step)[low.parity :: 2]
-            coupling[row, : len(values), 0] = values
-    out = np.empty((len(up.js), size, up.columns.shape[2]))
-    out[:, :first], out[:, last:] = 0.0, 0.0
-    np.multiply(up.columns[:, first + offset : last + offset], coupling[:, first:last], out=out[:, first:last])
-    return out
+def _couplings(jmax: int, rise: int, step: int) -> Floats:
+    """`tensors.wang_coupling` of all J from -1 on; 0 where K or K + step do not exist."""
+    j, k = np.arange(-1.0, jmax + 1)[:, None], np.arange(jmax + 2.0)
+    exists = (
+        (k <= j) & (k + step >= 0) & (k + step <= j + rise) & (j + rise > 0)
+    )  # a vector has no elements within J = 0
+    values = coupling_of_existing(np.maximum(j, 1 - rise), rise, 1, step, np.where(exists, k, 0.0))
+    if step:
+        values[:, (k == 0) | (k + step == 0)] *= np.sqrt(2.0)
+    return np.where(exists, values, 0.0)
