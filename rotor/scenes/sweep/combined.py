@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from duckdb import DuckDBPyConnection
-
     from rotor.table import Table
 
 KEY_LENGTH = 16  # hexadecimal digits of a point's key in its rows: two of a million points agree in 1 of 4e7 sweeps
@@ -102,24 +100,22 @@ class CombinedFile:
 
     def join(self, keys: Sequence[str], provenance: str) -> None:
         """Write the files with the rows of these points, in this order, and remove the folder."""
-        import duckdb
-
         from rotor.formats.atomic_write import atomic_path
-        from rotor.formats.tables import quoted, registered, run
+        from rotor.formats.sorted_pieces import engine_in, listed
+        from rotor.formats.tables import quoted, run
 
         waiting = self._waiting()
         before = self._joined() - waiting.keys()
         with ExitStack() as stack:
-            engine = stack.enter_context(duckdb.connect())
             unfinished = [stack.enter_context(atomic_path(target)) for target in self.targets]
-            engine.execute("SET memory_limit = $1", [f"{MEMORY_MB}MB"])
-            engine.execute("SET temp_directory = $1", [str(self.folder / "sort")])
-            _register_order(engine, keys)
-            few, sources = self._large_files(waiting.values())
-            parts = [_rows(sources)] if sources else []
-            if few is not None:
-                numbered = few | {"file_row_number": np.arange(len(few["point"]))}
-                parts.append(f"SELECT {registered(engine, 'few', numbered)} FROM few")
+            engine = stack.enter_context(engine_in(self.folder, MEMORY_MB))
+            places = {"key": np.array([key[:KEY_LENGTH] for key in keys]), "number": np.arange(len(keys))}
+            engine.register("given", places)
+            engine.execute("CREATE TABLE places AS SELECT key::VARCHAR AS key, number FROM given")
+            parts = []
+            if files := self._large_files(waiting.values()):
+                rows = f"read_parquet({listed(files)}, union_by_name = true, file_row_number = true)"
+                parts.append(f"SELECT * FROM {rows}")
             if before:
                 others = ", ".join(map(quoted, ("", *waiting)))
                 parts.append(f"SELECT * FROM {_table_of(self.targets[0])} WHERE point NOT IN ({others})")
@@ -135,24 +131,22 @@ class CombinedFile:
                 run(engine, f"COPY ({chosen}) TO {quoted(str(path))} {options}", target)
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _large_files(self, paths: Iterable[Path]) -> tuple[dict[str, Any] | None, list[str]]:
-        """The columns of a first batch of small files, and the other files; further batches become files."""
+    def _large_files(self, paths: Collection[Path]) -> list[Path]:
+        """The large files, and files into which the small ones are gathered."""
         from rotor.formats.tables import copy_columns
 
         place = self.folder / "joined"
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir()
-        batches = _gathered(path for path in paths if path.suffix == _SMALL)
-        few = next(batches, None)
-        large: list[Path] = []
-        for columns in batches:
-            large.append(place / f"{len(large)}{_LARGE}")
-            copy_columns(columns, large[-1], "(FORMAT parquet)")
-        return few, [str(path) for path in (*(path for path in paths if path.suffix == _LARGE), *large)]
+        large = [path for path in paths if path.suffix == _LARGE]
+        for number, rows in enumerate(_gathered(path for path in paths if path.suffix == _SMALL)):
+            large.append(place / f"{number}{_LARGE}")
+            copy_columns({name: rows[name] for name in rows.dtype.names or ()}, large[-1], "(FORMAT parquet)")
+        return large
 
 
-def _gathered(paths: Iterable[Path]) -> Iterator[dict[str, Any]]:
-    """Columns of small files of equal columns, one after the other, in batches of bounded size."""
+def _gathered(paths: Iterable[Path]) -> Iterator[NDArray[Any]]:
+    """Rows of small files of equal columns, one after the other, in batches of bounded size."""
     batches: dict[tuple[Any, ...], list[NDArray[Any]]] = {}
     for path in paths:
         rows = np.load(path, allow_pickle=False)
@@ -160,9 +154,8 @@ def _gathered(paths: Iterable[Path]) -> Iterator[dict[str, Any]]:
         batch = batches.setdefault(form, [])
         batch.append(rows)
         if sum(map(len, batch)) > BATCH_ROWS or len(batch) > BATCH_FILES:
-            yield _concatenated(batches.pop(form))
-    for batch in batches.values():
-        yield _concatenated(batch)
+            yield np.concatenate(batches.pop(form))
+    yield from map(np.concatenate, batches.values())
 
 
 def _rows_of(columns: Mapping[str, Any]) -> NDArray[Any]:
@@ -172,17 +165,6 @@ def _rows_of(columns: Mapping[str, Any]) -> NDArray[Any]:
     for name, column in arrays.items():
         rows[name] = column
     return rows
-
-
-def _concatenated(batch: list[NDArray[Any]]) -> dict[str, Any]:
-    return {name: np.concatenate([rows[name] for rows in batch]) for name in batch[0].dtype.names or ()}
-
-
-def _rows(files: Sequence[str]) -> str:
-    from rotor.formats.tables import quoted
-
-    listed = ", ".join(map(quoted, files))
-    return f"SELECT * FROM read_parquet([{listed}], union_by_name = true, file_row_number = true)"
 
 
 def _is_csv(path: Path) -> bool:
@@ -197,9 +179,3 @@ def _table_of(path: Path) -> str:
         return f"read_parquet({quoted(str(path))}, file_row_number = true)"
     rows = f"read_csv({quoted(str(path))}, header = true, all_varchar = true, delim = ',')"
     return f"(SELECT *, row_number() OVER () AS file_row_number FROM {rows})"
-
-
-def _register_order(engine: DuckDBPyConnection, keys: Sequence[str]) -> None:
-    places = {"key": np.array([key[:KEY_LENGTH] for key in keys]), "number": np.arange(len(keys))}
-    engine.register("given", places)
-    engine.execute("CREATE TABLE places AS SELECT key::VARCHAR AS key, number FROM given")
