@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from functools import cache
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -16,7 +17,6 @@ from rotor.checks import did_you_mean
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import Field
 from rotor.requests.fill import Entries
-from rotor.table import errors_html
 from rotor.verbs.calculation import Calculation, Outcome
 from rotor.verbs.verb import Verb, Work, verb_of
 
@@ -146,24 +146,21 @@ class Result(Outcome):
     def __repr__(self) -> str:
         return f"{self.verb.name} of {self.subject.text or 'no molecule'}: {self.table!r}"
 
-    def _repr_html_(self) -> str:
-        """The table and the error budget, for notebooks."""
-        return self.table._repr_html_() + errors_html(self.answer)
-
 
 def result_of(verb: Verb, values: Mapping[str, Any], executor: Any = None) -> Result:
     """Carry out a verb with values by the names of its fields.
 
     Raises TypeError for an unknown name, and ValueError for an invalid value.
     """
-    fields = {field.name: field for field in verb.fields.values()}
-    unknown = [name for name in values if name not in fields]
+    declared = {field.name: field for field in verb.fields.values()}
+    unknown = [name for name in values if name not in declared]
     if unknown:
-        others = f"; it takes {', '.join(fields)}"
-        raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{did_you_mean(unknown[0], fields) or others}")
-    entries = Entries({fields[name].identity: value for name, value in values.items() if value is not None}, "name")
+        others = f"; it takes {', '.join(declared)}"
+        raise TypeError(f"{verb.name}(): no argument {unknown[0]!r}{did_you_mean(unknown[0], declared) or others}")
+    entries = Entries({declared[name].identity: value for name, value in values.items() if value is not None}, "name")
     work = Work(shown=verb.read_shown(entries), note=_Notes(), provenance={"command": f"rotor.{verb.name}"})
-    return Result.extending(Calculation(verb, entries, work).run(executor))
+    outcome = Calculation(verb, entries, work).run(executor)
+    return Result(**{field.name: getattr(outcome, field.name) for field in fields(Outcome)})
 
 
 @cache

@@ -28,9 +28,10 @@ from rotor.verbs.verb import Work
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from rotor.scenes.scene import Scene, SceneResult
+    from rotor.scenes.scene import Scene
     from rotor.scenes.sweep import SweepResult
     from rotor.table import Table as Columns
+    from rotor.verbs.calculation import Outcome
 
 SHOWN = 20  # rows of the table, and reasons of failed points, in the report
 SHOWN_OF_REASON = 3  # points listed for one reason
@@ -90,7 +91,8 @@ class SceneRun:
     """A scene that was run."""
 
     options: Options
-    result: SceneResult
+    scene: Scene
+    result: Outcome
     failure: str = ""
 
     @property
@@ -103,7 +105,7 @@ class SceneRun:
         """The facts of the answer, and those of the run."""
         result = self.result
         content = result.report.content
-        head = {"scene": self.options.scene, "kind_of_scene": result.scene.kind}
+        head = {"scene": self.options.scene, "kind_of_scene": self.scene.kind}
         accuracy = None if result.reached is None else asdict(result.reached)
         run = {"accuracy": accuracy, "seconds": result.seconds}
         return {"rotor_version": content["rotor_version"], **head, **content, **head, **run}
@@ -117,7 +119,7 @@ class SceneRun:
         """The title of the scene and the report of its verb, then files and seconds of the run."""
         result = self.result
         parts = [*result.verb.show(result.answer, replace(result.report, content=report.content))]
-        if title := result.scene.title:
+        if title := self.scene.title:
             heading = parts.pop(0) if parts and isinstance(parts[0], str) else ""
             yield f"{title}\n{heading}".rstrip()
         yield from parts
@@ -207,10 +209,10 @@ def _single(scene: Scene, options: Options, pool: Executor | None) -> SceneRun:
     from rotor.scenes.run import run_scene
 
     with elapsed_time("computing"):
-        return SceneRun(options, run_scene(scene, folder=options.folder, out=options.out, executor=pool))
+        return SceneRun(options, scene, run_scene(scene, folder=options.folder, out=options.out, executor=pool))
 
 
-def _accuracy(result: SceneResult) -> list[tuple[str, str]]:
+def _accuracy(result: Outcome) -> list[tuple[str, str]]:
     """The requested accuracy beside the numerical error, and beside larger errors if they are estimated."""
     reached = result.reached
     if reached is None:

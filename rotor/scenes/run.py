@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from rotor.scenes.scene import SCHEMA, Scene, SceneResult, keyed, scene_of, scene_text, within
+from rotor.scenes.scene import SCHEMA, Scene, keyed, scene_of, scene_text, within
 from rotor.verbs.calculation import Calculation, Outcome
 from rotor.verbs.outputs import Files
 from rotor.verbs.verb import Work, verb_of
@@ -23,7 +23,7 @@ def run_scene(
     folder: Where = ".",
     out: Where = ".",
     executor: Executor | None = None,
-) -> SceneResult:
+) -> Outcome:
     """Run one scene.
 
     Parameters
@@ -39,7 +39,8 @@ def run_scene(
 
     Returns
     -------
-    SceneResult
+    Outcome
+        With `files`, those that were written.
 
     Raises
     ------
@@ -59,8 +60,7 @@ def run_scene(
         files.lock(stack)
         outcome = scene_calculation(scene, folder, out).run(executor)
         files.write({"json": lambda path: outcome.write_table(outcome.table, path), **outcome.writers})
-    paths = tuple(path for paths in files.paths.values() for path in paths)
-    return SceneResult.extending(outcome, scene=scene, files=paths)
+    return outcome
 
 
 def scene_calculation(scene: Scene, folder: Where = ".", out: Where = ".") -> Calculation:

@@ -24,12 +24,12 @@ from rotor.requests.choices import Choices, nearest
 from rotor.requests.field import REQUIRED, Field, all_fields
 from rotor.requests.fill import Entries
 from rotor.requests.readers import Custom, Each, Flag, NameList, Names, Quantity, Text
-from rotor.verbs.calculation import Outcome
 from rotor.verbs.outputs import Output
 from rotor.verbs.verb import SCENE_VERBS, Verb, verb_of
 
 if TYPE_CHECKING:
     from rotor.requests.plan import Plan
+    from rotor.verbs.calculation import Outcome
 
 SCHEMA = 1
 Keys = Mapping[str, Field]  # fields of a table by key
@@ -98,31 +98,15 @@ class Scene:
         folder: str | os.PathLike[str] = ".",
         out: str | os.PathLike[str] = ".",
         executor: Executor | None = None,
-    ) -> SceneResult:
+    ) -> Outcome:
         """Run the scene, see `rotor.scenes.run.run_scene`."""
-        result: SceneResult = import_module("rotor.scenes.run").run_scene(
-            self, folder=folder, out=out, executor=executor
-        )
-        return result
+        outcome: Outcome = import_module("rotor.scenes.run").run_scene(self, folder=folder, out=out, executor=executor)
+        return outcome
 
     def plan(self, *, folder: str | os.PathLike[str] = ".") -> Plan:
         """Plan of the scene with neglected effects, see `rotor.scenes.plan.plan_of`."""
         plan: Plan = import_module("rotor.scenes.plan").plan_of(self, folder)
         return plan
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class SceneResult(Outcome):
-    """Result of a scene. files: written files."""
-
-    scene: Scene
-    files: tuple[Path, ...]
-
-    def _repr_html_(self) -> str:
-        """The rows and their errors, for notebooks."""
-        from rotor.table import errors_html
-
-        return self.table._repr_html_() + errors_html(self.answer)
 
 
 def make_scene(kind: str, **content: Any) -> Scene:

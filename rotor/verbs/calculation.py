@@ -6,17 +6,17 @@ import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from rotor.checks import NoAnswerError
 from rotor.frozen import dataclass
 from rotor.reports.screen import plain
 from rotor.requests.field import OUTPUTS
 from rotor.requests.fill import Entries, naming, refuse_misfits
-from rotor.table import Table
+from rotor.table import Table, errors_html
 from rotor.verbs.outputs import Output, Report
 from rotor.verbs.verb import Place, Subject, Verb, Work
 from rotor.version import version
@@ -136,13 +136,6 @@ class Outcome:
     reached: Reached | None = None
     executor: Executor | None = None
 
-    @classmethod
-    def extending(cls, outcome: Outcome, **more: Any) -> Self:
-        """An outcome of a class with more fields, with the table and the report of the other if they were made."""
-        result = cls(**{field.name: getattr(outcome, field.name) for field in fields(Outcome)}, **more)
-        vars(result).update(vars(outcome))
-        return result
-
     @property
     def verb(self) -> Verb:
         """The verb."""
@@ -152,6 +145,11 @@ class Outcome:
     def subject(self) -> Subject:
         """The subject of the verb."""
         return self.calculation.inputs[1]
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files of the calculation, which its command or scene writes."""
+        return tuple(path for paths in self.calculation.work.files.values() for path in paths)
 
     @cached_property
     def table(self) -> Table:
@@ -186,6 +184,10 @@ class Outcome:
         from rotor.formats import write
 
         write(table, path, settings=dict(self.report.provenance))
+
+    def _repr_html_(self) -> str:
+        """The table and the line of errors, for notebooks."""
+        return self.table._repr_html_() + errors_html(self.answer)
 
     @property
     def writers(self) -> Mapping[str, Callable[[Path], None]]:

@@ -12,17 +12,18 @@ from scipy.special import ellipk, fresnel
 
 import rotor
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import SceneResult, read_scene
+from rotor.scenes.scene import read_scene
 from rotor.scenes.sweep import SweepResult, run_sweep
+from rotor.verbs.calculation import Outcome
 
 FOLDER = PROJECT / "examples" / "scenes"
 
 
-def column(result: SceneResult, name: str) -> np.ndarray:
+def column(result: Outcome, name: str) -> np.ndarray:
     return np.asarray(result.table.columns[name])
 
 
-def spin(result: SceneResult) -> np.ndarray:
+def spin(result: Outcome) -> np.ndarray:
     return np.stack([column(result, f"w{k}") for k in (1, 2, 3)], axis=-1)
 
 

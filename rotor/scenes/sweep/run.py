@@ -16,14 +16,14 @@ from rotor.checks import NoAnswerError
 from rotor.formats.atomic_write import FULL
 from rotor.frozen import dataclass
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import Scene, SceneResult, scene_text
+from rotor.scenes.scene import Scene, scene_text
 from rotor.scenes.sweep.combined import KEY_LENGTH, CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
 from rotor.scenes.sweep.points import Point, check_first, points
 from rotor.scenes.sweep.record import Record, appended, read_records
 from rotor.scenes.sweep.result import SweepResult
 from rotor.temporary import locked_file
-from rotor.verbs.verb import verb_of
+from rotor.verbs.calculation import Outcome
 
 AHEAD = 200  # submitted points that have not begun: workers never wait, and memory stays bounded
 
@@ -201,9 +201,9 @@ def run_point(job: Job) -> Record:
     }
 
 
-def _results(result: SceneResult) -> dict[str, Any]:
+def _results(result: Outcome) -> dict[str, Any]:
     """The results of the verb that are finite numbers; none of an answer without rows."""
-    numbers = verb_of(result.scene.kind).results(result.answer) if len(result.table) else {}
+    numbers = result.verb.results(result.answer) if len(result.table) else {}
     plain = {name: value.item() if hasattr(value, "item") else value for name, value in numbers.items()}
     return {name: value for name, value in plain.items() if value is not None and math.isfinite(value)}
 
