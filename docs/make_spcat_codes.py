@@ -234,7 +234,7 @@ DIPOLES = """
 ## Dipoles: FC TYP I1 V2 V1 SYM
 
 SYM 1, 2, 3 are a, b, c in debye, SYM 0 magnetic moments in Bohr magnetons; TYP has FC as its second digit. What each stands for is said in
-`moment_operators.py`; of TYP 7 and 8 I1 is a digit of the harmonic. A moment between two states leads from the one with the higher number.
+`dipole_codes.py`; of TYP 7 and 8 I1 is a digit of the harmonic. A moment between two states leads from the one with the higher number.
 
 | TYP | SYM 0, two states | SYM 1, 2, 3, two states | SYM 1, 2, 3, one state | SYM 0, a spin | SYM 1 (a), a spin | SYM 2, a spin |
 |---|---|---|---|---|---|---|

@@ -274,12 +274,16 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     acting = [(dipole, code) for dipole, code in light.others if set(code.states) <= set(here)]
     beside = tuple(
         line_moment(
-            dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), oblate, as_spcat, coded.series
+            dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), axes, as_spcat, coded.series
         )
         for dipole, code in acting
     )
-    group_lines = [line for line in coded.usable if line.states is None or set(line.states) <= set(here)]
-    usable = coupled_spin_lines(group_lines, states, not doubled, axes)
+    usable = coupled_spin_lines(
+        [line for line in coded.usable if line.states is None or set(line.states) <= set(here)],
+        states,
+        not doubled,
+        axes,
+    )
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.spind < 0)
     if kind in ("prolate", "oblate") and beside:
@@ -299,7 +303,14 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     elif light.phases.between_i:
         moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
     apart = _apart(states, pairs)
-    effect = FileEffect(usable, tuple(numbers), coupled, moments, limits, beside, first.ixx, pairs, axes, turned, apart)
+    seconds = {pair.second for pair in doubled}
+    lines = tuple(
+        line._replace(states=line.states and (here[line.states[0]], here[line.states[1]]))
+        for line in usable
+        # the program takes no operator of K l ≤ 0 alone
+        if not line.states or line.is_between or line.states[0] not in seconds
+    )
+    effect = FileEffect(lines, len(states), coupled, moments, limits, beside, first.ixx, pairs, axes, turned, apart)
     if pairs:  # raises for operators forbidden between l-doubled states, before levels are solved
         effect.spin_terms(_ANY_TOP)
         effect.couplings(_ANY_TOP, basis_of(axes))

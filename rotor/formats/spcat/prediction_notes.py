@@ -52,7 +52,7 @@ def _moment_notes(coded: CodedFile, intensities: IntensityFile, as_spcat: bool) 
     """Notes on dipole lines for which SPCAT deviates from its documentation, and on their phases."""
     dipoles, others = split_dipoles(intensities.dipoles, len(coded.states))
     oblate = coded.oblate
-    wrong = [str(dipole.code) for dipole, code in others if deviates_in_spcat(code, oblate)]
+    wrong = [str(dipole.code) for dipole, code in others if deviates_in_spcat(code, coded.axes)]
     notes = []
     if wrong:
         lines = f"dipole{'s' if len(wrong) > 1 else ''} {', '.join(dict.fromkeys(wrong))}"

@@ -164,8 +164,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
 
 def _notes_on_codes(file: ParameterFile) -> list[str]:
     """Notes on parameters that act on no level, and on free ones that a fit does not move from 0."""
-    from rotor.formats.spcat.fits.at_zero import stay_at_zero
-    from rotor.formats.spcat.fits.fit_states import groups_for_fit
+    from rotor.formats.spcat.fits.fit_states import groups_for_fit, stay_at_zero
     from rotor.formats.spcat.hamiltonian.coded_file import coded_file
     from rotor.formats.spcat.hamiltonian.labels import UNDIAGONALIZED_NOTE
 

@@ -80,7 +80,7 @@ class Tensor(NamedTuple):
         return self.rank % 2 == 1
 
     def shape(self, z: str) -> tuple[int, bool]:
-        """K of the tensor, and whether it is E + E† or (E - E†)/i, by its species (`spin_operators`)."""
+        """K of the tensor, and whether it is E + E† or (E - E†)/i, by its species (`operators`)."""
         x, y = ("c", "b") if z == "a" else ("a", "b")
         along = {"": "", x: "x", y: "y", z: "z"}[self.axis]
         k = self.rank - (self.rank % 2 if along in ("z", "") else 1 - self.rank % 2)

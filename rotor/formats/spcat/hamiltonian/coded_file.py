@@ -180,11 +180,12 @@ class CodedFile:
         return line._replace(states=(first, first))
 
     @cached_property
-    def _acting(self) -> tuple[list[CodedLine], list[str]]:
-        """`acting`, and a sentence for each line that is left out."""
+    def _selected(self) -> tuple[list[CodedLine], list[CodedLine], list[str]]:
+        """`acting`, `usable`, and a sentence for each line that is left out."""
         lines, unlike = _without(self.lines, self._forbidden)
-        lines, imaginary = _without([self._symmetric_part(line) for line in lines], self._imaginary)
-        return lines, unlike + imaginary
+        acting, imaginary = _without([self._symmetric_part(line) for line in lines], self._imaginary)
+        usable, without_spin = _without(acting, self._missing_spin)
+        return acting, usable, unlike + imaginary + without_spin
 
     @property
     def acting(self) -> list[CodedLine]:
@@ -192,17 +193,12 @@ class CodedFile:
 
         Raises ValueError for an odd operator within one state that is invariant under all half turns, which is imaginary in any phases.
         """
-        return self._acting[0]
-
-    @cached_property
-    def _usable(self) -> tuple[list[CodedLine], list[str]]:
-        """`usable`, and why others are left out."""
-        return _without(self.acting, self._missing_spin)
+        return self._selected[0]
 
     @property
     def usable(self) -> list[CodedLine]:
         """The acting lines whose spins occur in SPIND."""
-        return self._usable[0]
+        return self._selected[1]
 
     @cached_property
     def left_out(self) -> list[str]:
@@ -212,7 +208,7 @@ class CodedFile:
             missing = digits.missing_state(count)
             if missing is not None and parameter.value:
                 reasons.append(_left_out(parameter, f"state {missing} does not exist, NVIB = {count} counts from 0"))
-        return reasons + self._acting[1] + self._usable[1]
+        return reasons + self._selected[2]
 
     def _concerned(self, line: CodedLine) -> list[tuple[int, int]]:
         """The pairs of states in which a line acts."""

@@ -1,26 +1,97 @@
-"""Dipoles of an .int file by their codes, FC TYP I1 V2 V1 SYM: plain components by pairs of states, and other moments."""
+"""Dipoles of an .int file by their codes, FC TYP I1 V2 V1 SYM: plain components by pairs of states, and other moments.
+
+Moments by TYP, as operators made of direction cosines φ and components of N. x, y, z are b, c, a in a prolate and b, a, c in an oblate
+basis, where i stands for -i, {A, B} = AB + BA
+(H. M. Pickett, documentation of SPFIT and SPCAT, "Format of the .int file", table of dipole types):
+
+| TYP | SYM 0, of N | SYM 0, of a spin | SYM along z (and x, y in turn) |
+|---|---|---|---|
+| 0 | N = Σ φ_i N_i | S | φ_z |
+| 1 | ½(2 φ_z N_z - φ_x N_x - φ_y N_y) | as of N with S_i for N_i | ½i({φ_y, N_x} + {φ_x, N_y}) |
+| 2 | φ_y N_y - φ_x N_x | as of N | that of TYP 1 |
+| 6 | N (Ny² - Nx²) | S (Ny² - Nx²) | ({φ_z, Ny² - Nx²} + {φ_y, {Ny, Nz}} - {φ_x, {Nx, Nz}})/√6 |
+| 6 along x, y | | | ½({φ_x, Ny² - Nx²} + {φ_y, {Nx, Ny}}), ½({φ_y, Ny² - Nx²} - {φ_x, {Nx, Ny}}) |
+| 3, 5, 9, 10 | ½{N², }, -, ½{N⁴, }, ¼[N², [N², ]] of TYP 0 | the same | ½{N², }, ½[N², ], ½{N⁴, }, ¼[N², [N², ]] of TYP 0 |
+| 4 | ½{Nz², TYP 0} | the same | the same |
+| 11, 12 | ½[N², TYP 2], -½i{Nz, TYP 2} (documented with the other sign, which the program does not have) | | the same |
+| 7; n | TYP 0 times a cosine of K, a Fourier term of internal rotation (`series`) | | the same |
+| 8; n | i times TYP 0 times a sine of K; with n = 0 ½i{Nz, TYP 0}, as the program has it | | the same |
+
+SYM 1 to 3 in D, SYM 0 in Bohr magnetons, with TYP 8 in D, as documented, but in Bohr magnetons with `as_spcat`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.code_table import state_digits
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET
-from rotor.formats.spcat.hamiltonian.moment_operators import (
-    imaginary,
-    moment_operator,
-    moment_tensor,
-)
+from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, basis_of
+from rotor.formats.spcat.hamiltonian.operators import as_matrix, imaginary, operator_of
 from rotor.formats.spcat.hamiltonian.series import Series, k_factor
 from rotor.formats.spcat.text.int_file import Dipole
 from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
-from rotor.quantum.operators.algebra import Operator
-from rotor.quantum.operators.rotation import Weight, direction_cosine, j_squared, j_z, weighted
-from rotor.quantum.spins.operators import ByElements, Cosines
+from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
+from rotor.quantum.operators.rotation import Weight, components, direction_cosine, j_squared, j_z, weighted
+from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN
+
+
+def moment_operator(typ: int, sym: int, axes: str, with_spin: bool = False, as_spcat: bool = False) -> Operator:
+    """The operator of a TYP without its powers of N², for a value of 1.
+
+    typ: TYP 0, 1, 2, 4, 6, 11 or 12. sym: SYM: 0 for magnetic moments, 1 to 3 for a, b, c. axes: the axes x, y, z. with_spin: whether a
+    spin multiplies the operator, which then contains no cosine. as_spcat: whether N is ½(2 φ_z N_z - φ_x N_x - φ_y N_y), as SPCAT computes
+    it, except for TYP 6.
+    """
+    n_z = components(basis_of(axes))[axes[2]]
+    if typ == 4:
+        return half_anticommutator(n_z**2, moment_operator(0, sym, axes, with_spin, as_spcat))
+    if typ == 11:
+        return _with_n2(moment_operator(2, sym, axes), 5)
+    if typ == 12:
+        return -imaginary(axes, True) * half_anticommutator(n_z, moment_operator(2, sym, axes))
+    if typ in (1, 2) or not (sym or with_spin):
+        spcat_n = as_spcat and typ == 0 and not sym
+        c = moment_tensor(1 if spcat_n else typ, sym, axes)
+        plain = (1j if sym else 1.0) * operator_of(CosinesWithN(as_matrix(c)), axes)
+    else:
+        plain = direction_cosine("abc"[sym - 1], basis_of(axes)) if sym else UNIT
+    return _third_order(plain, sym, axes) if typ == 6 else plain
+
+
+def _third_order(plain: Operator, sym: int, axes: str) -> Operator:
+    """TYP 6 along an axis, or TYP 0 times Ny² - Nx² without one."""
+    (x, y, z), n = tuple(axes), components(basis_of(axes))
+    squares = n[y] ** 2 - n[x] ** 2
+    if not sym:
+        return plain @ squares
+
+    def product(cosine: str, first: str, second: str) -> Operator:
+        products_of_n = half_anticommutator(n[first], n[second])
+        return 4.0 * half_anticommutator(direction_cosine(cosine, basis_of(axes)), products_of_n)
+
+    both, along = 2.0 * half_anticommutator(plain, squares), "abc"[sym - 1]
+    if along == z:
+        return 1 / sqrt(6) * (both + product(y, y, z) - product(x, x, z))
+    return 0.5 * (both + product(y, x, y) if along == x else both - product(x, x, y))
+
+
+def moment_tensor(typ: int, sym: int, axes: str) -> Floats:
+    """c (3, 3) of Σ_ij c_ij φ_i N_j or φ_i S_j; for SYM 1 to 3 without the factor i, with its sign in an oblate basis."""
+    c = np.zeros((3, 3))
+    if sym:
+        i, j = (place for place in range(3) if place != sym - 1)
+        c[i, j] = c[j, i] = 1.0 if axes[2] == "a" else -1.0
+    else:
+        along_xyz = {1: (-0.5, -0.5, 1.0), 2: (-1.0, 1.0, 0.0)}.get(typ, (1.0, 1.0, 1.0))
+        for axis, value in zip(axes, along_xyz, strict=True):
+            c["abc".index(axis), "abc".index(axis)] = value
+    return c
+
 
 Dipoles = dict[tuple[int, int], tuple[float, float, float]]
 
@@ -87,73 +158,66 @@ def line_moment(
     code: DipoleCode,
     states: tuple[int, int],
     spins: int,
-    oblate: bool = False,
+    axes: str = AXES["Ir"],
     as_spcat: bool = False,
     series: Series | None = None,
 ) -> Moment:
     """The moment of a dipole line that is not a plain component of the dipole.
 
-    | TYP, I1, SYM | moment |
-    |---|---|
-    | 3, 5, 9, 10 | ½{N², φ}, ½[N², φ], ½{N⁴, φ}, ¼[N², [N², φ]], or of N or a spin in place of φ but for 5 |
-    | 0, 1, 2, 4, 6, 11, 12 | see `moment_operators` |
-    | 7; n; any | TYP 0 times a cosine of K, a Fourier term of internal rotation (`series`) |
-    | 8; n; any | i times TYP 0 times a sine of K; with n = 0 ½i{Nz, TYP 0}, as the program has it |
-
-    SYM 1 to 3 in D, SYM 0 in Bohr magnetons, with TYP 8 in D, as documented, but in Bohr magnetons with `as_spcat`. A moment between
-    two states leads from the one with the higher number to the other.
+    A moment between two states leads from the one with the higher number to the other.
 
     dipole: the line of the .int file, its value in D or Bohr magnetons. code: fields of its code. states: numbers of the states in their
-    group, the higher number of the file first. spins: number of spins in SPIND. oblate: whether z is the c axis. as_spcat: whether to
-    reproduce SPCAT where it differs from its documentation: N, spins with TYP 1 and 2. series: constants of the Fourier series of the
-    file.
+    group, the higher number of the file first. spins: number of spins in SPIND. axes: the axes x, y, z. as_spcat: whether to reproduce
+    SPCAT where it differs from its documentation: N, spins with TYP 1 and 2. series: constants of the Fourier series of the file.
     Returns: the moment in debye.
     Raises ValueError for any other code, with its meaning.
     """
     if not as_spcat and states[0] == states[1] and _is_turned(code):
         raise ValueError(f"dipole {dipole.code}: {_TURNED}")
-    if code.typ in FOURIER:
-        return _fourier_moment(dipole, code, states, series or Series(), oblate, as_spcat)
-    if code.spin > spins:
-        raise ValueError(f"dipole {dipole.code}: spin {code.spin} is not among the {spins} that SPIND names")
     if code.axis > 3:
         raise ValueError(
             f"dipole {dipole.code}: SYM = {code.axis}; expected 0 for magnetic moments, 1, 2, 3 for a, b, c"
         )
-    value = dipole.value * (1.0 if code.axis else DEBYE_PER_BOHR_MAGNETON)
-    if code.spin:
-        return _spin_moment(dipole, code, states, value, oblate, as_spcat)
-    if as_spcat and not code.axis and code.typ in (10, 11):  # without elements there
-        value = 0.0
-    if as_spcat and code.typ == 12 and code.axis == (3 if oblate else 1) and states[0] == states[1]:
-        value = 0.0
-    if code.typ not in _OPERATORS and not (code.typ == 5 and code.axis):
+    sine, fourier, value = code.typ == 8, code.typ in FOURIER, dipole.value
+    if not code.axis and not (sine and not as_spcat):
+        value *= DEBYE_PER_BOHR_MAGNETON
+    if fourier:
+        plain = imaginary(axes, sine) * moment_operator(0, code.axis, axes, as_spcat=as_spcat)
+        operator = weighted(plain, k_factor(code.spin, sine, series or Series(), code.states))
+    elif code.spin > spins:
+        raise ValueError(f"dipole {dipole.code}: spin {code.spin} is not among the {spins} that SPIND names")
+    elif code.spin:
+        return _spin_moment(dipole, code, states, value, axes, as_spcat)
+    elif code.typ not in _OPERATORS and not (code.typ == 5 and code.axis):
         raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
-    if (
-        code.typ == 5 and states[0] == states[1]
-    ):  # not Hermitian: the elements from the higher F to the lower are those of ½[N², φ]
-        value = -value
-    operator = moment_operator(0 if code.typ in _POWERS else code.typ, code.axis, oblate, as_spcat=as_spcat)
-    return _without_spin(value, states, _with_n2(operator, code.typ), bool(code.axis))
+    else:
+        typ = 0 if code.typ in _POWERS else code.typ
+        operator = _with_n2(moment_operator(typ, code.axis, axes, as_spcat=as_spcat), code.typ)
+        if as_spcat and _is_left_out(code, axes):
+            value = 0.0
+        if (
+            code.typ == 5 and states[0] == states[1]
+        ):  # not Hermitian: from the higher F to the lower elements are those of ½[N², φ]
+            value = -value
+    rotor = ByElements(1, (1j if code.axis else 1.0) * operator)
+    return Moment(value, states[::-1], rotor, electric=bool(code.axis))
 
 
-def _without_spin(value: float, states: tuple[int, int], operator: Operator, electric: bool) -> Moment:
-    """The moment of an operator on |N K⟩ from the state of the higher number in the file, the first one here, to the other."""
-    return Moment(value, states[::-1], ByElements(1, (1j if electric else 1.0) * operator), electric=electric)
-
-
-def deviates_in_spcat(code: DipoleCode, oblate: bool) -> bool:
+def deviates_in_spcat(code: DipoleCode, axes: str) -> bool:
     """Whether SPCAT deviates from its documentation, so that `as_spcat` changes the result of `line_moment`."""
-    magnetic, alone = code.axis == 0, code.states[0] == code.states[1]
-    if alone and _is_turned(code):
+    magnetic = code.axis == 0
+    if code.states[0] == code.states[1] and _is_turned(code):
         return True
-    if code.typ in FOURIER:
-        return magnetic
-    if code.spin:
-        return magnetic and code.typ in (1, 2)
-    if magnetic:
-        return code.typ not in (1, 2, 6, 12)
-    return code.typ == 12 and code.axis == (3 if oblate else 1) and alone
+    if code.typ in FOURIER or not magnetic:
+        return magnetic or _is_left_out(code, axes)
+    return code.typ in (1, 2) if code.spin else code.typ not in (1, 2, 6, 12)
+
+
+def _is_left_out(code: DipoleCode, axes: str) -> bool:
+    """Whether SPCAT has no elements of a moment: [N², ] of N, and within a state TYP 12 along z."""
+    if not code.axis:
+        return code.typ in (10, 11)
+    return code.typ == 12 and "abc"[code.axis - 1] == axes[2] and code.states[0] == code.states[1]
 
 
 _TURNED = "time reversal would change the sign of this moment in one state, so that it leads between two alone, V2 ≠ V1"
@@ -181,51 +245,31 @@ def _rank_two_with_n(m: Ints, n: Ints, above: Ints, below: Ints) -> Floats:
 
 
 def _spin_moment(
-    dipole: Dipole, code: DipoleCode, states: tuple[int, int], value: float, oblate: bool, as_spcat: bool
+    dipole: Dipole, code: DipoleCode, states: tuple[int, int], value: float, axes: str, as_spcat: bool
 ) -> Moment:
     """The magnetic moment of a spin."""
-    spin = f"I{code.spin}"
-    if code.axis == 0 and code.typ in (0, 3, 4, 6, 9):
-        operator = moment_operator(0 if code.typ in _POWERS else code.typ, 0, oblate, with_spin=True)
-        return Moment(value, states, ByElements(0, _with_n2(operator, code.typ)), spin, electric=False)
-    if code.typ == 0 and code.axis == (3 if oblate else 1):
-        cosine = direction_cosine("abc"[code.axis - 1], "IIIl" if oblate else "Ir")
+    spin, magnetic = f"I{code.spin}", code.axis == 0
+    if magnetic and code.typ in (0, 3, 4, 6, 9):
+        operator = moment_operator(0 if code.typ in _POWERS else code.typ, 0, axes, with_spin=True)
+    elif magnetic and as_spcat and code.typ in (1, 2):
+        squares = 1.5 * j_z(2) - 0.5 * j_squared()
+        operator = squares if code.typ == 1 else moment_operator(6, 0, axes, with_spin=True)
+    elif code.typ in (1, 2):
+        tensor = Cosines(as_matrix(moment_tensor(code.typ, code.axis, axes)))
+        # times i along an axis, hence i² in elements
+        return Moment(value if magnetic else -value, states[::-1], tensor, spin, electric=not magnetic)
+    elif code.typ == 0 and "abc"[code.axis - 1] == axes[2]:
+        cosine = direction_cosine(axes[2], basis_of(axes))
         return Moment(value, states[::-1], ByElements(2, 1j * weighted(cosine, _rank_two_with_n)), spin)
-    if code.typ in (1, 2):
-        if code.axis == 0 and as_spcat:
-            operator = (
-                1.5 * j_z(2) - 0.5 * j_squared() if code.typ == 1 else moment_operator(6, 0, oblate, with_spin=True)
-            )
-            return Moment(value, states, ByElements(0, operator), spin, electric=False)
-        tensor = Cosines(moment_tensor(code.typ, code.axis, oblate))  # times i along an axis, hence i² in elements
-        return Moment(-value if code.axis else value, states[::-1], tensor, spin, electric=code.axis > 0)
-    raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
-
-
-def _fourier_moment(
-    dipole: Dipole, code: DipoleCode, states: tuple[int, int], series: Series, oblate: bool, as_spcat: bool
-) -> Moment:
-    """TYP 0 times a function of K; states: numbers in the group, the higher number of the file first."""
-    sine, n = code.typ == 8, code.spin
-    if code.axis > 3:
-        raise ValueError(
-            f"dipole {dipole.code}: SYM = {code.axis}; expected 0 for magnetic moments, 1, 2, 3 for a, b, c"
-        )
-    in_debye = bool(code.axis) or (sine and not as_spcat)
-    value = dipole.value * (1.0 if in_debye else DEBYE_PER_BOHR_MAGNETON)
-    plain_operator = (imaginary(oblate) if sine else 1.0) * moment_operator(0, code.axis, oblate, as_spcat=as_spcat)
-    operator = weighted(plain_operator, k_factor(n, sine, series, code.states))
-    return _without_spin(value, states, operator, bool(code.axis))
+    else:
+        raise ValueError(f"dipole {dipole.code}: {_meaning(code)} {NOT_YET}")
+    return Moment(value, states, ByElements(0, _with_n2(operator, code.typ)), spin, electric=False)
 
 
 def _meaning(code: DipoleCode) -> str:
     """Meaning of a code, for messages."""
-    kinds = {1: "a moment of second order", 2: "a moment of second order", 6: "a moment of third order"}
-    what = kinds.get(code.typ, f"a moment of TYP {code.typ}")
-    if code.axis == 0 and code.typ in (0, 4, *_POWERS):
-        what = (
-            "the moment of l_z of an l-doubled state" if code.typ == 5 else "a magnetic moment with powers of N² or Nz²"
-        )
-    elif code.typ in (0, 4, *_POWERS):
-        what = "a moment along an axis"
+    what = "a moment of third order" if code.typ == 6 else f"a moment of TYP {code.typ}"
+    if code.typ in (0, 4, *_POWERS):
+        magnetic = "the moment of l_z of an l-doubled state" if code.typ == 5 else "a magnetic moment with powers of N²"
+        what = "a moment along an axis" if code.axis else magnetic
     return what + (f" that acts on spin {code.spin}" if code.spin else "")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import field, fields, replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import field, replace
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -34,7 +33,7 @@ Vector = tuple[float, float, float]
 class FileEffect(QuantumEffect):
     """The parameter lines of a file for a group of its states, which are numbered here from 0.
 
-    lines: with state numbers of the file. numbers: number in the file of each state. coupled: the spins by place. moments: dipoles in debye
+    lines: with state numbers of the group, None for all of its `count` states. coupled: the spins by place. moments: dipoles in debye
     by pairs of states. limits: smallest and largest K by state. others: moments of other kinds. ixx: bits for conserved sums of angular
     momenta, from N on. pairs: l-doubled states. axes: the axes x, y, z. turned: the axis g of `phases` whose half turn accompanies time
     reversal, if an operator within one state is odd under it. apart: species with elements by pairs of states, where weights forbid others.
@@ -44,7 +43,7 @@ class FileEffect(QuantumEffect):
     conserved: ClassVar[frozenset[str]] = frozenset()
 
     lines: tuple[CodedLine, ...]
-    numbers: tuple[int, ...]
+    count: int
     coupled: tuple[Spin, ...]
     moments: dict[tuple[int, int], Vector]
     limits: dict[int, tuple[int, int]]
@@ -55,28 +54,9 @@ class FileEffect(QuantumEffect):
     turned: str = ""
     apart: dict[tuple[int, int], SpeciesPairs] = field(default_factory=dict)
 
-    @cached_property
-    def _group_lines(self) -> tuple[tuple[CodedLine, tuple[int, int] | None], ...]:
-        """The lines of these states, with the numbers of the group (None: all states)."""
-        here = {v: place for place, v in enumerate(self.numbers)}
-        second = {pair.second for pair in self.pairs}
-        out: list[tuple[CodedLine, tuple[int, int] | None]] = []
-        for line in self.lines:
-            if line.states is None:
-                out.append((line, None))
-            elif line.states[0] in here and line.states[1] in here:
-                states = (here[line.states[0]], here[line.states[1]])
-                if states[0] != states[1] or states[0] not in second:  # the program takes no operator of K l ≤ 0 alone
-                    out.append((line, states))
-        return tuple(out)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """The fields; stored operators are functions, which no other process can receive."""
-        return {attribute.name: getattr(self, attribute.name) for attribute in fields(self)}
-
     def parameters(self, top: Top) -> dict[str, float]:
         """Values in MHz by code and number of the line."""
-        return {line.name: line.parameter.value for line, _ in self._group_lines}
+        return {line.name: line.parameter.value for line in self.lines}
 
     def operators(self, top: Top) -> dict[str, Operators]:
         """The operators of the first state."""
@@ -88,26 +68,26 @@ class FileEffect(QuantumEffect):
         named = next((pair.first for pair in self.pairs if pair.second == v), v)
         return {
             line.name: line.operator.plain
-            for line, states in self._group_lines
-            if line.operator.plain is not None and states in (None, (named, named))
+            for line in self.lines
+            if line.operator.plain is not None and line.states in (None, (named, named))
         }
 
     def states(self, top: Top) -> tuple[State, ...]:
         """The states beyond the first."""
-        return tuple(State(v, self._plain(v)) for v in range(1, len(self.numbers)))
+        return tuple(State(v, self._plain(v)) for v in range(1, self.count))
 
     def couplings(self, top: Top, representation: str) -> tuple[Coupling, ...]:
         """Interactions of states, and operators of one state that have no powers (p, q, n)."""
         couplings = list[Coupling]()
-        for line, states in self._group_lines:
-            operator = line.operator
+        for line in self.lines:
+            operator, states = line.operator, line.states
             if operator.rotor is not None:
                 continue
-            if self.pairs and states and not set(states).isdisjoint(v for pair in self.pairs for v in pair):
+            if states and self._has_pairs(states):
                 couplings += self._with_pairs(line, states)
-            elif operator.of_n is not None or (states and states[0] != states[1]):
+            elif operator.of_n is not None or line.is_between:
                 factors = half_turned(self.turned, operator.odd) if self._is_turned(line) else None
-                pairs = [states] if states else [(v, v) for v in range(len(self.numbers))]
+                pairs = [states] if states else [(v, v) for v in range(self.count)]
                 couplings += [Coupling(line.name, *pair, operator.alone, factors) for pair in pairs]
         return tuple(replace(each, factors=self._restricted(each)) for each in couplings)
 
@@ -118,6 +98,10 @@ class FileEffect(QuantumEffect):
             return coupling.factors
         between = np.array(factors_of_pairs(pairs)) * (1.0 if coupling.factors is None else np.array(coupling.factors))
         return tuple(map(tuple, between.tolist()))
+
+    def _has_pairs(self, states: tuple[int, int]) -> bool:
+        """Whether one of two states is l-doubled."""
+        return any(v in states for pair in self.pairs for v in pair)
 
     def _is_turned(self, line: CodedLine) -> bool:
         """Whether a half turn about the axis of the phases changes the sign of the operator of a line."""
@@ -144,8 +128,8 @@ class FileEffect(QuantumEffect):
     def spin_terms(self, top: Top) -> tuple[SpinTerm, ...]:
         """The lines with spins."""
         terms = []
-        for line, states in self._group_lines:
-            o = line.operator
+        for line in self.lines:
+            o, states = line.operator, line.states
             if o.rotor is not None:
                 names = tuple(self.coupled[place - 1].name for place in o.spins)
                 bra, ket = states or (EVERY_STATE, EVERY_STATE)
@@ -190,7 +174,7 @@ class FileEffect(QuantumEffect):
 
     def _at_pairs(self, line: CodedLine, states: tuple[int, int] | None, term: SpinTerm) -> list[SpinTerm]:
         """Terms of a line with a spin and l-doubled states."""
-        if not states or set(states).isdisjoint(v for pair in self.pairs for v in pair):
+        if not states or not self._has_pairs(states):
             return [term]
         if isinstance(term.rotor, ByElements):
             raise ValueError(

@@ -30,11 +30,12 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.labels import Functions, places, renamed, wang_functions
+from rotor.formats.spcat.hamiltonian.operators import as_matrix
 from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import weighted
-from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix, Rotor
+from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor
 from rotor.quantum.spins.scheme import SpinTerm
 from rotor.quantum.states import Coupling
 
@@ -187,8 +188,7 @@ def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
     if not turned.any():
         return None
     turned += 0.0  # no minus zeros
-    components: Matrix = tuple(tuple(float(value) for value in row) for row in turned)  # type: ignore[assignment]
-    return type(rotor)(components)
+    return type(rotor)(as_matrix(turned))
 
 
 # Labels of levels

@@ -30,8 +30,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Tensor
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, code_operator
-from rotor.formats.spcat.hamiltonian.spin_operators import imaginary, multiplied
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, code_operator, imaginary, multiplied
 from rotor.formats.spcat.text.par import Options, Parameter
 from rotor.frozen import dataclass
 from rotor.quantum.operators.algebra import Operator

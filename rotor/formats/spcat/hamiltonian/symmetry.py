@@ -14,9 +14,9 @@ import numpy as np
 
 from rotor.formats.spcat.hamiltonian.code_table import TURNS, Symmetry
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, as_matrix
 from rotor.formats.spcat.hamiltonian.states import SPECIES, StateOptions
-from rotor.quantum.spins.operators import Cosines, CosinesWithN, Matrix
+from rotor.quantum.spins.operators import Cosines, CosinesWithN
 
 
 def l_values(states: Sequence[StateOptions], pairs: Sequence[Pair]) -> dict[int, int]:
@@ -140,5 +140,4 @@ def _scaled_across(operator: CodedOperator, axes: str, factor: float) -> CodedOp
     along[x, y] = (c[x, y] - c[y, x]) / 2
     along[y, x], along[z, z] = -along[x, y], c[z, z]
     c = along + factor * (c - along)
-    components: Matrix = tuple(tuple(float(value) for value in row) for row in c)  # type: ignore[assignment]
-    return replace(operator, rotor=type(operator.rotor)(components))
+    return replace(operator, rotor=type(operator.rotor)(as_matrix(c)))

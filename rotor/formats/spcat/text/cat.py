@@ -16,6 +16,7 @@ from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import load
 from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue, Layout
 from rotor.formats.spcat.text.fields import BLANK
+from rotor.formats.spcat.text.freeform import Line
 from rotor.formats.spcat.text.line import Record, error_cap, quanta_width, read_record, spell_record
 from rotor.formats.spcat.text.rows import (
     ENERGY,
@@ -109,7 +110,8 @@ def _odd_line(catalogue: Catalogue, index: int) -> bytes:
 
 def _stored_record(text: bytes) -> Record:
     """The record of a stored spelling, which may begin with blank lines."""
-    return read_record(next(line for line in text.split(b"\n") if line.strip()).rstrip(b"\r").decode("ascii"))
+    line = next(line for line in text.split(b"\n") if line.strip())
+    return read_record(Line(line.rstrip(b"\r").decode("ascii"), 0, "stored text"))
 
 
 def _within_format(record: Record, index: int) -> Record:
@@ -302,7 +304,7 @@ def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: C
     for number in np.flatnonzero(~is_plain).tolist():
         line = text[lines.starts[number] : lines.stops[number]]
         if line.strip(_BLANKS):
-            records[number] = _careful_record(line, f"{name}, line {number + 1}")
+            records[number] = _careful_record(line, number + 1, name)
             if text.endswith(line) and set(records[number].quanta_lower) == {BLANK}:
                 raise ValueError(
                     f"{name}, line {number + 1}: the file ends without a lower state and a line end; it was cut"
@@ -320,15 +322,13 @@ def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: C
     return Catalogue(*whole, layout=replace(layout, spelling=spelling, ending=ending))
 
 
-def _careful_record(line: bytes, where: str) -> Record:
-    body = line.removesuffix(b"\n").removesuffix(b"\r")
+def _careful_record(text: bytes, number: int, name: str) -> Record:
+    body = text.removesuffix(b"\n").removesuffix(b"\r")
+    line = Line(body.decode("latin1"), number, name)
     strange = next((i for i, c in enumerate(body) if not 32 <= c < 127), None)
     if strange is not None:
-        raise ValueError(f"{where}, column {strange + 1}: byte {body[strange]:#04x}; expected plain ASCII, no tab")
-    try:
-        return read_record(body.decode("ascii"))
-    except ValueError as error:
-        raise ValueError(f"{where}, {error}") from None
+        raise line.error(strange, f"byte {body[strange]:#04x}; expected plain ASCII, no tab")
+    return read_record(line)
 
 
 def _with_records(columns: Columns, records: dict[int, Record]) -> Columns:

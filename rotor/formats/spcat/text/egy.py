@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field
 from typing import NamedTuple
 
@@ -66,13 +66,13 @@ class LevelList:
         )
 
 
-_FIELDS = (
-    ("IBLK", 0, 6, read_whole),
-    ("INDX", 6, 11, read_whole),
-    ("EGY", 11, 29, read_decimal),
-    ("ERR", 29, 47, read_decimal),
-    ("PMIX", 47, 58, read_decimal),
-    ("the degeneracy", 58, 63, read_whole),
+_FIELDS: tuple[tuple[str, slice, Callable[[str], float], float], ...] = (  # what is too large for columns is last
+    ("IBLK", slice(0, 6), read_whole, 10**6),
+    ("INDX", slice(6, 11), read_whole, 10**4),
+    ("EGY", slice(11, 29), read_decimal, 1e9),
+    ("ERR", slice(29, 47), read_decimal, 1e10),
+    ("PMIX", slice(47, 58), read_decimal, 1e3),
+    ("the degeneracy", slice(58, 63), read_whole, 10**4),
 )
 
 
@@ -115,52 +115,28 @@ def read_level(line: Line) -> Level:
     text = line.body
     if text[_COLON : _COLON + 1] != ":":
         raise line.error(_COLON, "a level has a colon here, before its quantum numbers")
-    numbers = []
-    for name, start, stop, read in _FIELDS:
-        try:
-            numbers.append(read(text[start:stop]))
-        except ValueError as error:
-            raise line.error(start, f"{name} reads {text[start:stop]!r}; {error}") from None
-        if isinstance(numbers[-1], int) and abs(numbers[-1]) > 2**31 - 1:
-            raise line.error(start, f"{name} = {numbers[-1]} is too large")
+    numbers = [line.read(part, name, read) for name, part, read, _ in _FIELDS]
     start, pattern = _COLON + 1, None
     if text[start : start + 1] == "(" and text[start + 4 : start + 5] == ")":
-        try:
-            pattern = read_whole(text[start + 1 : start + 4])
-        except ValueError as error:
-            raise line.error(start, f"the number in brackets reads {text[start : start + 5]!r}; {error}") from None
+        pattern = line.read(slice(start + 1, start + 4), "the number in brackets", read_whole)
         start += 5
-    return Level._make([*numbers, _quanta(line, start), pattern])
-
-
-def _quanta(line: Line, first: int) -> tuple[int, ...]:
-    quanta = []
-    for start in range(first, len(line.body), 3):
-        part = line.body[start : start + 3]
-        try:
-            quanta.append(read_whole(part))
-        except ValueError as error:
-            raise line.error(start, f"quantum number reads {part!r}; {error}") from None
-    return tuple(quanta)
+    columns = range(start, len(text), 3)
+    quanta = tuple(line.read(slice(at, min(at + 3, len(text))), "quantum number", read_whole) for at in columns)
+    return Level._make([*numbers, quanta, pattern])
 
 
 def format_level(level: Level) -> str:
     """The line of a level as SPCAT writes it; DoesNotFitError for numbers that do not fit its columns."""
     text = _plain_text(level)
     wide = [f"quantum number {q}" for q in level.quanta if not -99 <= q <= 999]
-    wide += [f"{name} = {value:.10g}" for name, value, limit in _too_large(level) if not abs(value) < limit]
+    numbers = zip(_FIELDS, level[:6], strict=True)
+    wide += [f"{name} = {value:.10g}" for (name, *_, limit), value in numbers if not abs(value) < limit]
     if wide or text.find(":") != _COLON:
         quanta = " ".join(map(str, level.quanta))
         raise DoesNotFitError(
             f"level {quanta}: {wide[0] if wide else 'a number'} does not fit the columns of an .egy file"
         )
     return text
-
-
-def _too_large(level: Level) -> list[tuple[str, float, float]]:
-    """The numbers of a level and what is too large for their columns."""
-    columns = zip(level[:6], (10**6, 10**4, 1e9, 1e10, 1e3, 10**4), strict=True)
-    return [(name, value, limit) for (name, *_), (value, limit) in zip(_FIELDS, columns, strict=True)]
 
 
 def _plain_text(level: Level) -> str:

@@ -89,6 +89,13 @@ def spell_decimal(value: float, width: int, decimals: int) -> str:
     raise ValueError(f"{value!r} does not fit a field of {width} characters")
 
 
+def spell_whole(value: int, width: int) -> str:
+    """A whole number right-justified in `width` characters."""
+    if len(text := f"{value:{width}d}") > width:
+        raise ValueError(f"{value} does not fit a field of {width} characters")
+    return text
+
+
 def read_decimal(text: str) -> float:
     """The number in a fixed field; blanks may stand around it, `D` exponents are those of Fortran."""
     match = _FIXED.match(text)

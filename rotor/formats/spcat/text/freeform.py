@@ -39,6 +39,14 @@ class Line(NamedTuple):
         """The error to raise for what stands from `column` on, which counts from 0 here and from 1 in the message."""
         return ValueError(f"{self.file}, line {self.number}, column {column + 1}: {message}")
 
+    def read(self, part: slice, name: str, read: Callable[[str], Any]) -> Any:
+        """What a fixed field says, called `name` in errors; ValueError with file, line and column."""
+        text = self.text[part]
+        try:
+            return read(text)
+        except ValueError as error:
+            raise self.error(part.start, f"{name} reads {text!r}; {error}") from None
+
 
 def read_lines(source: str | os.PathLike[str] | bytes) -> list[Line]:
     """The lines of a file or of its bytes, ends included; bytes that are no UTF-8 survive a round trip.

@@ -10,9 +10,8 @@ import pytest
 from places import ORACLES
 
 from rotor.fitting.fit import fit_lines
-from rotor.formats.spcat.fits.at_zero import left_at_zero, stay_at_zero
 from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit, spfit_input
-from rotor.formats.spcat.fits.fit_states import FileLevels
+from rotor.formats.spcat.fits.fit_states import FileLevels, left_at_zero, stay_at_zero
 from rotor.formats.spcat.text.lin import line_list, read_lin
 from rotor.formats.spcat.text.par import format_par, read_par
 from rotor.formats.spcat.variances import variance_factor
