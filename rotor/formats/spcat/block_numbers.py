@@ -16,7 +16,6 @@ Not known here: l-doubled states and total spins of equivalent nuclei. Their lev
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +27,7 @@ from rotor.formats.spcat.hamiltonian.code_table import TURNS, Digits, Kind, spli
 from rotor.formats.spcat.hamiltonian.states import SPECIES, StateOptions, species_numbers
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.frozen import dataclass
+from rotor.quantum.connected import part_numbers
 from rotor.quantum.levels import Levels
 
 
@@ -97,35 +97,28 @@ def _least_k(species: int, first: int) -> int:
 
 def numbered_blocks(file: ParameterFile, groups: Sequence[Group]) -> Blocks | None:
     """The blocks of a file; None for cases that are not supported (see the head of this module)."""
-    states = sorted((state for group in groups for state in group.states), key=lambda state: state.number)
-    digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
-    if any(state.equivalent or state.l_code for state in states):
+    states = {state.number: state for group in groups for state in group.states}
+    if any(state.equivalent or state.l_code for state in states.values()):
         return None
     oblate = file.options[0].nvib < 0
-    rises = {state.number: _rises(state.spins) for state in states}
+    rises = {v: _rises(state.spins) for v, state in states.items()}
     subs = [
-        SubBlock(state.number, species, pattern)
-        for state in states
+        SubBlock(v, species, pattern)
+        for v in sorted(states)
         for species in range(4)
-        if _exists(state, species, oblate)
-        for pattern in range(len(rises[state.number]))
+        if _exists(states[v], species, oblate)
+        for pattern in range(len(rises[v]))
     ]
-    options_by_state = {state.number: state for state in states}
-    labels = _components(
-        subs,
-        options_by_state,
-        rises,
-        [_reach(d, len(states), oblate) for d in digits if not d.is_constant],
-        file,
-        oblate,
-    )
+    digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
+    reaches = {_reach(d, len(states), oblate) for d in digits if not d.is_constant}
+    weights = [_weight(states[sub.v], sub.species, oblate) for sub in subs]
+    parts = _connected(subs, weights, [rises[sub.v][sub.pattern] for sub in subs], reaches, file.options[0].ixx)
     members = [
-        [sub for sub, component in zip(subs, labels, strict=True) if component == label]
-        for label in sorted(set(labels))
+        [sub for sub, part in zip(subs, parts, strict=True) if part == number] for number in range(max(parts) + 1)
     ]
     ordered = tuple(tuple(sorted(block, key=lambda s: (s.pattern, s.v, s.species))) for block in members)
-    limits = {state.number: (state.kmin, state.kmax) for state in states}
-    return Blocks(ordered, limits, {state.number: state.spins for state in states}, rises)
+    limits = {v: (state.kmin, state.kmax) for v, state in states.items()}
+    return Blocks(ordered, limits, {v: state.spins for v, state in states.items()}, rises)
 
 
 def _rises(spins: tuple[int, ...]) -> Ints:
@@ -165,55 +158,44 @@ class _Reach(NamedTuple):
 
 
 def _reach(d: Digits, states: int, oblate: bool) -> _Reach:
-    """The sub-blocks that a code connects."""
+    """The sub-blocks that a code connects; sums of angular momenta change up to the last coupled of the acting spins."""
     species = int(species_numbers(*TURNS[d.symmetry(oblate).axis], oblate))
     spins = (1,) if d.projects_spin else tuple(sorted(d.spins))
-    return _Reach(d.states(states), species, _ranks(spins, d))
-
-
-def _ranks(spins: Sequence[int], d: Digits) -> tuple[int, ...]:
-    """Largest doubled changes of N, J, F1, ..., up to the last coupled of the acting spins."""
     if not spins:
-        return ()
-    first, last = spins[0], spins[-1]
+        return _Reach(d.states(states), species, ())
     rotational_rank = 0 if d.kind is Kind.SCALAR and not d.projects_spin else 1 if len(spins) == 1 else 2
-    return (*([2 * rotational_rank] * first), *([2] * (last - first)))
+    ranks = (*([2 * rotational_rank] * spins[0]), *([2] * (spins[-1] - spins[0])))
+    return _Reach(d.states(states), species, ranks)
 
 
-def _components(
+_UNLIKE = 10**6  # stands for sums of angular momenta that a state does not have
+
+
+def _connected(
     subs: Sequence[SubBlock],
-    states: dict[int, StateOptions],
-    rises: dict[int, Ints],
+    weights: Sequence[tuple[int, ...]],
+    rises: Sequence[Ints],
     reaches: Iterable[_Reach],
-    file: ParameterFile,
-    oblate: bool,
-) -> list[int]:
-    """For each sub-block the number of the first sub-block in its connected component."""
-    labels, ixx = list(range(len(subs))), file.options[0].ixx
-    acting = list(dict.fromkeys(reaches))
-    for i, k in combinations(range(len(subs)), 2):
-        a, b = subs[i], subs[k]
-        if labels[i] == labels[k] or _weight(states[a.v], a.species, oblate) != _weight(states[b.v], b.species, oblate):
-            continue
-        rises_a, rises_b = rises[a.v][a.pattern], rises[b.v][b.pattern]
-        if len(rises_a) != len(rises_b):
-            continue
-        change = np.abs(rises_a - rises_b)
-        if any(ixx >> place & 1 and change[place] for place in range(len(change) - 1)):
-            continue
-        if any(_connects(reach, a, b, change) for reach in acting):
-            low, high = sorted((labels[i], labels[k]))
-            labels = [low if label == high else label for label in labels]
-    return labels
+    ixx: int,
+) -> Ints:
+    """For each sub-block the number of its connected component; weights must agree, and sums that IXX conserves do not change.
 
-
-def _connects(reach: _Reach, a: SubBlock, b: SubBlock, change: Ints) -> bool:
-    """Whether a parameter connects two sub-blocks."""
-    pair = (min(a.v, b.v), max(a.v, b.v))
-    if a.species ^ b.species != reach.species or (reach.states != pair if reach.states else a.v != b.v):
-        return False
-    ranks = [*reach.ranks, *[0] * (len(change) - len(reach.ranks))]
-    return bool((change <= ranks[: len(change)]).all())
+    subs: in order of v.
+    """
+    v, species, _ = np.array(subs).T
+    width = max(len(each) for each in rises)
+    sums = np.array([[*each, *[_UNLIKE] * (width - len(each))] for each in rises])
+    alike = np.array([weights.index(weight) for weight in weights])
+    low, high = np.triu_indices(len(subs), 1)
+    change, held = np.abs(sums[low] - sums[high]), ixx >> np.arange(width) & 1 == 1
+    free = (alike[low] == alike[high]) & ~change[:, held].any(axis=1)
+    linked = np.zeros(len(low), dtype=bool)
+    for reach in reaches:
+        first, second = reach.states or (v[high], v[low])  # sub-blocks rise in v
+        both = (v[low] == first) & (v[high] == second)
+        ranks = [*reach.ranks, *[0] * width][:width]
+        linked |= both & (species[low] ^ species[high] == reach.species) & (change <= ranks).all(axis=1)
+    return part_numbers(len(subs), low[linked & free], high[linked & free])
 
 
 def sub_blocks(group: Group, levels: Levels, negative: bool) -> tuple[list[SubBlock], Ints]:

@@ -194,10 +194,8 @@ def _keys(left: Catalogue, right: Catalogue, width: int) -> list[Rows]:
 def _place_within(code: Rows) -> Rows:
     """Number of earlier lines with the same code, (n,)."""
     order = np.argsort(code, kind="stable")  # stable: rows of one label keep their order
-    ordered = code[order]
-    begins = np.flatnonzero(np.concatenate(([True], np.diff(ordered) != 0))) if len(code) else np.zeros(0, np.int64)
     place = np.empty(len(code), dtype=np.int64)
-    place[order] = np.arange(len(code)) - np.repeat(begins, np.diff(np.append(begins, len(code))))
+    place[order] = np.arange(len(code)) - np.searchsorted(code[order], code[order])
     return place
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,6 @@ from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.int_file import Request
-from rotor.frozen import dataclass
 from rotor.quantum.levels import Levels
 from rotor.spectra.intensity import LGINT_NM2_MHZ, IntensityCut
 from rotor.spectra.transitions import Transitions, all_transitions
@@ -28,24 +27,14 @@ from rotor.spectra.transitions import Transitions, all_transitions
 Quanta = NDArray[np.int16]
 
 
-@dataclass(frozen=True)
-class GroupLines:
-    """The lines of one group, one for each component of a K doublet: columns (n,) and quantum numbers (n, width).
+class GroupLines(NamedTuple):
+    """The lines of one group, one for each component of a K doublet, and the transitions of these lines.
 
-    transitions: the transitions of these lines.
+    columns: frequency_mhz, error_mhz, intensity in nm² MHz, energy_lower_mhz, g_upper (n,); quantum numbers upper, lower (n, width).
     """
 
-    frequency_mhz: Floats
-    intensity: Floats
-    energy_lower_mhz: Floats
-    g_upper: Ints
-    upper: Quanta
-    lower: Quanta
-    error_mhz: Floats
+    columns: dict[str, NDArray[Any]]
     transitions: Transitions
-
-
-_COLUMNS = ("frequency_mhz", "intensity", "energy_lower_mhz", "g_upper", "upper", "lower", "error_mhz")
 
 
 def group_transitions(group: Group, levels: Levels, request: Request) -> Transitions:
@@ -64,13 +53,13 @@ def group_transitions(group: Group, levels: Levels, request: Request) -> Transit
         cut=_wide_cut(levels, request),
         moments=group.effect.others,
     )
-    exists = np.ones(len(transitions.lower), dtype=bool)
-    if (levels.weight <= 0).any():
-        exists = (levels.weight[transitions.lower] > 0) & (levels.weight[transitions.upper] > 0)
+    exists, weight = np.ones(len(transitions.lower), dtype=bool), levels.weight // levels.components
+    if (weight <= 0).any():
+        exists = (weight[transitions.lower] > 0) & (weight[transitions.upper] > 0)
     if any(state.fold > 2 and state.equivalent < 3 for state in group.states):
         exists &= share_a_weight(group, levels, transitions.upper, transitions.lower)
-    else:
-        exists &= equally_weighted(levels, transitions.upper, transitions.lower)
+    elif weight.min() != weight.max():  # lines between functions of unequal weight do not exist for any dipole
+        exists &= weight[transitions.upper] == weight[transitions.lower]
     order = rising_order(transitions.frequency_mhz)  # sorted lines make later sorting fast
     rows = order if exists.all() else order[exists[order]]
     return _rows(transitions, rows)
@@ -134,14 +123,6 @@ def line_weights(group: Group, levels: Levels, transitions: Transitions) -> Ints
     )
 
 
-def equally_weighted(levels: Levels, upper: Indices, lower: Indices) -> NDArray[np.bool_]:
-    """Whether transitions connect levels of equal nuclear-spin weight; others do not exist for any dipole."""
-    weight = levels.weight // levels.components
-    if len(weight) and weight.min() == weight.max():
-        return np.ones(len(upper), dtype=bool)  # lines between functions of unequal weight do not exist
-    return np.asarray(weight[upper] == weight[lower])
-
-
 # factor of a preliminary cut; the selected lines are tested with full precision and both terms of the cut
 _NEARLY = 0.999
 _STR_SCALE_MHZ = 300_000.0  # STR1 counts (ν/300 GHz)²
@@ -177,10 +158,16 @@ def group_lines(
     up, low = transitions.upper, transitions.lower
     error = np.zeros(len(up)) if spread is None else np.linalg.norm(spread[up] - spread[low], axis=1)
     g_upper = (levels.multiplicity * (levels.weight // levels.components))[up]
-    columns = (transitions.frequency_mhz, intensity, levels.energy_mhz[low], error)
+    columns = {
+        "frequency_mhz": transitions.frequency_mhz,
+        "error_mhz": error,
+        "intensity": intensity,
+        "energy_lower_mhz": levels.energy_mhz[low],
+        "g_upper": g_upper,
+    }
     index, upper, lower = _single_component(group, levels, form, up, low)
-    frequency, strength, energy, error = (column[index] for column in columns)
-    return GroupLines(frequency, strength, energy, g_upper[index], upper, lower, error, transitions)
+    chosen_columns = {name: column[index] for name, column in columns.items()}
+    return GroupLines(chosen_columns | {"upper": upper, "lower": lower}, transitions)
 
 
 def _intensity(group: Group, levels: Levels, transitions: Transitions, request: Request) -> Floats:
@@ -232,27 +219,16 @@ def as_catalogue(lines: list[tuple[GroupLines, int]], form: Format, tag: int, *,
     Returns: frequencies in MHz, lower energies in cm⁻¹, log10 of intensities in nm² MHz.
     Raises ValueError for a tag of more than six digits.
     """
-    joined = {name: end_to_end([getattr(each, name) for each, _ in lines]) for name in _COLUMNS}
-    qnfmt = np.concatenate([np.full(len(each.frequency_mhz), code) for each, code in lines])
+    joined = {name: end_to_end([each.columns[name] for each, _ in lines]) for name in lines[0][0].columns}
+    qnfmt = np.concatenate([np.full(len(each.columns["g_upper"]), code) for each, code in lines])
     order = _rising(joined["frequency_mhz"])
-    width = max(6, form.width)  # six columns at least, as the format has
-    quanta = {}
-    for name in ("upper", "lower"):
-        table = np.full((len(qnfmt), width), BLANK, dtype=np.int16)
-        table[:, : form.width] = joined[name][order]
-        quanta[name] = table
+    numbers = {name: column[order] for name, column in joined.items()}
     with np.errstate(divide="ignore"):  # a strength of 0 has no logarithm
-        lgint = np.log10(joined["intensity"][order])
-    numbers = {
-        "frequency_mhz": joined["frequency_mhz"][order],
-        "error_mhz": joined["error_mhz"][order],
-        "lgint": lgint,
-        "energy_lower_cm": joined["energy_lower_mhz"][order] / units.MHZ_PER_CM,
-        "g_upper": joined["g_upper"][order],
-    }
-    return predicted_catalogue(
-        numbers, quanta["upper"], quanta["lower"], qnfmt[order].astype(np.int32), tag, linear=linear
-    )
+        numbers["lgint"] = np.log10(numbers["intensity"])
+    numbers["energy_lower_cm"] = numbers["energy_lower_mhz"] / units.MHZ_PER_CM
+    upper, lower = (np.full((len(qnfmt), max(6, form.width)), BLANK, dtype=np.int16) for _ in range(2))
+    upper[:, : form.width], lower[:, : form.width] = numbers["upper"], numbers["lower"]
+    return predicted_catalogue(numbers, upper, lower, qnfmt[order].astype(np.int32), tag, linear=linear)
 
 
 def _rising(frequency_mhz: Floats) -> Ints | slice:

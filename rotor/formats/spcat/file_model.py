@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,9 +55,6 @@ from rotor.quantum.spins.scheme import Spin
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
-if TYPE_CHECKING:
-    from concurrent.futures import Executor
-
 
 @dataclass(frozen=True)
 class Group:
@@ -91,7 +88,7 @@ class Group:
         """The quantum numbers of levels that spins add."""
         return [name for name in levels.quanta if name not in ("v", "n", "k", "ka", "kc")] if self.spins else []
 
-    def levels(self, twice_f: tuple[int, int], executor: Executor | None = None) -> Levels:
+    def levels(self, twice_f: tuple[int, int]) -> Levels:
         """The levels with doubled F from the first to the last of `twice_f`, with the weights of the file.
 
         Levels that do not exist are listed with weight 0.
@@ -102,11 +99,9 @@ class Group:
             exist = None if self.top.kind == "linear" else self._exist
             if self.effect.pairs:  # labels by l must be known before existing levels can be selected
                 exist = None
-            levels = levels_of_f(self.top, (self.effect,), all_f, None, executor, exist)
+            levels = levels_of_f(self.top, (self.effect,), all_f, None, None, exist)
         else:
-            levels = solve_levels(
-                self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,), executor=executor
-            )
+            levels = solve_levels(self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,))
         levels = self.named(levels)
         return replace(levels, weight=self._weights(levels))
 
@@ -397,7 +392,7 @@ def coupled_spin_lines(
         state_of = {state.number: state for state in states}
         return tuple(part for line in usable for part in _by_exchange(line, state_of))
     if first.equivalent == 3:
-        return tuple(_with_threefold_factors(line, len(first.spins), axes) for line in usable)
+        return tuple(_with_threefold_factors(line, first, axes) for line in usable)
     return usable
 
 
@@ -413,31 +408,24 @@ def _by_exchange(line: CodedLine, state_of: Mapping[int, StateOptions]) -> list[
     return [line._replace(states=(v, v), exchange=part) for v, part in part_by_state.items()]
 
 
-def _with_threefold_factors(line: CodedLine, spins: int, axes: str) -> CodedLine:
+def _with_threefold_factors(line: CodedLine, state: StateOptions, axes: str) -> CodedLine:
     """A line with SPCAT's factors for three equivalent spins."""
-    # only terms that touch the three equivalent spins change
-    touches = max(line.operator.spins, default=0) > spins - 3
-    if touches and isinstance(line.operator.rotor, ByElements):
+    if not state.is_threefold(line.operator.spins):
+        return line
+    if isinstance(line.operator.rotor, ByElements):
         raise ValueError(
             f"parameter {line.parameter.code}: a term of higher order or of a series with three equivalent spins {NOT_YET}"
         )
-    return line._replace(operator=halved_across(line.operator, axes)) if touches else line
+    return line._replace(operator=halved_across(line.operator, axes))
 
 
 def coupled_spins(state: StateOptions, first: Options) -> tuple[Spin, ...]:
     """The spins of a state in the order of coupling, equivalent last ones with a total; ValueError for unsupported options."""
     others = len(state.spins) - state.equivalent  # spins without a total
-    _check_three(state, others, first)
+    if state.equivalent == 3 and first.diag in BY_DIAG:
+        raise ValueError(f"DIAG = {first.diag} with a total spin of three nuclei {NOT_YET}; expected 0 or 3")
+    if state.equivalent == 3 and first.ixx >> (others + 1):
+        raise ValueError(f"IXX = {first.ixx}: a total spin of three nuclei that is taken for conserved {NOT_YET}")
     return tuple(
         Spin(f"I{place}", twice, total="I_tot" if place > others else "") for place, twice in enumerate(state.spins, 1)
     )
-
-
-def _check_three(state: StateOptions, others: int, first: Options) -> None:
-    """Raise ValueError for options that are not supported with a total spin of three."""
-    if state.equivalent < 3:
-        return
-    if first.diag in BY_DIAG:
-        raise ValueError(f"DIAG = {first.diag} with a total spin of three nuclei {NOT_YET}; expected 0 or 3")
-    if first.ixx >> (others + 1):
-        raise ValueError(f"IXX = {first.ixx}: a total spin of three nuclei that is taken for conserved {NOT_YET}")

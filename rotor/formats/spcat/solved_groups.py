@@ -13,7 +13,7 @@ from rotor import units
 from rotor.arrays import Floats, Ints, end_to_end
 from rotor.formats.spcat.file_model import Group, connected_groups
 from rotor.formats.spcat.file_quanta import Format
-from rotor.formats.spcat.hamiltonian.code_table import join_code, split_code
+from rotor.formats.spcat.hamiltonian.code_table import split_code
 from rotor.formats.spcat.hamiltonian.coded_file import line_names
 from rotor.formats.spcat.hamiltonian.codes import file_constants
 from rotor.formats.spcat.hamiltonian.states import file_states
@@ -169,12 +169,12 @@ def _column(levels: Levels, name: str, most: Levels) -> Ints:
 def _shown(parameters: ParameterFile, group: Group) -> Top:
     """The top of the lowest state with named constants, if they have names; else the top that represents its symmetry."""
     states = max(abs(parameters.options[0].nvib), 1)
-    parameters_of_state = []
-    for parameter in parameters.parameters:
-        d = split_code(parameter.code, states)
-        if d.is_orthorhombic and not d.is_energy and d.states(states) in ((0, 0), None):
-            code = join_code(d._replace(v1=0, v2=0))
-            parameters_of_state.append(replace(parameter, code=code, constrained=False, text=""))
+    digits = [split_code(parameter.code, states) for parameter in parameters.parameters]
+    parameters_of_state = [
+        replace(parameter, code=d.in_lowest_state, constrained=False, text="")
+        for parameter, d in zip(parameters.parameters, digits, strict=True)
+        if d.is_orthorhombic and not d.is_energy and d.states(states) in ((0, 0), None)
+    ]
     first = parameters.options[0]
     option = replace(first, spind=-1 if first.spind < 0 else 1, nvib=-1 if first.nvib < 0 else 1, knmin=0, text="")
     if group.states[0].linear:

@@ -118,13 +118,9 @@ def _named_constants(file: ParameterFile) -> tuple[Constants, Floats] | None:
 def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> SpfitInput:
     """The fit from a .par file and lines that have been read."""
     _refuse_options(file.header)
-    held, ties = _roles(file.parameters)
-    _refuse_twice(file.parameters, held)
-    columns, ratios, free = _columns(file.parameters, held, ties)
-    spread = np.zeros((len(file.parameters), len(free)))
-    for row, (column, ratio) in enumerate(zip(columns, ratios, strict=True)):
-        if column >= 0:
-            spread[row, column] = ratio
+    columns, ratios, free = _columns(file.parameters)
+    _refuse_twice([file.parameters[i] for i in free])
+    spread = np.array(ratios)[:, None] * (np.array(columns)[:, None] == np.arange(len(free)))
     model, constants, kmax, quanta = None, None, None, _quanta_names(file)
     named = _named_constants(file)
     if named is not None:
@@ -152,7 +148,7 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
             "no parameter is free: every a-priori error is below 1e-30; give one that is to be fitted 1e36"
         )
     options = FitOptions(
-        reject_above=_largest_error(file.header),
+        reject_above=file.header.errtst if file.header.errtst > 0 else _NO_ERRTST,
         # a count, whatever its sign
         most_iterations=max(abs(file.header.nitr), 1),
         kmax=kmax,
@@ -174,11 +170,6 @@ def _notes_on_codes(file: ParameterFile) -> list[str]:
     return coded_file(file).left_out + ([at_zero] if stay else []) + ([UNDIAGONALIZED_NOTE] if below else [])
 
 
-def _largest_error(header: Header) -> float:
-    """ERRTST; 1e6 if it is 0 or less, as in SPFIT."""
-    return header.errtst if header.errtst > 0 else _NO_ERRTST
-
-
 def _refuse_options(header: Header) -> None:
     """Raise ValueError for options of line 2 that are not supported."""
     if not 0 <= header.nxpar <= header.npar:
@@ -190,45 +181,29 @@ def _refuse_options(header: Header) -> None:
         raise ValueError(f"CAL = {header.cal:g}: the factor of wavenumbers is above 0")
 
 
-def _roles(parameters: Sequence[Parameter]) -> tuple[list[bool], list[bool]]:
-    """Whether parameters are held (a-priori error below 1e-30, or below 0), and whether they have a fixed ratio to the one before."""
-    if parameters and parameters[0].constrained:
-        raise ValueError(f"parameter -{parameters[0].code}: the first one has none before it to keep a ratio to")
-    ties = [p.constrained for p in parameters]
-    held = [not tied and is_held(p) for p, tied in zip(parameters, ties, strict=True)]
-    return held, ties
-
-
-def _refuse_twice(parameters: Sequence[Parameter], held: Sequence[bool]) -> None:
+def _refuse_twice(free: Sequence[Parameter]) -> None:
     """Raise ValueError for two free parameters with equal code and no a-priori error, which lines cannot distinguish."""
-    free = [
-        p.code
-        for p, fixed in zip(parameters, held, strict=True)
-        if not fixed and not p.constrained and _prior(p) == np.inf
-    ]
-    twice = next((code for code in free if free.count(code) > 1), None)
+    codes = [p.code for p in free if _prior(p) == np.inf]
+    twice = next((code for code in codes if codes.count(code) > 1), None)
     if twice is not None:
         raise ValueError(
             f"parameter {twice} stands twice and both are free; leave one out, hold it, or tie it (-{twice})"
         )
 
 
-def _columns(
-    parameters: Sequence[Parameter], held: Sequence[bool], ties: Sequence[bool]
-) -> tuple[tuple[int, ...], tuple[float, ...], list[int]]:
+def _columns(parameters: Sequence[Parameter]) -> tuple[tuple[int, ...], tuple[float, ...], list[int]]:
     """Columns and ratios of `SpfitInput`, and the places of free parameters."""
     columns, ratios, free = list[int](), list[float](), list[int]()
-    leader = -1
     for i, parameter in enumerate(parameters):
-        if not ties[i]:
-            leader = i
-            if not held[i]:
-                free.append(i)
-        value = parameters[leader].value
-        if ties[i] and not value:
-            raise ValueError(f"parameter -{parameter.code}: no ratio to {parameters[leader].code}, which is 0")
-        columns.append(-1 if held[leader] else len(free) - 1)
-        ratios.append(parameter.value / value if ties[i] else 1.0)
+        if not parameter.constrained:
+            leader = parameter
+            free += [] if is_held(parameter) else [i]
+        elif not i:
+            raise ValueError(f"parameter -{parameter.code}: the first one has none before it to keep a ratio to")
+        elif not leader.value:
+            raise ValueError(f"parameter -{parameter.code}: no ratio to {leader.code}, which is 0")
+        columns.append(-1 if is_held(leader) else len(free) - 1)
+        ratios.append(parameter.value / leader.value if parameter.constrained else 1.0)
     return tuple(columns), tuple(ratios), free
 
 
@@ -287,13 +262,11 @@ def _widths(lines: LineList, blends: Ints, used: np.ndarray, header: Header) -> 
 def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> None:
     """Raise ValueError for a line with fewer or more quantum numbers than the top has."""
     counts = (lines.quanta != BLANK).sum(axis=1) // 2
-    for i in np.flatnonzero(used).tolist():
-        count = int(counts[i])
-        if count != len(names):
-            raise LineWidthError(
-                f"line {i + 1} has {count} quantum numbers for each state; these constants have "
-                f"{len(names)} ({', '.join(names)})"
-            )
+    if len(wrong := np.flatnonzero(used & (counts != len(names)))):
+        raise LineWidthError(
+            f"line {wrong[0] + 1} has {counts[wrong[0]]} quantum numbers for each state; these constants have "
+            f"{len(names)} ({', '.join(names)})"
+        )
 
 
 def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignments) -> list[str]:

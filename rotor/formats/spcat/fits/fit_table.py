@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from rotor.fitting.publication import Row, value_text
 from rotor.fitting.result import Fit
 from rotor.formats.spcat.fits.fit_input import SpfitInput
-from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, join_code, split_code
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, split_code
 from rotor.formats.spcat.hamiltonian.codes import (
     A_REDUCTION,
     LINEAR,
@@ -18,7 +16,7 @@ from rotor.formats.spcat.hamiltonian.codes import (
     Named,
     is_linear,
 )
-from rotor.formats.spcat.text.par import Parameter, ParameterFile
+from rotor.formats.spcat.text.par import ParameterFile
 
 _RIGID = tuple(Named(name, code, 1) for code, name in SQUARES.items())
 _B = Named("B", MEAN, 1)
@@ -55,22 +53,17 @@ def _numbers(fit_input: SpfitInput, fit: Fit, place: int) -> tuple[float, float 
     parameter, column, ratio = fit_input.file.parameters[place], fit_input.columns[place], fit_input.ratios[place]
     if column < 0:
         return parameter.value, None, ""
-    leader = _leader(fit_input.file.parameters, place)
+    # a constrained parameter follows the last free one above it
+    leader = next(p for p in reversed(fit_input.file.parameters[: place + 1]) if not p.constrained)
     follows = "" if not parameter.constrained else leader.label or str(leader.code)
     return float(fit.values[column]) * ratio, float(fit.errors[column]) * abs(ratio), follows
-
-
-def _leader(parameters: Sequence[Parameter], place: int) -> Parameter:
-    """The parameter to which a parameter has a fixed ratio."""
-    # a constrained parameter follows the last free one above it
-    return next(p for p in reversed(parameters[: place + 1]) if not p.constrained)
 
 
 def _rotational(digits: Digits) -> int:
     """The code without its states; -1 for terms with spins, series or between states."""
     if digits.v1 != digits.v2 or digits.has_spin or digits.ex or digits.ff:
         return -1
-    return join_code(digits._replace(v1=0, v2=0))
+    return digits.in_lowest_state
 
 
 def _names(file: ParameterFile) -> tuple[Named, ...]:

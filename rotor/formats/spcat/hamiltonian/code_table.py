@@ -176,6 +176,16 @@ class Digits(NamedTuple):
         return plain and not (self.has_spin or self.ff or self.ex)
 
     @property
+    def has_name(self) -> bool:
+        """Whether the operator is one of the lowest state, or of all, that may have a named constant."""
+        return self.is_orthorhombic and not self.is_energy and self.states(1) in ((0, 0), None)
+
+    @property
+    def in_lowest_state(self) -> int:
+        """The code of the operator in the lowest state of a file with few states."""
+        return join_code(self._replace(v1=0, v2=0))
+
+    @property
     def is_constant(self) -> bool:
         """Whether the code names a constant of a series, which is not an operator and is not fitted."""
         return self.kind is Kind.EULER and self._is_second_of_pair and self.ksq < 2

@@ -225,8 +225,8 @@ class CodedFile:
 
     def _symmetric_part(self, line: CodedLine) -> CodedLine:
         """The line with the part of its operator that an axis of more than two folds allows."""
-        states = {v for pair in self._concerned(line) for v in pair}
-        if not line.symmetry.square or not any(_turns_alone(self.states[v], line) for v in states):
+        states = [self.states[v] for pair in self._concerned(line) for v in pair]
+        if not line.symmetry.square or all(s.fold <= 2 or s.is_threefold(line.operator.spins) for s in states):
             return line
         return line._replace(operator=symmetric_part(line.operator, self.axes))
 
@@ -271,9 +271,3 @@ def _without(lines: Sequence[CodedLine], reason: Callable[[CodedLine], str]) -> 
     # a parameter may be one line for each state
     sentences = dict.fromkeys(_left_out(line.parameter, why) for line, why in both if why)
     return [line for line, why in both if not why], list(sentences)
-
-
-def _turns_alone(state: StateOptions, line: CodedLine) -> bool:
-    """Whether an axis of more than two folds leaves an operator invariant: it acts on none of three equivalent spins."""
-    touches = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
-    return state.fold > 2 and not touches

@@ -83,10 +83,10 @@ A_REDUCTION = _named(sorted(published.A_REDUCTION.items(), key=_by_order))
 def _whole_code(parameter: Parameter) -> int:
     """The code for the lowest state; ValueError unless it is that of a rotational operator of this state alone."""
     d = split_code(parameter.code)
-    if not d.is_orthorhombic or d.is_energy or d.states(1) not in ((0, 0), None):
+    if not d.has_name:
         label = f" /{parameter.label}" if parameter.label else ""
         raise ValueError(f"parameter {parameter.code}{label}: its operator {NO_NAME}")
-    return join_code(d._replace(v1=0, v2=0))
+    return d.in_lowest_state
 
 
 def file_constants(file: ParameterFile, *, errors: bool = False) -> Constants:
@@ -97,88 +97,59 @@ def file_constants(file: ParameterFile, *, errors: bool = False) -> Constants:
     error below 1e-30 holds a parameter).
 
     Raises ValueError, with the parameter, for operators that have no name here or are not supported."""
-    return _constants_and_factors(file, errors)[0]
+    return constants_and_matrix(file, errors=errors)[0]
 
 
-def constants_and_matrix(file: ParameterFile) -> tuple[Constants, NDArray[np.float64]]:
+def constants_and_matrix(file: ParameterFile, *, errors: bool = False) -> tuple[Constants, NDArray[np.float64]]:
     """The constants of a file, and M (constants, parameters) with constants = M @ values of the parameters.
 
     >>> from rotor.formats.spcat.text.par import read_par
-    >>> file = read_par(b"x\\n 2 1 1\\ns -1 1 0 20\\n 1000 4.0 1\\n 100 5.0 1\\n")
+    >>> file = read_par(b"x\n 2 1 1\ns -1 1 0 20\n 1000 4.0 1\n 100 5.0 1\n")
     >>> constants, matrix = constants_and_matrix(file)
     >>> constants.values["A"], matrix.tolist()
     (9.0, [[1.0, 1.0], [0.0, 1.0]])
     """
-    constants, factors = _constants_and_factors(file)
-    names = list(constants.values)
-    matrix = np.zeros((len(names), len(file.parameters)))
-    for column, parameter in enumerate(file.parameters):
-        for name, factor in factors[_whole_code(parameter)].items():
-            matrix[names.index(constants.spelling(name)), column] += factor
-    return constants, matrix
-
-
-def _constants_and_factors(file: ParameterFile, errors: bool = False) -> tuple[Constants, Factors]:
-    """The constants of a file, and the factors in them of each of its codes."""
-    options = file.options[0]
-    values, spreads = _summed(file.parameters)
+    codes = [_whole_code(parameter) for parameter in file.parameters]
+    values = dict.fromkeys(codes, 0.0)
+    for code, parameter in zip(codes, file.parameters, strict=True):
+        values[code] += parameter.value
+    kind, representation = _kind(file.options[0], values), "Ir" if file.options[0].nvib > 0 else "IIIl"
     distortion = [code for code in values if code not in _RIGID]
-    kind = _kind(options, values)
-    reduction = _reduction(options, distortion) if kind == "asymmetric" else None
-    representation = "Ir" if options.nvib > 0 else "IIIl"
-
+    reduction = _reduction(file.options[0], distortion) if kind == "asymmetric" else None
     rigid = _rigid_factors(kind, AXES[representation])
     useless = next((code for code in values if code in _RIGID and code not in rigid), None)
     if useless is not None:
         raise ValueError(f"parameter {useless} does nothing in a {kind} top, whose constant is {MEAN}; leave it out")
-    factors = rigid | {
-        code: {named.name: float(named.sign)} for code, named in _code_names(distortion, kind, reduction).items()
-    }
+    factors = rigid | _distortion_factors(distortion, kind, reduction)
     named: dict[str, Any] = {name: 0.0 for name in RIGID if any(name in row for row in rigid.values())}
-    codes_of: dict[str, list[int]] = {}
     for code in [*(code for code in rigid if code in values), *distortion]:
         for name, factor in factors[code].items():
             named[name] = named.get(name, 0.0) + factor * values[code]
-            codes_of.setdefault(name, []).append(code)
-    alone = {name: spreads[codes[0]] for name, codes in codes_of.items() if len(codes) == 1} if errors else {}
+    matrix = np.array([[factors[code].get(name, 0.0) for code in codes] for name in named])
+    # constants that are one parameter
+    alone = {name: file.parameters[np.flatnonzero(row)[0]].error for name, row in zip(named, matrix, strict=True)
+             if errors and np.count_nonzero(row) == 1}  # fmt: skip
     constants = Constants(
         kind=kind,
         reduction=reduction,
         representation=representation if kind == "asymmetric" else None,
-        uncertainties={name: spread for name, spread in alone.items() if spread and spread > HELD_BELOW},
+        uncertainties={name: error for name, error in alone.items() if error and error > HELD_BELOW},
         **named,
     )
-    return constants, factors
+    rows = [constants.spelling(name) for name in named]
+    return constants, matrix[[rows.index(name) for name in constants.values]]
 
 
-def _summed(parameters: Iterable[Parameter]) -> tuple[dict[int, float], dict[int, float | None]]:
-    """Values by code, with equal codes added, and errors of codes that are one parameter."""
-    values: dict[int, float] = {}
-    spreads: dict[int, float | None] = {}
-    for parameter in parameters:
-        code = _whole_code(parameter)
-        spreads[code] = None if code in values else parameter.error
-        values[code] = values.get(code, 0.0) + parameter.value
-    return values, spreads
-
-
-def _code_names(codes: Iterable[int], kind: str, reduction: str | None) -> dict[int, Named]:
-    """Names of distortion codes: published ones, else spelled operators such as J8Jpm2 for 40400."""
-    names = {item.code: item for item in _vocabulary(kind, reduction)}
-    for code in codes:
-        if code not in names:
-            names[code] = Named(_spelled_code(code, kind, reduction), code, 1)
-    return names
-
-
-def _spelled_code(code: int, kind: str, reduction: str | None) -> str:
-    """The spelled operator of a code."""
-    d = split_code(code)
-    n = d.ladder
-    if d.kind is Kind.SQUARE or (n and kind != "asymmetric") or (d.ksq and kind in ("linear", "spherical")):
-        whose = f"the {reduction}-reduction" if reduction else f"a top of kind {kind}"
-        raise ValueError(f"parameter {code}: no constant of {whose} has this operator; it {NOT_YET}")
-    return spelled_term(d.nsq, d.ksq, n)
+def _distortion_factors(codes: Iterable[int], kind: str, reduction: str | None) -> Factors:
+    """The constants of distortion codes: published ones with their signs, else spelled operators such as J8Jpm2 for 40400."""
+    factors: Factors = {item.code: {item.name: float(item.sign)} for item in _vocabulary(kind, reduction)}
+    for code in [code for code in codes if code not in factors]:
+        d = split_code(code)
+        if d.kind is Kind.SQUARE or (d.ladder and kind != "asymmetric") or (d.ksq and kind in ("linear", "spherical")):
+            whose = f"the {reduction}-reduction" if reduction else f"a top of kind {kind}"
+            raise ValueError(f"parameter {code}: no constant of {whose} has this operator; it {NOT_YET}")
+        factors[code] = {spelled_term(d.nsq, d.ksq, d.ladder): 1.0}
+    return factors
 
 
 SQUARES = {join_code(Digits(0, 0, 0, 0, 0, square_typ(x), 0, 0, 0, 0)): x.upper() for x in "abc"}

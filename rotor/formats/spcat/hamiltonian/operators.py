@@ -47,13 +47,11 @@ from rotor.frozen import dataclass
 from rotor.quantum.effects.spin_effect import matrix_of
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import (
-    Weight,
     body_tensor,
     components,
     direction_cosine,
     ladder,
     sum_of_powers,
-    weighted,
     with_powers,
 )
 from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Matrix, Rotor, Scalar, Vector
@@ -62,14 +60,8 @@ from rotor.tops.operators import Operators
 
 
 @lru_cache(maxsize=256)
-def tensor_with_spins(tensor: Tensor, spins: int, axes: str) -> ByElements:
-    """A tensor with one or two different spins, or none, with a factor i (-i in an oblate basis) for odd rank."""
-    return ByElements(min(tensor.rank, spins), tensor_operator(tensor, spins, axes), tensor.odd)
-
-
-@lru_cache(maxsize=256)
 def tensor_operator(tensor: Tensor, spins: int, axes: str) -> Operator:
-    """The part of a tensor that acts on N, with this number of spins in place of N."""
+    """The part of a tensor that acts on N, with this number of spins in place of N, and a factor i (-i in an oblate basis) for odd rank."""
     order, rank, z = tensor.rank, min(tensor.rank, spins), axes[2]
     k, cosine, factor, frame = order, True, 1.0 + 0.0j, axes
     if tensor.axis or tensor.odd:
@@ -125,15 +117,6 @@ def _circular(frame: str, sign: int, power: int, axes: str) -> Operator:
     return (sign * 1j if swapped else 1.0) ** power * ladder(-power if lowers != swapped else power)
 
 
-def multiplied(rotor: Rotor, factor: Weight, whole: complex, odd: bool, axes: str) -> ByElements:
-    """An operator times a number, its elements times a function.
-
-    rotor: the operator. factor: function of N', N, K' and K. whole: the number. odd: whether time reversal changes the sign of the
-    result. axes: the axes x, y, z.
-    """
-    return ByElements(rotor.rank, whole * weighted(operator_of(rotor, axes), factor), odd)
-
-
 def as_matrix(c: Floats) -> Matrix:
     """A matrix (3, 3) as nested tuples, which can be hashed."""
     return tuple(map(tuple, c.tolist()))  # type: ignore[return-value]
@@ -154,13 +137,6 @@ def operator_of(rotor: Rotor, axes: str) -> Operator:
     for i, k in np.argwhere(c).tolist():
         total = total + c[i, k] * half_anticommutator(direction_cosine("abc"[i], basis_of(axes)), along["abc"[k]])
     return total
-
-
-REFUSED = {
-    "commutator": "a commutator of a spin term with N² (the program's is not ½i[N², S], which C_ab-ba names here)",
-    "series": "a term of a series without the constants of its file",
-    "szsz": "N_z S_z together with another operator",
-}
 
 
 @dataclass(frozen=True)
@@ -204,14 +180,15 @@ def code_operator(digits: Digits, axes: str) -> CodedOperator:
 
 def _refuse(d: Digits) -> None:
     """Raise ValueError for codes that are not supported."""
+    commutator = "a commutator of a spin term with N² (the program's is not ½i[N², S], which C_ab-ba names here)"
     reasons = {
-        "commutator": d.i1 == 0 and d.i2 > 0,
-        "series": bool(d.ff or d.ex) or d.kind in (Kind.EULER, Kind.LEVEL),
-        "szsz": d.projects_spin and (d.kind is not Kind.SCALAR or bool(d.spins)),
+        commutator: d.i1 == 0 and d.i2 > 0,
+        "a term of a series without the constants of its file": d.ff or d.ex or d.kind in (Kind.EULER, Kind.LEVEL),
+        "N_z S_z together with another operator": d.projects_spin and (d.kind is not Kind.SCALAR or d.spins),
     }
     for reason, applies in reasons.items():
         if applies:
-            raise ValueError(f"{REFUSED[reason]} is read but not computed yet")
+            raise ValueError(f"{reason} {NOT_YET}")
 
 
 def _plain(d: Digits, axes: str) -> Operators:
@@ -247,7 +224,8 @@ def _with_spins(d: Digits, axes: str) -> CodedOperator:
     if spins and along.rank <= 2 and not vector:
         matrix = _matrix(d, axes)
         return replace(powered, rotor=CosinesWithN(matrix) if len(spins) == 1 else Cosines(matrix))
-    tensor = tensor_with_spins(along, 0 if vector else len(spins), axes)  # of rank 0: I1·I2 times N
+    count = 0 if vector else len(spins)  # of rank 0: I1·I2 times N
+    tensor = ByElements(min(along.rank, count), tensor_operator(along, count, axes), along.odd)
     return replace(powered, rotor=tensor, odd=tensor.odd)
 
 
@@ -258,6 +236,5 @@ def _matrix(d: Digits, axes: str) -> Matrix:
     if d.kind is Kind.SQUARE:
         return matrix_of(d.square_axis * 2)
     if d.kind is Kind.LADDER:  # N₊² + N₋² = 2 (Nx² - Ny²)
-        plain = matrix_of(f"{axes[0] * 2}-{axes[1] * 2}")
-        return tuple(tuple(2 * value for value in row) for row in plain)  # type: ignore[return-value]
+        return as_matrix(2.0 * np.array(matrix_of(f"{axes[0] * 2}-{axes[1] * 2}")))
     return matrix_of("abc".replace(d.tensor.axis, ""))

@@ -30,11 +30,12 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Tensor
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
-from rotor.formats.spcat.hamiltonian.operators import CodedOperator, code_operator, imaginary, multiplied
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator, code_operator, imaginary, operator_of
 from rotor.formats.spcat.text.par import Options, Parameter
 from rotor.frozen import dataclass
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import Weight, ladders, weighted
+from rotor.quantum.spins.operators import ByElements
 
 
 @dataclass(frozen=True)
@@ -102,10 +103,8 @@ def series_term(d: Digits, axes: str, series: Series, states: tuple[int, int]) -
     if d.kind is Kind.LEVEL or (d.ff and (d.ex or euler)) or (d.ex and euler):
         raise ValueError("a code has one series alone, and no energy of one K (TYP 80 to 89) with it")
     if d.ff:
-        sine, n = d.sine, d.harmonic
         base = code_operator(d._replace(ff=0), axes)
-        sampled = _sampled(n, sine) if series.nofc else _fourier(n, sine, series, states)
-        return _multiplied(base, sampled, sine, axes)
+        return _multiplied(base, k_factor(d.harmonic, d.sine, series, states), d.sine, axes)
     return _euler(d, axes, series, states)
 
 
@@ -135,38 +134,22 @@ def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float,
     return each * abs(up), each * abs(low)  # the size of ρ turns; unlike signs shift n by one half
 
 
-def _fourier(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Weight:
-    """Factor of a Fourier term."""
-    up, low = angles_by_k(n, series, states)
-
-    def factor(m: Ints, n_low: Ints, above: Ints, below: Ints) -> Floats:
-        angle = up * above + low * below
-        turned = np.where(np.minimum(abs(above), abs(below)) % 2 == 1, -1.0, 1.0) if series.g12 and n % 2 else 1.0
-        return np.asarray(turned * (np.where(above == -below, 0.0, np.sin(angle)) if sine else np.cos(angle)))
-
-    return factor
-
-
 def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Weight:
     """Factor of an element in a Fourier term: a single K with NOFC; ½(K' + K'') for the sine of n = 0, as in the program.
 
     n: the harmonic. sine: sine or cosine. series: the constants of the file. states: the states of K' and of K''.
     Returns: function of N', N'', K' and K''.
     """
-    if sine and n == 0:
-        return lambda m, low, above, below: (above + below) / 2
-    if n and series.nofc:
-        return _sampled(n, sine)
-    return _fourier(n, sine, series, states)
-
-
-def _sampled(n: int, sine: bool) -> Weight:
-    """Factor with NOFC, which selects a single K."""
+    up, low = angles_by_k(n, series, states)
 
     def factor(m: Ints, n_low: Ints, above: Ints, below: Ints) -> Floats:
-        twice = above + below
-        # the mean of both K, rounded up, is n
-        return np.where((abs(twice) + 1) // 2 == n, np.sign(twice) if sine else 1.0, 0.0)
+        twice, angle = above + below, up * above + low * below
+        if sine and n == 0:
+            return twice / 2
+        if n and series.nofc:  # the mean of both K, rounded up, is n
+            return np.where((abs(twice) + 1) // 2 == n, np.sign(twice) if sine else 1.0, 0.0)
+        turned = np.where(np.minimum(abs(above), abs(below)) % 2 == 1, -1.0, 1.0) if series.g12 and n % 2 else 1.0
+        return np.asarray(turned * (np.where(above == -below, 0.0, np.sin(angle)) if sine else np.cos(angle)))
 
     return factor
 
@@ -206,11 +189,11 @@ def _mean(n2: int, k2: int, constants: tuple[float, float], extra: bool) -> Weig
 def _multiplied(base: CodedOperator, factor: Weight, sine: bool, axes: str) -> CodedOperator:
     """An operator times the factor of a series."""
     phase = imaginary(axes, sine)
-    whole = 1.0 / phase if base.odd else phase
-    if base.rotor is not None:
-        alike = multiplied(base.rotor, factor, whole, base.odd != sine, axes)
-        return replace(base, rotor=alike, odd=base.odd != sine)
-    return replace(base, plain=None, of_n=whole * weighted(base.alone, factor), odd=base.odd != sine)
+    whole, odd = 1.0 / phase if base.odd else phase, base.odd != sine
+    operator = whole * weighted(base.alone if base.rotor is None else operator_of(base.rotor, axes), factor)
+    if base.rotor is None:
+        return replace(base, plain=None, of_n=operator, odd=odd)
+    return replace(base, rotor=ByElements(base.rotor.rank, operator, odd), odd=odd)
 
 
 def refuse_within_pairs(d: Digits, states: Sequence[int], doubled: frozenset[int]) -> None:

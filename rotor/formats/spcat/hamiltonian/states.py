@@ -6,7 +6,7 @@ The first line sets the defaults of all states. If VSYM is negative another line
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -68,6 +68,10 @@ class StateOptions:
     def equivalent(self) -> int:
         """Number of last spins that are coupled to a total first: 0, 2 or 3."""
         return (3 if self.fold == 3 else 2) if self.i_tot else 0
+
+    def is_threefold(self, spins: Sequence[int]) -> bool:
+        """Whether an operator with these spins, numbered from 1, acts on one of three equivalent ones."""
+        return self.equivalent == 3 and max(spins, default=0) > len(self.spins) - 3
 
     @property
     def linear(self) -> bool:
@@ -254,8 +258,6 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
     if min(first.wtpl, first.wtmn) < 0 or (first.iax in _FOLDS and first.wtpl != first.wtmn):
         return False
     digits = [split_code(parameter.code) for parameter in parameters.parameters]
-    orthorhombic = all(d.is_orthorhombic and d.states(1) in ((0, 0), None) for d in digits)
-    energies = any(d.is_energy for d in digits)
     mixed = len(frozenset().union(*(d.reductions for d in digits))) > 1  # terms of both reductions
     plain_dipoles = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
-    return orthorhombic and plain_dipoles and not energies and not mixed
+    return all(d.has_name for d in digits) and plain_dipoles and not mixed

@@ -41,7 +41,7 @@ def forbidden(
     if (low.fold, low.i_tot) != (high.fold, high.i_tot):
         return "the axes of the two states differ"
     first = len(low.spins) - 2  # the number of the first of three equivalent spins
-    if low.equivalent == 3 and max(spins, default=0) >= first:
+    if low.is_threefold(spins):
         among = sorted(spin for spin in spins if spin >= first)
         named = set(among) == {first} or among == [first, first + 1] == sorted(spins)
         return "" if named else "of three equivalent spins the first is named, or the first and the second"
@@ -113,7 +113,7 @@ def symmetric_part(operator: CodedOperator, axes: str) -> CodedOperator:
     """The part of Nb² and Nc² (also with a spin) that an axis of more than two folds along z allows, without ΔK = 2."""
     if operator.plain is not None:
         return replace(operator, plain={powers: value for powers, value in operator.plain.items() if powers[2] == 0})
-    return operator if not _is_matrix(operator) else _scaled_across(operator, axes, 0.0)
+    return _scaled_across(operator, axes, 0.0)
 
 
 def halved_across(operator: CodedOperator, axes: str) -> CodedOperator:
@@ -122,17 +122,13 @@ def halved_across(operator: CodedOperator, axes: str) -> CodedOperator:
     With tensors of the three nuclei that are turned by 120° from one to the next, levels agree with the program's if its parameter with
     ΔK = 1 or 2 is twice that of a single nucleus; with ΔK = 0 both are equal.
     """
-    return operator if not _is_matrix(operator) else _scaled_across(operator, axes, 0.5)
-
-
-def _is_matrix(operator: CodedOperator) -> bool:
-    """Whether an operator has a matrix of components."""
-    return isinstance(operator.rotor, Cosines | CosinesWithN) and np.ndim(operator.rotor.components) == 2
+    return _scaled_across(operator, axes, 0.5)
 
 
 def _scaled_across(operator: CodedOperator, axes: str, factor: float) -> CodedOperator:
-    """The operator with the parts of its matrix that change K times a factor."""
-    assert isinstance(operator.rotor, Cosines | CosinesWithN)
+    """The operator with the parts of its matrix, if it has one, that change K times a factor."""
+    if not isinstance(operator.rotor, Cosines | CosinesWithN) or np.ndim(operator.rotor.components) < 2:
+        return operator
     x, y, z = ("abc".index(axis) for axis in axes)
     c = np.array(operator.rotor.components, dtype=float)
     along = np.zeros((3, 3))

@@ -16,7 +16,7 @@ from math import gcd
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.formats.spcat.hamiltonian.code_table import PAIRS, TYPES_BETWEEN, Digits, Kind, join_code, split_code
+from rotor.formats.spcat.hamiltonian.code_table import PAIRS, TYPES_BETWEEN, Kind, split_code
 from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, CodedLine, coded_file
 from rotor.formats.spcat.hamiltonian.codes import (
     ALONG,
@@ -28,6 +28,7 @@ from rotor.formats.spcat.hamiltonian.codes import (
     is_linear,
 )
 from rotor.formats.spcat.hamiltonian.dipole_codes import split_dipoles
+from rotor.formats.spcat.hamiltonian.operators import CodedOperator
 from rotor.formats.spcat.hamiltonian.states import StateOptions, is_single_state, state_options
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
 from rotor.formats.spcat.model import fold_parts, option_weights
@@ -138,7 +139,7 @@ def _parameters_by_state(coded: CodedFile) -> list[list[Parameter]]:
             continue
         if line.operator.plain is None:
             raise ValueError(f"parameter {line.parameter.code}: a term of this kind in one state {NO_NAME}")
-        plain = _with_lowest_state(line.parameter, line.digits)
+        plain = replace(line.parameter, code=line.digits.in_lowest_state, constrained=False, text="")
         parts = [plain]
         if line.digits.kind is Kind.SQUARE and len(line.operator.plain) == 2:  # across an axis of more than two folds
             parts = [
@@ -149,17 +150,8 @@ def _parameters_by_state(coded: CodedFile) -> list[list[Parameter]]:
             by_state[v] += parts
     if is_single_state(coded.file):  # a constant of value 0 has a name as well
         zeros = zip(coded.file.parameters, coded.digits, strict=True)
-        by_state[0] += [
-            _with_lowest_state(p, d)
-            for p, d in zeros
-            if not p.value and d.is_orthorhombic and not max(d.states(1) or (0,))
-        ]
+        by_state[0] += [replace(p, code=d.in_lowest_state) for p, d in zeros if not p.value and d.has_name]
     return by_state
-
-
-def _with_lowest_state(parameter: Parameter, digits: Digits) -> Parameter:
-    """A parameter with the code of the lowest state."""
-    return replace(parameter, code=join_code(digits._replace(v1=0, v2=0)), constrained=False, text="")
 
 
 def _couplings(rows: list[CodedLine], first: Options, turned: bool) -> dict[str, float]:
@@ -317,7 +309,9 @@ def _spins(
         if line.operator.rotor is None:
             continue
         try:
-            kind, matrix = _tensor(_single_nucleus(line, states[0], oblate))
+            # of three equivalent nuclei, the parts of the term of one of them that change K are halved
+            threefold = states[0].is_threefold(line.operator.spins)
+            kind, matrix = _tensor(halved_across(line.operator, basis_axes(oblate)) if threefold else line.operator)
         except ValueError as reason:
             raise ValueError(f"parameter {parameter.code}: {reason}") from None
         o, value = line.operator, parameter.value
@@ -346,12 +340,6 @@ def _spins(
     return SpinConstants(values, twice, uncertainties=spreads, totals=totals, weights_of_others=weights_are_of_others)
 
 
-def _single_nucleus(line: CodedLine, state: StateOptions, oblate: bool) -> CodedLine:
-    """A line as the term of one nucleus; for one of three equivalent nuclei the parts that change K are halved."""
-    acts_on_three = state.equivalent == 3 and max(line.operator.spins, default=0) > len(state.spins) - 3
-    return line._replace(operator=halved_across(line.operator, basis_axes(oblate))) if acts_on_three else line
-
-
 def _spin_names(rows: list[CodedLine], sizes: tuple[int, ...]) -> list[str]:
     """Names of the spins: S or the isotope in labels of parameters with one spin, if the size agrees; else I1, I2, ..."""
     names = [f"I{place}" for place in range(1, len(sizes) + 1)]
@@ -369,9 +357,9 @@ def _once(states: Iterable[int]) -> list[int]:
     return list(dict.fromkeys(states))
 
 
-def _tensor(line: CodedLine) -> tuple[str, Floats]:
+def _tensor(operator: CodedOperator) -> tuple[str, Floats]:
     """The tensor of a spin term, and the matrix (or 1) that its value multiplies."""
-    rotor, spins = line.operator.rotor, line.operator.spins
+    rotor, spins = operator.rotor, operator.spins
     if isinstance(rotor, Scalar) and len(spins) == 2:
         return "J", np.array(1.0)
     if isinstance(rotor, CosinesWithN):
