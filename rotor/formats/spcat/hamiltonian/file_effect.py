@@ -9,7 +9,7 @@ import numpy as np
 
 from rotor.formats.spcat.hamiltonian.coded_file import CodedLine
 from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, basis_of
-from rotor.formats.spcat.hamiltonian.l_doubled import Pair, couplings_with_pairs, spin_terms_with_pairs
+from rotor.formats.spcat.hamiltonian.l_doubled import Pair, RealPart, over_real_states, turned_operator, turned_rotor
 from rotor.formats.spcat.hamiltonian.phases import half_turned
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs
 from rotor.frozen import dataclass
@@ -84,7 +84,14 @@ class FileEffect(QuantumEffect):
             if operator.rotor is not None:
                 continue
             if states and self._has_pairs(states):
-                couplings += self._with_pairs(line, states)
+                if line.is_between or operator.plain is None:  # else with the operators of both components
+                    turned = turned_operator(operator.alone)
+                    couplings += [
+                        Coupling(
+                            line.name, part.bra, part.ket, part.factor * (turned if part.turned else operator.alone)
+                        )
+                        for part in self._real_parts(line, states)
+                    ]
             elif operator.of_n is not None or line.is_between:
                 factors = half_turned(self.turned, operator.odd) if self._is_turned(line) else None
                 pairs = [states] if states else [(v, v) for v in range(self.count)]
@@ -107,17 +114,10 @@ class FileEffect(QuantumEffect):
         """Whether a half turn about the axis of the phases changes the sign of the operator of a line."""
         return bool(self.turned) and line.symmetry.axis not in ("", self.turned)
 
-    def _with_pairs(self, line: CodedLine, states: tuple[int, int]) -> list[Coupling]:
-        """Couplings of a line with l-doubled states."""
-        operator = line.operator
-        if operator.plain is not None and states[0] == states[1]:
-            return []  # listed with the operators of both components
-        # -i stands between states of an oblate basis, not within a pair
-        sign = -1.0 if operator.odd and states[0] == states[1] and self.axes[2] == "c" else 1.0
+    def _real_parts(self, line: CodedLine, states: tuple[int, int], what: str = "operator") -> list[RealPart]:
+        """Parts of a line with l-doubled states over real states."""
         try:
-            return couplings_with_pairs(
-                line.name, sign * operator.alone, operator.odd, states, line.reversed_, self.pairs
-            )
+            return over_real_states(states, line.operator.odd, line.reversed_, self.pairs, self.axes, what)
         except ValueError as error:
             raise ValueError(f"parameter {line.parameter.code}: {error}") from None
 
@@ -180,10 +180,12 @@ class FileEffect(QuantumEffect):
             raise ValueError(
                 f"parameter {line.parameter.code}: a spin term of higher order or of a series, of l-doubled states, {NOT_YET}"
             )
-        try:
-            return spin_terms_with_pairs(term, states, line.reversed_, self.pairs, self.axes)
-        except ValueError as error:
-            raise ValueError(f"parameter {line.parameter.code}: {error}") from None
+        turned = turned_rotor(term.rotor, self.axes)
+        return [
+            replace(term, bra=part.bra, ket=part.ket, factor=term.factor * part.factor, rotor=rotor)
+            for part in self._real_parts(line, states, "spin operator")
+            if (rotor := turned if part.turned else term.rotor) is not None
+        ]
 
     def dipoles(self, top: Top) -> dict[tuple[int, int], Vector]:
         """The dipoles of the .int file."""

@@ -22,7 +22,6 @@ which depends on the phase between x and y, is not verified against the program.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import sqrt
 from typing import NamedTuple
 
@@ -36,8 +35,6 @@ from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import weighted
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor
-from rotor.quantum.spins.scheme import SpinTerm
-from rotor.quantum.states import Coupling
 
 
 class Pair(NamedTuple):
@@ -82,13 +79,13 @@ class RealPart(NamedTuple):
 
 
 def over_real_states(
-    states: tuple[int, int], odd: bool, reversed_: bool, pairs: Sequence[Pair], what: str = "operator"
+    states: tuple[int, int], odd: bool, reversed_: bool, pairs: Sequence[Pair], axes: str, what: str = "operator"
 ) -> list[RealPart]:
     """Parts of a parameter over real states, if at least one of its states is l-doubled (table of this module).
 
     states: numbers, the lower one first. odd: whether the operator changes sign under time reversal. reversed_: whether V2 > V1 in the
-    code, Δk Δl < 0. pairs: the l-doubled states of the file. what: kind of operator for messages; an odd "spin operator" between
-    different states is not supported.
+    code, Δk Δl < 0. pairs: the l-doubled states of the file. axes: the axes x, y, z: bca or bac. what: kind of operator for messages; an
+    odd "spin operator" between different states is not supported.
     Returns: real states, factors and kinds of operator.
     Raises ValueError for operators that symmetry forbids or this package does not support.
     """
@@ -96,7 +93,12 @@ def over_real_states(
     firsts, seconds = {pair.first: pair for pair in pairs}, {pair.second: pair for pair in pairs}
     sign = -1.0 if reversed_ else 1.0
     if low == high:
-        return _within(odd, firsts.get(low))
+        if low not in firsts:  # of the second state: passed over
+            return []
+        x, y = sorted(firsts[low])
+        # the sign of what is odd is another between states than within a pair of an oblate basis
+        sign = -1.0 if (x == low) == (axes[2] == "a") else 1.0
+        return [RealPart(x, y, sign)] if odd else [RealPart(x, x, 1.0), RealPart(y, y, 1.0)]
     if odd and what != "operator":
         raise ValueError(f"an odd {what} between l-doubled states is read but not computed yet")
     if (low in firsts and firsts[low].second == high) or (high in firsts and firsts[high].second == low):
@@ -124,51 +126,9 @@ def _ordered(first: int, second: int, factor: float, turned: bool = False) -> Re
     return RealPart(min(first, second), max(first, second), factor, turned)
 
 
-def _within(odd: bool, pair: Pair | None) -> list[RealPart]:
-    """Parts of an operator within one state or pair."""
-    if pair is None:  # of the second state: passed over
-        return []
-    x, y = sorted(pair)
-    if odd:
-        return [RealPart(x, y, -1.0 if x == pair.first else 1.0)]
-    return [RealPart(x, x, 1.0), RealPart(y, y, 1.0)]
-
-
-def _rising_less_falling(operator: Operator) -> Operator:
-    """O↑ - O↓."""
-    return weighted(operator, lambda m, n, above, below: np.sign(above - below))
-
-
-def couplings_with_pairs(
-    name: str, operator: Operator, odd: bool, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair]
-) -> list[Coupling]:
-    """The couplings of `over_real_states` for an operator over |J k⟩, with a factor i if it is odd."""
-    return [
-        Coupling(name, bra, ket, 1j * factor * _rising_less_falling(operator) if turned else factor * operator)
-        for bra, ket, factor, turned in over_real_states(states, odd, reversed_, pairs)
-    ]
-
-
-def spin_terms_with_pairs(
-    term: SpinTerm, states: tuple[int, int], reversed_: bool, pairs: Sequence[Pair], axes: str
-) -> list[SpinTerm]:
-    """A spin term of a file over real states, if at least one of its states is l-doubled (table of this module).
-
-    term: the term for states that are not l-doubled. states: numbers, the lower one first. reversed_: whether V2 > V1 in the code, Δk Δl
-    < 0. pairs: the l-doubled states of the file. axes: the axes x, y, z: bca or bac.
-    Returns: terms over x and y.
-    Raises ValueError for terms that are not supported between such states.
-    """
-    odd = term.rotor.odd
-    if odd and states[0] == states[1] and axes[2] == "c":
-        # the sign of what is odd is another between states than within a pair there
-        term = replace(term, factor=-term.factor)
-    turned = turned_rotor(term.rotor, axes)
-    return [
-        replace(term, bra=part.bra, ket=part.ket, factor=term.factor * part.factor, rotor=rotor)
-        for part in over_real_states(states, odd, reversed_, pairs, "spin operator")
-        if (rotor := turned if part.turned else term.rotor) is not None
-    ]
+def turned_operator(operator: Operator) -> Operator:
+    """i(O↑ - O↓)."""
+    return weighted(operator, lambda m, n, above, below: 1j * np.sign(above - below))
 
 
 def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:

@@ -82,8 +82,9 @@ def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diago
         functions = wang_functions(block, str(levels.representation))
         energies = -block.energies_mhz if oblate else block.energies_mhz  # along c energies fall with K
         at = places(functions, energies, diag, diagonal)
-        tables.append(functions.names[at])
-        shares.append(_group_weights(functions, at, diag))
+        groups = _groups(functions, diag)
+        tables.append(functions.names[at])  # with the weight of each state in the group that labels it
+        shares.append((functions.amplitudes**2 * (groups[:, None] == groups[at])).sum(axis=0))
     return renamed(levels, tables, shares)
 
 
@@ -143,13 +144,13 @@ def _groups(functions: Functions, diag: int) -> Ints:
 
 def has_other_names(levels: Levels, diag: int, diagonal: Diagonal) -> bool:
     """Whether DIAG gives levels of an asymmetric top other labels than those that they have."""
-    anew = diagonal is not Diagonal.RISES or diag in BY_DIAG
-    return "kc" in levels.quanta and (anew or any(_needs_names(block, diag) for block in levels.blocks))
-
-
-def _needs_names(block: SolvedBlock, diag: int) -> bool:
-    """Whether a block contains several Wang blocks (with spins: of one v and pattern, and DIAG is 3)."""
-    return diag == 3 and _connects_wang_blocks(block.spins) if block.spins else len(block.parts) > 1
+    if "kc" not in levels.quanta or diagonal is not Diagonal.RISES or diag in BY_DIAG:
+        return "kc" in levels.quanta
+    # blocks of several Wang blocks, with spins of one v and pattern if DIAG is 3
+    return any(
+        diag == 3 and _connects_wang_blocks(block.spins) if block.spins else len(block.parts) > 1
+        for block in levels.blocks
+    )
 
 
 def _connects_wang_blocks(block: SpinFunctions) -> bool:
@@ -185,19 +186,12 @@ def _clear_labels(block: SolvedBlock, oblate: bool, representation: str) -> tupl
     return names, shares
 
 
-def _group_weights(functions: Functions, at: Ints, diag: int) -> Floats:
-    """The weight of each state in the group that labels it."""
-    group_of_function = _groups(functions, diag)
-    inside = group_of_function[:, None] == group_of_function[at][None, :]
-    return np.asarray((functions.amplitudes**2 * inside).sum(axis=0))
-
-
 def places(functions: Functions, energies: Floats, diag: int, diagonal: Diagonal = Diagonal.RISES) -> Ints:
     """The function that labels each state, (states,); see `named_by`."""
     shares = functions.amplitudes**2
     if diag == 1:
         return assigned(shares, np.ones(len(shares), dtype=np.int64))
-    groups = functions.wang if diag in _OF_WANG else functions.pattern
+    groups = _groups(functions, diag)
     if diagonal is Diagonal.FALLS_IN_K and diag == 0 and (clear := clear_functions(functions.amplitudes)) is not None:
         return clear
     if diagonal is not Diagonal.RISES:
@@ -211,10 +205,10 @@ def places(functions: Functions, energies: Floats, diag: int, diagonal: Diagonal
         members, states = np.flatnonzero(groups == g), np.flatnonzero(group_of_state == g)
         if diag == 4:
             functions_of_states[states] = _by_k2(functions, members, states, shares, energies)
-        else:
-            rising = _by_rising_k(functions, members) if ranks is None else _by_diagonal(functions, members, ranks)
-            # stable: states of one energy keep their order
-            functions_of_states[states[np.argsort(energies[states], kind="stable")]] = rising
+            continue
+        rising = _by_rising_k(functions, members) if ranks is None else _by_diagonal(functions, members, ranks)
+        # stable: states of one energy keep their order
+        functions_of_states[states[np.argsort(energies[states], kind="stable")]] = rising
     return functions_of_states
 
 

@@ -60,11 +60,8 @@ def read_phases(options: Options, codes: Iterable[Digits], states: int, doubled:
         return Phases(odd, frozenset("abc"))
     more: dict[str, int] = {}
     for d in codes:
-        count = (
-            len(set(range(states)) - doubled)
-            if d.states(states) is None
-            else int(d.v1 < states and d.v1 not in doubled)
-        )
+        concerned = range(states) if d.states(states) is None else [d.v1] * (d.v1 < states)
+        count = len(set(concerned) - doubled)
         kind = d.symmetry(oblate)
         if d.v1 == d.v2 and count and kind.axis and not d.is_constant:
             more[kind.axis] = more.get(kind.axis, 0) + (count if kind.odd else -count)
