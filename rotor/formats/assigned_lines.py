@@ -126,7 +126,7 @@ def names_sums(path: str | os.PathLike[str], count: int) -> bool:
     if not text.endswith(".lin"):
         return False
     lines = without_v(without_zeros_behind(read_lin(path, count), count), count)
-    return len(lines) > 0 and len(lines.measured(0).quanta) // 2 > count
+    return len(lines) > 0 and bool(lines.counts[0] > count)
 
 
 def names_field(path: str | os.PathLike[str]) -> bool:
@@ -146,13 +146,11 @@ def _from_lin(path: str | os.PathLike[str], names: Sequence[str]) -> tuple[Assig
         notes.append(
             f"{counted(int((~used).sum()), 'line that gives', 'lines that give')} the width of a blend: not counted"
         )
-    for i in np.flatnonzero(used).tolist():
-        count = len(lines.measured(i).quanta) // 2
-        if count != len(names):
-            raise ValueError(
-                f"{path}, line {i + 1} of the list: {count} quantum numbers for each state; {len(names)} are needed "
-                f"({', '.join(names)})"
-            )
+    if len(wrong := np.flatnonzero(used & (lines.counts != len(names)))):
+        raise ValueError(
+            f"{path}, line {wrong[0] + 1} of the list: {lines.counts[wrong[0]]} quantum numbers for each state; "
+            f"{len(names)} are needed ({', '.join(names)})"
+        )
     upper, lower = (side[used][:, : len(names)] for side in lines.states())
     listed = assignments(
         names, upper, lower, lines.frequency_mhz[used], lines.error_mhz[used], weight=lines.weight[used],

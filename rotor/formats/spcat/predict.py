@@ -15,7 +15,7 @@ from rotor.formats.spcat import wavenumbers
 from rotor.formats.spcat.block_numbers import numbered_blocks
 from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, group_lines, group_transitions
 from rotor.formats.spcat.file_model import Group
-from rotor.formats.spcat.file_quanta import Format, quanta_format
+from rotor.formats.spcat.file_quanta import quanta_format
 from rotor.formats.spcat.hamiltonian.labels import UNDIAGONALIZED_NOTE
 from rotor.formats.spcat.hamiltonian.states import file_states
 from rotor.formats.spcat.prediction_notes import (
@@ -23,9 +23,9 @@ from rotor.formats.spcat.prediction_notes import (
     falling_diagonal_notes,
     file_notes,
     full_basis_notes,
-    qrot_notes,
+    request_notes,
 )
-from rotor.formats.spcat.solved_groups import SolvedGroup, groups_to_solve, highest_n, joined_lines, solved_groups
+from rotor.formats.spcat.solved_groups import groups_to_solve, highest_n, joined_lines, solved_groups
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
@@ -99,36 +99,9 @@ def predict(
         files = wavenumbers.files_in_mhz(parameters, intensities)
         in_mhz = predict(*files, as_spcat=as_spcat, full_basis=full_basis)
         return replace(in_mhz, catalogue=wavenumbers.catalogue_in_cm(in_mhz.catalogue), request=request)
-    further = (*qrot_notes(request, as_spcat), *_not_written(request))
+    further = request_notes(request, as_spcat)
     if as_spcat and request.qrot < 1:
         request = replace(request, qrot=1.0)
-        intensities = replace(intensities, request=request)
-    noting = partial(_notes, parameters, intensities, as_spcat, full_basis, further)
-    return _predicted(parameters, intensities, as_spcat, full_basis, noting)
-
-
-def _refuse_limits(request: Request) -> None:
-    """Raise ValueError for a range of F without levels, and for Q or a temperature that is not above 0."""
-    if not 0 <= request.fbgn <= request.fend <= QUANTUM_RANGE[1]:
-        raise ValueError(
-            f"FBGN = {request.fbgn}, FEND = {request.fend}: F runs from FBGN to FEND, from 0 to {QUANTUM_RANGE[1]}, the "
-            "highest that two characters of a catalogue can say"
-        )
-    if not (math.isfinite(request.qrot) and request.qrot > 0):
-        raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
-    if not (math.isfinite(request.temperature_k) and request.temperature_k > 0):
-        raise ValueError(f"TEMP = {request.temperature_k:g}: a temperature is above 0 K")
-
-
-def _predicted(
-    parameters: ParameterFile,
-    intensities: IntensityFile,
-    as_spcat: bool,
-    full_basis: bool,
-    noting: Callable[[list[Group]], Iterable[str]],
-) -> Prediction:
-    """The prediction of files in MHz. noting: the notes, from the groups that have levels."""
-    request = intensities.request
     groups = groups_to_solve(parameters, intensities, as_spcat, full_basis)
     form = quanta_format(parameters, groups)
     solved = solved_groups(parameters, groups, request, form)
@@ -143,9 +116,22 @@ def _predicted(
         joined_lines(parameters, solved, [lines.transitions for lines in listed], form, request),
         request.qrot,
         request,
-        partial(noting, present),
-        partial(_listed_levels, parameters, without_vectors, form),
+        partial(_notes, parameters, intensities, as_spcat, full_basis, further, present),
+        lambda: as_level_list(without_vectors, form, numbered_blocks(parameters, present)),
     )
+
+
+def _refuse_limits(request: Request) -> None:
+    """Raise ValueError for a range of F without levels, and for Q or a temperature that is not above 0."""
+    if not 0 <= request.fbgn <= request.fend <= QUANTUM_RANGE[1]:
+        raise ValueError(
+            f"FBGN = {request.fbgn}, FEND = {request.fend}: F runs from FBGN to FEND, from 0 to {QUANTUM_RANGE[1]}, the "
+            "highest that two characters of a catalogue can say"
+        )
+    if not (math.isfinite(request.qrot) and request.qrot > 0):
+        raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
+    if not (math.isfinite(request.temperature_k) and request.temperature_k > 0):
+        raise ValueError(f"TEMP = {request.temperature_k:g}: a temperature is above 0 K")
 
 
 def _notes(
@@ -168,18 +154,3 @@ def _notes(
     if full_basis:
         yield from full_basis_notes(file_states(parameters), highest)
     yield from further
-
-
-def _listed_levels(parameters: ParameterFile, solved: list[SolvedGroup], form: Format) -> LevelList:
-    """The levels as SPCAT lists them, with its block numbers and places."""
-    return as_level_list(solved, form, numbered_blocks(parameters, [each.group for each in solved]))
-
-
-def _not_written(request: Request) -> list[str]:
-    """Note on output that FLAGS request and that is not written here, a .str file (tens digit)."""
-    if request.flags // 10 % 10 == 0:
-        return []
-    return [
-        f"FLAGS = {request.flags} asks for a .str file, which is not written here: the signs of its transition dipoles follow from the "
-        "phases of SPCAT's diagonalization; strengths of lines are in --csv and --json"
-    ]

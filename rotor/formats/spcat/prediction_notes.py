@@ -32,11 +32,17 @@ def file_notes(parameters: ParameterFile, intensities: IntensityFile, as_spcat: 
     return [*npar_notes(parameters), *coded.left_out, *_moment_notes(coded, intensities, as_spcat)]
 
 
-def qrot_notes(request: Request, as_spcat: bool) -> list[str]:
-    """A note for QROT below 1, which SPCAT replaces by 1."""
-    if not 0 < request.qrot < 1:
-        return []
-    return [f"QROT = {request.qrot:g} is below 1: {_choice('SPCAT takes 1', as_spcat)}"]
+def request_notes(request: Request, as_spcat: bool) -> list[str]:
+    """Notes on QROT below 1, which SPCAT replaces by 1, and on a .str file (tens digit of FLAGS), which is not written here."""
+    notes = []
+    if 0 < request.qrot < 1:
+        notes.append(f"QROT = {request.qrot:g} is below 1: {_choice('SPCAT takes 1', as_spcat)}")
+    if request.flags // 10 % 10:
+        notes.append(
+            f"FLAGS = {request.flags} asks for a .str file, which is not written here: the signs of its transition dipoles follow from the "
+            "phases of SPCAT's diagonalization; strengths of lines are in --csv and --json"
+        )
+    return notes
 
 
 def _choice(program: str, as_spcat: bool) -> str:
@@ -84,12 +90,12 @@ def basis_notes(groups: list[Group], whole: list[Group], request: Request) -> li
     groups: groups with the basis of the file. whole: groups with all K. request: highest F.
     Returns: one sentence for each group whose basis is cut.
     """
-    cut = [group for group in groups if any(state.is_cut for state in group.states)]
-    return [_cut_note(group, [other for other in whole if _share_a_state(group, other)], request) for group in cut]
-
-
-def _share_a_state(group: Group, other: Group) -> bool:
-    return bool({state.number for state in group.states} & {state.number for state in other.states})
+    notes = []
+    for group in [group for group in groups if any(state.is_cut for state in group.states)]:
+        numbers = {state.number for state in group.states}
+        others = [other for other in whole if any(state.number in numbers for state in other.states)]
+        notes.append(_cut_note(group, others, request))
+    return notes
 
 
 def _cut_note(group: Group, whole: list[Group], request: Request) -> str:

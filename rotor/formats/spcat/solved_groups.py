@@ -62,13 +62,15 @@ def solved_groups(parameters: ParameterFile, groups: list[Group], request: Reque
     factor, names = variance_factor(parameters), line_names(parameters)
     solved = []
     for group in _with_levels(groups, request):
-        levels = group.levels(_f_range(group, request))
-        solved_group = SolvedGroup(group, levels, _spread(group, levels, names, factor))
+        levels, spread = group.levels(_f_range(group, request)), None
+        if factor is not None:
+            parameters_of_group = tuple(group.effect.parameters(group.top))
+            rows = [names.index(name) for name in parameters_of_group]
+            spread = level_derivatives(group.top, levels, parameters_of_group) @ factor[rows]
         if request.maxv >= 0 and form.states:
             # a weight of 0 leaves the level out of lines, but in the table
-            weight = np.where(group.numbers(levels) <= request.maxv, levels.weight, 0)
-            solved_group = solved_group._replace(levels=replace(levels, weight=weight))
-        solved.append(solved_group)
+            levels = replace(levels, weight=np.where(group.numbers(levels) <= request.maxv, levels.weight, 0))
+        solved.append(SolvedGroup(group, levels, spread))
     if not any((each.levels.weight > 0).any() for each in solved):
         raise ValueError(
             f"no level has a weight from FBGN = {request.fbgn} to FEND = {request.fend}, MAXV = {request.maxv}; give other limits or "
@@ -93,15 +95,6 @@ def _f_range(group: Group, request: Request) -> tuple[int, int]:
     """The doubled F from FBGN to FEND, which are rounded up."""
     half = sum(group.spins) % 2  # F has the parity of the sum of the spins, doubled
     return max(half, 2 * request.fbgn - half), 2 * request.fend - half
-
-
-def _spread(group: Group, levels: Levels, names: Sequence[str], factor: Floats | None) -> Floats | None:
-    """∂E/∂p F of the levels of a group; names: of the rows of F."""
-    if factor is None:
-        return None
-    parameters = tuple(group.effect.parameters(group.top))
-    rows = [names.index(name) for name in parameters]
-    return np.asarray(level_derivatives(group.top, levels, parameters) @ factor[rows])
 
 
 def joined_lines(

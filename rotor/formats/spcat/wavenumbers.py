@@ -14,7 +14,7 @@ from rotor import units
 from rotor.formats.spcat.hamiltonian.code_table import split_code
 from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW
 from rotor.formats.spcat.text.catalogue import Catalogue, Layout
-from rotor.formats.spcat.text.int_file import IntensityFile, Request
+from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 
 FROM = 1000  # constants are in cm⁻¹ for FLAGS of at least this value
@@ -23,42 +23,33 @@ _DECIMALS = (6, 6, 4, 4)
 
 
 def files_in_mhz(parameters: ParameterFile, intensities: IntensityFile) -> tuple[ParameterFile, IntensityFile]:
-    """Both files converted to MHz."""
-    return parameters_in_mhz(parameters), request_in_mhz(intensities)
-
-
-def parameters_in_mhz(file: ParameterFile) -> ParameterFile:
-    """The parameters with values and errors in MHz.
+    """Both files converted to MHz: values and errors of parameters, limits of the request.
 
     >>> from rotor.formats.spcat.text.par import read_par
-    >>> parameters_in_mhz(read_par(b"CO\\n 1 0 0 0\\nl -1 1 0 0\\n 100 1.9225 1e-37\\n")).parameters[0].value.__round__(3)
-    57635.1
+    >>> file = read_par(b"CO\n 1 0 0 0\nl -1 1 0 0\n 100 1.9225 1e-37\n")
+    >>> file, intensities = files_in_mhz(file, IntensityFile("", Request(flags=1001, fqlim_ghz=100.0), ()))
+    >>> round(file.parameters[0].value, 3), round(intensities.request.fqlim_ghz, 6)
+    (57635.1, 2997.92458)
     """
-    states = max(abs(file.options[0].nvib), 1)
-    return replace(file, parameters=tuple(_in_mhz(parameter, states) for parameter in file.parameters))
+    states, request = max(abs(parameters.options[0].nvib), 1), intensities.request
+    request = replace(
+        request,
+        flags=request.flags % FROM,
+        fqlim_ghz=request.fqlim_ghz * units.MHZ_PER_CM * 1e-3,
+        str1=request.str1 - 2.0 * math.log10(units.MHZ_PER_CM),
+        text="",
+    )
+    in_mhz = tuple(_in_mhz(parameter, states) for parameter in parameters.parameters)
+    return replace(parameters, parameters=in_mhz), replace(intensities, request=request)
 
 
 def _in_mhz(parameter: Parameter, states: int) -> Parameter:
     if split_code(parameter.code, states).is_constant:  # ρ, a and b of a series are pure numbers
         return parameter
-    held = parameter.error is None or parameter.error < HELD_BELOW
-    error = parameter.error if held else parameter.error * units.MHZ_PER_CM  # type: ignore[operator]
+    error = parameter.error
+    if error is not None and error >= HELD_BELOW:
+        error *= units.MHZ_PER_CM
     return replace(parameter, value=parameter.value * units.MHZ_PER_CM, error=error, text="")
-
-
-def request_in_mhz(file: IntensityFile) -> IntensityFile:
-    """The request with its limits in MHz.
-
-    >>> round(request_in_mhz(IntensityFile("", Request(flags=1001, fqlim_ghz=100.0), ())).request.fqlim_ghz, 6)
-    2997.92458
-    """
-    request: Request = file.request
-    limits = {
-        "flags": request.flags % FROM,
-        "fqlim_ghz": request.fqlim_ghz * units.MHZ_PER_CM * 1e-3,
-        "str1": request.str1 - 2.0 * math.log10(units.MHZ_PER_CM),
-    }
-    return replace(file, request=replace(request, **limits, text=""))  # type: ignore[arg-type]
 
 
 def catalogue_in_cm(catalogue: Catalogue) -> Catalogue:

@@ -23,7 +23,6 @@ from rotor.formats.assigned_lin import with_excluded_lines
 from rotor.formats.assigned_lines import QUANTA
 from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, is_held
 from rotor.formats.spcat.hamiltonian.states import is_plain
-from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.lin import LineList, default_note, read_lin, remark_notes, with_defaults
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, npar_notes, read_par
 from rotor.formats.spcat.variances import FREE_ABOVE
@@ -261,10 +260,9 @@ def _widths(lines: LineList, blends: Ints, used: np.ndarray, header: Header) -> 
 
 def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> None:
     """Raise ValueError for a line with fewer or more quantum numbers than the top has."""
-    counts = (lines.quanta != BLANK).sum(axis=1) // 2
-    if len(wrong := np.flatnonzero(used & (counts != len(names)))):
+    if len(wrong := np.flatnonzero(used & (lines.counts != len(names)))):
         raise LineWidthError(
-            f"line {wrong[0] + 1} has {counts[wrong[0]]} quantum numbers for each state; these constants have "
+            f"line {wrong[0] + 1} has {lines.counts[wrong[0]]} quantum numbers for each state; these constants have "
             f"{len(names)} ({', '.join(names)})"
         )
 

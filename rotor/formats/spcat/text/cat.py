@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Indices
 from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import load
-from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue, Layout
+from rotor.formats.spcat.text.catalogue import Catalogue, Layout
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.freeform import Line
 from rotor.formats.spcat.text.line import Record, error_cap, quanta_width, read_record, spell_record
@@ -246,7 +246,7 @@ def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Ma
     """The numbers of all lines, and which lines are just what those numbers would be written as."""
     is_plain = np.zeros(len(lines.starts), dtype=np.bool_)
     width = _width_guess(text, lines)
-    parts = []
+    parts = [take_rows(np.empty((0, QUANTA + 4 * width), dtype=np.uint8), width, layout.decimals)]
     for start in range(0, len(is_plain), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         rows, regular = _character_rows(text, lines, chunk)
@@ -257,7 +257,7 @@ def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Ma
         plain &= (padded[:, : lines.length] == rows).all(axis=1) & _quanta_present(columns)
         is_plain[chunk] = regular & plain
         parts.append(columns)
-    return _joined(parts, width), is_plain
+    return Columns._make(np.concatenate(column) for column in zip(*parts, strict=True)), is_plain
 
 
 def _width_guess(text: bytes, lines: _Lines) -> int:
@@ -283,19 +283,6 @@ def _quanta_present(columns: Columns) -> Mask:
     needed = np.arange(width) < (columns.qnfmt % 10)[:, None]
     blank = (columns.quanta_upper == BLANK) | (columns.quanta_lower == BLANK)
     return ~np.asarray((needed & blank).any(axis=1))
-
-
-def _joined(parts: list[Columns], width: int) -> Columns:
-    if not parts:
-        return _empty(0, width)
-    return Columns._make(np.concatenate([part[i] for part in parts]) for i in range(len(parts[0])))
-
-
-def _empty(lines: int, width: int) -> Columns:
-    shapes = [(lines, width) if name.startswith("quanta") else (lines,) for name in DTYPES]
-    return Columns._make(
-        np.full(s, BLANK if len(s) > 1 else 0, d) for s, d in zip(shapes, DTYPES.values(), strict=True)
-    )
 
 
 def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: Columns, is_plain: Mask) -> Catalogue:
@@ -334,10 +321,9 @@ def _careful_record(text: bytes, number: int, name: str) -> Record:
 def _with_records(columns: Columns, records: dict[int, Record]) -> Columns:
     """The columns with the lines of `records` set, wider where one of them has more quantum numbers."""
     width = max([columns.quanta_upper.shape[1], *(len(record.quanta_upper) for record in records.values())])
-    wider = _empty(len(columns.dr), width)
-    wider.quanta_upper[:, : columns.quanta_upper.shape[1]] = columns.quanta_upper
-    wider.quanta_lower[:, : columns.quanta_lower.shape[1]] = columns.quanta_lower
-    columns = columns._replace(quanta_upper=wider.quanta_upper, quanta_lower=wider.quanta_lower)
+    wider = ((0, 0), (0, width - columns.quanta_upper.shape[1]))
+    upper, lower = (np.pad(side, wider, constant_values=BLANK) for side in (columns.quanta_upper, columns.quanta_lower))
+    columns = columns._replace(quanta_upper=upper, quanta_lower=lower)
     for number, record in records.items():
         for name, value in record._asdict().items():
             getattr(columns, name)[number] = (*value, *(BLANK,) * width)[:width] if isinstance(value, tuple) else value

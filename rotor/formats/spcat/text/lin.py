@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,15 +33,6 @@ _AS_USUAL = re.compile(  # one to three numbers and nothing that must be looked 
     rf"[ \t]*{_NUMBER}(?:{_END}|{_BETWEEN}{_NUMBER}(?:{_END}|{_BETWEEN}{_NUMBER}(?=[ \t,/]|$)))", re.ASCII
 )
 _ROTATION = ("j", "n", "k", "ka", "kc", "v")
-
-
-class Measured(NamedTuple):
-    """The numbers of one line: quantum numbers of the upper state, then of the lower, and the rest as in the file."""
-
-    quanta: tuple[int, ...]
-    frequency: float
-    error: float
-    weight: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +71,11 @@ class LineList:
         return int(np.shape(self.quanta)[-1])
 
     @property
+    def counts(self) -> NDArray[np.int64]:
+        """Number of quantum numbers of a state of each line, (n,)."""
+        return np.asarray((self.quanta != BLANK).sum(axis=1) // 2)
+
+    @property
     def frequency_mhz(self) -> NDArray[np.float64]:
         """Frequencies in MHz, (n,)."""
         return np.where(self.error < 0, self.frequency * MHZ_PER_CM, self.frequency)
@@ -95,7 +91,7 @@ class LineList:
         if count := self.per_state:
             upper[:, :count], lower[:, :count] = self.quanta[:, :count], self.quanta[:, count : 2 * count]
             return upper, lower
-        counts = (self.quanta != BLANK).sum(axis=1) // 2
+        counts = self.counts
         for count in distinct(counts).tolist():
             rows = counts == count
             upper[rows, :count] = self.quanta[rows, :count]
@@ -131,11 +127,6 @@ class LineList:
                 groups[i] = blend
         return groups
 
-    def measured(self, index: int) -> Measured:
-        """The numbers of one line."""
-        quanta = tuple(q for q in self.quanta[index].tolist() if q != BLANK)
-        return Measured(quanta, float(self.frequency[index]), float(self.error[index]), float(self.weight[index]))
-
 
 def like_line_before(
     frequency: NDArray[np.float64], error: NDArray[np.float64]
@@ -169,20 +160,21 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0, most: i
     behind these one that is no line ends the list. Raises ValueError with file, line,
     column and the rule that is broken; nothing is skipped in silence.
     """
-    lines = read_lines(source)
+    lines, width = read_lines(source), max(QUANTA_FIELDS, 2 * per_state)
     first = next((i for i, line in enumerate(lines) if not line.blank), len(lines))
     end = next((i for i, line in enumerate(lines) if i > first and line.blank), len(lines))
     if most is not None:
-        end = next((i for i in range(first + most, end) if not _is_line(lines[i], per_state)), end)
+        end = next((i for i in range(first + most, end) if not _is_line(lines[i], width)), end)
     listed = lines[first:end]
     texts = {i: line.text for i, line in enumerate(listed)}
     if texts:
         texts[0] = "".join(line.text for line in lines[:first]) + texts[0]
-    width = max(QUANTA_FIELDS, 2 * per_state)
     plain = [_plain(line) for line in listed]
     fields = [_fields(line, width) for line in plain]
     missing = next((i for i, row in enumerate(fields) if _is_incomplete(row, per_state)), None)
-    if missing is not None:
+    if missing is None:
+        per_state = 0
+    else:
         per_state = per_state or max((_leading(row) // 2 for row in fields if _leading(row) % 2 == 0), default=0)
         if not per_state:
             count = _leading(fields[missing])
@@ -192,27 +184,24 @@ def read_lin(source: str | os.PathLike[str] | bytes, per_state: int = 0, most: i
                 "a line with all numbers or the constants of a fit, from which the missing ones follow",
             )
     measured = [_numbers(line, width) for line in plain]
-    count = width if missing is None else 2 * per_state
-    present = [row[: _leading(row) if missing is None else count] for row in fields]
-    quanta = np.array([row + (BLANK,) * (width - len(row)) for row in present], dtype=np.int16).reshape(-1, width)
+    quanta = np.array([_row(row, per_state, width) for row in fields], dtype=np.int16).reshape(-1, width)
     columns = np.array([numbers for numbers, _ in measured], dtype=np.float64).reshape(-1, 3)
     rest = "".join(line.text for line in lines[end if texts else 0 :])
     without_error = frozenset(i for i, (_, words) in enumerate(measured) if words < 2)
-    return LineList(
-        quanta,
-        columns[:, 0],
-        columns[:, 1],
-        columns[:, 2],
-        texts,
-        rest,
-        0 if missing is None else per_state,
-        without_error,
-    )
+    frequency, error, weight = columns.T
+    return LineList(quanta, frequency, error, weight, texts, rest, per_state, without_error)
 
 
-def _is_line(line: Line, per_state: int) -> bool:
+def _row(fields: tuple[int, ...], per_state: int, width: int) -> tuple[int, ...]:
+    """The quantum numbers of a line before the first blank one, or with blanks among so many of each state."""
+    present = fields[: 2 * per_state or _leading(fields)]
+    return present + (BLANK,) * (width - len(present))
+
+
+def _is_line(line: Line, width: int) -> bool:
     try:
-        read_measured(line, max(QUANTA_FIELDS, 2 * per_state))
+        _fields(_plain(line), width)
+        _numbers(_plain(line), width)
     except ValueError:
         return False
     return True
@@ -298,13 +287,6 @@ def _plain(line: Line) -> Line:
     return Line(line.body.removeprefix("\ufeff"), line.number, line.file)
 
 
-def read_measured(line: Line, width: int = QUANTA_FIELDS) -> Measured:
-    """The numbers of one line of the file with so many fields of quantum numbers."""
-    plain = _plain(line)
-    fields = _fields(plain, width)
-    return Measured(fields[: _leading(fields)], *_numbers(plain, width)[0])
-
-
 def _numbers(line: Line, width: int) -> tuple[tuple[float, float, float], int]:
     """Frequency, error and weight behind so many fields of quantum numbers of a plain line, and how many of them are written."""
     if match := _AS_USUAL.match(line.text, 3 * width):
@@ -366,26 +348,22 @@ def format_lin(lines: LineList) -> bytes:
 
 
 def _line_text(lines: LineList, index: int) -> str:
-    measured, stored = lines.measured(index), lines.texts.get(index, "")
-    if lines.per_state:  # blanks among them
-        measured = measured._replace(quanta=tuple(lines.quanta[index, : 2 * lines.per_state].tolist()))
-    if stored and _stored(stored, index, lines.per_state, lines.fields) == measured:
-        return stored
-    wrong = next((q for q in measured.quanta if q != BLANK and not -99 <= q <= 999), None)
-    if wrong is not None or not measured.quanta or len(measured.quanta) % 2:
+    row, stored = tuple(lines.quanta[index].tolist()), lines.texts.get(index, "")
+    numbers = float(lines.frequency[index]), float(lines.error[index]), float(lines.weight[index])
+    if stored:
+        line = _plain(Line(stored.rstrip("\r\n").rpartition("\n")[2], index, "stored text"))
+        if row == _row(_fields(line, lines.fields), lines.per_state, lines.fields) and (
+            numbers == _numbers(line, lines.fields)[0]
+        ):
+            return stored
+    quanta = row[: 2 * lines.per_state] or tuple(q for q in row if q != BLANK)
+    if not quanta or len(quanta) % 2 or any(q != BLANK and not -99 <= q <= 999 for q in quanta):
         raise ValueError(
-            f"line {index + 1} cannot be written: quantum numbers {measured.quanta}; as many for the upper as for "
+            f"line {index + 1} cannot be written: quantum numbers {quanta}; as many for the upper as for "
             "the lower state, from -99 to 999, fit the format"
         )
-    quanta = "".join("   " if q == BLANK else f"{q:3d}" for q in measured.quanta)
-    return f"{quanta:<{3 * lines.fields}} {measured.frequency!r:>16} {measured.error!r:>10} {measured.weight!r}\n"
-
-
-def _stored(text: str, index: int, per_state: int, width: int) -> Measured:
-    """The numbers of a line as it was read, blank fields among them where lines lack quantum numbers."""
-    line = Line(text.rstrip("\r\n").rpartition("\n")[2], index, "stored text")
-    numbers, fields = read_measured(line, width), _fields(_plain(line), width)[: 2 * per_state]
-    return numbers._replace(quanta=fields + (BLANK,) * (2 * per_state - len(fields))) if per_state else numbers
+    spelled = "".join("   " if q == BLANK else f"{q:3d}" for q in quanta)
+    return f"{spelled:<{3 * lines.fields}} {numbers[0]!r:>16} {numbers[1]!r:>10} {numbers[2]!r}\n"
 
 
 def write_lin(lines: LineList, path: str | os.PathLike[str]) -> None:
@@ -397,29 +375,11 @@ def write_lin(lines: LineList, path: str | os.PathLike[str]) -> None:
 def line_list(quanta_upper: Any, quanta_lower: Any, frequency_mhz: Any, error_mhz: Any, weight: Any = 1.0) -> LineList:
     """A line list from quantum numbers of both states, frequencies and errors.
 
-    Parameters
-    ----------
-    quanta_upper, quanta_lower : (n, k) arrays of int
-        k up to 10.
-    frequency_mhz : (n,) array
-        Measured.
-    error_mhz : (n,) array or float
-        Not negative.
-    weight : (n,) array or float, optional
-        Shares in blends.
+    quanta_upper, quanta_lower (n, k): k up to 10. frequency_mhz (n,): measured. error_mhz (n,) or a number: not negative. weight (n,) or a
+    number: shares in blends.
+    Returns: n lines.
+    Raises ValueError for shapes that do not fit each other, and errors below 0.
 
-    Returns
-    -------
-    LineList
-        n lines.
-
-    Raises
-    ------
-    ValueError
-        For shapes that do not fit each other, and errors below 0.
-
-    Examples
-    --------
     >>> print(format_lin(line_list([[1]], [[0]], [115271.2018], 0.0005)).decode(), end="")
       1  0                                    115271.2018     0.0005 1.0
     """
