@@ -72,12 +72,9 @@ def named_by(levels: Levels, diag: int, oblate: bool, diagonal: Diagonal = Diago
     rises = diagonal is Diagonal.RISES
     tables, shares = [], []
     for block in levels.blocks:
-        clear = _clear_labels(block, oblate, str(levels.representation)) if diag == 0 and rises else None
         if diag == 3 and rises and block.spins and not _connects_wang_blocks(block.spins):
-            clear = np.asarray(block.labels), np.asarray(block.mixing)
-        if clear is not None:
-            tables.append(clear[0])
-            shares.append(clear[1])
+            tables.append(np.asarray(block.labels))
+            shares.append(np.asarray(block.mixing))
             continue
         functions = wang_functions(block, str(levels.representation))
         energies = -block.energies_mhz if oblate else block.energies_mhz  # along c energies fall with K
@@ -164,26 +161,6 @@ def _connects_wang_blocks(block: SpinFunctions) -> bool:
         for number in range(part.patterns.start, part.patterns.stop)
     ]
     return len(set(held)) < len(held)
-
-
-def _clear_labels(block: SolvedBlock, oblate: bool, representation: str) -> tuple[Ints, Floats] | None:
-    """Labels v, Ka, Kc of DIAG 0 and weights, if each state has more than half of its weight in one Wang block; else None."""
-    if block.spins or block.alone:
-        return None
-    # squares over each part: the weight of the part
-    weights_of_parts = np.add.reduceat(block.vectors**2, [part.start for part in block.parts], axis=0)
-    part_of_state, shares = weights_of_parts.argmax(axis=0), weights_of_parts.max(axis=0)
-    sizes = [part.basis.size for part in block.parts]
-    # every state has one clear part, and each part as many states as functions
-    if shares.min() <= _CLEAR or (np.bincount(part_of_state, minlength=len(sizes)) != sizes).any():
-        return None
-    names = np.empty((len(shares), 3), dtype=np.int64)
-    for place, part in enumerate(block.parts):
-        ka, kc = names_of(part.basis, representation)
-        order = np.argsort(kc if representation == "IIIl" else ka)
-        rows = np.flatnonzero(part_of_state == place)  # by energy
-        names[rows[::-1] if oblate else rows] = np.column_stack([np.full_like(ka, part.v), ka, kc])[order]
-    return names, shares
 
 
 def places(functions: Functions, energies: Floats, diag: int, diagonal: Diagonal = Diagonal.RISES) -> Ints:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import field, replace
+from dataclasses import replace
 from math import gcd
 
 import numpy as np
@@ -34,7 +34,6 @@ from rotor.formats.spcat.hamiltonian.symmetry import halved_across
 from rotor.formats.spcat.model import fold_parts, option_weights
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
-from rotor.frozen import dataclass
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
 from rotor.tops.constants import AxisOrderError, Constants
 from rotor.tops.spins.spin_constants import SpinConstants, is_isotope
@@ -251,28 +250,18 @@ def _states(
 # spins
 
 
-@dataclass
-class _Sum:
-    """Terms of one kind with the same spins, powers and states: matrices along a, b, c (or numbers), and their errors."""
+def _elements(kind: str, terms: list[tuple[Floats, float]]) -> dict[str, tuple[float, float | None]]:
+    """The elements of a tensor by name, each with its error if it comes from one parameter.
 
-    kind: str
-    values: list[Floats] = field(default_factory=list)
-    errors: list[float] = field(default_factory=list)
-
-    def named(self) -> dict[str, tuple[float, float | None]]:
-        """Elements by name, each with its error if it comes from one parameter."""
-        total = np.sum(self.values, axis=0)
-        out: dict[str, tuple[float, float | None]] = {}
-        for letters in _letters(self.kind, total):
-            parts = [_element(matrix, letters) for matrix in self.values]
-            spreads = [abs(part) * error for part, error in zip(parts, self.errors, strict=True) if part]
-            has_error = len(spreads) == 1 and spreads[0] > 0
-            value = float(f"{_element(total, letters):.15g}")
-            out[f"{self.kind}_{letters}" if letters else self.kind] = (
-                value,
-                float(f"{spreads[0]:.12g}") if has_error else None,
-            )
-        return out
+    terms: of one kind with the same spins, powers and states: matrices along a, b, c (or numbers), and their relative errors.
+    """
+    total = np.sum([matrix for matrix, _ in terms], axis=0)
+    out: dict[str, tuple[float, float | None]] = {}
+    for letters in _letters(kind, total):
+        spreads = [abs(part) * error for matrix, error in terms if (part := _element(matrix, letters))]
+        error = float(f"{spreads[0]:.12g}") if len(spreads) == 1 and spreads[0] > 0 else None
+        out[f"{kind}_{letters}" if letters else kind] = float(f"{_element(total, letters):.15g}"), error
+    return out
 
 
 def _letters(kind: str, total: Floats) -> list[str]:
@@ -303,7 +292,7 @@ def _spins(
 ) -> SpinConstants | None:
     sizes, called = states[0].spins, _spin_names(rows, states[0].spins)
     equivalent = states[0].equivalent
-    sums: dict[tuple[str, str], _Sum] = {}
+    sums: dict[tuple[str, str], list[tuple[Floats, float]]] = {}
     for line in rows:
         parameter = line.parameter
         if line.operator.rotor is None:
@@ -318,26 +307,22 @@ def _spins(
         state_suffix = "" if line.states is None or len(states) == 1 else f"[{','.join(map(str, _once(line.states)))}]"
         spins = ",".join(called[place - 1] for place in _once(sorted(o.spins)))
         key = kind, f"{_with_powers('', o.n2, o.nz2, o.ns)}({spins}){state_suffix}"
-        term_sum = sums.setdefault(key, _Sum(kind))
-        term_sum.values.append(value * (matrix[::-1, ::-1] if turned and matrix.ndim else matrix))
         spread = parameter.error or 0.0
-        term_sum.errors.append(spread / abs(value) if errors and spread > HELD_BELOW and value else 0.0)
-    values: dict[str, float] = {}
-    spreads: dict[str, float] = {}
-    for (_, rest), term_sum in sums.items():
-        for symbol, (value, error) in term_sum.named().items():
-            values[symbol + rest] = value
-            if error:
-                spreads[symbol + rest] = error
+        relative = spread / abs(value) if errors and spread > HELD_BELOW and value else 0.0
+        sums.setdefault(key, []).append((value * (matrix[::-1, ::-1] if turned and matrix.ndim else matrix), relative))
     if not sizes:
         return None
+    named = {
+        symbol + rest: element
+        for (kind, rest), terms in sums.items()
+        for symbol, element in _elements(kind, terms).items()
+    }
+    values = {name: value for name, (value, _) in named.items()}
+    spreads = {name: error for name, (_, error) in named.items() if error}
     totals = dict.fromkeys(called[len(called) - equivalent :], "I") if equivalent else {}
-    # whose functions WTPL and WTMN never count
-    twice, weights_are_of_others = (
-        dict(zip(called, sizes, strict=True)),
-        equivalent == 2,
-    )
-    return SpinConstants(values, twice, uncertainties=spreads, totals=totals, weights_of_others=weights_are_of_others)
+    twice = dict(zip(called, sizes, strict=True))
+    # WTPL and WTMN never count the functions of two equivalent spins
+    return SpinConstants(values, twice, uncertainties=spreads, totals=totals, weights_of_others=equivalent == 2)
 
 
 def _spin_names(rows: list[CodedLine], sizes: tuple[int, ...]) -> list[str]:
