@@ -16,7 +16,7 @@ K do at high K, round-off would mix them and give a spurious derivative.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -44,18 +44,17 @@ from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation
 
-_SYMMETRIES = range(4)  # species of the group of twofold rotations; an operator of symmetry s connects t with s ^ t
-
-Place = tuple[int, int, int]  # the two states and the symmetry of an operator
+_SYMMETRIES = 4  # species of the group of twofold rotations; an operator of symmetry s connects t with s ^ t
 
 
 def left_at_zero(file: ParameterFile) -> frozenset[int]:
     """Places of parameters of value 0 that are held, or that connect otherwise unconnected sets and therefore remain 0."""
     coded = coded_file(file)
-    places = _places(coded)
-    acting = (place for place, p in zip(places, file.parameters, strict=True) if place and p.value)
-    set_of_node = _sets(acting, len(coded.states))
-    apart = [place is not None and all(set_of_node[a] != set_of_node[b] for a, b in _edges(place)) for place in places]
+    edges = [_edges(coded, digits) for digits in coded.digits]
+    acting = (edge for each, p in zip(edges, file.parameters, strict=True) if p.value for edge in each)
+    parts = connected_parts(_SYMMETRIES * len(coded.states), acting)
+    set_of_node = {node: number for number, part in enumerate(parts) for node in part}
+    apart = [bool(each) and all(set_of_node[a] != set_of_node[b] for a, b in each) for each in edges]
     return frozenset(
         i for i, p in enumerate(file.parameters) if not p.value and (p.constrained or is_held(p) or apart[i])
     )
@@ -67,33 +66,16 @@ def stay_at_zero(file: ParameterFile) -> list[str]:
     return [p.label or str(p.code) for p in remaining if not (p.constrained or is_held(p))]
 
 
-def _places(coded: CodedFile) -> list[Place | None]:
-    """States and symmetry of the operator of each parameter without spins between definite states; None for others."""
-    if any(state.spins for state in coded.states) or coded.pairs:
-        return [None] * len(coded.digits)
-    return [_place(digits, len(coded.states)) for digits in coded.digits]
-
-
-def _place(digits: Digits, states: int) -> Place | None:
-    """States and symmetry of a code; None with spins or for all states."""
-    both = digits.states(states)
-    if digits.is_series or digits.is_constant or digits.kind is Kind.LEVEL or both is None or max(both) >= states:
-        return None
-    return (*both, ("", "a", "b", "c").index(digits.tensor.axis))
-
-
-def _sets(places: Iterable[Place], states: int) -> dict[int, int]:
-    """Number of the connected set of each node, 4 v + symmetry."""
-    edges = (edge for place in places for edge in _edges(place))
-    return {node: i for i, part in enumerate(connected_parts(len(_SYMMETRIES) * states, edges)) for node in part}
-
-
-def _edges(place: Place) -> list[tuple[int, int]]:
-    """The pairs of nodes that an operator connects."""
-    low, high, symmetry = place
-    return [
-        (len(_SYMMETRIES) * low + species, len(_SYMMETRIES) * high + (species ^ symmetry)) for species in _SYMMETRIES
-    ]
+def _edges(coded: CodedFile, digits: Digits) -> list[tuple[int, int]]:
+    """The pairs of sets 4 v + symmetry that a code without spins connects between definite states; none for others."""
+    both = digits.states(len(coded.states))
+    if both is None or max(both) >= len(coded.states) or any(state.spins for state in coded.states) or coded.pairs:
+        return []
+    if digits.is_series or digits.is_constant or digits.kind is Kind.LEVEL:
+        return []
+    symmetry = ("", "a", "b", "c").index(digits.tensor.axis)
+    low, high = (_SYMMETRIES * v for v in both)
+    return [(low + species, high + (species ^ symmetry)) for species in range(_SYMMETRIES)]
 
 
 _NO_REQUEST = IntensityFile("", Request(), ())
@@ -195,7 +177,9 @@ def _with_labels(
     group: Group, form: Format, labels: Ints, names: Sequence[str], values: Floats
 ) -> list[AssignedLevels]:
     """Assign labels to the levels of a group by their quantum numbers, a few F at a time."""
-    here = _group_places(group, form, labels)
+    here = np.arange(len(labels))
+    if form.states:
+        here = np.flatnonzero(np.isin(labels[:, form.rotation], [state.number for state in group.states]))
     if not len(here):
         return []
     total = labels[here, -1] if form.spins else labels[here, 0]
@@ -268,7 +252,9 @@ def _label_rows(group: Group, levels: Levels, form: Format, labels: Ints) -> Int
     for negative in (True, False):
         for row, label in enumerate(map(tuple, listed_quanta(group, levels, form, negative).tolist())):
             rows_by_label.setdefault(label, row)
-    return np.array([_row(rows_by_label, tuple(label), form) for label in labels.tolist()])
+    if form.rotation == 2:  # a label without a level is that of the opposite sign of K
+        rows_by_label = {(n, -k, *others): row for (n, k, *others), row in rows_by_label.items()} | rows_by_label
+    return np.array([rows_by_label.get(tuple(label), -1) for label in labels.tolist()])
 
 
 def _parameter_columns(group: Group, names: Sequence[str], values: Floats) -> tuple[Ints, Floats]:
@@ -312,22 +298,6 @@ def _label_functions(group: Group, levels: Levels) -> Functions:
         return functions.amplitudes, functions.names
 
     return functions_of
-
-
-def _group_places(group: Group, form: Format, labels: Ints) -> Ints:
-    """Places of the labels whose state belongs to the group."""
-    if not form.states:
-        return np.arange(len(labels))
-    numbers = [state.number for state in group.states]
-    return np.flatnonzero(np.isin(labels[:, form.rotation], numbers))
-
-
-def _row(rows: dict[tuple[int, ...], int], label: tuple[int, ...], form: Format) -> int:
-    """The row of a label, else of the label with the opposite sign of K, -1 if there is none."""
-    if label in rows or form.rotation != 2:
-        return rows.get(label, -1)
-    turned = (label[0], -label[1], *label[2:])
-    return rows.get(turned, -1)
 
 
 HIGHEST_SEARCHED = 9  # highest F that is tried for a level with F below 0 if |F| has none

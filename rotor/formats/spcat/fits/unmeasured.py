@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import prod
-
 import numpy as np
 
 from rotor.arrays import Floats, Ints
@@ -15,14 +13,13 @@ from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.spins.levels import unmixed_levels
 
 _WIDER = 0.01  # relative distance by which a line may lie outside the measured frequencies
-_MOST_NUMBERS = 2**62  # most labels that an integer can number
 
 
 def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, Ints]:
     """Labels (n, k) of both states of the lines with the same changes of quantum numbers as a measured line.
 
     The states are the same as the measured line's (v), N is at most the highest measured, the frequency within the measured range,
-    where spins do not count. Raises ValueError where a file has so many quantum numbers that labels cannot be counted.
+    where spins do not count.
 
     file: parameters near the fitted ones. measured: measured lines; F below 0 and energies are ignored.
     """
@@ -40,23 +37,26 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
     v = form.rotation if form.states else 0
     state = seen.lower[:, v] if form.states else np.zeros(len(seen), dtype=np.int64)
     changes = np.unique(np.column_stack([state, seen.upper - seen.lower]), axis=0)
-    number = _Numbering(np.concatenate([labels, seen.upper, seen.lower]), changes[:, 1:])
-    measured_pairs = set(zip(number.of(seen.upper).tolist(), number.of(seen.lower).tolist(), strict=True))
-    rows = number.of(labels)
-    order = np.argsort(rows)
+    every = np.concatenate([labels, seen.upper, seen.lower])
+    least = every.min(axis=0) + np.minimum(changes[:, 1:].min(axis=0, initial=0), 0)
+    spans = every.max(axis=0) + np.maximum(changes[:, 1:].max(axis=0, initial=0), 0) - least + 1
+
+    def number(rows: Ints) -> Ints:
+        return np.asarray(np.ravel_multi_index(tuple((rows - least).T), spans.tolist()))
+
+    measured_pairs = set(zip(number(seen.upper).tolist(), number(seen.lower).tolist(), strict=True))
+    numbers = number(labels)  # rising, as the labels do
     low_mhz = float(seen.frequency_mhz.min()) * (1 - _WIDER)  # a little beyond the measured band
     high_mhz = float(seen.frequency_mhz.max()) * (1 + _WIDER)
     pairs = []
     for change in changes:
         lower = np.flatnonzero(labels[:, v] == change[0]) if form.states else np.arange(len(labels))
-        goal = number.of(labels[lower] + change[1:])
-        place = np.minimum(np.searchsorted(rows[order], goal), len(rows) - 1)
-        upper = order[place]
+        goal = number(labels[lower] + change[1:])
+        upper = np.minimum(np.searchsorted(numbers, goal), len(numbers) - 1)
         frequency = energies[upper] - energies[lower]
-        chosen = (rows[upper] == goal) & (frequency > low_mhz) & (frequency < high_mhz)
-        new = [(i, k) for i, k in zip(upper[chosen].tolist(), lower[chosen].tolist(), strict=True)
-               if (int(rows[i]), int(rows[k])) not in measured_pairs]  # fmt: skip
-        pairs += new
+        chosen = (numbers[upper] == goal) & (frequency > low_mhz) & (frequency < high_mhz)
+        new = zip(upper[chosen].tolist(), lower[chosen].tolist(), strict=True)
+        pairs += [(i, k) for i, k in new if (int(numbers[i]), int(numbers[k])) not in measured_pairs]
     table = np.array(pairs, dtype=np.int64).reshape(-1, 2)
     return labels[table[:, 0]], labels[table[:, 1]]
 
@@ -77,18 +77,3 @@ def _group_labels(group: Group, form: Format, highest: int) -> tuple[Ints, Float
     labels = np.concatenate(tables)
     inside = labels[:, 0] <= highest
     return labels[inside], np.tile(levels.energy_mhz, len(tables))[inside]
-
-
-class _Numbering:
-    """An integer for each label, so that labels can be searched."""
-
-    def __init__(self, labels: Ints, changes: Ints) -> None:
-        self._least = labels.min(axis=0) + np.minimum(changes.min(axis=0, initial=0), 0)
-        spans = labels.max(axis=0) + np.maximum(changes.max(axis=0, initial=0), 0) - self._least + 1
-        if prod(spans.tolist()) > _MOST_NUMBERS:  # int64 keys of all labels must not overflow
-            raise ValueError("so many quantum numbers cannot be counted: no line can be suggested for this file")
-        self._steps = np.array([prod(spans[i + 1 :].tolist()) for i in range(len(spans))], dtype=np.int64)
-
-    def of(self, labels: Ints) -> Ints:
-        """Numbers (n,) of labels (n, k)."""
-        return np.asarray((labels.astype(np.int64) - self._least) @ self._steps)

@@ -42,7 +42,6 @@ BY_DIAG = (1, 2, 4, 5)  # values of DIAG whose labels differ from the default on
 _OF_WANG = (0, 2)  # values of DIAG that group by Wang blocks
 _BY_DIAGONAL = (2, 5)
 _ANEW = (2, 4, 5)  # values of DIAG whose order of labels depends on the constants
-_CLEAR = 0.5  # a larger weight is the largest of its state
 _EQUAL = 1e-11  # diagonal elements of the two functions of one K agree within this fraction of the largest energy
 
 
