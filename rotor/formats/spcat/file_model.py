@@ -25,7 +25,14 @@ from rotor.formats.spcat.hamiltonian.dipole_codes import (
 )
 from rotor.formats.spcat.hamiltonian.file_effect import FileEffect
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l
-from rotor.formats.spcat.hamiltonian.labels import BY_DIAG, named_by, refuse_other_functions, without_diagonalization
+from rotor.formats.spcat.hamiltonian.labels import (
+    BY_DIAG,
+    Diagonal,
+    falls_with_k,
+    named_by,
+    refuse_other_functions,
+    without_diagonalization,
+)
 from rotor.formats.spcat.hamiltonian.phases import (
     Phases,
     by_order,
@@ -34,7 +41,6 @@ from rotor.formats.spcat.hamiltonian.phases import (
     turned_odd_axes,
     with_dipoles,
 )
-from rotor.formats.spcat.hamiltonian.roll_over import Diagonal, falls_with_k
 from rotor.formats.spcat.hamiltonian.states import ALL_K, StateOptions, file_states
 from rotor.formats.spcat.hamiltonian.symmetry import (
     SpeciesPairs,

@@ -16,7 +16,7 @@ from spcat_fits import fit_of_prediction
 from rotor.cli import run
 from rotor.fitting.fit import fit_lines
 from rotor.formats.spcat.fits.fit_input import read_fit
-from rotor.formats.spcat.hamiltonian.roll_over import connected_groups, falls_with_k
+from rotor.formats.spcat.hamiltonian.labels import connected_groups, falls_with_k
 from rotor.formats.spcat.predict import Prediction, predict
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import ParameterFile, format_par, read_par

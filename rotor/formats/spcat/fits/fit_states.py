@@ -29,8 +29,14 @@ from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind
 from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, coded_file, line_names
 from rotor.formats.spcat.hamiltonian.codes import is_held
 from rotor.formats.spcat.hamiltonian.l_doubled import functions_by_l, named_by_l
-from rotor.formats.spcat.hamiltonian.labels import has_other_names, named_by, naming_by, over_basis, spin_naming_by
-from rotor.formats.spcat.hamiltonian.roll_over import Diagonal
+from rotor.formats.spcat.hamiltonian.labels import (
+    Diagonal,
+    has_other_names,
+    named_by,
+    naming_by,
+    over_basis,
+    spin_naming_by,
+)
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.connected import connected_parts

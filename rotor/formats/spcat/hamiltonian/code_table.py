@@ -106,16 +106,16 @@ class Symmetry(NamedTuple):
 class Digits(NamedTuple):
     """The fields of a code."""
 
-    ex: int
-    ff: int
-    i2: int
-    i1: int
-    ns: int
-    typ: int
-    ksq: int
-    nsq: int
-    v2: int
-    v1: int
+    ex: int = 0
+    ff: int = 0
+    i2: int = 0
+    i1: int = 0
+    ns: int = 0
+    typ: int = 0
+    ksq: int = 0
+    nsq: int = 0
+    v2: int = 0
+    v1: int = 0
 
     @property
     def row(self) -> Row:

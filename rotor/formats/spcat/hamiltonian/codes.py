@@ -59,7 +59,7 @@ def term_code(p: int, q: int, n: int) -> int:
     >>> [term_code(*term) for term in ((1, 0, 0), (0, 1, 0), (1, 0, 1), (0, 0, 4))]
     [100, 1000, 40100, 70000]
     """
-    return join_code(Digits(0, 0, 0, 0, 0, typ=ladder_typ(n), ksq=q, nsq=p, v2=0, v1=0))
+    return join_code(Digits(typ=ladder_typ(n), ksq=q, nsq=p))
 
 
 def _named(terms: Iterable[tuple[str, Operators]]) -> tuple[Named, ...]:
@@ -152,7 +152,7 @@ def _distortion_factors(codes: Iterable[int], kind: str, reduction: str | None) 
     return factors
 
 
-SQUARES = {join_code(Digits(0, 0, 0, 0, 0, square_typ(x), 0, 0, 0, 0)): x.upper() for x in "abc"}
+SQUARES = {join_code(Digits(typ=square_typ(x))): x.upper() for x in "abc"}
 MEAN, ALONG, ACROSS = term_code(1, 0, 0), term_code(0, 1, 0), term_code(0, 0, 1)  # N², Nz², N₊² + N₋²
 _RIGID = (*SQUARES, MEAN, ALONG, ACROSS)
 

@@ -90,29 +90,24 @@ def _set(series: Series, d: Digits, parameter: Parameter, pair: tuple[int, int])
         )
 
 
-def series_term(d: Digits, axes: str, series: Series, states: tuple[int, int]) -> CodedOperator:
-    """The operator of a code with a series, between two states, lower first.
+def coded_operator(d: Digits, axes: str, series: Series, states: tuple[int, int] | None) -> CodedOperator:
+    """The operator of a code, with a series by its elements over |J k⟩.
 
-    d: fields of the code. axes: the axes x, y, z: bca or bac. series: the constants of the file. states: states whose constants apply.
-    Returns: the operator by its elements over |J k⟩.
-    Raises ValueError for two series at once, and for an unsupported base operator.
+    d: fields of the code. axes: the axes x, y, z: bca or bac. series: the constants of the file. states: states whose constants apply,
+    lower first; None for all.
+    Raises ValueError as `code_operator`, and for two series at once.
     """
+    if states is None or not d.is_series:
+        return level_term(d, axes) if d.kind is Kind.LEVEL else code_operator(d, axes)
     euler = d.kind is Kind.EULER
     if euler and d.spins and d.typ != d.row.first:
         raise ValueError(f"a spin with TYP {d.typ}, which SPCAT passes over: EX with TYP 4 and above has one")
     if d.kind is Kind.LEVEL or (d.ff and (d.ex or euler)) or (d.ex and euler):
         raise ValueError("a code has one series alone, and no energy of one K (TYP 80 to 89) with it")
-    if d.ff:
-        base = code_operator(d._replace(ff=0), axes)
-        return _multiplied(base, k_factor(d.harmonic, d.sine, series, states), d.sine, axes)
-    return _euler(d, axes, series, states)
-
-
-def coded_operator(d: Digits, axes: str, series: Series, states: tuple[int, int] | None) -> CodedOperator:
-    """The operator of a code, with a series between two states; see `code_operator` and `series_term`."""
-    if states is not None and d.is_series:
-        return series_term(d, axes, series, states)
-    return level_term(d, axes) if d.kind is Kind.LEVEL else code_operator(d, axes)
+    if not d.ff:
+        return _euler(d, axes, series, states)
+    base = code_operator(d._replace(ff=0), axes)
+    return _multiplied(base, k_factor(d.harmonic, d.sine, series, states), d.sine, axes)
 
 
 def level_term(d: Digits, axes: str, sine: bool = False) -> CodedOperator:

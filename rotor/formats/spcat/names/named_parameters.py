@@ -65,11 +65,6 @@ def constant_codes(constants: TopConstants) -> Codes:
     return _rotational_codes(constants) | _interaction_codes(constants)
 
 
-def _scheme(constants: TopConstants) -> Scheme | None:
-    scheme = scheme_of(constants.top, constants.effects)
-    return scheme if scheme.spins else None
-
-
 def _states(constants: TopConstants) -> int:
     return 1 if constants.top.states is None else constants.top.states.count
 
@@ -80,7 +75,7 @@ def _rotational_codes(constants: TopConstants) -> Codes:
     for v in range(states):
         values: dict[str, Any] = dict(top.constants.values) if v == 0 or top.states is None else top.states.for_state(v)
         if v:
-            out[join_code(Digits(0, 0, 0, 0, 0, 0, 0, 0, v, v), states)] = {f"E[{v}]": 1.0}
+            out[join_code(Digits(v2=v, v1=v), states)] = {f"E[{v}]": 1.0}
             values.pop("E", None)
         state_constants = Constants(
             kind=constants.kind, reduction=constants.reduction, representation=constants.representation, **values
@@ -94,7 +89,8 @@ def _rotational_codes(constants: TopConstants) -> Codes:
 
 def _interaction_codes(constants: TopConstants) -> Codes:
     """Factors of interactions and spin constants."""
-    out, scheme, oblate = Codes(), _scheme(constants), is_oblate(constants.top.constants)
+    out, states, oblate = Codes(), _states(constants), is_oblate(constants.top.constants)
+    scheme = scheme_of(constants.top, constants.effects)
     terms = {
         term.name: term
         for effect in constants.effects
@@ -103,24 +99,21 @@ def _interaction_codes(constants: TopConstants) -> Codes:
     }
     for name in constants.values:
         factors: dict[Digits, float] = {}
-        if name in terms and scheme is not None:
+        if name in terms:
             factors = _spin_codes(parse_name(name), terms[name], scheme, constants, oblate)
         elif "," in name:
             parts = parse_name(name)
             assert parts.states is not None
             typ, (low, high) = TYPES_BETWEEN[parts.symbol], parts.states
             sign = -1.0 if oblate and parts.symbol.startswith("G") else 1.0
-            factors = {Digits(0, 0, 0, 0, 0, typ, parts.nz2, parts.n2, low, high): sign}
+            factors = {Digits(typ=typ, ksq=parts.nz2, nsq=parts.n2, v2=low, v1=high): sign}
         for digits, factor in factors.items():
-            out.setdefault(_code(name, digits, _states(constants)), {})[name] = factor
+            if digits.nsq > 9 or digits.ksq > 9:
+                raise ValueError(
+                    f"{name}: SPFIT's codes have powers of N² and of Nz² up to 9 (J and K to the power 18)"
+                )
+            out.setdefault(join_code(digits, states), {})[name] = factor
     return out
-
-
-def _code(name: str, digits: Digits, states: int) -> int:
-    """The code with these fields."""
-    if digits.nsq > 9 or digits.ksq > 9:
-        raise ValueError(f"{name}: SPFIT's codes have powers of N² and of Nz² up to 9 (J and K to the power 18)")
-    return join_code(digits, states)
 
 
 def _spin_codes(
@@ -131,7 +124,7 @@ def _spin_codes(
     i1, i2 = max(places), (min(places) if len(places) == 2 else 0)
     wild = 0 if states == 1 else all_states_digit(states)
     v1, v2 = (wild, wild) if parts.states is None else (max(parts.states), min(parts.states))
-    base = Digits(0, 0, i2, i1, parts.ns, 0, parts.nz2, parts.n2, v2, v1)
+    base = Digits(i2=i2, i1=i1, ns=parts.ns, ksq=parts.nz2, nsq=parts.n2, v2=v2, v1=v1)
     rotor = term.rotor
     if not isinstance(rotor, Cosines | CosinesWithN):
         return {base: term.factor}
