@@ -185,18 +185,14 @@ def _numbered(*tables: NDArray[Any]) -> list[Rows]:
 
 def _keys(left: Catalogue, right: Catalogue, width: int) -> list[Rows]:
     """An integer for each line of both catalogues, from its label and its place among lines with this label."""
-    codes = _numbered(_labels(left, width), _labels(right, width))
-    places = [_place_within(code) for code in codes]
+    codes, places = _numbered(_labels(left, width), _labels(right, width)), []
+    for code in codes:
+        order = np.argsort(code, kind="stable")  # stable: rows of one label keep their order
+        place = np.empty(len(code), dtype=np.int64)
+        place[order] = np.arange(len(code)) - np.searchsorted(code[order], code[order])
+        places.append(place)
     most = 1 + max(int(place.max(initial=0)) for place in places)
     return [code * most + place for code, place in zip(codes, places, strict=True)]
-
-
-def _place_within(code: Rows) -> Rows:
-    """Number of earlier lines with the same code, (n,)."""
-    order = np.argsort(code, kind="stable")  # stable: rows of one label keep their order
-    place = np.empty(len(code), dtype=np.int64)
-    place[order] = np.arange(len(code)) - np.searchsorted(code[order], code[order])
-    return place
 
 
 class Agreement(NamedTuple):

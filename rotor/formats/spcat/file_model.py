@@ -150,21 +150,23 @@ class Group:
         v, ka, kc = labels[:, 0], labels[:, 1], labels[:, 2]
         if self.top.kind in ("prolate", "oblate"):
             return np.asarray(ka <= self.axial_kmax)
-        exists = np.zeros(len(labels), dtype=bool)
-        for place, state in enumerate(self.states):
-            odd = state.odd_spins({"i_tot": labels[:, -2] // 2, "i_sym": labels[:, -3] // 2}) if state.i_tot else 0
-            exists |= (v == place) & (state.weights(ka, kc, kc if self.oblate else ka, odd) > 0)
-        return exists
+        totals = {"i_tot": labels[:, -2] // 2, "i_sym": labels[:, -3] // 2} if self.states[0].i_tot else {}
+        return self._component_weights(v, ka, kc, kc if self.oblate else ka, totals) > 0
 
     def _weights(self, levels: Levels) -> Ints:
         """Weights of levels, summed over components."""
-        quanta, v = levels.quanta, levels.quantum("v")
-        total = np.zeros(len(levels), dtype=np.int64)
-        for place, state in enumerate(self.states):
-            for ka, kc, k, alike in _components(levels, self.oblate):
-                component_weight = np.where(k <= self.axial_kmax, state.weights(ka, kc, k, state.odd_spins(quanta)), 0)
-                total += np.where((v == place) & alike, np.maximum(component_weight, 0), 0)
+        total, v = np.zeros(len(levels), dtype=np.int64), levels.quantum("v")
+        for ka, kc, k, alike in _components(levels, self.oblate):
+            total += np.where(alike, self._component_weights(v, ka, kc, k, levels.quanta), 0)
         return total
+
+    def _component_weights(self, v: Ints, ka: Ints, kc: Ints, k: Ints, totals: Mapping[str, Ints]) -> Ints:
+        """Weights of components with these labels (n,); 0 for those that do not exist. totals: with the total spins among them."""
+        weights = np.zeros(len(v), dtype=np.int64)
+        for place, state in enumerate(self.states):
+            exists = (v == place) & (k <= self.axial_kmax)
+            weights += np.where(exists, np.maximum(state.weights(ka, kc, k, state.odd_spins(totals)), 0), 0)
+        return weights
 
 
 def _components(levels: Levels, oblate: bool) -> list[tuple[Ints, Ints, Ints, Ints]]:
@@ -289,7 +291,11 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     kind = _kind(states, usable, oblate, first.spind < 0)
     if kind in ("prolate", "oblate") and beside:
         kind = "asymmetric"  # |N K⟩ does not distinguish K from -K, which such moments may exchange
-    limits = {} if kind in ("linear", "prolate", "oblate") else _limits(states)
+    limits = {
+        place: (state.kmin, state.kmax)
+        for place, state in enumerate(states)
+        if kind == "asymmetric" and (state.kmin > 0 or state.kmax < ALL_K)
+    }
     coupled = coupled_spins(states[0], first)
     turned = _turned(usable, light, doubled)
     if light.phases.odd:
@@ -371,12 +377,6 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
     if symmetric and whole and good and states[0].equivalent < 3 and not any(line.operator.of_n for line in lines):
         return "oblate" if oblate else "prolate"
     return "asymmetric"
-
-
-def _limits(states: list[StateOptions]) -> dict[int, tuple[int, int]]:
-    """KNMIN and KNMAX by state, where they restrict the basis."""
-    cut = [(place, state) for place, state in enumerate(states) if state.kmin > 0 or state.kmax < ALL_K]
-    return {place: (state.kmin, state.kmax) for place, state in cut}
 
 
 # spins

@@ -52,16 +52,12 @@ def _estimated(parameter: Parameter) -> float:
     return error if HELD_BELOW <= error < FREE_ABOVE and not parameter.constrained else 0.0
 
 
-def _is_numeric(line: str) -> bool:
-    return not line.strip() or line.strip()[0] in "+-.0123456789"
-
-
 def _correlations(file: ParameterFile) -> Floats:
     """V (k, k), upper triangular; (0, 0) if the file has none.
 
     As in SPCAT (`getpar`, `getvar`), V is ignored after fewer parameters than NPAR, and so is text after the parameters, such as another
     list."""
-    rows = list(takewhile(_is_numeric, file.rest.splitlines()))
+    rows = list(takewhile(lambda line: line.strip()[:1] in "+-.0123456789", file.rest.splitlines()))
     if len(file.parameters) < file.header.npar:
         rows = []
     words = [line[i : i + _WIDTH] for line in rows for i in range(0, len(line.rstrip()), _WIDTH)]
@@ -77,6 +73,5 @@ def _correlations(file: ParameterFile) -> Floats:
             f"{len(values)} correlations stand at the end of the file; k (k + 1)/2 are needed for k parameters"
         )
     out = np.zeros((size, size))
-    for column in range(size):
-        out[: column + 1, column] = values[column * (column + 1) // 2 : (column + 1) * (column + 2) // 2]
+    out.T[np.tril_indices(size)] = values
     return out

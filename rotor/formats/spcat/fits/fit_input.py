@@ -236,7 +236,11 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
     widths = _widths(lines, blends, used, header)
     used &= blends >= 0
     upper, lower = lines.states()
-    _refuse_width(lines, names, used)
+    if len(wrong := np.flatnonzero(used & (lines.counts != len(names)))):
+        raise LineWidthError(
+            f"line {wrong[0] + 1} has {lines.counts[wrong[0]]} quantum numbers for each state; these constants have "
+            f"{len(names)} ({', '.join(names)})"
+        )
     wavenumber = lines.error < 0
     scale = np.where(wavenumber, header.cal, 1.0)  # SPFIT multiplies what it calculates in cm⁻¹ by CAL
     frequency, error = lines.frequency_mhz / scale, lines.error_mhz / scale
@@ -256,15 +260,6 @@ def _widths(lines: LineList, blends: Ints, used: np.ndarray, header: Header) -> 
         scale = header.cal if lines.error[i] < 0 else 1.0
         widths[int(blends[:i][blends[:i] >= 0][-1])] = float(lines.error_mhz[i] / scale)
     return widths
-
-
-def _refuse_width(lines: LineList, names: Sequence[str], used: np.ndarray) -> None:
-    """Raise ValueError for a line with fewer or more quantum numbers than the top has."""
-    if len(wrong := np.flatnonzero(used & (lines.counts != len(names)))):
-        raise LineWidthError(
-            f"line {wrong[0] + 1} has {lines.counts[wrong[0]]} quantum numbers for each state; these constants have "
-            f"{len(names)} ({', '.join(names)})"
-        )
 
 
 def _notes(file: ParameterFile, options: FitOptions, plain: bool, lines: Assignments) -> list[str]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from enum import Enum
 from functools import lru_cache
-from math import sqrt
 from typing import NamedTuple
 
 from rotor.frozen import dataclass
@@ -86,10 +85,6 @@ class Tensor(NamedTuple):
         k = self.rank - (self.rank % 2 if along in ("z", "") else 1 - self.rank % 2)
         return k, along == ("x" if k == self.rank else "y") or (along == "z" and k < self.rank)
 
-    def factor_below(self) -> float:
-        """Factor of {Z, N₊^(L-1)} with its conjugate: ¼ √(2L), twice that without an axis."""
-        return sqrt(2 * self.rank) * (0.25 if self.axis else 0.5)
-
 
 class Symmetry(NamedTuple):
     """Symmetry of a code: its axis, whether time reversal changes its sign, its change of K, and whether it is a square Na², Nb², Nc².
@@ -143,11 +138,6 @@ class Digits(NamedTuple):
         if self.kind is Kind.EULER:
             return (self.typ - self.row.first) // 2
         return self.tensor.rank // 2 if self.kind is Kind.LADDER else 0
-
-    @property
-    def level_k(self) -> int:
-        """K of an energy of one K."""
-        return 10 * (self.typ - self.row.first) + self.ksq
 
     @property
     def spins(self) -> tuple[int, ...]:

@@ -68,16 +68,13 @@ def _named(terms: Iterable[tuple[str, Operators]]) -> tuple[Named, ...]:
     return tuple(Named(name, term_code(*powers), int(sign)) for name, powers, sign in signed_terms)
 
 
-def _by_order(term: tuple[str, Operators]) -> tuple[int, int]:
-    """Sorting key of terms: by order (quartic, sextic, ...), terms diagonal in K first."""
-    powers = next(iter(term[1]))
-    return sum(powers), powers[2]
-
-
 LINEAR, SYMMETRIC, S_REDUCTION = (
     _named(t.items()) for t in (published.LINEAR, published.SYMMETRIC, published.S_REDUCTION)
 )
-A_REDUCTION = _named(sorted(published.A_REDUCTION.items(), key=_by_order))
+# by order (quartic, sextic, ...), terms diagonal in K first
+A_REDUCTION = _named(
+    sorted(published.A_REDUCTION.items(), key=lambda term: [(sum(powers), powers[2]) for powers in term[1]])
+)
 
 
 def _whole_code(parameter: Parameter) -> int:
@@ -222,16 +219,12 @@ def code_factors(constants: Constants) -> Factors:
         rigid = {ALONG: {axis: 1.0, "B": -1.0}} | rigid
     vocabulary = _vocabulary(constants.kind, constants.reduction)
     named = {item.code: {item.name: float(item.sign)} for item in vocabulary if item.name in constants}
-    unnamed = [name for name in constants.values if name not in (*RIGID, *(item.name for item in vocabulary))]
-    return rigid | named | {_operator_code(name): {name: 1.0} for name in unnamed}
-
-
-def _operator_code(name: str) -> int:
-    """The code of a spelled operator such as `J4Jz2Jpm2`."""
-    powers = spelled_powers(name)
-    if powers is None:
-        raise ValueError(f"{name}: SPFIT's files have no code for it; leave it out")
-    return term_code(*powers)
+    spelled: Factors = {}
+    for name in [name for name in constants.values if name not in (*RIGID, *(item.name for item in vocabulary))]:
+        if (powers := spelled_powers(name)) is None:
+            raise ValueError(f"{name}: SPFIT's files have no code for it; leave it out")
+        spelled[term_code(*powers)] = {name: 1.0}
+    return rigid | named | spelled
 
 
 FIXED = 1e-37  # error of a parameter that is not fitted

@@ -67,7 +67,9 @@ def tensor_operator(tensor: Tensor, spins: int, axes: str) -> Operator:
     if tensor.axis or tensor.odd:
         k, cosine = tensor.shape(z)
         frame = "cba" if z == "a" else "abc"
-        factor = (0.5 if k == order else tensor.factor_below()) * imaginary(axes, tensor.odd)
+        # ¼ √(2L) in front of {Z, N₊^(L-1)} with its conjugate, twice that without an axis
+        below = np.sqrt(2 * order) * (0.25 if tensor.axis else 0.5)
+        factor = (0.5 if k == order else below) * imaginary(axes, tensor.odd)
         if k == 0:
             return imaginary(axes, True) * (
                 direction_cosine(z, basis_of(axes)) if rank else components(basis_of(axes))[z]

@@ -116,7 +116,7 @@ def level_term(d: Digits, axes: str, sine: bool = False) -> CodedOperator:
         raise ValueError("a power of N·S of one K is read but not computed yet")
 
     def factor_for_k(m: Ints, n: Ints, above: Ints, below: Ints) -> Floats:
-        chosen = (np.abs(above) == d.level_k) & (above == below)
+        chosen = (np.abs(above) == 10 * (d.typ - d.row.first) + d.ksq) & (above == below)
         return np.asarray(chosen * (np.sign(above) if sine else 1.0))
 
     return _multiplied(code_operator(d._replace(typ=0, ksq=0), axes), factor_for_k, sine, axes)

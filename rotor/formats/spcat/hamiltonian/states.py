@@ -209,27 +209,21 @@ def _state(v: int, line: Options, first: Options) -> StateOptions:
 def _check_total(v: int, line: Options, spins: tuple[int, ...], e_species: tuple[int, int]) -> None:
     """Raise ValueError for an unsupported total spin: not of two or three spins, of unequal spins, or with levels of E species."""
     fold = _FOLDS[-line.iax].n if -line.iax in _FOLDS else 2
-    if fold > 3:
-        raise ValueError(
-            f"IAX = {line.iax} of state {v}: a total spin of {fold} equivalent nuclei is read but not computed yet"
-        )
-    if fold == 3 and len(spins) < 3:
-        raise ValueError(
-            f"IAX = {line.iax} of state {v} couples three spins to a total; SPIND = {line.spind} names {len(spins)}"
-        )
-    if len(spins) > 1 and len(set(spins[-fold:])) > 1:
-        raise ValueError(
-            f"IAX = {line.iax} of state {v} couples the last {'two' if fold == 2 else 'three'} spins to a total; they are of "
-            f"several sizes in SPIND = {line.spind}"
-        )
-    if fold == 3 and e_species[0]:
-        raise ValueError(
-            f"EWT = {line.ewt} of state {v}: an l-doubled state with a total spin of three nuclei {NOT_YET}"
-        )
-    if fold == 3 and e_species[1]:
-        raise ValueError(
-            f"EWT = {line.ewt} of state {v}: with a total spin of three nuclei levels of E species do not exist; their weight is 0"
-        )
+    together = f"IAX = {line.iax} of state {v} couples {'two' if fold == 2 else 'three'} spins to a total"
+    ewt = f"EWT = {line.ewt} of state {v}"
+    reasons = {
+        f"IAX = {line.iax} of state {v}: a total spin of {fold} equivalent nuclei {NOT_YET}": fold > 3,
+        f"{together}; SPIND = {line.spind} names {len(spins)}": fold == 3 and len(spins) < 3,
+        f"{together}; they are of several sizes in SPIND = {line.spind}": len(spins) > 1
+        and len(set(spins[-fold:])) > 1,
+        f"{ewt}: an l-doubled state with a total spin of three nuclei {NOT_YET}": fold == 3 and e_species[0],
+        f"{ewt}: with a total spin of three nuclei levels of E species do not exist; their weight is 0": (
+            fold == 3 and e_species[1]
+        ),
+    }
+    for reason, applies in reasons.items():
+        if applies:
+            raise ValueError(reason)
 
 
 def species_numbers(ka: Ints | int, kc: Ints | int, oblate: bool) -> Ints:

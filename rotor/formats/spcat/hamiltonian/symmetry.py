@@ -98,15 +98,15 @@ def species_pairs(up: StateOptions, low: StateOptions, turned: tuple[bool, bool]
     """
     if low.equivalent or up.equivalent:
         return None
-    up_weights, low_weights = (_by_species(state, flip) for state, flip in zip((up, low), turned, strict=True))
+    swapped = (
+        replace(state, plus=state.minus, minus=state.plus) if flip else state
+        for state, flip in zip((up, low), turned, strict=True)
+    )
+    up_weights, low_weights = (
+        {"eo"[ka] + "eo"[kc]: _weights(state, ka, kc) for ka, kc in SPECIES} for state in swapped
+    )
     pairs = frozenset((s, t) for s in up_weights for t in low_weights if up_weights[s] == low_weights[t])
     return pairs if len(pairs) < len(up_weights) * len(low_weights) else None
-
-
-def _by_species(state: StateOptions, turned: bool) -> dict[str, tuple[int, ...]]:
-    """Weights of a state by species."""
-    swapped = replace(state, plus=state.minus, minus=state.plus) if turned else state
-    return {"eo"[ka] + "eo"[kc]: _weights(swapped, ka, kc) for ka, kc in SPECIES}
 
 
 def symmetric_part(operator: CodedOperator, axes: str) -> CodedOperator:

@@ -53,18 +53,6 @@ _KINDS = (NuclearQuadrupole, SpinRotation, SpinSpin)
 Codes = dict[int, dict[str, float]]  # factors of the named constants in the value of each code
 
 
-def constant_codes(constants: TopConstants) -> Codes:
-    """For each code of the file of a top, the constants in its value and their factors.
-
-    Raises ValueError for constants in another representation than Ir and IIIl.
-    """
-    if constants.kind == "asymmetric" and constants.representation not in AXES:
-        raise ValueError(
-            f"constants in representation {constants.representation}: SPFIT's files have Ir and IIIl alone; convert them first"
-        )
-    return _rotational_codes(constants) | _interaction_codes(constants)
-
-
 def _states(constants: TopConstants) -> int:
     return 1 if constants.top.states is None else constants.top.states.count
 
@@ -173,7 +161,11 @@ def named_parameters(constants: TopConstants, title: str, kmax: int) -> tuple[Pa
 
     A parameter that contains a constant of unknown error has the error 1e-37, which holds it. Raises ValueError as `named_parameter_file`.
     """
-    codes, names = constant_codes(constants), list(constants.values)
+    if constants.kind == "asymmetric" and constants.representation not in AXES:
+        raise ValueError(
+            f"constants in representation {constants.representation}: SPFIT's files have Ir and IIIl alone; convert them first"
+        )
+    codes, names = _rotational_codes(constants) | _interaction_codes(constants), list(constants.values)
     matrix = np.zeros((len(codes), len(names)))
     for row, factors in enumerate(codes.values()):
         for name, factor in factors.items():

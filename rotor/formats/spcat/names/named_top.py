@@ -9,7 +9,7 @@ without a name here (l-doubled states, terms outside orthorhombic symmetry in on
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from math import gcd
 
@@ -62,7 +62,9 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     if odd and any(line.symmetry.axis for line in rows):
         raise ValueError(f"operators within one state that are odd under time reversal, or a PHASE for them, {NO_NAME}")
 
-    letter, parameters_of_states = _letter(file, rows), _parameters_by_state(coded)
+    letters = frozenset().union(*(line.digits.reductions for line in rows if line.operator.plain is not None))
+    letter = "s" if "S" in letters else "a" if letters else first.chr  # of all states, as one of them shows it
+    parameters_of_states = _parameters_by_state(coded)
     constants, energies = [], []
     for v, parameters in enumerate(parameters_of_states):
         option = replace(state_options(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
@@ -70,7 +72,8 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
         energies.append(sum(p.value for p in parameters if split_code(p.code).is_energy))
         plain = tuple(p for p in parameters if not split_code(p.code).is_energy)
         constants.append(_state_constants(v, replace(file, options=(option,), parameters=plain), errors))
-    _refuse_unlike(constants)
+    if len(kinds := dict.fromkeys(state_constants.kind for state_constants in constants)) > 1:
+        raise ValueError(f"states of the kinds {' and '.join(kinds)} in one file: a top has one kind of constants")
     turned = (constants[0].kind, first.nvib < 0) in (("prolate", True), ("oblate", False))
     weights = _weights(file, states, constants[0].kind in ("prolate", "oblate"))
     couplings, dipoles = _couplings(rows, first, turned), _dipoles(intensities, len(states), turned)
@@ -114,19 +117,6 @@ def _state_constants(v: int, file: ParameterFile, errors: bool) -> Constants:
         return file_constants(file, errors=errors)
     except AxisOrderError as reason:
         raise ValueError(f"state {v}: {reason.constants}; axes in another order than A >= B >= C {NO_NAME}") from None
-
-
-def _refuse_unlike(constants: list[Constants]) -> None:
-    """Raise ValueError for states of different kinds of top."""
-    kinds = list(dict.fromkeys(state_constants.kind for state_constants in constants))
-    if len(kinds) > 1:
-        raise ValueError(f"states of the kinds {' and '.join(kinds)} in one file: a top has one kind of constants")
-
-
-def _letter(file: ParameterFile, rows: list[CodedLine]) -> str:
-    """The letter of the reduction of all states: the one that a state shows, else that of the file."""
-    letters = frozenset().union(*(line.digits.reductions for line in rows if line.operator.plain is not None))
-    return "s" if "S" in letters else "a" if letters else file.options[0].chr
 
 
 def _parameters_by_state(coded: CodedFile) -> list[list[Parameter]]:
@@ -304,8 +294,10 @@ def _spins(
         except ValueError as reason:
             raise ValueError(f"parameter {parameter.code}: {reason}") from None
         o, value = line.operator, parameter.value
-        state_suffix = "" if line.states is None or len(states) == 1 else f"[{','.join(map(str, _once(line.states)))}]"
-        spins = ",".join(called[place - 1] for place in _once(sorted(o.spins)))
+        state_suffix = (
+            "" if line.states is None or len(states) == 1 else f"[{','.join(map(str, dict.fromkeys(line.states)))}]"
+        )
+        spins = ",".join(called[place - 1] for place in sorted(set(o.spins)))
         key = kind, f"{_with_powers('', o.n2, o.nz2, o.ns)}({spins}){state_suffix}"
         spread = parameter.error or 0.0
         relative = spread / abs(value) if errors and spread > HELD_BELOW and value else 0.0
@@ -335,11 +327,6 @@ def _spin_names(rows: list[CodedLine], sizes: tuple[int, ...]) -> list[str]:
             if name.startswith("S") or is_isotope(name, sizes[place]):
                 names[place] = name
     return names
-
-
-def _once(states: Iterable[int]) -> list[int]:
-    """States without repetitions."""
-    return list(dict.fromkeys(states))
 
 
 def _tensor(operator: CodedOperator) -> tuple[str, Floats]:

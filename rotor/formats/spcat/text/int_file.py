@@ -106,12 +106,11 @@ def _dipole(line: Line) -> Dipole:
 def format_int(file: IntensityFile) -> bytes:
     """The text of an .int file; each line as it was read, as long as it says the same."""
     request = freeform.as_read(file.request, _request) or _request_text(file.request)
-    dipoles = [freeform.as_read(dipole, _dipole) or _dipole_text(dipole) for dipole in file.dipoles]
+    dipoles = [
+        freeform.as_read(dipole, _dipole) or f"{'-' if dipole.grouped else ''}{dipole.code} {dipole.value!r}\n"
+        for dipole in file.dipoles
+    ]
     return freeform.encode([freeform.title_text(file.title, file.title_text), request, *dipoles, file.rest])
-
-
-def _dipole_text(dipole: Dipole) -> str:
-    return f"{'-' if dipole.grouped else ''}{dipole.code} {dipole.value!r}\n"
 
 
 def _request_text(r: Request) -> str:
