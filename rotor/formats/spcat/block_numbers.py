@@ -48,15 +48,18 @@ class Blocks:
     spins: dict[int, tuple[int, ...]]
     rises: dict[int, Ints]
 
-    def numbers(self, levels: Sequence[SubBlock], n: Ints, k: Ints, twice_f: Ints) -> tuple[Ints, Ints]:
-        """Block and place of levels.
+    def numbers(self, group: Group, levels: Levels, rows: Ints, negative: bool) -> tuple[Ints, Ints]:
+        """Block and place of rows of the levels of a group, as in the first two columns of an .egy file.
 
-        levels: sub-block of each of n levels. n, k, twice_f (n,): N, |K| and doubled F.
-        Returns: as in the first two columns of an .egy file.
+        negative: for a symmetric top, of the component -K.
         """
-        starts = {f: self._starts(f) for f in sorted(set(twice_f.tolist()))}
+        every, k = _sub_blocks(group, levels, negative)
+        subs, twice_f = [every[i] for i in rows], (levels.multiplicity[rows] - 1).astype(np.int64).tolist()
+        starts = {f: self._starts(f) for f in sorted(set(twice_f))}
         block, rank = list[int](), list[int]()
-        for sub, n_of_level, k_of_level, f in zip(levels, n.tolist(), k.tolist(), twice_f.tolist(), strict=True):
+        for sub, n_of_level, k_of_level, f in zip(
+            subs, levels.rotational[rows].tolist(), k[rows].tolist(), twice_f, strict=True
+        ):
             place, before = starts[f][sub]
             block.append(len(self.members) * ((f + 1) // 2) + place + 1)
             rank.append(before + (k_of_level - self._least_k(sub, n_of_level)) // 2 + 1)
@@ -198,7 +201,7 @@ def _connected(
     return part_numbers(len(subs), low[linked & free], high[linked & free])
 
 
-def sub_blocks(group: Group, levels: Levels, negative: bool) -> tuple[list[SubBlock], Ints]:
+def _sub_blocks(group: Group, levels: Levels, negative: bool) -> tuple[list[SubBlock], Ints]:
     """Sub-block and |K| of each level of a group; negative: for a symmetric top, of the component -K."""
     quanta, n = levels.quanta, levels.rotational
     v, k, names = group.numbers(levels), group.basis_k(levels), group.spin_names(levels)

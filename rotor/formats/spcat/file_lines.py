@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotor import units
 from rotor.arrays import Floats, Indices, Ints, copy_rows, end_to_end, rising_order
-from rotor.formats.spcat.block_numbers import Blocks, sub_blocks
+from rotor.formats.spcat.block_numbers import Blocks
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format, listed_quanta
 from rotor.formats.spcat.hamiltonian.states import species_numbers
@@ -259,7 +259,9 @@ def as_level_list(solved: Sequence[SolvedGroup], form: Format, blocks: Blocks | 
             numbered = form.aggregates(len(group.spins))
             pattern = listed_quanta(group, levels, form, negative)[:, -2] if numbered else np.full(len(levels), -1)
             energy = levels.energy_mhz / units.MHZ_PER_CM
-            numbers = _numbers(group, levels, blocks, negative, rows)
+            numbers = np.ones((2, len(rows)), dtype=np.int64)
+            if blocks is not None:
+                numbers = np.array(blocks.numbers(group, levels, rows, negative))
             tables.append([*numbers, *(column[rows] for column in (energy, error, mixing, g, quanta, pattern))])
     block, rank, energy, error, mixing, g, quanta, pattern = (
         np.concatenate(parts) for parts in zip(*tables, strict=True)
@@ -278,12 +280,3 @@ def as_level_list(solved: Sequence[SolvedGroup], form: Format, blocks: Blocks | 
         quanta=quanta[order].astype(np.int16),
         pattern=pattern[order].astype(np.int16) if form.aggregate else None,
     )
-
-
-def _numbers(group: Group, levels: Levels, blocks: Blocks | None, negative: bool, rows: Ints) -> tuple[Ints, Ints]:
-    """Block and place of rows of levels."""
-    if blocks is None:
-        return np.ones(len(rows), dtype=np.int64), np.zeros(len(rows), dtype=np.int64)
-    subs, k = sub_blocks(group, levels, negative)
-    twice_f = (levels.multiplicity - 1).astype(np.int64)
-    return blocks.numbers([subs[i] for i in rows], levels.rotational[rows], k[rows], twice_f[rows])

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_model import Group
@@ -111,35 +110,24 @@ def listed_quanta(group: Group, levels: Levels, form: Format, negative: bool = F
 
 
 def _rotation(group: Group, levels: Levels, v: Ints, form: Format, negative: bool) -> list[Ints]:
-    """Nothing, signed K, or Ka and Kc."""
-    quanta = levels.quanta
+    """Nothing, signed K, or Ka and Kc.
+
+    Levels of E species, or of l-doubled states, have no sign of K, and N - K across the axis, or N - K + 1 in the first state of a pair.
+    """
+    quanta, n = levels.quanta, levels.rotational
     if form.rotation == 1:
         return []
-    if form.rotation == 3:
-        if "kc" in quanta:
-            return _ka_kc(group, levels, v)
-        n = levels.rotational  # linear, in a file with the quanta of asymmetric tops
+    if form.rotation == 3 and "kc" not in quanta:  # linear, in a file with the quanta of asymmetric tops
         return [np.zeros_like(n), n]
-    k = group.basis_k(levels)
-    odd = is_odd(quanta["ka"], quanta["kc"]) if "kc" in quanta else np.full(len(levels), negative)
-    return [np.where(odd & ~_unsigned(group, v, k), -k, k)]
-
-
-def _unsigned(group: Group, v: Ints, k: Ints) -> NDArray[np.bool_]:
-    """Whether levels are of E species or l-doubled, so that the sign of K, or the parity of the other K, has no meaning."""
-    unsigned = np.zeros(len(k), dtype=bool)
+    k, unsigned = group.basis_k(levels), np.zeros(len(n), dtype=bool)
     for place, state in enumerate(group.states):
         unsigned |= (v == place) & state.is_e(k)
-    return unsigned
-
-
-def _ka_kc(group: Group, levels: Levels, v: Ints) -> list[Ints]:
-    """Ka and Kc; for E species the K across the axis is N - K, or N - K + 1 in the first state of an l-doubled pair."""
-    n, ka, kc = levels.rotational, levels.quanta["ka"], levels.quanta["kc"]
-    along = group.basis_k(levels)
+    if form.rotation == 2:
+        odd = is_odd(quanta["ka"], quanta["kc"]) if "kc" in quanta else np.full(len(levels), negative)
+        return [np.where(odd & ~unsigned, -k, k)]
     firsts = [pair.first for pair in group.effect.pairs]
-    other = np.where(_unsigned(group, v, along), n - along + np.isin(v, firsts), ka if group.oblate else kc)
-    return [other, along] if group.oblate else [along, other]
+    across = np.where(unsigned, n - k + np.isin(v, firsts), quanta["ka" if group.oblate else "kc"])
+    return [across, k] if group.oblate else [k, across]
 
 
 def pattern_numbers(group: Group, levels: Levels, names: list[str]) -> Ints:
@@ -151,7 +139,9 @@ def pattern_numbers(group: Group, levels: Levels, names: list[str]) -> Ints:
     if not group.states[0].i_tot:
         return _among(pattern_steps(spins), _steps(chain, spins))
     if group.states[0].equivalent == 3:
-        return _among(_threefold_patterns(spins), _threefold_steps(chain, spins))
+        total, symmetry = chain[-2], chain[-3] // 2
+        steps = np.insert(_steps([*chain[:-3], chain[-1]], (*spins[:-3], total)), 1, total, axis=1)
+        return _among(_threefold_patterns(spins), np.column_stack([steps, symmetry]))
     total, totals = chain.pop(-2), range(0, spins[-1] + spins[-2] + 1, 2)
     all_steps = np.concatenate([np.insert(pattern_steps((*spins[:-2], i_tot)), 1, i_tot, axis=1) for i_tot in totals])
     all_steps = all_steps[np.lexsort((all_steps[:, 1], all_steps[:, 0]))]  # lexsort is stable within one I_tot
@@ -170,13 +160,6 @@ def _threefold_patterns(spins: tuple[int, ...]) -> Ints:
         tables.append(np.column_stack([np.repeat(steps, len(names), axis=0), np.tile(names[order], len(steps))]))
     table = np.concatenate(tables)
     return table[np.lexsort((table[:, 1], table[:, 0]))]
-
-
-def _threefold_steps(chain: list[Ints], spins: tuple[int, ...]) -> Ints:
-    """Steps of levels with a total of three spins."""
-    total, symmetry = chain[-2], chain[-3] // 2
-    steps = _steps([*chain[:-3], chain[-1]], (*spins[:-3], total))
-    return np.column_stack([np.insert(steps, 1, total, axis=1), symmetry])
 
 
 def pattern_steps(spins: tuple[int, ...]) -> Ints:
