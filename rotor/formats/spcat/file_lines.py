@@ -58,7 +58,7 @@ def group_transitions(group: Group, levels: Levels, request: Request) -> Transit
         exists = (weight[transitions.lower] > 0) & (weight[transitions.upper] > 0)
     if any(state.fold > 2 and state.equivalent < 3 for state in group.states):
         exists &= share_a_weight(group, levels, transitions.upper, transitions.lower)
-    elif weight.min() != weight.max():  # lines between functions of unequal weight do not exist for any dipole
+    elif (weight != weight[:1]).any():  # lines between functions of unequal weight do not exist for any dipole
         exists &= weight[transitions.upper] == weight[transitions.lower]
     order = rising_order(transitions.frequency_mhz)  # sorted lines make later sorting fast
     rows = order if exists.all() else order[exists[order]]

@@ -30,7 +30,6 @@ from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, coded_file, li
 from rotor.formats.spcat.hamiltonian.codes import is_held
 from rotor.formats.spcat.hamiltonian.l_doubled import functions_by_l, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import (
-    Diagonal,
     has_other_names,
     named_by,
     naming_by,
@@ -226,12 +225,12 @@ def _assign_with_spins(
     columns, start = _parameter_columns(group, names, values)
     parameters = tuple(group.effect.parameters(group.top))
 
-    diagonal = group.diagonal(int(labels[here, 0].max()))
-    naming = (
-        partial(spin_naming_by, group.diag, group.oblate, diagonal)
-        if _has_names_of_diag(group, int(twice.max()), diagonal)
-        else None
-    )
+    diagonal, naming = group.diagonal(int(labels[here, 0].max())), None
+    # three equivalent nuclei have names by sub-blocks, l-doubled states by l
+    if not group.effect.pairs and group.states[0].equivalent < 3:
+        highest = unmixed_levels(group.top, (group.effect,), [int(twice.max())])
+        if has_other_names(highest, group.diag, diagonal):
+            naming = partial(spin_naming_by, group.diag, group.oblate, diagonal)
 
     def rows_of(levels: Levels, chosen: Ints) -> Ints:
         if group.effect.pairs:
@@ -243,13 +242,6 @@ def _assign_with_spins(
     functions = partial(_label_functions, group) if group.effect.pairs else None
     assigned = assigned_with_spins(group.top, (group.effect,), parameters, start, twice, rows_of, functions, naming)
     return [AssignedLevels(here[part.rows], columns, part.blocks) for part in assigned]
-
-
-def _has_names_of_diag(group: Group, twice_f: int, diagonal: Diagonal) -> bool:
-    """Whether DIAG names levels of this doubled F otherwise; three equivalent nuclei have names by sub-blocks, l-doubled states by l."""
-    if group.effect.pairs or any(state.equivalent == 3 for state in group.states):
-        return False
-    return has_other_names(unmixed_levels(group.top, (group.effect,), [twice_f]), group.diag, diagonal)
 
 
 def _label_rows(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:

@@ -270,6 +270,8 @@ def _meaning(code: DipoleCode) -> str:
     """Meaning of a code, for messages."""
     what = "a moment of third order" if code.typ == 6 else f"a moment of TYP {code.typ}"
     if code.typ in (0, 4, *_POWERS):
-        magnetic = "the moment of l_z of an l-doubled state" if code.typ == 5 else "a magnetic moment with powers of N²"
+        magnetic = (
+            "the moment of l_z of an l-doubled state" if code.typ == 5 else "a magnetic moment with powers of N² or Nz²"
+        )
         what = "a moment along an axis" if code.axis else magnetic
     return what + (f" that acts on spin {code.spin}" if code.spin else "")

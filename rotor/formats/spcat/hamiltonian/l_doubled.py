@@ -104,26 +104,20 @@ def over_real_states(
     if (low in firsts and firsts[low].second == high) or (high in firsts and firsts[high].second == low):
         if odd:
             raise ValueError("an odd operator between l and -l is not invariant under time reversal")
-        turned = 0.5 * sign * (1.0 if low in firsts else -1.0)
-        return [RealPart(low, low, 0.5), RealPart(high, high, -0.5), RealPart(low, high, turned, True)]
+        half = 0.5 * sign * (1.0 if low in firsts else -1.0)
+        return [RealPart(low, low, 0.5), RealPart(high, high, -0.5), RealPart(low, high, half, True)]
     if low in firsts and high in firsts:
         if odd:
             raise ValueError("an odd operator between two l-doubled states is read but not computed yet")
-        return [_ordered(first, second, 1.0) for first, second in zip(firsts[low], firsts[high], strict=True)]
+        return [RealPart(min(pair), max(pair), 1.0) for pair in zip(firsts[low], firsts[high], strict=True)]
     if low in seconds or high in seconds:
         article = "an" if what == "operator" else "a"
         raise ValueError(
             f"{article} {what} of the state with K l ≤ 0 is read but not computed yet; name the one with K l > 0"
         )
     pair, second = (firsts[low], high) if low in firsts else (firsts[high], low)
-    share = 1 / sqrt(2.0)
-    return [_ordered(second, pair.first, share), _ordered(second, pair.second, sign * share, True)]
-
-
-def _ordered(first: int, second: int, factor: float, turned: bool = False) -> RealPart:
-    """A real part with the lower number first."""
-    # a pair has the lower state first
-    return RealPart(min(first, second), max(first, second), factor, turned)
+    components = ((pair.first, 1.0, False), (pair.second, sign, True))
+    return [RealPart(min(second, v), max(second, v), factor / sqrt(2.0), turned) for v, factor, turned in components]
 
 
 def turned_operator(operator: Operator) -> Operator:

@@ -77,7 +77,9 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     turned = (constants[0].kind, first.nvib < 0) in (("prolate", True), ("oblate", False))
     weights = _weights(file, states, constants[0].kind in ("prolate", "oblate"))
     couplings, dipoles = _couplings(rows, first, turned), _dipoles(intensities, len(states), turned)
-    _refuse_phases(couplings, dipoles)
+    of_one_state = [low == high for (low, high), mu in dipoles.items() if any(mu)]
+    if couplings and of_one_state and not any(of_one_state):
+        raise ValueError(f"dipoles between coupled states alone, which SPCAT takes times i, {NO_NAME}")
     top = Top.from_constants(
         constants[0],
         name=file.title,
@@ -205,16 +207,6 @@ def _dipoles(
     if others:
         raise ValueError(f"dipole {others[0][0].code}: a moment other than a plain component {NO_NAME}")
     return {pair: mu[::-1] if turned else mu for pair, mu in plain.items()}
-
-
-def _refuse_phases(
-    couplings: Mapping[str, float], dipoles: Mapping[tuple[int, int], tuple[float, float, float]]
-) -> None:
-    """Raise ValueError for dipoles between states with a phase that a top cannot have: SPCAT gives them i without dipoles in states."""
-    across = any(low != high and any(mu) for (low, high), mu in dipoles.items())
-    has_dipole_in_state = any(low == high and any(mu) for (low, high), mu in dipoles.items())
-    if across and not has_dipole_in_state and couplings:
-        raise ValueError(f"dipoles between coupled states alone, which SPCAT takes times i, {NO_NAME}")
 
 
 def _states(

@@ -245,7 +245,8 @@ def _decimals_in(line: bytes, part: slice) -> int:
 def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Mask]:
     """The numbers of all lines, and which lines are just what those numbers would be written as."""
     is_plain = np.zeros(len(lines.starts), dtype=np.bool_)
-    width = _width_guess(text, lines)
+    count = _typical_line(text, lines)[QNFMT][-1:]
+    width = quanta_width(int(count)) if count.isdigit() else 6
     parts = [take_rows(np.empty((0, QUANTA + 4 * width), dtype=np.uint8), width, layout.decimals)]
     for start in range(0, len(is_plain), _CHUNK):
         chunk = slice(start, start + _CHUNK)
@@ -258,11 +259,6 @@ def _read_plain(text: bytes, lines: _Lines, layout: Layout) -> tuple[Columns, Ma
         is_plain[chunk] = regular & plain
         parts.append(columns)
     return Columns._make(np.concatenate(column) for column in zip(*parts, strict=True)), is_plain
-
-
-def _width_guess(text: bytes, lines: _Lines) -> int:
-    last = _typical_line(text, lines)[QNFMT][-1:]
-    return quanta_width(int(last)) if last.isdigit() else 6
 
 
 def _character_rows(text: bytes, lines: _Lines, chunk: slice) -> tuple[Text, Mask]:
