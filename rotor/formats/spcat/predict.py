@@ -14,7 +14,7 @@ from functools import cached_property, partial
 from rotor.formats.spcat import wavenumbers
 from rotor.formats.spcat.block_numbers import numbered_blocks
 from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, group_lines, group_transitions
-from rotor.formats.spcat.file_model import Group
+from rotor.formats.spcat.file_model import Group, connected_groups
 from rotor.formats.spcat.file_quanta import quanta_format
 from rotor.formats.spcat.hamiltonian.labels import UNDIAGONALIZED_NOTE
 from rotor.formats.spcat.hamiltonian.states import file_states
@@ -25,7 +25,7 @@ from rotor.formats.spcat.prediction_notes import (
     full_basis_notes,
     request_notes,
 )
-from rotor.formats.spcat.solved_groups import groups_to_solve, highest_n, joined_lines, solved_groups
+from rotor.formats.spcat.solved_groups import highest_n, joined_lines, solved_groups
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
@@ -102,7 +102,8 @@ def predict(
     further = request_notes(request, as_spcat)
     if as_spcat and request.qrot < 1:
         request = replace(request, qrot=1.0)
-    groups = groups_to_solve(parameters, intensities, as_spcat, full_basis)
+    highest = highest_n(parameters, request)
+    groups = connected_groups(parameters, intensities, as_spcat=as_spcat, full_basis=full_basis, highest_n=highest)
     form = quanta_format(parameters, groups)
     solved = solved_groups(parameters, groups, request, form)
     listed = [group_lines(*each, group_transitions(each.group, each.levels, request), form, request) for each in solved]
@@ -143,13 +144,13 @@ def _notes(
     groups: list[Group],
 ) -> Iterator[str]:
     """The notes on the files and on their groups that have levels, then further ones."""
+    highest = highest_n(parameters, intensities.request)
     yield from file_notes(parameters, intensities, as_spcat)
     if any(group.diag < 0 and not group.is_diagonal for group in groups):
         yield UNDIAGONALIZED_NOTE
     if any(state.is_cut for group in groups for state in group.states):
-        whole = groups_to_solve(parameters, intensities, as_spcat, True)
+        whole = connected_groups(parameters, intensities, as_spcat=as_spcat, full_basis=True, highest_n=highest)
         yield from basis_notes(groups, whole, intensities.request)
-    highest = highest_n(parameters, intensities.request)
     yield from falling_diagonal_notes(groups, parameters.options[0].diag, highest)
     if full_basis:
         yield from full_basis_notes(file_states(parameters), highest)

@@ -13,8 +13,6 @@ from rotor.formats.spcat.file_model import Group, moments_within_states
 from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, coded_file
 from rotor.formats.spcat.hamiltonian.dipole_codes import (
     EVEN_ORDER,
-    DipoleCode,
-    Dipoles,
     deviates_in_spcat,
     split_dipoles,
 )
@@ -70,18 +68,13 @@ def _moment_notes(coded: CodedFile, intensities: IntensityFile, as_spcat: bool) 
     if phases.odd and with_dipoles(coded.phases, within, oblate, True) != phases:
         program = "SPCAT settles the phases along axes without odd parameters by the dipoles, SPFIT does not"
         notes.append(f"phases: {_choice(program, as_spcat)}")
-    if phases.between_i and not phases.odd and _has_unlike_orders(dipoles, [code for _, code in others if code.axis]):
+    # whether electric moments between the same two states are of even and of odd order
+    orders = {(states, False) for states in dipoles} | {(c.states, c.typ in EVEN_ORDER) for _, c in others if c.axis}
+    unlike = any((states, True) in orders and (states, False) in orders for states, _ in orders if len(set(states)) > 1)
+    if phases.between_i and not phases.odd and unlike:
         program = "SPCAT gives moments of even order in angular momenta the other sign beside those of odd order"
         notes.append(f"dipoles between two states: {_choice(program, as_spcat)}")
     return notes
-
-
-def _has_unlike_orders(dipoles: Dipoles, others: Iterable[DipoleCode]) -> bool:
-    """Whether there are electric moments of even and of odd order between the same two states."""
-    orders = {states: {False} for states in dipoles}
-    for code in others:
-        orders.setdefault(code.states, set()).add(code.typ in EVEN_ORDER)
-    return any(len(each) > 1 for (low, high), each in orders.items() if low != high)
 
 
 def basis_notes(groups: list[Group], whole: list[Group], request: Request) -> list[str]:

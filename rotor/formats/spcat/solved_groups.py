@@ -11,13 +11,13 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints, end_to_end
-from rotor.formats.spcat.file_model import Group, connected_groups
+from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format
 from rotor.formats.spcat.hamiltonian.code_table import split_code
 from rotor.formats.spcat.hamiltonian.coded_file import line_names
 from rotor.formats.spcat.hamiltonian.codes import file_constants
 from rotor.formats.spcat.hamiltonian.states import file_states
-from rotor.formats.spcat.text.int_file import IntensityFile, Request
+from rotor.formats.spcat.text.int_file import Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.variances import variance_factor
 from rotor.quantum.estimates.derivatives import level_derivatives
@@ -28,14 +28,6 @@ from rotor.thermodynamics import PartitionFunction
 from rotor.tops.top import Top
 
 MOST_EXPONENT = 700.0  # of a population in double precision
-
-
-def groups_to_solve(
-    parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool, full_basis: bool
-) -> list[Group]:
-    """The groups for the levels of an .int file, which reach N = FEND + the sum of the spins."""
-    highest = highest_n(parameters, intensities.request)
-    return connected_groups(parameters, intensities, as_spcat=as_spcat, full_basis=full_basis, highest_n=highest)
 
 
 def highest_n(parameters: ParameterFile, request: Request) -> int:

@@ -46,7 +46,9 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
         parameters, free = _tied(fit, file.parameters, back, matrix, variances)
     numbers = iter(range(len(free)))
     columns = [-1 if p.error == FIXED else next(numbers) for p in parameters if not p.constrained]
-    rest = packed_correlations(_correlations(fit, free), columns) if variances else ""
+    covariance = _covariance(fit, free)
+    errors = np.sqrt(np.diag(covariance))
+    rest = packed_correlations(covariance / np.outer(errors, errors), columns) if variances else ""
     count = len(fit.lines) if file.header.nline > 0 else -len(fit.lines)
     header = replace(file.header, npar=len(parameters), nline=count, nitr=100)
     return replace(file, header=header, parameters=tuple(parameters), rest=rest)
@@ -57,13 +59,6 @@ def _covariance(fit: Fit, rows: Floats) -> Floats:
     # undetermined parameters have no covariance in the file
     covariance = np.where(np.isfinite(fit.statistics.covariance), fit.statistics.covariance, 0.0)
     return np.asarray(rows @ covariance @ rows.T)
-
-
-def _correlations(fit: Fit, rows: Floats) -> Floats:
-    """Correlations of combinations (m, n) of the free constants."""
-    covariance = _covariance(fit, rows)
-    errors = np.sqrt(np.diag(covariance))
-    return np.asarray(covariance / np.outer(errors, errors))
 
 
 def _error(fit: Fit, row: Floats, variances: bool) -> float:

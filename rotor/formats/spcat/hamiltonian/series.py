@@ -122,20 +122,15 @@ def level_term(d: Digits, axes: str, sine: bool = False) -> CodedOperator:
     return _multiplied(code_operator(d._replace(typ=0, ksq=0), axes), factor_for_k, sine, axes)
 
 
-def angles_by_k(n: int, series: Series, states: tuple[int, int]) -> tuple[float, float]:
-    """α' and α of the angle α'K' + αK'' of a Fourier term between two states."""
-    up, low = (series.rho.get(v, 0.0) for v in states)
-    each = pi / 3 * (n - 0.5 * ((up < 0) != (low < 0)))
-    return each * abs(up), each * abs(low)  # the size of ρ turns; unlike signs shift n by one half
-
-
 def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Weight:
     """Factor of an element in a Fourier term: a single K with NOFC; ½(K' + K'') for the sine of n = 0, as in the program.
 
     n: the harmonic. sine: sine or cosine. series: the constants of the file. states: the states of K' and of K''.
     Returns: function of N', N'', K' and K''.
     """
-    up, low = angles_by_k(n, series, states)
+    rho = [series.rho.get(v, 0.0) for v in states]
+    shifted = n - 0.5 * ((rho[0] < 0) != (rho[1] < 0))  # the size of ρ turns; unlike signs shift n by one half
+    up, low = (pi / 3 * shifted * abs(each) for each in rho)
 
     def factor(m: Ints, n_low: Ints, above: Ints, below: Ints) -> Floats:
         twice, angle = above + below, up * above + low * below

@@ -17,7 +17,7 @@ from rotor.formats.packed import load
 from rotor.formats.spcat.text.catalogue import Catalogue, Layout
 from rotor.formats.spcat.text.fields import BLANK
 from rotor.formats.spcat.text.freeform import Line
-from rotor.formats.spcat.text.line import Record, error_cap, quanta_width, read_record, spell_record
+from rotor.formats.spcat.text.line import error_cap, quanta_width, read_record, spell_record
 from rotor.formats.spcat.text.rows import (
     ENERGY,
     ERROR,
@@ -108,13 +108,13 @@ def _odd_line(catalogue: Catalogue, index: int) -> bytes:
     return text.rstrip(" ").ljust(length).encode() + layout.newline
 
 
-def _stored_record(text: bytes) -> Record:
+def _stored_record(text: bytes) -> Columns:
     """The record of a stored spelling, which may begin with blank lines."""
     line = next(line for line in text.split(b"\n") if line.strip())
     return read_record(Line(line.rstrip(b"\r").decode("ascii"), 0, "stored text"))
 
 
-def _within_format(record: Record, index: int) -> Record:
+def _within_format(record: Columns, index: int) -> Columns:
     """The record with as many columns of quantum numbers as its QNFMT can hold."""
     width = quanta_width(record.qnfmt)
     states = [(*state, *(BLANK,) * width) for state in record[-2:]]
@@ -283,7 +283,7 @@ def _quanta_present(columns: Columns) -> Mask:
 
 def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: Columns, is_plain: Mask) -> Catalogue:
     """The catalogue; lines that are not plain are read one by one, and blank lines belong to the line that follows."""
-    records: dict[int, Record] = {}
+    records: dict[int, Columns] = {}
     for number in np.flatnonzero(~is_plain).tolist():
         line = text[lines.starts[number] : lines.stops[number]]
         if line.strip(_BLANKS):
@@ -305,7 +305,7 @@ def _assembled(text: bytes, name: str, lines: _Lines, layout: Layout, columns: C
     return Catalogue(*whole, layout=replace(layout, spelling=spelling, ending=ending))
 
 
-def _careful_record(text: bytes, number: int, name: str) -> Record:
+def _careful_record(text: bytes, number: int, name: str) -> Columns:
     body = text.removesuffix(b"\n").removesuffix(b"\r")
     line = Line(body.decode("latin1"), number, name)
     strange = next((i for i, c in enumerate(body) if not 32 <= c < 127), None)
@@ -314,7 +314,7 @@ def _careful_record(text: bytes, number: int, name: str) -> Record:
     return read_record(line)
 
 
-def _with_records(columns: Columns, records: dict[int, Record]) -> Columns:
+def _with_records(columns: Columns, records: dict[int, Columns]) -> Columns:
     """The columns with the lines of `records` set, wider where one of them has more quantum numbers."""
     width = max([columns.quanta_upper.shape[1], *(len(record.quanta_upper) for record in records.values())])
     wider = ((0, 0), (0, width - columns.quanta_upper.shape[1]))

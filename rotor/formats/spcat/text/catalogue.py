@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.spcat.text.fields import BLANK
-from rotor.formats.spcat.text.line import Record
 from rotor.formats.spcat.text.rows import Columns
 from rotor.frozen import dataclass
 from rotor.table import Table
@@ -111,10 +110,10 @@ class Catalogue(Table):
             out |= {f"q{i}_{side}": column for i, column in enumerate(quanta.T, 1) if (column != BLANK).any()}
         return out
 
-    def record(self, index: int) -> Record:
+    def record(self, index: int) -> Columns:
         """The numbers of one line."""
         values = [getattr(self, name)[index] for name in DTYPES]
-        return Record._make(tuple(value.tolist()) if value.ndim else value.item() for value in values)
+        return Columns._make(tuple(value.tolist()) if value.ndim else value.item() for value in values)
 
 
 def predicted_catalogue(

@@ -18,22 +18,8 @@ from rotor.formats.spcat.text.rows import (
     QNFMT,
     QUANTA,
     TAG,
+    Columns,
 )
-
-
-class Record(NamedTuple):
-    """The numbers of one line; the names are those of `Catalogue`."""
-
-    frequency_mhz: float
-    error_mhz: float
-    lgint: float
-    dr: int
-    energy_lower_cm: float
-    g_upper: int
-    tag: int
-    qnfmt: int
-    quanta_upper: tuple[int, ...]
-    quanta_lower: tuple[int, ...]
 
 
 class _Field(NamedTuple):
@@ -81,7 +67,7 @@ def error_cap(decimals: int) -> float:
     return (10**7 - 1) / 10.0**decimals
 
 
-def read_record(line: Line) -> Record:
+def read_record(line: Line) -> Columns:
     """The numbers of a line without its end.
 
     Raises ValueError with file, line, column, the field and the rule that is broken.
@@ -96,7 +82,7 @@ def read_record(line: Line) -> Record:
         raise line.error(QNFMT.start, f"QNFMT is {qnfmt}; it counts quantum numbers and is not negative")
     upper = _read_state(line, QUANTA, qnfmt, may_be_blank=False)
     lower = _read_state(line, QUANTA + 2 * quanta_width(qnfmt), qnfmt, may_be_blank=True)
-    return Record._make([*numbers, upper, lower])
+    return Columns._make([*numbers, upper, lower])
 
 
 def _read_state(line: Line, start: int, qnfmt: int, *, may_be_blank: bool) -> tuple[int, ...]:
@@ -115,7 +101,7 @@ def _quantum(text: str) -> int:
     return fields.read_quantum(text if text.strip(" ") else "  ")
 
 
-def spell_record(record: Record, decimals: tuple[int, int, int, int]) -> str:
+def spell_record(record: Columns, decimals: tuple[int, int, int, int]) -> str:
     """The line of a record, without its end; numbers too wide for their decimals are given with as many as fit.
 
     A frequency beyond 99999999 MHz has three decimals, and error and intensity with it, as the field's program

@@ -26,18 +26,18 @@ _TENS = 10 ** np.arange(1, 18)  # the least numbers of two digits, three, ...
 
 
 class Columns(NamedTuple):
-    """The numbers of some lines, column by column; the names are those of `Catalogue`."""
+    """The numbers of some lines, column by column, or those of one line; the names are those of `Catalogue`, which says more."""
 
-    frequency_mhz: NDArray[np.float64]
-    error_mhz: NDArray[np.float64]
-    lgint: NDArray[np.float64]
-    dr: NDArray[np.int16]
-    energy_lower_cm: NDArray[np.float64]
-    g_upper: NDArray[np.int32]
-    tag: NDArray[np.int32]
-    qnfmt: NDArray[np.int32]
-    quanta_upper: NDArray[np.int16]
-    quanta_lower: NDArray[np.int16]
+    frequency_mhz: Any
+    error_mhz: Any
+    lgint: Any
+    dr: Any
+    energy_lower_cm: Any
+    g_upper: Any
+    tag: Any
+    qnfmt: Any
+    quanta_upper: Any
+    quanta_lower: Any
 
 
 @cache
