@@ -171,7 +171,7 @@ def _reach(d: Digits, states: int, oblate: bool) -> _Reach:
     return _Reach(d.states(states), species, ranks)
 
 
-_UNLIKE = 10**6  # stands for sums of angular momenta that a state does not have
+_UNLIKE = 10_000  # stands for sums of angular momenta that a state does not have
 
 
 def _connected(
@@ -187,7 +187,8 @@ def _connected(
     """
     v, species, _ = np.array(subs).T
     width = max(len(each) for each in rises)
-    sums = np.array([[*each, *[_UNLIKE] * (width - len(each))] for each in rises])
+    # int16: pairs of sub-blocks are many
+    sums = np.array([[*each, *[_UNLIKE] * (width - len(each))] for each in rises], dtype=np.int16)
     alike = np.array([weights.index(weight) for weight in weights])
     low, high = np.triu_indices(len(subs), 1)
     change, held = np.abs(sums[low] - sums[high]), ixx >> np.arange(width) & 1 == 1

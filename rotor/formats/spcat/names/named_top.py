@@ -141,7 +141,9 @@ def _parameters_by_state(coded: CodedFile) -> list[list[Parameter]]:
             by_state[v] += parts
     if is_single_state(coded.file):  # a constant of value 0 has a name as well
         zeros = zip(coded.file.parameters, coded.digits, strict=True)
-        by_state[0] += [replace(p, code=d.in_lowest_state) for p, d in zeros if not p.value and d.has_name]
+        by_state[0] += [
+            replace(p, code=d.in_lowest_state, constrained=False) for p, d in zeros if not p.value and d.has_name
+        ]
     return by_state
 
 
