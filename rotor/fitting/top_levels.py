@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.label_tracking import LabelledBlocks, without_level
+from rotor.quantum.label_tracking import TrackedLevels, without_level
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError, level_model
 from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels
@@ -94,7 +94,7 @@ def _levels_with_spins(
     values = np.array(list(begin.values.values()))
     parts = assigned_with_spins(begin.top, begin.effects, names, values, doubled, rows_of)
     _refuse(begin, labels, without_level(parts, len(labels)))
-    return LabelledBlocks.from_parts(names, parts, len(labels))
+    return TrackedLevels.from_parts(names, parts, len(labels))
 
 
 def _in_closed_form(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:

@@ -33,7 +33,7 @@ from rotor.quantum.internal_rotation.levels import (
 )
 from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.rho_axis_tensors import slope_by_angle
-from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
+from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesLevels
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.levels import SolvedBlock, placed
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
@@ -102,7 +102,7 @@ class TorsionLevels(LevelModel):
     constants: InternalRotationConstants
     spins: Spins | None
     species: tuple[LabelledSpecies, ...]
-    _blocks: dict[str, tuple[Floats, SpeciesBlocks]] = field(default_factory=dict)
+    _blocks: dict[str, tuple[Floats, SpeciesHamiltonian]] = field(default_factory=dict)
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`. Raises MissingLevelsError for labels without a level."""
@@ -150,7 +150,7 @@ class TorsionLevels(LevelModel):
             return self._species_blocks(part, model).solve(model.coefficients, vt_max, by_energy)
         return self._new_blocks(part, name, model).solve_once(model.coefficients, vt_max, by_energy)
 
-    def _species_blocks(self, part: LabelledSpecies, model: RamModel) -> SpeciesBlocks:
+    def _species_blocks(self, part: LabelledSpecies, model: RamModel) -> SpeciesHamiltonian:
         """The blocks of a species, rebuilt if the torsional constants have changed."""
         torsion = np.array([model.values.get(name, 0.0) for name in TORSIONAL])
         cached = self._blocks.get(part.name)
@@ -158,7 +158,7 @@ class TorsionLevels(LevelModel):
             self._blocks[part.name] = torsion, self._new_blocks(part, part.name, model)
         return self._blocks[part.name][1]
 
-    def _new_blocks(self, part: LabelledSpecies, name: str, model: TurningTops) -> SpeciesBlocks:
+    def _new_blocks(self, part: LabelledSpecies, name: str, model: TurningTops) -> SpeciesHamiltonian:
         """New blocks for the J that the labels need."""
         j = part.rotations(self.spins.scheme.total if self.spins else 0)
         return species_blocks(model, name, int(j.min()), int(j.max()), self.constants.functions, j)

@@ -91,7 +91,7 @@ def tracked_blocks(
     count: int,
     find: Callable[[int, Ints], tuple[Ints, Ints]],
     values_mhz: Floats,
-) -> LabelledBlocks:
+) -> TrackedLevels:
     """The blocks, solved at values of named parameters, in which labels lie, of which there are `count`.
 
     find: from the number of a block and the names (n, columns) of its states to the places of labels in it, and which states have them.
@@ -115,7 +115,7 @@ def tracked_blocks(
                 leading_of_states = leading[place, : block.size], shares[place, : block.size]
                 start = AtStart(values_mhz[block.parameters], energies[place, states], block_rows, *leading_of_states)
                 tracked.append(Tracked(block, named, rows, state_names[place][states], states, start))
-    return LabelledBlocks(tuple(names), count, tuple(tracked))
+    return TrackedLevels(tuple(names), count, tuple(tracked))
 
 
 def _members(sub_blocks: Sequence[Ints], size: int) -> Floats:
@@ -282,12 +282,12 @@ class AssignedLevels(NamedTuple):
 
     rows: Ints
     columns: Ints
-    blocks: LabelledBlocks | ContractedLevels | ClosedForm
+    blocks: TrackedLevels | ContractedLevels | ClosedForm
 
     @property
     def with_level(self) -> Ints:
         """Places of the labels that have a level."""
-        return self.rows[self.blocks.with_level] if isinstance(self.blocks, LabelledBlocks) else self.rows
+        return self.rows[self.blocks.with_level] if isinstance(self.blocks, TrackedLevels) else self.rows
 
 
 def without_level(parts: Sequence[AssignedLevels], count: int) -> NDArray[np.bool_]:
@@ -299,7 +299,7 @@ def without_level(parts: Sequence[AssignedLevels], count: int) -> NDArray[np.boo
 
 
 @dataclass(frozen=True)
-class LabelledBlocks(LevelModel):
+class TrackedLevels(LevelModel):
     """Blocks of named parameters and the labels in them; others: parts of which each label is solved among functions near it or is one."""
 
     names: tuple[str, ...]
@@ -308,15 +308,15 @@ class LabelledBlocks(LevelModel):
     others: tuple[AssignedLevels, ...] = ()
 
     @classmethod
-    def from_parts(cls, names: tuple[str, ...], parts: Sequence[AssignedLevels], count: int) -> LabelledBlocks:
+    def from_parts(cls, names: tuple[str, ...], parts: Sequence[AssignedLevels], count: int) -> TrackedLevels:
         """The model of `count` labels; blocks of all parts are one set, so that those of equal size are solved together."""
         tracked = [
             block
             for part in parts
-            if isinstance(part.blocks, LabelledBlocks)
+            if isinstance(part.blocks, TrackedLevels)
             for block in part.blocks.moved(part.rows, part.columns)
         ]
-        others = tuple(part for part in parts if not isinstance(part.blocks, LabelledBlocks))
+        others = tuple(part for part in parts if not isinstance(part.blocks, TrackedLevels))
         return cls(names, count, tuple(tracked), others)
 
     @property

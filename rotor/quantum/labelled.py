@@ -75,7 +75,7 @@ def level_model(constants: Constants, labels: Ints, *, kmax: int | None = None) 
         )
     _refuse_labels(constants.kind, labels)
     if constants.kind == "asymmetric":
-        return WangBlocks.from_labels(constants, labels, kmax)
+        return WangLevels.from_labels(constants, labels, kmax)
     if "Dt" in constants.values:
         raise ValueError(
             "D_t splits the levels of a spherical top, which J alone does not label; it cannot be fitted here"
@@ -122,7 +122,7 @@ class ClosedForm(LevelModel):
 
 
 @dataclass(frozen=True)
-class WangBlocks(LevelModel):
+class WangLevels(LevelModel):
     """An asymmetric top, the blocks that occur.
 
     rise: 1 where energies rise with K (z is a), -1 where they fall (c), 0 where neither (b)
@@ -139,7 +139,7 @@ class WangBlocks(LevelModel):
     rise: int
 
     @classmethod
-    def from_labels(cls, constants: Constants, labels: Ints, kmax: int | None) -> WangBlocks:
+    def from_labels(cls, constants: Constants, labels: Ints, kmax: int | None) -> WangLevels:
         """The model for labels (J, Ka, Kc) of a set of constants."""
         by_name = operators_by_name(constants)
         hamiltonian = sorted({powers for terms in by_name.values() for powers in terms})

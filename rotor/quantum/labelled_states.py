@@ -15,7 +15,7 @@ from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.basis.state_elements import StateElements, StateTerms, Vertex
 from rotor.quantum.coupled_levels import names_of_functions, names_of_states
 from rotor.quantum.effect import QuantumEffect, k_limits_of
-from rotor.quantum.label_tracking import Follows, LabelledBlocks, NamedBlock, NamedFunctions, Naming, tracked_blocks
+from rotor.quantum.label_tracking import Follows, NamedBlock, NamedFunctions, Naming, TrackedLevels, tracked_blocks
 from rotor.quantum.wang.basis import blocks_within, parts_of
 from rotor.quantum.wang.rotation import representation_of
 
@@ -30,7 +30,7 @@ def labelled_states(
     labels: Ints,
     values_mhz: Floats,
     naming: Naming | None = None,
-) -> LabelledBlocks:
+) -> TrackedLevels:
     """The blocks in which labels J, v, Ka, Kc (n, 4) lie, for any values of the named parameters; states are named at `values_mhz`.
 
     naming: how the states of connected Wang blocks get their names; by overlaps by default, see `names_of_states`. Raises ValueError for a

@@ -15,7 +15,7 @@ from rotor.quantum.basis.state_elements import linear_blocks_of
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.label_tracking import LabelledBlocks
+from rotor.quantum.label_tracking import TrackedLevels
 from rotor.quantum.linear_stacks import LinearStack, stack_numbers
 from rotor.quantum.solve import solve_levels
 from rotor.tops.top import Top
@@ -102,7 +102,7 @@ def test_blocks_of_many_sizes_give_what_each_gives_alone(monkeypatch):
     monkeypatch.setattr(linear_stacks, "_AT_ONCE", 1)
     model = FileLevels.from_labels(file, labels)
     blocks = model.whole
-    assert isinstance(blocks, LabelledBlocks)
+    assert isinstance(blocks, TrackedLevels)
     alone = model.levels(other)
     at_start, _ = model.levels(values)
     assert at_start == pytest.approx(alone[0], rel=2e-9)  # the step of 1e-9

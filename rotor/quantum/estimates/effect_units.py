@@ -15,10 +15,10 @@ from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.basis.state_elements import linear_blocks_of, vertices_of
 from rotor.quantum.label_tracking import (
     Follows,
-    LabelledBlocks,
     NamedBlock,
     NamedFunctions,
     Naming,
+    TrackedLevels,
     tracked_blocks,
 )
 from rotor.quantum.labelled_states import by_overlaps
@@ -45,10 +45,10 @@ def unit_levels(
     functions: Functions | None = None,
     naming: Naming | None = None,
     spin_naming: SpinNaming | None = None,
-) -> LabelledBlocks:
+) -> TrackedLevels:
     """The blocks of labelled levels as functions of the parameters.
 
-    rows: of the levels, in the order in which `LabelledBlocks.levels` returns them; the levels have vectors, at `values_mhz` of `names`.
+    rows: of the levels, in the order in which `TrackedLevels.levels` returns them; the levels have vectors, at `values_mhz` of `names`.
     functions: for blocks of several states that are labelled by other than basis functions, returns these functions (n, n) in rows over the
     basis, and their labels v, Ka, Kc and, with spins, the doubled pattern (n, 3 + pattern). naming: how states of blocks without spins are
     labelled, by default by overlaps. With either, levels without spins have these labels. spin_naming: how states of blocks with spins are

@@ -27,7 +27,7 @@ from rotor.quantum.internal_rotation.rho_axis_tensors import (
     unit_operator,
 )
 from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_tops
-from rotor.quantum.internal_rotation.species import SpeciesBlocks, SpeciesLevels
+from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesLevels
 from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
@@ -305,7 +305,7 @@ def turning_model(
 
 def species_blocks(
     model: TurningTops, name: str, jmin: int, jmax: int, count: int, needed: Ints | None = None
-) -> SpeciesBlocks:
+) -> SpeciesHamiltonian:
     """Blocks of a species, for J from jmin to jmax or for those in `needed`."""
     sigma: Any = model.species[name]
     return model.blocks(sigma, jmax, jmin=jmin, count=count, needed=needed)

@@ -14,7 +14,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import Product, Terms, Torsion, contracted_torsion
 from rotor.quantum.internal_rotation.frames import axis_of_angles, rho_axis
 from rotor.quantum.internal_rotation.functions import TorsionRotation
-from rotor.quantum.internal_rotation.species import SpeciesBlocks
+from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
 from rotor.quantum.internal_rotation.terms import Axes, products_of, torsional_products
 from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import BARRIERS
@@ -115,7 +115,7 @@ class RamModel:
         count: int = DEFAULT_COUNT,
         waves: int = 10,
         needed: Ints | None = None,
-    ) -> SpeciesBlocks:
+    ) -> SpeciesHamiltonian:
         """The blocks of one species, 0 for A and 1 for E, with J from `jmin` to `jmax` or, of these, the `needed` ones.
 
         count: n_v, torsional functions retained for each K. waves: k of the free functions runs from -waves to waves.
@@ -123,7 +123,7 @@ class RamModel:
         torsion = contracted_torsion(self.torsion, sigma, jmax, count, waves)
         functions = TorsionRotation(torsion, jmin, jmax, folded=sigma == 0 and self.has_plane)
         chosen: NDArray[np.bool_] | None = None if needed is None else np.isin(functions.labels["J"], needed)
-        return SpeciesBlocks(functions, self.terms(sigma), chosen)
+        return SpeciesHamiltonian(functions, self.terms(sigma), chosen)
 
 
 def model_of_principal_axes(values: Mapping[str, float]) -> RamModel:

@@ -23,7 +23,7 @@ from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Produc
 from rotor.quantum.internal_rotation.exchange import TURNS, ExchangedTops, exchange_axis
 from rotor.quantum.internal_rotation.frames import axis_of_angles
 from rotor.quantum.internal_rotation.functions import TorsionRotation
-from rotor.quantum.internal_rotation.species import SpeciesBlocks
+from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
 from rotor.quantum.internal_rotation.terms import products_of
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_x, j_y, j_z
@@ -151,7 +151,7 @@ class SeveralTops:
         each: int = EACH,
         waves: int = 10,
         needed: Ints | None = None,
-    ) -> SpeciesBlocks:
+    ) -> SpeciesHamiltonian:
         """The blocks of a species, σ = 0, 1 or -1 of each top, with J from `jmin` to `jmax` or, of these, the `needed` ones.
 
         count: products of torsional functions retained for each K, the lowest by energy; by default 25 of two tops, 60 of three. each:
@@ -174,7 +174,7 @@ class SeveralTops:
         else:
             functions = TorsionRotation(product, jmin, jmax, folded)
         chosen = None if needed is None else np.isin(functions.labels["J"], needed)
-        return SpeciesBlocks(functions, self.terms(species), chosen)
+        return SpeciesHamiltonian(functions, self.terms(species), chosen)
 
     def terms(self, species: Species) -> Mapping[str, tuple[Product, ...]]:
         """Sums of products by coefficient, in the order of `coefficients`."""

@@ -26,7 +26,7 @@ from rotor.quantum.operators.algebra import Operator
 
 
 @dataclass(frozen=True, eq=False)
-class SpeciesBlocks:
+class SpeciesHamiltonian:
     """H_b(c) = Σ c_i O_i,b of one species over torsion-rotation functions.
 
     needed: functions whose blocks are made; None for all. Elements of each term are computed at first use, for fits that solve at many
@@ -100,7 +100,7 @@ def _zeroth_order(linear: LinearBlocks, coefficients: Floats) -> Floats:
 class SpeciesLevels:
     """Labelled levels of one species with v_t ≤ vt_max, by block in order of energy; `rows` are their places in the arrays of `solved`."""
 
-    source: SpeciesBlocks
+    source: SpeciesHamiltonian
     solved: SolvedBlocks
     zeroth_order: Floats
     vt_max: int

@@ -42,7 +42,7 @@ from rotor.quantum.connected import connected_parts
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.estimates.effect_units import Functions, unit_levels
 from rotor.quantum.estimates.labelled_spins import assigned_with_spins
-from rotor.quantum.label_tracking import AssignedLevels, LabelledBlocks, without_level
+from rotor.quantum.label_tracking import AssignedLevels, TrackedLevels, without_level
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError
 from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels, SolvedBlock
@@ -119,7 +119,7 @@ class FileLevels(LevelModel):
     """
 
     names: tuple[str, ...]
-    whole: LabelledBlocks
+    whole: TrackedLevels
     reduced: Ints
     excluded: Ints
 
@@ -135,7 +135,7 @@ class FileLevels(LevelModel):
         if len(reduced):
             refuse_far_f(labels, reduced, form, quanta_names(form), max(sum(group.spins) for group in groups))
         names, parts = line_names(file), _searched(file, groups, form, labels, reduced)
-        return cls(names, LabelledBlocks.from_parts(names, parts, len(labels)), reduced, excluded_parameters(file))
+        return cls(names, TrackedLevels.from_parts(names, parts, len(labels)), reduced, excluded_parameters(file))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """Energies and derivatives, see `LevelModel`."""
@@ -147,7 +147,7 @@ class FileLevels(LevelModel):
         return energies, slopes
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """See `LabelledBlocks`."""
+        """See `TrackedLevels`."""
         return self.whole.overlaps(before_mhz, after_mhz)
 
 
