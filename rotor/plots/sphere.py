@@ -14,6 +14,7 @@ from rotor.classical.free.polhodes import centre_axis, even_levels, polhode, sep
 # colours for colour-blind readers (Okabe and Ito): polhodes about the axis of smallest moment, intermediate, largest; the motion
 SMALL, MIDDLE, LARGE, MOTION = "#0072B2", "#A06A92", "#009E73", "#D55E00"
 _RIM, _HIDDEN = "#9A9A9A", 0.22
+_ASIDE = 0.5  # horizontal part of the direction of an axis from which its name begins or ends at the tip
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,9 @@ def draw_axes(axes: Any, view: View, moments: Floats, names: tuple[str, str, str
             arrowprops={"arrowstyle": "-|>,head_width=0.18,head_length=0.35", "color": "black", "lw": 0.9,
                         "alpha": 1.0 if front else 0.45, "shrinkA": 3, "shrinkB": 0},
         )  # fmt: skip
-        axes.text(*view.flat(1.2 * positive) + 0.075 * _outward(tip), f"${name}$", ha="center", va="center", zorder=7)
+        outward = _outward(tip)
+        side = "center" if abs(outward[0]) < _ASIDE else "left" if outward[0] > 0 else "right"
+        axes.text(*tip + (0.075 if side == "center" else 0.04) * outward, f"${name}$", ha=side, va="center", zorder=7)
 
 
 def _outward(point: Floats) -> Floats:

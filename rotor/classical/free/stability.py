@@ -16,11 +16,6 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.classical.euler import checked_moments, checked_momentum
 
-NOT_CHAOS = (
-    "Free tumbling is periodic, not chaotic: the growth rate belongs to the unstable axis alone, "
-    "the largest Lyapunov exponent of every torque-free motion is zero."
-)
-
 
 @dataclass(frozen=True)
 class FixedAxis:
@@ -46,7 +41,15 @@ class Stability:
     growth_rate: float
     period: float
     asymptotic_period: float
-    chaos: str = NOT_CHAOS
+
+    @property
+    def chaos(self) -> str:
+        """Why the motion is not chaotic."""
+        growth = "the growth rate belongs to the unstable axis alone; " if self.growth_rate > 0 else ""
+        return (
+            "Free tumbling is quasi-periodic, not chaotic: L repeats in the body, and the body turns about L at a second rate; "
+            f"{growth}the largest Lyapunov exponent of every torque-free motion is zero."
+        )
 
 
 def axis_rate_squared(moments: ArrayLike, axis: int, momentum: ArrayLike) -> Floats:

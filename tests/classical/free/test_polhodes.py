@@ -198,6 +198,16 @@ def test_the_word_period_stands_below_the_curves():
     assert right.get_ylim()[0] < box.y0 < box.y1 < -1.0 < min(line.get_ydata().min() for line in right.lines[:3])
 
 
+def test_long_names_of_axes_begin_beside_their_arrows():
+    motion = free_motion([1.8e-3, 3.9e-3, 5.5e-3], [1e-4, 0.02, 1e-4])
+    left = polhode_figure(motion, [0.0, 10.0], axis_names=("long", "across", "thick")).axes[0]
+    left.figure.canvas.draw()
+    arrows = [text.arrow_patch.get_window_extent() for text in left.texts if getattr(text, "arrow_patch", None)]
+    names = [text.get_window_extent() for text in left.texts if text.get_text()]
+    assert (len(arrows), len(names)) == (4, 3)  # the fourth is of the motion
+    assert not any(name.overlaps(arrow) for name in names for arrow in arrows[:3])
+
+
 def test_the_same_picture_is_the_same_file_and_has_provenance(tmp_path):
     motion = free_motion([0.6, 0.8, 1.0], [1.8, 0.4, -0.9])
     for suffix in ("png", "svg", "pdf"):

@@ -167,6 +167,8 @@ def test_one_table_for_every_kind_of_body():
     sphere = stab.stability([2.0, 2.0, 2.0], [0.5, 0.75, 1.0])
     assert np.isnan(sphere.separatrix_ratio)
     assert (sphere.growth_rate, sphere.period) == (0.0, np.inf)
+    assert "growth rate" in water.chaos
+    assert "growth rate" not in sphere.chaos  # it has no unstable axis
     linear = stab.stability([0.0, 2.0, 2.0], [0.0, 0.75, 1.0])
     assert (linear.growth_rate, linear.period) == (0.0, np.inf)
     assert stab.separatrix_ratio([[1.0, 2.0, 2.0], [1.0, 1.0, 2.0]]).tolist() == [np.inf, 0.0]
