@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gzip
 import os
+import threading
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -22,12 +23,9 @@ from rotor.formats.provenance import provenance_record, write_beside
 from rotor.formats.spcat.text.cat import Between, format_chunks, state_texts, write_cat
 from rotor.formats.spcat.text.catalogue import Catalogue, predicted_catalogue
 from rotor.formats.spcat.text.fields import BLANK
-from rotor.formats.spcat.text.rows import StateTexts
 from rotor.spectra.lines import Lines
 
 if TYPE_CHECKING:
-    from concurrent.futures import Future, ThreadPoolExecutor
-
     from rotor.formats.hitran import HitranLines
 
 MAX_QUANTA = 9  # the last digit of QNFMT counts them
@@ -45,7 +43,7 @@ def catalogue(lines: Lines, tag: int = 0) -> Catalogue:
     Lines of zero strength have no logarithm and are left out; ERR is 0 where no uncertainty is known.
     Raises ValueError for a tag that has no place in its six digits, and for quantum numbers that the format has not.
     """
-    return _catalogue(*_with_logarithm(lines), tag)
+    return _catalogue(*_with_logarithm(lines), tag, as_printed(lines.levels.quanta, lines.levels.halves))
 
 
 def _with_logarithm(lines: Lines) -> tuple[Lines, Floats]:
@@ -56,8 +54,8 @@ def _with_logarithm(lines: Lines) -> tuple[Lines, Floats]:
     return lines, lgint
 
 
-def _catalogue(lines: Lines, lgint: Floats, tag: int) -> Catalogue:
-    """The lines with these intensities as a catalogue."""
+def _catalogue(lines: Lines, lgint: Floats, tag: int, printed: tuple[NDArray[np.int16], int]) -> Catalogue:
+    """The lines with these intensities as a catalogue. printed: quantum numbers of all levels, and QNFMT."""
     numbers = {
         "frequency_mhz": lines.frequency_mhz,
         "lgint": lgint,
@@ -66,7 +64,7 @@ def _catalogue(lines: Lines, lgint: Floats, tag: int) -> Catalogue:
     }
     if (error := lines.error_mhz) is not None:
         numbers["error_mhz"] = np.nan_to_num(error, nan=0.0)
-    quanta, qnfmt = as_printed(lines.levels.quanta, lines.levels.halves)
+    quanta, qnfmt = printed
     linear = lines.levels.kind == "linear"
     upper, lower = copy_rows(quanta, lines.upper), copy_rows(quanta, lines.lower)
     return predicted_catalogue(numbers, upper, lower, qnfmt, tag, linear=linear)
@@ -117,42 +115,55 @@ def write_read_catalogue(lines: Catalogue, path: str | os.PathLike[str], setting
 
 def _write_in_pieces(lines: Lines, path: str | os.PathLike[str], tag: int) -> None:
     """Write the 80-column file of a long list: pieces are made in parallel on all cores and written in order."""
-    from concurrent.futures import ThreadPoolExecutor
-
     _ = lines.partition, lines.spread  # made once, before the pieces ask for them
-    states = _state_texts(lines, tag) if len(lines.levels) < len(lines) else None
+    printed = as_printed(lines.levels.quanta, lines.levels.halves)
+    states = None
+    if len(lines.levels) < len(lines):  # the texts of all levels, each as a line from itself to itself
+        rows, zeros = np.arange(len(lines.levels), dtype=np.int32), np.zeros(len(lines.levels))
+        each = replace(lines.where(slice(0)), frequency_mhz=zeros, strength_debye2=zeros, upper=rows, lower=rows)
+        states = state_texts(_catalogue(each, zeros, tag, printed))
 
     def text(start: int) -> list[bytes]:
         piece, lgint = _with_logarithm(lines.where(slice(start, start + PIECE)))
         between = Between(states, piece.upper, piece.lower) if states else None
-        return list(format_chunks(_catalogue(piece, lgint, tag), between))
+        return list(format_chunks(_catalogue(piece, lgint, tag, printed), between))
 
     opened = gzip.open if os.fspath(path).endswith(".gz") else open
-    with (
-        atomic_path(path) as unfinished,
-        opened(unfinished, "wb") as handle,
-        ThreadPoolExecutor(os.cpu_count()) as pool,
-    ):
-        handle.writelines(chain.from_iterable(_in_order(pool, text, range(0, len(lines), PIECE))))
+    with atomic_path(path) as unfinished, opened(unfinished, "wb") as handle:
+        handle.writelines(chain.from_iterable(_in_order(text, range(0, len(lines), PIECE))))
 
 
-def _state_texts(lines: Lines, tag: int) -> StateTexts:
-    """The texts of all levels, each as a line from itself to itself."""
-    rows = np.arange(len(lines.levels), dtype=np.int32)
-    zeros = np.zeros(len(rows))
-    each = replace(lines.where(slice(0)), frequency_mhz=zeros, strength_debye2=zeros, upper=rows, lower=rows)
-    return state_texts(_catalogue(each, zeros, tag))
-
-
-def _in_order(pool: ThreadPoolExecutor, make: Callable[[int], T], starts: Iterable[int]) -> Iterator[T]:
-    """make(start) for all starts, in order; the number of pending calls is limited to bound memory."""
-    under_way: deque[Future[T]] = deque()
+def _in_order(make: Callable[[int], T], starts: Iterable[int]) -> Iterator[T]:
+    """make(start) for all starts, in order; the number of threads that make them is limited to bound memory."""
+    under_way: deque[Callable[[], T]] = deque()
     for start in starts:
-        under_way.append(pool.submit(make, start))
-        if len(under_way) > 2 * (os.cpu_count() or 1):
-            yield under_way.popleft().result()
+        under_way.append(_begun(make, start))
+        if len(under_way) > (os.cpu_count() or 1):
+            yield under_way.popleft()()
     while under_way:
-        yield under_way.popleft().result()
+        yield under_way.popleft()()
+
+
+def _begun(make: Callable[[int], T], start: int) -> Callable[[], T]:
+    """A function that waits for make(start) in a thread; `concurrent.futures` would take longer to load than a list of J ≤ 30 to write."""
+    values, errors = list[T](), list[BaseException]()
+
+    def run() -> None:
+        try:
+            values.append(make(start))
+        except BaseException as error:  # raised again where the piece is waited for
+            errors.append(error)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+
+    def result() -> T:
+        thread.join()
+        for error in errors:
+            raise error
+        return values[0]
+
+    return result
 
 
 def write_hitran_lines(lines: Lines, path: str | os.PathLike[str], settings: Settings) -> None:
