@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size
-from rotor.quantum.wang.basis import WangBlock, ka_kc, wang_blocks
+from rotor.quantum.wang.basis import WangBlock, first_name, wang_blocks
 
 _MOST_PADDED = 1 << 22  # matrix elements of blocks that are worked on together: 32 MB
 _LIKE, _SMALL = 2.0, 8  # largest ratio of sizes of blocks that are worked on together, and sizes that all are
@@ -60,7 +60,7 @@ def occurring_blocks(labels: Ints, representation: str, kmax: int | None) -> lis
         if j not in by_j:
             by_j[j] = {block.species: block for block in wang_blocks(j, representation)}
         basis = by_j[j][species]
-        rank = (ka - int(ka_kc(j, species, 1)[0][0])) // 2
+        rank = (ka - first_name(j, species)[0]) // 2
         if (j, species) not in occurring:
             occurring[j, species] = Occurring(basis, _cut(basis, kmax), [], [])
         current = occurring[j, species]

@@ -57,8 +57,10 @@ BY_OVERLAP = """
 MUTATIONS = (
     Mutation(
         1, "rotor/quantum/wang/rotation.py",
-        "    labels = [names_of(b.basis, representation) for b in blocks]\n",
-        "    labels = [tuple(q[np.abs(b.vectors).argmax(axis=0)] for q in names_of(b.basis, representation)) for b in blocks]\n",
+        "    ka, kc = names_of_blocks(functions, sizes, representation)\n",
+        "    ka, kc = names_of_blocks(functions, sizes, representation)\n"
+        "    largest = np.concatenate([b.start + np.abs(b.vectors).argmax(axis=0) for b in blocks])\n"
+        "    ka, kc = ka[largest], kc[largest]\n",
         "tests/quantum/test_levels.py::test_every_label_stands_once",
     ),
     Mutation(

@@ -11,12 +11,13 @@ In any representation (-1)^Ka and (-1)^Kc are the characters under C2a and C2c, 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.arrays import numbers_in_runs
 from rotor.tops.operators import REPRESENTATIONS as REPRESENTATIONS
 from rotor.tops.operators import axis_order
 
@@ -127,19 +128,15 @@ def wang_blocks(j: int, representation: str) -> list[WangBlock]:
     return sorted(WangBlock(j, _species(j, first, sign, axes), first, sign, size) for first, sign, size in sized)
 
 
-def ka_kc(j: int, species: str, size: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Ka and Kc of the states of a block in order of energy.
+def first_name(j: int, species: str) -> tuple[int, int]:
+    """Ka of the lowest state of a block and Ka + Kc, J or J + 1 by the parities; Ka rises by two through the block.
 
-    Ka rises by two through the block; Kc follows from Ka + Kc = J or J + 1 and its parity.
-
-    >>> ka_kc(2, "ee", 2)
-    (array([0, 2]), array([2, 0]))
+    >>> first_name(2, "ee"), first_name(3, "oo")
+    ((0, 2), (1, 4))
     """
     ka_odd, kc_odd = species[0] == "o", species[1] == "o"
     at_j = (ka_odd + kc_odd) % 2 == j % 2  # Ka + Kc = J, else J + 1
-    first = 1 if ka_odd else (0 if at_j else 2)
-    ka = first + 2 * np.arange(size)
-    return ka, (j if at_j else j + 1) - ka
+    return 1 if ka_odd else (0 if at_j else 2), j if at_j else j + 1
 
 
 def limited(block: WangBlock, kmin: int, kmax: int) -> WangBlock | None:
@@ -166,14 +163,30 @@ def names_of(block: WangBlock, representation: str) -> tuple[NDArray[np.int64], 
     >>> names_of(WangBlock(5, "eo", 2, 1, 1), "Ir")
     (array([2]), array([3]))
     """
+    first, total = _first_of_part(block, representation)
+    ka = first + 2 * np.arange(block.size)
+    return ka, total - ka
+
+
+def names_of_blocks(
+    blocks: Sequence[WangBlock], counts: Sequence[int], representation: str
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """`names_of` of the lowest states of each block, one block behind the other."""
+    first, total = np.array([_first_of_part(block, representation) for block in blocks]).reshape(-1, 2).T
+    number, place = numbers_in_runs(np.asarray(counts))
+    ka = first[number] + 2 * place
+    return ka, total[number] - ka
+
+
+def _first_of_part(block: WangBlock, representation: str) -> tuple[int, int]:
+    """Ka of the lowest state of a block, of which some K may be left out, and Ka + Kc."""
+    first, total = first_name(block.j, block.species)
     whole = (block.j - block.first_k % 2) // 2 + 1 - (block.first_k % 2 == 0 and block.sign < 0)
     if block.size == whole:
-        return ka_kc(block.j, block.species, block.size)
+        return first, total
     axis = REPRESENTATIONS[representation][2]
     if axis == "b":
         raise ValueError(f"K limited in representation {representation}: its z is b, where K is neither Ka nor Kc")
     lowest = block.first_k % 2 if block.first_k % 2 or block.sign > 0 else 2
-    first = (block.first_k - lowest) // 2
-    ka, kc = ka_kc(block.j, block.species, whole)
-    chosen = slice(first, first + block.size) if axis == "a" else slice(whole - first - block.size, whole - first)
-    return ka[chosen], kc[chosen]
+    skipped = (block.first_k - lowest) // 2
+    return first + 2 * (skipped if axis == "a" else whole - skipped - block.size), total

@@ -13,7 +13,7 @@ from rotor.quantum.coupled_levels import Model, coupled_levels, model_of
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels, SolvedBlock, levels_table, single_block
-from rotor.quantum.wang.basis import WangBlock, blocks_within, names_of
+from rotor.quantum.wang.basis import WangBlock, blocks_within, names_of_blocks
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
 from rotor.quantum.wang.wang_matrix import (
     JMatrix,
@@ -170,13 +170,9 @@ def _in_wang_blocks(
     solved = executor.map(_solve, *zip(*pieces, strict=True)) if executor else (_solve(*piece) for piece in pieces)
     blocks = tuple(_placed(block for solutions in solved for block in solutions))
 
-    labels = [names_of(b.basis, representation) for b in blocks]
-    sizes = [len(b.energies_mhz) for b in blocks]
-    j = np.repeat([b.basis.j for b in blocks], sizes)
-    ka, kc = (
-        np.concatenate([column[:size] for column, size in zip(columns, sizes, strict=True)])
-        for columns in zip(*labels, strict=True)
-    )
+    functions, sizes = [b.basis for b in blocks], [len(b.energies_mhz) for b in blocks]
+    j = np.repeat([block.j for block in functions], sizes)
+    ka, kc = names_of_blocks(functions, sizes, representation)
     energies, quanta = np.concatenate([b.energies_mhz for b in blocks]), {"j": j, "ka": ka, "kc": kc}
     return levels_table(top, effects, jmax, energies, quanta, representation, blocks=blocks if vectors else ())
 
