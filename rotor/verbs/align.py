@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rotor.alignment.pulse import SHAPES, Axis, Pulse, read_axis
+import numpy as np
+
+from rotor.alignment.align import AlignmentTrace
+from rotor.alignment.pulse import SHAPES, Axis, Pulse, TabulatedPulse, read_axis
 from rotor.alignment.request import AlignAnswer, AlignRequest, answer_align
+from rotor.arrays import Floats
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, record_table
 from rotor.requests.field import CONDITIONS, REQUIRED, all_fields, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_fields
 from rotor.requests.readers import Quantity
 from rotor.table import counted
+from rotor.tops.top import Top
 from rotor.verbs.molecule import NUCLEI, REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Subject, Verb
-
-if TYPE_CHECKING:
-    from rotor.alignment.align import AlignmentTrace
-    from rotor.arrays import Floats
-    from rotor.tops.top import Top
 
 FIELDS = all_fields(AlignRequest)
 _TEXTS = {
@@ -103,10 +103,6 @@ def _pulse_of_text(text: str, option: str, axis: Axis) -> Pulse:
 
 
 def _pulse_of_table(path: str, axis: Axis) -> Pulse:
-    import numpy as np
-
-    from rotor.alignment.pulse import TabulatedPulse
-
     names, rows = _rows(path)
     columns = ("t_ps", "intensity_w_per_cm2")
     if not set(columns) <= set(names):
@@ -189,8 +185,6 @@ def _facts(trace: AlignmentTrace, content: Mapping[str, Any]) -> list[tuple[str,
 
 def _samples_text(trace: AlignmentTrace) -> str:
     """The number of times and their step, that max and min are samples, and how far the cosines go between them."""
-    import numpy as np
-
     longest = float(np.diff(trace.t_ps).max(initial=0.0))
     beyond = max(beyond_samples(trace.t_ps, sign * values) for values in trace.cosines.values() for sign in (1.0, -1.0))
     text = f"{counted(len(trace.t_ps), 'time')}, at most {longest:.3g} ps apart; max and min are samples"
@@ -205,8 +199,6 @@ def beyond_samples(times: Floats, values: Floats) -> float:
     >>> round(beyond_samples(t, -((t - 0.53) ** 2)), 6)  # (0.53 - 0.5)²
     0.0009
     """
-    import numpy as np
-
     top = int(np.argmax(values))
     if not 0 < top < len(values) - 1:
         return 0.0

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 from rotor.assignment.request import AssignRequest, answer_assign
 from rotor.fitting.publication import value_text
@@ -33,8 +35,6 @@ def spectrum_source(raw: Any) -> Any:
     """The file name as text, or numbers as an array (peaks, 2 or 3): frequency, intensity[, error]."""
     if isinstance(raw, str | os.PathLike):
         return os.fspath(raw)
-    import numpy as np
-
     values = np.asarray(raw, dtype=np.float64)
     if values.ndim != 2 or not {2, 3} & set(values.shape):
         raise ValueError(f"an array of shape {values.shape}: expected columns of frequency, intensity[, error]")

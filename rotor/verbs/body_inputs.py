@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rotor.classical.bodies import NamedBody, named_body
 from rotor.classical.driven import BODY_EFFECTS, DEFAULT_TOLERANCE
+from rotor.classical.euler import checked_moments
+from rotor.classical.tumble import Three
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, NUMERICS, all_fields, declared
 from rotor.requests.readers import Custom, Grid, Quantity, Reader, Whole
 from rotor.units import parse_grid
-
-if TYPE_CHECKING:
-    from rotor.classical.bodies import NamedBody
-    from rotor.classical.tumble import Three
 
 _UNIT_AT_END = re.compile(r"[A-Za-z][\w ²*^/]*$")
 MOST_TIMES = 10_000_000
 
 
 def _body(name: Any) -> NamedBody:
-    from rotor.classical.bodies import named_body
-
     return named_body(name)
 
 
@@ -46,8 +43,6 @@ def _numbers(raw: Any, count: int, expected: str, unit: str = "") -> list[float]
 
 
 def _moments(raw: Any) -> Three:
-    from rotor.classical.euler import checked_moments
-
     moments = three(raw, "kg*m2" if in_si(raw) else "")
     try:
         checked_moments(moments)

@@ -5,11 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from rotor.formats.spcat.catalogue_budget import catalogue_budget
+from rotor.formats.spcat.compare import in_mhz, with_measured_lines
+from rotor.formats.spcat.text.cat import write_cat
+from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, json_text, record_table
 from rotor.reports.top_facts import error_facts
+from rotor.requests.budget import ErrorBudget
 from rotor.verbs.comparing import (
     CatRequest,
     Compared,
@@ -23,10 +30,6 @@ from rotor.verbs.comparing import (
 from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import ErrorsShown, Work
-
-if TYPE_CHECKING:
-    from rotor.formats.spcat.text.catalogue import Catalogue
-    from rotor.requests.budget import ErrorBudget
 
 EXAMPLES = """\b
 Examples:
@@ -47,10 +50,6 @@ class CatAnswer:
 
     def facts(self) -> dict[str, Any]:
         """Number, range and species of the lines, by the keys of docs/verbs."""
-        import numpy as np
-
-        from rotor.formats.spcat.compare import in_mhz
-
         lines, (frequency, _) = self.lines, in_mhz(self.lines)
         facts = {
             "line_count": len(lines),
@@ -66,8 +65,6 @@ class CatAnswer:
     @property
     def errors(self) -> ErrorBudget:
         """Error budget of the frequencies, from the errors in the file."""
-        from rotor.formats.spcat.catalogue_budget import catalogue_budget
-
         return catalogue_budget(self.lines)
 
 
@@ -77,16 +74,12 @@ def answer(request: CatRequest, work: Work) -> CatAnswer:
         raise ValueError("--plot-vertical: cannot be combined with --compare, whose picture fixes its vertical axis")
     lines = request.chosen(read_catalogue(request.file))
     if request.measured is not None:
-        from rotor.formats.spcat.compare import with_measured_lines
-
         lines = with_measured_lines(lines, read_catalogue(request.measured))
     return CatAnswer(request, lines, None if request.compare is None else beside(lines, request, work.note))
 
 
 def write_lines(answer: CatAnswer, path: Path, report: Report) -> None:
     """Write the lines as a catalogue."""
-    from rotor.formats.spcat.text.cat import write_cat
-
     write_cat(answer.lines, path)
 
 
@@ -128,10 +121,6 @@ def show(answer: CatAnswer, report: Report) -> Iterable[Part | None]:
 
 def _table(prefix: str, lines: Catalogue, shown: int) -> Table:
     """The strongest lines in order of frequency."""
-    import numpy as np
-
-    from rotor.formats.spcat.compare import in_mhz
-
     strongest = np.sort(np.argsort(-lines.lgint, kind="stable")[:shown]).tolist()
     frequency, error = in_mhz(lines)
     records = [line_record(lines, row) | {"frequency": frequency[row], "error": error[row]} for row in strongest]

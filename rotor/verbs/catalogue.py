@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from rotor.formats.spcat.catalogue_budget import stored_budget
 from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.top_facts import error_facts
+from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
 from rotor.table import Table as Columns
 from rotor.verbs.outputs import Output
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import ErrorsShown, Work
-
-if TYPE_CHECKING:
-    from rotor.requests.budget import ErrorBudget
 
 ADD, LIST, SHOW = ACTIONS = ("add", "list", "show")
 EXAMPLES = """\b
@@ -154,8 +155,6 @@ class LinesInRange:
     @property
     def errors(self) -> ErrorBudget:
         """Error budget of the frequencies, from the errors in their sources."""
-        from rotor.formats.spcat.catalogue_budget import stored_budget
-
         names = ("frequency_mhz", "error_mhz", "log_intensity_300k")
         return stored_budget(*(self.table.columns[name] for name in names))
 
@@ -178,7 +177,6 @@ def find_lines(request: CatalogueRequest, work: Work) -> LinesInRange:
 
 def _stored_lines(species: Sequence[Any]) -> StoredLines:
     """The lines of all species, in order of frequency."""
-    import numpy as np
 
     def intensity(lines: Any) -> Any:
         low, high = lines.partition.range_k
@@ -200,8 +198,6 @@ def _stored_lines(species: Sequence[Any]) -> StoredLines:
 
 
 def _table(lines: StoredLines, shown: int) -> Table:
-    import numpy as np
-
     columns = {
         "species": "{species}",
         "frequency (MHz)": "{frequency_mhz:.4f}",

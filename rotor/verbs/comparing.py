@@ -6,9 +6,15 @@ import json
 import math
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from rotor.checks import NoAnswerError
+from rotor.formats.spcat.compare import Comparison, agreement, compare, in_mhz, likely_temperature_k, within
+from rotor.formats.spcat.text.cat import read_cat
+from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.fields import BLANK
 from rotor.frozen import dataclass
 from rotor.requests.field import OUTPUT, REQUIRED, changed_fields, declared
 from rotor.requests.readers import INFINITE, Flag, Names, Quantity, Range, Text, Whole
@@ -16,12 +22,6 @@ from rotor.table import counted
 from rotor.verbs.molecule import with_some_dipole
 from rotor.verbs.subjects import top_of_word
 from rotor.verbs.verb import Note
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from rotor.formats.spcat.compare import Comparison
-    from rotor.formats.spcat.text.catalogue import Catalogue
 
 FORMAT_K = 300.0  # intensities of the 80-column format are those at 300 K
 DIFFERENCES = ("frequency_mhz", "lgint", "energy_lower_cm")
@@ -85,10 +85,6 @@ class CatRequest:
 
     def chosen(self, lines: Catalogue) -> Catalogue:
         """The lines in the range and above the intensity cut."""
-        import numpy as np
-
-        from rotor.formats.spcat.compare import in_mhz
-
         frequency, _ = in_mhz(lines)
         least = -np.inf if self.min_lgint is None else self.min_lgint
         return lines.take((frequency >= self.range_mhz[0]) & (frequency <= self.range_mhz[1]) & (lines.lgint >= least))
@@ -105,22 +101,19 @@ class Compared:
     @cached_property
     def likely_temperature_k(self) -> float:
         """The temperature (K) at which the intensities agree best; nan if they do not determine it."""
-        from rotor.formats.spcat.compare import likely_temperature_k
-
         return likely_temperature_k(self.comparison, self.temperature_k or FORMAT_K)
 
 
 def beside(lines: Catalogue, request: CatRequest, note: Note) -> Compared:
     """Compare the lines of a file with those of OTHER."""
-    from rotor.formats.spcat.compare import compare, within
-    from rotor.formats.spcat.predict import predict_file
-
     other = request.compare or ""
     if not len(lines):
         raise NoAnswerError("--compare: no lines are left to compare")
     if other.lower().endswith((".cat", ".cat.gz")):
         return Compared(compare(lines, request.chosen(read_catalogue(other))))
     if other.lower().endswith(".int"):
+        from rotor.formats.spcat.predict import predict_file
+
         prediction = predict_file(other, as_spcat=request.as_spcat, full_basis=request.full_basis)
         for text in prediction.notes:
             note(text)
@@ -136,8 +129,6 @@ def read_catalogue(path: str) -> Catalogue:
     """Read a catalogue; ValueError for another kind of file."""
     if not path.lower().endswith((".cat", ".cat.gz")):
         raise ValueError(f"{path}: expected a catalogue, .cat or .cat.gz")
-    from rotor.formats.spcat.text.cat import read_cat
-
     return read_cat(path)
 
 
@@ -159,7 +150,6 @@ def temperature_of(file: str, option: float | None) -> tuple[float, str]:
 def predicted(lines: Catalogue, request: CatRequest, kelvin: float, note: Note) -> Catalogue:
     """Lines of a molecule up to the highest J and down to the weakest line of the catalogue, somewhat beyond its range."""
     from rotor.formats.line_tables import catalogue
-    from rotor.formats.spcat.compare import in_mhz
     from rotor.spectra.lines import line_list
 
     source = request.compare or ""
@@ -182,8 +172,6 @@ def predicted(lines: Catalogue, request: CatRequest, kelvin: float, note: Note) 
 
 def comparison_record(compared: Compared, other: str, shown: int) -> dict[str, Any]:
     """Counts of matched, missing and extra lines, and differences (OTHER minus the catalogue), for JSON."""
-    from rotor.formats.spcat.compare import agreement
-
     comparison = compared.comparison
     measured = agreement(comparison)
     return {
@@ -218,8 +206,6 @@ def temperature_note(compared: Compared | None) -> list[str]:
 
 
 def _spread(difference: np.ndarray[Any, Any]) -> dict[str, float] | None:
-    import numpy as np
-
     if not len(difference):
         return None
     size = np.abs(difference)
@@ -228,8 +214,6 @@ def _spread(difference: np.ndarray[Any, Any]) -> dict[str, float] | None:
 
 def line_record(lines: Catalogue, row: int) -> dict[str, Any]:
     """A line by the fields of the format, without blank quantum numbers."""
-    from rotor.formats.spcat.text.fields import BLANK
-
     record = lines.record(row)._asdict()
     for side in ("quanta_upper", "quanta_lower"):
         record[side] = [q for q in record[side] if q != BLANK]

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from rotor.frozen import dataclass
+from rotor.quantum.quanta import headings
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.sources import short_source
@@ -16,6 +19,7 @@ from rotor.requests.fill import Entries, NamedError, read_instance, written_fiel
 from rotor.requests.plan import MOST_LEFT_OUT
 from rotor.requests.readers import Custom, Quantity, Text, Whole
 from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
+from rotor.spectra.emitters import CatalogueLines
 from rotor.tops.top import Top
 from rotor.verbs.emission_observed import OBSERVED
 from rotor.verbs.molecule import (
@@ -32,9 +36,6 @@ from rotor.verbs.observed_file import SeveralInput, is_catalogue
 from rotor.verbs.outputs import Output, Report, picture, tables
 from rotor.verbs.subjects import beside, saved_molecule
 from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb
-
-if TYPE_CHECKING:
-    from rotor.spectra.emitters import CatalogueLines
 
 EXAMPLES = """\b
 Examples:
@@ -204,8 +205,6 @@ def show(answer: EmissionAnswer, report: Report) -> Iterable[Part | None]:
 
 
 def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
-    from rotor.quantum.quanta import headings
-
     request, layer = answer.request, answer.request.sources[0]
     behind = f"background {layer.background_k:g} K as observed, filling {layer.filling:g}"
     facts = [
@@ -248,8 +247,6 @@ def _limits(answer: EmissionAnswer, with_spins: str) -> list[tuple[str, str]]:
 
 def _table(answer: EmissionAnswer, shown: int) -> Table:
     """The brightest lines in order of frequency."""
-    import numpy as np
-
     lines = answer.lines
     rows = np.sort(np.argsort(-lines.brightness_k, kind="stable")[:shown])
     columns = {

@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.requests.field import Rule, changed_fields, declared_fields
@@ -62,8 +64,6 @@ class Observed:
 
     def facts(self) -> dict[str, Any]:
         """Spectrum and model, by the keys of docs/verbs."""
-        import numpy as np
-
         from rotor.observed.fit import component_facts
         from rotor.observed.overlay_table import modelled
 

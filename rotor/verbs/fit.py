@@ -10,6 +10,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.fitting.publication import value_text
+from rotor.fitting.report import (
+    dfbetas,
+    error_text,
+    far_off,
+    mostly_off,
+    parameter_units,
+    quartics_not_free,
+    scatter_text,
+    statistics_text,
+    status_text,
+)
+from rotor.formats.assigned_lin import lin_notes
+from rotor.formats.assigned_lines import write_assigned_lines
 from rotor.formats.fit_request import (
     FitAnswer,
     FitRequest,
@@ -121,8 +135,6 @@ def answer(request: FitRequest, work: Work) -> FitAnswer:
         fit_answer = answer_fit(request, _show_iteration if work.progress and sys.stderr.isatty() else None)
     fit_answer = with_further(fit_answer, further.try_constants, further.suggest, further.bootstrap, further.seed)
     if any(path.suffix.lower() == ".lin" for path in work.files.get("save_lines", ())):
-        from rotor.formats.assigned_lin import lin_notes
-
         for text in lin_notes(fit_answer.fit.marked_lines):
             work.note(text)
     return fit_answer
@@ -183,8 +195,6 @@ def write_table(answer: FitAnswer, path: Path, report: Report) -> None:
 
 def write_lines(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the assigned lines, merged."""
-    from rotor.formats.assigned_lines import write_assigned_lines
-
     write_assigned_lines(answer.fit.marked_lines, path)
 
 
@@ -209,8 +219,6 @@ def content(answer: FitAnswer, shown: FitShown) -> dict[str, Any]:
 def _line_records(fit: Fit) -> list[dict[str, Any]]:
     lines = fit.lines
     leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
-    from rotor.fitting.report import dfbetas
-
     shifts = dfbetas(fit)
     dfbetas_of_line = {} if shifts is None else dict(zip(fit.groups.tolist(), shifts, strict=True))
     difference = fit.difference_mhz
@@ -234,8 +242,6 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
 
 def show(answer: FitAnswer, report: Report) -> Iterable[Part | None]:
     """Parameters with errors, statistics and analyses."""
-    from rotor.fitting.report import far_off, statistics_text, status_text
-
     fit = answer.fit
     yield f"{answer.request.title}: {status_text(fit)}"
     yield _parameter_table(fit, answer.spread)
@@ -251,8 +257,6 @@ def show(answer: FitAnswer, report: Report) -> Iterable[Part | None]:
 
 def _advice(fit: Fit) -> list[tuple[str, str]] | None:
     """What may help a fit that failed with most lines far off: distortion constants that are not free."""
-    from rotor.fitting.report import mostly_off, quartics_not_free
-
     names = "" if fit.converged or not mostly_off(fit) else ",".join(quartics_not_free(fit))
     if not names:
         return None
@@ -264,9 +268,6 @@ def _advice(fit: Fit) -> list[tuple[str, str]] | None:
 
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
-    from rotor.fitting.publication import value_text
-    from rotor.fitting.report import error_text, parameter_units, scatter_text
-
     columns = [
         "parameter",
         f"value ({parameter_units(fit)})",

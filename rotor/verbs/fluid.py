@@ -11,7 +11,12 @@ from pathlib import Path
 from tempfile import gettempdir
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rotor.checks import NoAnswerError, RunStopped
+from rotor.fluids.forces.models import MODELS, find_model, find_models, model_shapes
+from rotor.fluids.initial_box import model_labels
+from rotor.fluids.motion.bodies import rigid_bodies
 from rotor.fluids.request import WATER_G_CM3, FluidAnswer, FluidRequest, NewBox, answer_fluid
 from rotor.fluids.run import Outputs
 from rotor.fluids.settings import Settings
@@ -154,8 +159,6 @@ def _read(path: str) -> Atoms:
 
 def _refuse_other_model(source: str, settings: Settings) -> None:
     """Refuse a new box of another molecule than that of the model."""
-    from rotor.fluids.forces.models import MODELS, find_model
-
     if source != settings.model and source in MODELS:
         raise ValueError(f"{source!r}: the model is {settings.model}; write --model {source} too")
     if "," in settings.model or source not in ("water", settings.model):
@@ -258,12 +261,7 @@ def frames_for(outputs: Outputs, drawn: bool) -> Iterator[tuple[Outputs, str | N
 
 def _centres(answer: FluidAnswer, frames: str | None) -> Floats:
     """Centres of mass (frames, n, 3) in Å over the second half of a run, or at its end without frames."""
-    import numpy as np
     from ase.io import read
-
-    from rotor.fluids.forces.models import find_models, model_shapes
-    from rotor.fluids.initial_box import model_labels
-    from rotor.fluids.motion.bodies import rigid_bodies
 
     models = find_models(answer.request.settings.model)
     shapes = model_shapes(models)

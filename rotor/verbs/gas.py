@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rotor.classical.gas.ensembles import Correlations
 from rotor.reports import top_facts
 from rotor.reports.progress import counting
 from rotor.reports.screen import Part, Table, record_table, sampled
@@ -18,9 +19,6 @@ from rotor.verbs.molecule import NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Verb, Work
-
-if TYPE_CHECKING:
-    from rotor.classical.gas.ensembles import Correlations
 
 SHOWN = 11  # rows of the correlation functions in the report
 

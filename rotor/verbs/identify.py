@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.formats.catalogue.cat_species import read_cat_species
+from rotor.formats.catalogue.catdir import is_catdir
 from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, record_table
@@ -112,8 +114,6 @@ def answer(request: IdentifyRequest, work: Work) -> Identified:
 
 def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[SpeciesLines]:
     """Species with lines in the range, from catalogues, folders and files."""
-    from rotor.formats.catalogue.cat_species import read_cat_species
-    from rotor.formats.catalogue.catdir import is_catdir
     from rotor.formats.catalogue.database import LineCatalogue
 
     out: list[SpeciesLines] = []

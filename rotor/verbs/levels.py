@@ -6,7 +6,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from rotor.frozen import dataclass
+from rotor.quantum import quanta
+from rotor.quantum.quanta import headings
 from rotor.quantum.request import LevelsAnswer, LevelsRequest, answer_levels
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title
@@ -65,10 +69,6 @@ def show(answer: LevelsAnswer, report: Report) -> Iterable[Part | None]:
 
 
 def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    import numpy as np
-
-    from rotor.quantum.quanta import headings
-
     top, request = answer.request.top, answer.request
     between = f"= {request.jmin}" if request.jmin == request.jmax else f"from {request.jmin} to {request.jmax}"
     limits = f"{'N' if 'n' in content['quantum_numbers'] else 'J'} {between}"
@@ -95,10 +95,6 @@ def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, 
 
 def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
     """The lowest existing levels in order of energy."""
-    import numpy as np
-
-    from rotor.quantum import quanta
-
     table = answer.table
     order = np.argsort(table.energy_mhz, kind="stable")
     existing = order[table.levels.weight[table.rows[order]] > 0]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
 from rotor.reports.progress import progress_bar
+from rotor.spectra.intensity import highest_j
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.spectra.transitions import TooManyLinesError, spin_functions, transition_count
 
@@ -125,8 +126,6 @@ def _no_json(count: str) -> str:
 
 def _highest_j(request: SpectrumRequest) -> int:
     """The requested highest J, or an estimate from the usual cut (with Q = 1e4 if Q is not known)."""
-    from rotor.spectra.intensity import highest_j
-
     dipole, least = request.top.dipole_abc_debye, -math.inf if request.min_lgint is None else request.min_lgint
     if dipole is None:
         return request.jmax or 0

@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, renamed
@@ -316,8 +318,6 @@ def _semirigid(top: Top, hessian: str, reading: Reading) -> Top:
 
 
 def _with_dipole_of_input(top: Top, dipole: tuple[float, ...], reading: Reading) -> Top:
-    import numpy as np
-
     if top.frame is None:
         raise ValueError(f"needs the frame of a geometry; with constants use {reading.named('dipole_abc')}")
     vector = (top.frame.axes @ np.array(dipole)).tolist()
@@ -340,8 +340,6 @@ def _with_polarizability(top: Top, numbers: tuple[float, ...], reading: Reading)
 
 
 def _with_anisotropy(top: Top, anisotropy: float, reading: Reading) -> Top:
-    import numpy as np
-
     if top.kind not in ("linear", "prolate", "oblate"):
         raise ValueError(
             f"a top of the kind {top.kind} has no single anisotropy; give {reading.named('polarizability')} aa,bb,cc"

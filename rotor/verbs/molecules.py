@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from json import dumps
 from pathlib import Path
@@ -116,8 +117,6 @@ def record(path: Path, *, symmetry: bool = True) -> dict[str, Any]:
 
 def _top_of_constants(file: MoleculeFile) -> Top:
     """The top without its geometry: finding the symmetry would take most of the time."""
-    from dataclasses import replace
-
     from rotor.tops.top import Top
 
     assert file.constants is not None

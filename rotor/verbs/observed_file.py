@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, Rule, declared
 from rotor.requests.readers import INFINITE, Names, Numbers, Quantity, Text, Whole
@@ -174,8 +176,6 @@ def padded(spectrum: ObservedSpectrum, redshift: float = 0.0, km_s: float = 300.
 
 def spectrum_facts(spectrum: ObservedSpectrum) -> list[tuple[str, str]]:
     """The spectrum as rows of a report."""
-    import numpy as np
-
     first, last = spectrum.frequency_mhz[0], spectrum.frequency_mhz[-1]
     rows = [
         (
@@ -189,8 +189,6 @@ def spectrum_facts(spectrum: ObservedSpectrum) -> list[tuple[str, str]]:
 
 def json_of(spectrum: ObservedSpectrum) -> dict[str, Any]:
     """The spectrum by the keys of docs/verbs."""
-    import numpy as np
-
     return {
         "source": spectrum.source,
         "channels": len(spectrum),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
@@ -122,8 +123,6 @@ def components_of(
     spectrum: ObservedSpectrum, species: Sequence[SpeciesLines], sight: Sight, request: ObservedRequest
 ) -> list[Component]:
     """Components from the typed options; for a fit, the rest is estimated from the spectrum."""
-    from dataclasses import replace
-
     from rotor.observed.model import Component
     from rotor.observed.start import start_components
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rotor.frozen import dataclass
 from rotor.reports import top_facts
@@ -11,14 +11,12 @@ from rotor.reports.line_tables import first_rows_title, labelled_rows, states_te
 from rotor.reports.screen import Part, Table, record_table
 from rotor.requests.field import OUTPUT, declared
 from rotor.requests.readers import Whole
+from rotor.spectra.raman import RamanLines
 from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
 from rotor.verbs.molecule import DIPOLE, REFINEMENT, with_known_polarizability
 from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Shown, Verb
-
-if TYPE_CHECKING:
-    from rotor.spectra.raman import RamanLines
 
 EXAMPLES = """\b
 Examples:

@@ -10,6 +10,7 @@ from typing import Any
 
 from rotor.frozen import dataclass
 from rotor.quantum.estimates.uncertainty import ESTIMATES
+from rotor.quantum.quanta import headings, rotational_quanta
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part
@@ -192,8 +193,6 @@ def show(answer: SpectrumAnswer, report: Report) -> Iterable[Part | None]:
     if not len(lines):
         part = f"no lines: {_why_none(answer, report.entries)}\n"
     elif record["patterns"] is not None:
-        from rotor.quantum.quanta import headings, rotational_quanta
-
         part = patterns_table(record["patterns"], headings(rotational_quanta(lines.levels.quanta)))
     else:
         part = lines_table(lines, record["strongest"], record["optical_depth"])

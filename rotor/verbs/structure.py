@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rotor.checks import NoAnswerError
 from rotor.formats.family_file import FamilyFile, read_family
@@ -16,15 +16,13 @@ from rotor.reports.top_facts import error_facts
 from rotor.requests.field import MOLECULE, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom
+from rotor.structures.consistency import PlanarMoment, Without
 from rotor.structures.family import Family
+from rotor.structures.substitution import SubstitutionStructure, Value
 from rotor.table import counted
 from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.subjects import file_name, saved_inputs
 from rotor.verbs.verb import ErrorsShown, Place, Subject, SubjectKind, Verb
-
-if TYPE_CHECKING:
-    from rotor.structures.consistency import PlanarMoment, Without
-    from rotor.structures.substitution import SubstitutionStructure, Value
 
 EXAMPLES = """\b
 Examples:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import CONDITIONS
+from rotor.thermodynamics import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT
 from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Verb, Work
-
-if TYPE_CHECKING:
-    from rotor.thermodynamics import ThermoFunctions
 
 SHOWN = 25  # rows of the table in the report
 

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rotor.arrays import Floats
 from rotor.classical.driven import DrivenAnswer, DrivenRequest, answer_driven
 from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import Rule
 from rotor.requests.fill import NamedError
+from rotor.table import Table as Columns
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.turning_body import TurningBody, build
 from rotor.verbs.verb import Verb
-
-if TYPE_CHECKING:
-    from rotor.arrays import Floats
-    from rotor.table import Table as Columns
 
 SHOWN = 11  # rows of the motion in the report
 SMALL = 1e-4  # largest component of a column below which numbers are printed with digits instead of decimals

@@ -5,8 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
+import numpy as np
+
+from rotor.classical.bodies import BODIES, NamedBody
+from rotor.classical.driven import DrivenRequest
+from rotor.classical.euler import checked_momentum
+from rotor.classical.tumble import COHERENT, SI, Three, TumbleRequest, Units
 from rotor.frozen import dataclass
 from rotor.requests.field import Field
 from rotor.requests.fill import Entries, NamedError, read_instance, renaming, written_fields
@@ -14,13 +20,7 @@ from rotor.requests.readers import Custom, Grid, Quantity
 from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL
 from rotor.verbs.body_inputs import BODY, MOTION, BodyInput, MotionInput, in_si, three
 from rotor.verbs.subjects import MOLECULE, OneMolecule, saved_molecule
-from rotor.verbs.verb import Place, Subject
-
-if TYPE_CHECKING:
-    from rotor.classical.bodies import NamedBody
-    from rotor.classical.driven import DrivenRequest
-    from rotor.classical.tumble import Three, TumbleRequest, Units
-    from rotor.verbs.verb import Verb
+from rotor.verbs.verb import Place, Subject, Verb
 
 _HBAR_PER_U_ANGSTROM2_RAD_PER_PS = ASE_TIME_PS / HBAR_CLASSICAL  # angular momentum in ħ of 1 u Å² at 1 rad/ps
 AT_REST = (1.0, 0.0, 0.0, 0.0)  # attitude: body and space axes coincide
@@ -113,14 +113,10 @@ def read_body(entries: Entries) -> Body | None:
 
 def _named_source(source: Any) -> NamedBody | None:
     """The everyday body that a source names, unless it is a file."""
-    from rotor.classical.bodies import BODIES
-
     return BODIES.get(source.replace("-", " ")) if isinstance(source, str) and not Path(source).exists() else None
 
 
 def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
-    from rotor.classical.tumble import COHERENT, SI
-
     assert inputs.moments is not None
     typed = entries.of(BODY["moments"])
     text = typed if isinstance(typed, str) else ",".join(f"{moment:g}" for moment in inputs.moments)
@@ -129,10 +125,7 @@ def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
 
 def _everyday_body(body: NamedBody) -> Body:
     """An everyday body in SI units; its default motion is one turn a second about the intermediate, unstable axis."""
-    import numpy as np
-
     from rotor.classical.gas.thermal_momentum import off_intermediate_axis
-    from rotor.classical.tumble import SI
     from rotor.thermodynamics.thermal_tumble import TILT_DEGREES
 
     moments = np.array(body.moments_kg_m2)
@@ -176,10 +169,6 @@ def _times(entries: Entries, motion: MotionInput, unit: str) -> tuple[float, ...
 
 
 def _motion_of_body(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
-    import numpy as np
-
-    from rotor.classical.tumble import TumbleRequest
-
     body: Body = subject.values["body"]
     chosen = _start(entries, start, motion, np.array(body.moments), (body.rate_unit, "")) or body.start
     if chosen is None:
@@ -196,8 +185,6 @@ def _motion_of_body(entries: Entries, subject: Subject, start: BodyInput, motion
 
 
 def _motion_of_top(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
-    import numpy as np
-
     from rotor.thermodynamics.thermal_tumble import thermal_tumble
 
     top, times = subject.top, _times(entries, motion, "ps")
@@ -221,8 +208,6 @@ def _start(
 
     units: of the angular velocity and of the angular momentum.
     """
-    from rotor.classical.euler import checked_momentum
-
     by_velocity = start.angular_velocity is not None
     field = BODY["angular_velocity"] if by_velocity else MOTION["angular_momentum"]
     value = start.angular_velocity if by_velocity else motion.angular_momentum
@@ -243,8 +228,6 @@ def _start(
 
 
 def _driven(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> DrivenRequest:
-    from rotor.classical.driven import DrivenRequest
-
     if "body" not in subject.values:
         raise NamedError("{effects}: acts on a body; give {moments} or {body} instead of a molecule")
     body: Body = subject.values["body"]

@@ -15,6 +15,7 @@ from rotor.requests.field import CONDITIONS, declared, names_of
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Numbers
 from rotor.table import counted
+from rotor.tops.magnetic import MagneticTensors, tensor_for
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
 from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
@@ -48,8 +49,6 @@ class MagneticInput:
 
 def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
     """The top with the tensors of the inputs, else with those of its file."""
-    from rotor.tops.magnetic import MagneticTensors, tensor_for
-
     magnetic = read_instance(MagneticInput, entries)
     called = names_of(MagneticInput, entries.style)
 
