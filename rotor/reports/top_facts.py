@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Facts, Part
@@ -75,6 +75,26 @@ def top_parts(
     yield facts
     yield from parts
     yield [*source_facts(top, tables, report.sources), *model_facts(report)]
+
+
+def report_on_top(
+    facts: Callable[[Any, Mapping[str, Any]], Facts],
+    *parts: Callable[[Any, Mapping[str, Any]], Part | None],
+    sources: Sequence[str] = ("constants",),
+    title: Callable[[Top], str] = lambda top: heading(top),
+) -> Callable[[Any, Any], Iterable[Part | None]]:
+    """The function `show` of a verb on the top of its request, from functions of the answer and the content of its JSON.
+
+    sources: tables of the top that are cited.
+    """
+
+    def show(answer: Any, report: Any) -> Iterable[Part | None]:
+        """The parts of the report."""
+        top, content = answer.request.top, report.content
+        made = [part(answer, content) for part in parts]
+        return top_parts(top, facts(answer, content), made, sources, report, title(top))
+
+    return show
 
 
 def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:

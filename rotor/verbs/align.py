@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,14 @@ from rotor.alignment.pulse import SHAPES, Axis, Pulse, TabulatedPulse, read_axis
 from rotor.alignment.request import AlignAnswer, AlignRequest, answer_align
 from rotor.arrays import Floats
 from rotor.reports import top_facts
-from rotor.reports.screen import Part, record_table
+from rotor.reports.screen import Table, record_table
 from rotor.requests.field import CONDITIONS, REQUIRED, all_fields, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_fields
 from rotor.requests.readers import Quantity
 from rotor.table import counted
 from rotor.tops.top import Top
 from rotor.verbs.molecule import NUCLEI, REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
-from rotor.verbs.outputs import Report, picture, tables
+from rotor.verbs.outputs import picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Subject, Verb
 
@@ -144,9 +144,9 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:
     return AlignRequest(**subject.values, **values)
 
 
-def show(answer: AlignAnswer, report: Report) -> Iterable[Part | None]:
-    """Conditions, extremes of the cosines, sources and errors."""
-    trace, content = answer.trace, report.content
+def _table(answer: AlignAnswer, content: Mapping[str, Any]) -> Table:
+    """Extremes of the cosines."""
+    trace = answer.trace
     columns = {
         "cosine": "{name}",
         "max": "{max:.6f}",
@@ -155,13 +155,11 @@ def show(answer: AlignAnswer, report: Report) -> Iterable[Part | None]:
         "min at (ps)": "{min_at_ps:.3f}",
         "mean after": lambda row: f"{trace.permanent[row['name']]:.6f}" if row["name"] in trace.permanent else "",
     }
-    table = record_table("", columns, content["extremes"], {"cosine"})
-    sources = ("constants", "dipole", "polarizability")
-    return top_facts.top_parts(trace.top, _facts(trace, content), (table,), sources, report)
+    return record_table("", columns, content["extremes"], {"cosine"})
 
 
-def _facts(trace: AlignmentTrace, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    top = trace.top
+def _facts(answer: AlignAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    trace, top = answer.trace, answer.trace.top
     acts_on = {pulse.acts_on for pulse in trace.pulses}
     facts = [("constants", top_facts.constants_text(top))]
     if "dipole" in acts_on:
@@ -232,7 +230,7 @@ VERB = Verb(
     answer=lambda request, work: answer_align(request, work.executor),
     results=results,
     rows="trace",
-    show=show,
+    show=top_facts.report_on_top(_facts, _table, sources=("constants", "dipole", "polarizability")),
     outputs=(
         *tables("the cosines", "out"),
         picture("Draw the cosines", "out.png"),

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
 
-from rotor.classical.gas.ensembles import Correlations
 from rotor.reports import top_facts
 from rotor.reports.progress import counting
-from rotor.reports.screen import Part, Table, record_table, sampled
+from rotor.reports.screen import Table, record_table, sampled
 from rotor.requests.fill import Entries
 from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
 from rotor.verbs.molecule import NUCLEI, POLARIZABILITY, REFINEMENT, STATES
-from rotor.verbs.outputs import Report, picture, tables
+from rotor.verbs.outputs import picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Verb, Work
 
@@ -44,14 +43,6 @@ def answer(request: GasRequest, work: Work) -> GasAnswer:
         return answer_gas(request, pool, advance)
 
 
-def show(answer: GasAnswer, report: Report) -> Iterable[Part | None]:
-    """The test of equipartition and the correlation functions."""
-    content, top = report.content, answer.request.top
-    tables = _degrees_table(content), _curves_table(answer.correlations)
-    title = f"{top_facts.heading(top)}, a classical gas"
-    return top_facts.top_parts(top, _facts(answer, content), tables, ("constants",), report, title)
-
-
 def _facts(answer: GasAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
     top, test = answer.request.top, answer.test
     count = content["degrees_of_freedom"]
@@ -71,7 +62,7 @@ def _facts(answer: GasAnswer, content: Mapping[str, Any]) -> list[tuple[str, str
     return facts
 
 
-def _degrees_table(content: Mapping[str, Any]) -> Table:
+def _degrees_table(answer: GasAnswer, content: Mapping[str, Any]) -> Table:
     columns = {
         "degree": "{name}",
         "E (cm-1)": "{energy_cm:.4f}",
@@ -87,7 +78,8 @@ def _degrees_table(content: Mapping[str, Any]) -> Table:
     return record_table(title, columns, content["degrees"], {"degree"})
 
 
-def _curves_table(curves: Correlations | None) -> Table | None:
+def _curves_table(answer: GasAnswer, content: Mapping[str, Any]) -> Table | None:
+    curves = answer.correlations
     if curves is None:
         return None
     records, few = sampled(curves, SHOWN, "times")
@@ -106,7 +98,9 @@ VERB = Verb(
     records=lambda answer: answer.correlations,
     results=lambda answer: {"p_value": answer.test.p_value, "chi2": answer.test.chi2},
     rows="correlation",
-    show=show,
+    show=top_facts.report_on_top(
+        _facts, _degrees_table, _curves_table, title=lambda top: f"{top_facts.heading(top)}, a classical gas"
+    ),
     outputs=(
         *tables("the correlation functions", "out"),
         picture("Draw the test and the functions", "out.png"),

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
-from rotor.reports.screen import Part, Table, record_table
+from rotor.reports.screen import Table, record_table
 from rotor.requests.fill import Entries, read_fields
 from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_info
-from rotor.tops.top import Top
 from rotor.tops.uncertain_numbers import known_digits
 from rotor.units import MHZ_PER_CM
 from rotor.verbs.molecule import POLARIZABILITY
-from rotor.verbs.outputs import Report, tables
+from rotor.verbs.outputs import tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Subject, Verb, Work
 
@@ -36,24 +35,8 @@ def answer(request: InfoRequest, work: Work) -> InfoAnswer:
     return answer_info(request, sum_progress() if work.progress else None)
 
 
-def show(answer: InfoAnswer, report: Report) -> Iterable[Part | None]:
-    """The top, its constants, axes, nuclei, Q(T) and conformers."""
-    top, content = answer.request.top, report.content
-    axes, nuclei, q = _axes_table(content), _nuclei_table(top, content), _q_table(content)
-    tables = (
-        _constants_table(top),
-        _states_table(top),
-        axes,
-        nuclei,
-        q,
-        _conformers_table(content.get("conformers", []), top),
-    )
-    sources = ("constants", "dipole", "polarizability", "spin weights")
-    return top_facts.top_parts(top, _facts(top, content), tables, sources, report)
-
-
-def _facts(top: Top, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    facts: list[tuple[str, str]] = []
+def _facts(answer: InfoAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    top, facts = answer.request.top, list[tuple[str, str]]()
     if top.symmetry is not None:
         number = content["symmetry_number"]
         facts.append(
@@ -100,7 +83,8 @@ def _margin_text(margin: float) -> str:
     return f"{margin:.3g}" if margin < 1e9 else "more than 1e9"
 
 
-def _constants_table(top: Top) -> Table:
+def _constants_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
+    top = answer.request.top
     stated, estimated = top.constants.uncertainties, top.estimated_errors_mhz
     rows = []
     for name, mhz in top.constants.values.items():
@@ -121,16 +105,17 @@ def wavenumber_digits(mhz: float) -> int:
     return min(10, 1 + len(digits.replace(".", "").lstrip("0")))
 
 
-def _states_table(top: Top) -> Table | None:
+def _states_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table | None:
     """Constants of further vibrational states and their couplings."""
-    if top.states is None:
+    states = answer.request.top.states
+    if states is None:
         return None
-    values = top.states.values.items()
+    values = states.values.items()
     rows = [(name, f"{mhz:.12g}", f"{mhz / MHZ_PER_CM:.{wavenumber_digits(mhz)}g}") for name, mhz in values]
     return Table("", ("of states", "MHz", "cm-1"), rows, frozenset({"of states"}))
 
 
-def _axes_table(content: Mapping[str, Any]) -> Table:
+def _axes_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
     """Moments and planar moments; axes and centre of mass in the frame of the input."""
     moments, planar, frame = (content[k] for k in ("moments_u_angstrom2", "planar_moments_u_angstrom2", "frame"))
     columns = ["axis", "I (u Å²)", "P (u Å²)"] + (["x", "y", "z"] if frame else [])
@@ -148,9 +133,9 @@ def _fixed(number: float) -> str:
     return f"{round(number, 6) + 0.0:.6f}"
 
 
-def _nuclei_table(top: Top, content: Mapping[str, Any]) -> Table | None:
+def _nuclei_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table | None:
     """Nuclei that split lines, the size of the splitting, and their constants if known."""
-    rows = []
+    top, rows = answer.request.top, []
     for nucleus in content["splitting_nuclei"]:
         constants_of_spin = top.spin_constants.of(nucleus["nucleus"]) if nucleus["known"] and top.spin_constants else {}
         constants = ", ".join(f"{name} {value:.6g}" for name, value in constants_of_spin.items())
@@ -179,7 +164,7 @@ def _reason(source: str) -> str:
     return re.sub(r"^Q\([^)]*\):? *", "", source).partition(";")[0]
 
 
-def _q_table(content: Mapping[str, Any]) -> Table:
+def _q_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
     rows = content["partition_function"]
     columns: dict[str, Any] = {
         "T (K)": "{temperature_k:g}",
@@ -194,13 +179,12 @@ def _q_table(content: Mapping[str, Any]) -> Table:
     return record_table("", columns, rows, {"remark"})
 
 
-def _conformers_table(records: Sequence[Mapping[str, Any]], top: Top) -> Table | None:
+def _conformers_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
     """Energies, constants (to the digits that the error of the geometry leaves) and dipoles of the conformers, if requested."""
-    if not records:
-        return None
     columns = ("conformer", "E (kJ/mol)", "A (MHz)", "B (MHz)", "C (MHz)", "μa (D)", "μb (D)", "μc (D)")
-    rows, relative = [], (top.molecule.uncertainty or 0.0) if top.molecule is not None else 0.0
-    for number, conformer in enumerate(records, start=1):
+    rows, molecule = [], answer.request.top.molecule
+    relative = (molecule.uncertainty or 0.0) if molecule is not None else 0.0
+    for number, conformer in enumerate(content.get("conformers", ()), start=1):
         constants = [
             known_digits(x, relative * x) if x < float("inf") else "-" for x in conformer["rotational_constants_mhz"]
         ]
@@ -225,11 +209,14 @@ VERB = Verb(
     results=results,
     rows="partition_function",
     records=lambda answer: None,
-    show=show,
+    show=top_facts.report_on_top(
+        _facts, _constants_table, _states_table, _axes_table, _nuclei_table, _q_table, _conformers_table,
+        sources=("constants", "dipole", "polarizability", "spin weights"),
+    ),
     outputs=(*tables("the table of Q(T)", "q"),),
     subject=OneMolecule((*POLARIZABILITY, "internal_rotation")),
     build=build,
     drawn=None,
     accuracy="of the rotational constants",
     start={"molecule": "water", "outputs.csv": "q.csv"},
-)
+)  # fmt: skip

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from rotor.frozen import dataclass
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title, labelled_rows, states_text
-from rotor.reports.screen import Part, Table, record_table
+from rotor.reports.screen import Part, record_table
 from rotor.requests.field import OUTPUT, declared
 from rotor.requests.readers import Whole
-from rotor.spectra.raman import RamanLines
 from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
 from rotor.verbs.molecule import DIPOLE, REFINEMENT, with_known_polarizability
-from rotor.verbs.outputs import Report, picture, tables
+from rotor.verbs.outputs import picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Shown, Verb
 
@@ -38,18 +37,8 @@ def content(answer: RamanAnswer, shown: RamanShown) -> Mapping[str, Any]:
     return {"strongest": answer.strongest(shown.top_lines)}
 
 
-def show(answer: RamanAnswer, report: Report) -> Iterable[Part | None]:
-    """Constants, conditions and the strongest lines."""
-    lines, record = answer.lines, report.content
-    none = "" if len(lines) else f"no lines: {answer.why_no_lines}\n"
-    sources = ("constants", "polarizability", "spin weights")
-    return top_facts.top_parts(
-        lines.top, _facts(lines, record), (none, _table(lines, record["strongest"])), sources, report
-    )
-
-
-def _facts(lines: RamanLines, record: Mapping[str, Any]) -> list[tuple[str, str]]:
-    top, least = lines.top, record["min_relative"]
+def _facts(answer: RamanAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    lines, top, least = answer.lines, answer.lines.top, record["min_relative"]
     count = f"{len(lines)}, together {record['band_cross_section_cm2_per_sr']:.4g} cm²/sr" if len(lines) else "none"
     return [
         ("constants", top_facts.constants_text(top)),
@@ -67,9 +56,12 @@ def _facts(lines: RamanLines, record: Mapping[str, Any]) -> list[tuple[str, str]
     ]
 
 
-def _table(lines: RamanLines, rows: Any) -> Table:
-    """The strongest lines in order of shift."""
-    selected = lines.where(rows)
+def _table(answer: RamanAnswer, record: Mapping[str, Any]) -> Part:
+    """The strongest lines in order of shift, or why there are none."""
+    lines = answer.lines
+    if not len(lines):
+        return f"no lines: {answer.why_no_lines}\n"
+    selected = lines.where(record["strongest"])
     digits = 6 if "f" in lines.quanta_names else 4  # hyperfine shifts are about 1e-5 cm⁻¹
     columns = {
         "shift (cm-1)": f"{{shift_cm:.{digits}f}}",
@@ -108,7 +100,7 @@ VERB = Verb(
     table=lambda answer: answer.lines,
     results=results,
     rows="lines",
-    show=show,
+    show=top_facts.report_on_top(_facts, _table, sources=("constants", "polarizability", "spin weights")),
     outputs=(
         *tables("all lines", "lines"),
         picture("Draw the lines", "lines.png"),

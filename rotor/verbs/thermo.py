@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
-from rotor.reports.screen import Part, Table, record_table, sampled
+from rotor.reports.screen import Table, record_table, sampled
 from rotor.requests.field import CONDITIONS
 from rotor.thermodynamics import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT
-from rotor.verbs.outputs import Report, picture, tables
+from rotor.verbs.outputs import picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Verb, Work
 
@@ -33,16 +33,8 @@ def answer(request: ThermoRequest, work: Work) -> ThermoAnswer:
     return answer_thermo(request, sum_progress() if work.progress else None)
 
 
-def show(answer: ThermoAnswer, report: Report) -> Iterable[Part | None]:
-    """Constants, conditions and the functions by temperature."""
-    functions = answer.functions
-    tables = _rotation_table(functions), _gas_table(functions)
-    facts = _facts(functions, report.content)
-    return top_facts.top_parts(functions.top, facts, tables, ("constants", "spin weights"), report)
-
-
-def _facts(functions: ThermoFunctions, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    top = functions.top
+def _facts(answer: ThermoAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    functions, top = answer.functions, answer.functions.top
     corrections = content["classical_corrections"]
     series = " ".join(
         f"{'-' if value < 0 else '+'} {abs(value):.6g}{unit}"
@@ -95,9 +87,9 @@ def _theta_text(theta: Sequence[float]) -> str:
     return ", ".join(finite) + " K"
 
 
-def _rotation_table(functions: ThermoFunctions) -> Table:
+def _rotation_table(answer: ThermoAnswer, content: Mapping[str, Any]) -> Table:
     """The functions of rotation at evenly spaced temperatures."""
-    records, few = sampled(functions, SHOWN, "temperatures")
+    records, few = sampled(answer.functions, SHOWN, "temperatures")
     columns = {
         "T (K)": "{temperature_k:g}",
         "Q": "{q_rot:.6g}",
@@ -113,9 +105,9 @@ def _rotation_table(functions: ThermoFunctions) -> Table:
     return record_table(title, columns, records)
 
 
-def _gas_table(functions: ThermoFunctions) -> Table | None:
+def _gas_table(answer: ThermoAnswer, content: Mapping[str, Any]) -> Table | None:
     """The functions of the ideal gas, if they are requested."""
-    gas = functions.gas
+    functions, gas = answer.functions, answer.functions.gas
     if gas is None:
         return None
     columns = {
@@ -147,7 +139,7 @@ VERB = Verb(
     table=lambda answer: answer.functions,
     results=results,
     rows="functions",
-    show=show,
+    show=top_facts.report_on_top(_facts, _rotation_table, _gas_table, sources=("constants", "spin weights")),
     notes=lambda answer: answer.notes,
     outputs=(
         *tables("the table", "out"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ from rotor import units
 from rotor.formats import write
 from rotor.reports import top_facts
 from rotor.reports.progress import progress_bar
-from rotor.reports.screen import Part, Table, record_table, table_records
+from rotor.reports.screen import Table, record_table, table_records
 from rotor.requests.field import Rule
 from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
@@ -20,7 +20,7 @@ from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Shown, Verb, Work
 
 if TYPE_CHECKING:
-    from rotor.thermodynamics.classical_torsion import ClassicalTorsion
+    pass
 
 EXAMPLES = """\b
 Examples:
@@ -44,13 +44,6 @@ def answer(request: TorsionRequest, work: Work) -> TorsionAnswer:
 def content(answer: TorsionAnswer, shown: Shown) -> Mapping[str, Any]:
     """The thermodynamic functions of all methods, for the JSON."""
     return {"functions": table_records(answer.functions)}
-
-
-def show(answer: TorsionAnswer, report: Report) -> Iterable[Part | None]:
-    """Potential, reduced moment, levels and functions by temperature."""
-    gas = None if answer.classical is None else _classical_facts(answer.classical)
-    parts = _level_table(answer), _thermo_table(answer), gas
-    return top_facts.top_parts(answer.request.top, _facts(answer, report.content), parts, ("constants",), report)
 
 
 def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -84,7 +77,10 @@ def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, 
     return facts
 
 
-def _classical_facts(gas: ClassicalTorsion) -> list[tuple[str, str]]:
+def _classical_facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    gas = answer.classical
+    if gas is None:
+        return []
     torsion, rotation, potential = (gas.equipartition[name] for name in ("torsion", "rotation", "potential"))
     conserved = f"energy within {gas.energy_error:.1g} kT, L in space within {gas.momentum_error:.1g}"
     return [
@@ -116,7 +112,7 @@ def _terms_text(record: Mapping[str, Any]) -> str:
     return (", ".join(selected) + " cm⁻¹") if selected else "none"
 
 
-def _level_table(answer: TorsionAnswer) -> Table:
+def _level_table(answer: TorsionAnswer, record: Mapping[str, Any]) -> Table:
     def splitting(row: Mapping[str, Any]) -> str:
         hidden = math.isnan(row["splitting_mhz"]) or (row["splitting_mhz"] == 0.0 and row["species"] == 0)
         return "" if hidden else f"{row['splitting_mhz']:.4f}"
@@ -133,7 +129,7 @@ def _level_table(answer: TorsionAnswer) -> Table:
     return record_table(title, columns, table_records(answer.levels, slice(SHOWN)))
 
 
-def _thermo_table(answer: TorsionAnswer) -> Table:
+def _thermo_table(answer: TorsionAnswer, record: Mapping[str, Any]) -> Table:
     functions = answer.functions
     exact = functions.for_method("levels")
     columns: dict[str, Any] = {
@@ -165,7 +161,7 @@ VERB = Verb(
     table=lambda answer: answer.levels,
     results=results,
     rows="levels",
-    show=show,
+    show=top_facts.report_on_top(_facts, _level_table, _thermo_table, _classical_facts),
     outputs=(
         Output("csv", (".csv",), "Write the levels as CSV", example="levels.csv"),
         Output("thermo_csv", (".csv",), "Write the thermodynamic functions of all methods as CSV", example="thermo.csv",

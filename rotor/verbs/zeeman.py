@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,14 +10,14 @@ from rotor.frozen import dataclass
 from rotor.quantum.effects.zeeman import ZeemanAnswer, ZeemanRequest, answer_zeeman
 from rotor.reports import top_facts
 from rotor.reports.field_maps import accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
-from rotor.reports.screen import Part
+from rotor.reports.screen import Table
 from rotor.requests.field import CONDITIONS, declared, names_of
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Numbers
 from rotor.table import counted
 from rotor.tops.magnetic import MagneticTensors, tensor_for
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
-from rotor.verbs.outputs import Report, picture, tables
+from rotor.verbs.outputs import picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Verb
 
@@ -71,11 +71,9 @@ def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
     return top if chi is None else replace(top, magnetic=replace(top.magnetic, magnetisability=chi))
 
 
-def show(answer: ZeemanAnswer, report: Report) -> Iterable[Part | None]:
-    """The conditions and the first states."""
+def _table(answer: ZeemanAnswer, content: Mapping[str, Any]) -> Table:
     states = answer.states
-    table = table_of_states(states, "T", {"moment there (μ_N)": lambda ends: f"{states.slope[ends[1]]:z.6f}"})
-    return top_facts.top_parts(answer.request.top, _facts(answer, report.content), (table,), ("constants",), report)
+    return table_of_states(states, "T", {"moment there (μ_N)": lambda ends: f"{states.slope[ends[1]]:z.6f}"})
 
 
 def _facts(answer: ZeemanAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -107,7 +105,7 @@ VERB = Verb(
     table=lambda answer: answer.states,
     results=results_of_map,
     rows="states",
-    show=show,
+    show=top_facts.report_on_top(_facts, _table),
     outputs=(
         *tables("the map", "out"),
         picture("Draw the map", "out.png"),
