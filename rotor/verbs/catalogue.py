@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,9 +28,7 @@ Examples:
   rotor catalogue add 1H2-16O__POKAZATEL.states --catalogue lines.rotorcat --licence "CC BY-SA 4.0"
   rotor catalogue list --catalogue lines.rotorcat
   rotor catalogue show CO "HC3N, v7=1" --catalogue lines.rotorcat --range 84:116GHz --csv lines.csv"""
-
-
-ADDED = "Added sources"
+added_field = partial(declared, panel="Added sources")  # a field under this heading of --help
 
 
 @dataclass(frozen=True)
@@ -41,12 +40,12 @@ class CatalogueRequest:
         (), Names(), "add: files (.cat, .states, .par), folders or 'library'; show: species, all without", option="WORD"
     )
     catalogue: str = declared("lines.rotorcat", Text(metavar="FILE"), "The catalogue")
-    catdir: str | None = declared(
-        None, Text(metavar="FILE"), "Table of species with Q(T); by default the one beside .cat files", panel=ADDED
+    catdir: str | None = added_field(
+        None, Text(metavar="FILE"), "Table of species with Q(T); by default the one beside .cat files"
     )
-    licence: str = declared("", Text(), "Licence of the added sources", panel=ADDED)
-    citation: str = declared("", Text(), "Citation of the added sources", panel=ADDED)
-    database: str = declared("", Text(metavar="NAME"), "Database of the added sources", panel=ADDED)
+    licence: str = added_field("", Text(), "Licence of the added sources")
+    citation: str = added_field("", Text(), "Citation of the added sources")
+    database: str = added_field("", Text(metavar="NAME"), "Database of the added sources")
     range_mhz: tuple[float, float] = declared(INFINITE, Range("MHz"), "Frequencies of show (MHz)", option="--range")
     top_lines: int = declared(
         20, Whole(0), "Number of lines shown, the strongest at 300 K", option="--top", panel=OUTPUT

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,36 +61,24 @@ Examples:
 MOST_SAMPLES = 100_000  # bootstrap samples; each is a fit
 FORMS = {".txt": "text", ".md": "markdown", ".tex": "latex"}
 CONSTANTS = ("toml", "par", "var")  # outputs that hold the fitted constants
+analysis = partial(declared, panel=OBSERVABLES)  # a field under this heading of --help
 
 
 @dataclass(frozen=True)
 class FitShown(ErrorsShown):
     """Analyses beside the fit, and display options."""
 
-    try_constants: tuple[str, ...] | None = declared(
-        None,
-        NameList(),
-        "Test the fit with each of these constants added or removed",
-        option="--try",
-        panel=OBSERVABLES,
-        common=True,
+    try_constants: tuple[str, ...] | None = analysis(
+        None, NameList(), "Test the fit with each of these constants added or removed", option="--try", common=True
     )
-    choose: tuple[str, ...] | None = declared(
-        None, NameList(), "Build the model from these constants, one at a time", panel=OBSERVABLES, common=True
+    choose: tuple[str, ...] | None = analysis(
+        None, NameList(), "Build the model from these constants, one at a time", common=True
     )
-    all_orders: bool = declared(
-        False,
-        Flag(),
-        "With --choose: constants of all orders compete from the first step",
-        panel=OBSERVABLES,
-        rule=Rule(("choose",)),
+    all_orders: bool = analysis(
+        False, Flag(), "With --choose: constants of all orders compete from the first step", rule=Rule(("choose",))
     )
-    suggest: str | None = declared(
-        None,
-        Text(metavar="NAME"),
-        "Unmeasured lines that would best determine this constant",
-        panel=OBSERVABLES,
-        common=True,
+    suggest: str | None = analysis(
+        None, Text(metavar="NAME"), "Unmeasured lines that would best determine this constant", common=True
     )
     bootstrap: int = declared(
         0, Whole(0, MOST_SAMPLES), "Also errors from N bootstrap samples of the lines", panel=NUMERICS

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from rotor.requests.budget import ErrorBudget
 
 CAT = (".cat", ".cat.gz")
+source_field = partial(declared, panel=CONDITIONS)  # a field under this heading of --help
 EXAMPLES = """\b
 Examples:
   rotor identify spectrum.fits --catalogue lines.rotorcat --plot pages.pdf
@@ -42,24 +44,16 @@ class IdentifyRequest:
     file: str = declared(REQUIRED, Text(), "Spectrum: FITS or text", option="FILE")
     catalogue: tuple[str, ...] = declared((), Names("FILE"), "Local catalogue, folder of .cat, or .cat; repeatable")
     range_mhz: tuple[float, float] = declared(INFINITE, Range("MHz"), "Range of frequencies (MHz)", option="--range")
-    velocity_km_s: float | None = declared(
-        None,
-        Quantity("km/s", metavar="V"),
-        "Velocity of the source (km/s); by default estimated",
-        option="--velocity",
-        panel=CONDITIONS,
+    velocity_km_s: float | None = source_field(
+        None, Quantity("km/s", metavar="V"), "Velocity of the source (km/s); by default estimated", option="--velocity"
     )
-    fwhm_km_s: float | None = declared(
-        None,
-        Quantity("km/s", metavar="W"),
-        "Full width of the lines (km/s); by default estimated",
-        option="--width",
-        panel=CONDITIONS,
+    fwhm_km_s: float | None = source_field(
+        None, Quantity("km/s", metavar="W"), "Full width of the lines (km/s); by default estimated", option="--width"
     )
-    background_k: float = declared(
-        2.725, Quantity("K", metavar="T"), "Temperature behind the source (K)", option="--background", panel=CONDITIONS
+    background_k: float = source_field(
+        2.725, Quantity("K", metavar="T"), "Temperature behind the source (K)", option="--background"
     )
-    redshift: float = declared(0.0, Quantity(metavar="Z"), "Redshift of the source", panel=CONDITIONS)
+    redshift: float = source_field(0.0, Quantity(metavar="Z"), "Redshift of the source")
     model_error: float = declared(0.1, Quantity(least=0, most=1), "Error of the model as a fraction of the brightness")
     most: int = declared(60, Whole(1), "Largest number of species")
     spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())

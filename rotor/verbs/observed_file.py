@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,8 +22,7 @@ if TYPE_CHECKING:
     from rotor.observed.spectrum import ObservedSpectrum
 
 PANEL = "Observed spectrum"
-
-
+observed = partial(declared, panel=PANEL)  # a field under this heading of --help
 SINGLE = Rule(excludes=("outputs.maps",), why="needs a single spectrum")
 
 
@@ -43,41 +43,26 @@ class SeveralInput:
 class SpectrumFile:
     """Facts that the file of a spectrum does not state, and corrections before its use."""
 
-    rest_mhz: float | None = declared(
-        None, Quantity("MHz", metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest", panel=PANEL
+    rest_mhz: float | None = observed(
+        None, Quantity("MHz", metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest"
     )
-    unit: str | None = declared(
-        None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, Jy/beam, mJy/beam, absorbance", panel=PANEL
+    unit: str | None = observed(
+        None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, Jy/beam, mJy/beam, absorbance"
     )
-    axis_unit: str | None = declared(
-        None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, km/s", panel=PANEL
-    )
-    frame: str | None = declared(
-        None, Text(metavar="NAME"), "Frame of the frequencies, such as LSRK or SOURCE", panel=PANEL
-    )
-    noise: float | None = declared(
-        None, Quantity(), "Noise of a channel; by default estimated from line-free channels", panel=PANEL
-    )
-    beam_arcsec: tuple[float, ...] | None = declared(
-        None,
-        Numbers("arcsec", (1, 2), "30 or 30,25", metavar="A[,B]"),
-        "Widths of the beam at half maximum (arcsec)",
-        option="--beam",
-        panel=PANEL,
-    )
-    size_arcsec: float | None = declared(
-        None, Quantity("arcsec", metavar="A"), "Width of the source at half maximum (arcsec); needs --beam", option="--size",
-        panel=PANEL,
+    axis_unit: str | None = observed(None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, km/s")
+    frame: str | None = observed(None, Text(metavar="NAME"), "Frame of the frequencies, such as LSRK or SOURCE")
+    noise: float | None = observed(None, Quantity(), "Noise of a channel; by default estimated from line-free channels")
+    beam_arcsec: tuple[float, ...] | None = observed(
+        None, Numbers("arcsec", (1, 2), "30 or 30,25", metavar="A[,B]"), "Widths of the beam at half maximum (arcsec)", option="--beam",
     )  # fmt: skip
-    baseline: int | None = declared(None, Whole(0), "Subtract a baseline of this order", panel=PANEL, rule=SINGLE)
-    row: int | None = declared(None, Whole(), "Number of the spectrum in a table, from 1", panel=PANEL, rule=SINGLE)
-    pixel: tuple[float, ...] | None = declared(
-        None,
-        Numbers(counts=(2,), example="32,40", metavar="X,Y"),
-        "Pixel of the spectrum in a cube, from 1",
-        panel=PANEL,
-        rule=SINGLE,
-    )
+    size_arcsec: float | None = observed(
+        None, Quantity("arcsec", metavar="A"), "Width of the source at half maximum (arcsec); needs --beam", option="--size",
+    )  # fmt: skip
+    baseline: int | None = observed(None, Whole(0), "Subtract a baseline of this order", rule=SINGLE)
+    row: int | None = observed(None, Whole(), "Number of the spectrum in a table, from 1", rule=SINGLE)
+    pixel: tuple[float, ...] | None = observed(
+        None, Numbers(counts=(2,), example="32,40", metavar="X,Y"), "Pixel of the spectrum in a cube, from 1", rule=SINGLE,
+    )  # fmt: skip
 
     @property
     def beam(self) -> tuple[float, float] | None:

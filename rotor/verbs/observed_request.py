@@ -10,7 +10,7 @@ from rotor.frozen import dataclass
 from rotor.requests.field import Rule, changed_fields, declared, declared_fields, identical, part
 from rotor.requests.readers import INFINITE, NameList, Quantity, Text, Whole
 from rotor.spectra.emission_request import LayerInput, WindowInput
-from rotor.verbs.observed_file import PANEL, SINGLE, SeveralInput, SpectrumFile, padded, species_of
+from rotor.verbs.observed_file import SINGLE, SeveralInput, SpectrumFile, observed, padded, species_of
 from rotor.verbs.verb import Note
 
 if TYPE_CHECKING:
@@ -44,35 +44,24 @@ class ObservedRequest:
     """Inputs of a model over a spectrum, or of its fit."""
 
     sources: SeveralInput = part(SeveralInput, identical, identical, SeveralInput())
-    over: str | None = declared(
-        None, Text(metavar="FILE"), "Observed spectrum (FITS, text) to compare with the model", panel=PANEL
+    over: str | None = observed(None, Text(metavar="FILE"), "Observed spectrum (FITS, text) to compare with the model")
+    fit: str | None = observed(None, Text(metavar="FILE"), "Observed spectrum to fit")
+    catalogue: str | None = observed(None, Text(metavar="FILE"), "Local catalogue with the species that SOURCE names")
+    free: tuple[str, ...] = observed(
+        (), NameList(tuple(FREE)), "Fitted parameters: column, excitation, velocity, width, size", rule=OF_FIT
     )
-    fit: str | None = declared(None, Text(metavar="FILE"), "Observed spectrum to fit", panel=PANEL)
-    catalogue: str | None = declared(
-        None, Text(metavar="FILE"), "Local catalogue with the species that SOURCE names", panel=PANEL
+    shared: tuple[str, ...] = observed(
+        (), NameList(tuple(FREE)), "Parameters with one value for all species: velocity,width", rule=OF_FIT
     )
-    free: tuple[str, ...] = declared(
-        (),
-        NameList(tuple(FREE)),
-        "Fitted parameters: column, excitation, velocity, width, size",
-        panel=PANEL,
-        rule=OF_FIT,
+    calibration: float = observed(0.0, Quantity(least=0, most=1), "Relative error of the intensity scale", rule=OF_FIT)
+    reject: float | None = observed(
+        None, Quantity(), "Fit near lines only, without channels X standard deviations above the model", rule=SINGLE_FIT
     )
-    shared: tuple[str, ...] = declared(
-        (), NameList(tuple(FREE)), "Parameters with one value for all species: velocity,width", panel=PANEL, rule=OF_FIT
-    )
-    calibration: float = declared(
-        0.0, Quantity(least=0, most=1), "Relative error of the intensity scale", panel=PANEL, rule=OF_FIT
-    )
-    reject: float | None = declared(
-        None, Quantity(), "Fit near lines only, without channels X standard deviations above the model", panel=PANEL,
-        rule=SINGLE_FIT,
-    )  # fmt: skip
-    mask: str | None = declared(
+    mask: str | None = observed(
         None, Text(metavar="FILE"), "Pixels of --maps: FITS, nonzero where fitted; by default those above 5 standard deviations",
-        panel=PANEL, rule=Rule(("outputs.maps",), why="belongs to maps of a cube"),
+        rule=Rule(("outputs.maps",), why="belongs to maps of a cube"),
     )  # fmt: skip
-    sample: int = declared(0, Whole(1), "Steps of emcee after the fit (extra sampling)", panel=PANEL, rule=SINGLE_FIT)
+    sample: int = observed(0, Whole(1), "Steps of emcee after the fit (extra sampling)", rule=SINGLE_FIT)
     spectrum: SpectrumFile = part(SpectrumFile, identical, identical, SpectrumFile())
     column_per_cm2: tuple[float, ...] | None = layer_field("column_per_cm2")
     excitation_k: tuple[float, ...] | None = layer_field("excitation_k")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from rotor.verbs.verb import Place, Shown, Subject, Verb, Work
 
 MOST_FACTS_OF_STATES = 10  # in the head of a line list; rotor info shows all
 HITRAN_K = 296.0
+option_field = partial(declared, panel=OBSERVABLES)  # a field under this heading of --help
 _FILE_ALONE = ("as_spcat", "full_basis")  # options of .int files
 
 EXAMPLES = """\b
@@ -52,20 +54,16 @@ def _hitran_numbers(raw: Any) -> tuple[int, int]:
 class SpectrumShown(Shown):
     """Display options of `spectrum`, and options of its files."""
 
-    resolution: float | None = declared(
+    resolution: float | None = option_field(
         None, Quantity("MHz", above=0, metavar="D"), "Show components of a rotational line closer than this (MHz) as one line",
-        panel=OBSERVABLES,
     )  # fmt: skip
-    as_spcat: bool = declared(
-        False, Flag(), "For an .int file: results of SPCAT, also where SPCAT errs (notes say where)",
-        panel=OBSERVABLES,
-    )  # fmt: skip
-    full_basis: bool = declared(
-        False, Flag(), "For an .int file: every K in the basis, ignoring KNMIN and KNMAX", panel=OBSERVABLES
+    as_spcat: bool = option_field(
+        False, Flag(), "For an .int file: results of SPCAT, also where SPCAT errs (notes say where)"
     )
-    over: str | None = declared(
+    full_basis: bool = option_field(False, Flag(), "For an .int file: every K in the basis, ignoring KNMIN and KNMAX")
+    over: str | None = option_field(
         None, Text(metavar="FILE"), "Compare with a measured spectrum or its peaks (columns of text, .npy, FITS): --plot draws both",
-        panel=OBSERVABLES, common=True,
+        common=True,
     )  # fmt: skip
     top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
     tag: int = declared(0, Whole(0, 999_999), "Tag of the species in the catalogue", "outputs.tag", panel=OUTPUT)
