@@ -19,7 +19,7 @@ from rotor.requests.field import OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom, Range, Text
 from rotor.table import counted
-from rotor.verbs.outputs import Output, Report, picture
+from rotor.verbs.outputs import Output, Report, picture, table_file
 from rotor.verbs.subjects import saved_inputs
 from rotor.verbs.verb import Place, Subject, SubjectKind, Verb
 
@@ -187,7 +187,7 @@ VERB = Verb(
     numerics="rotor.assignment.numerics:ASSIGN",
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write every peak with its assignment as CSV", example="assigned.csv"),
+        table_file("csv", "every peak with its assignment", "assigned.csv"),
         Output(
             "lin",
             (".lin", ".csv"),

@@ -17,7 +17,7 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
 from rotor.table import Table as Columns
-from rotor.verbs.outputs import Output
+from rotor.verbs.outputs import table_file
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import ErrorsShown, Work
 
@@ -228,7 +228,7 @@ VERB = Tool(
     answer=lambda request, work: {ADD: add, LIST: list_species, SHOW: find_lines}[request.action](request, work),
     table=lambda answer: answer.table,
     show=lambda answer, report: answer.parts(),
-    outputs=(Output("csv", (".csv",), "Write the species (list) or the lines (show) as CSV"),),
+    outputs=(table_file("csv", "the species (list) or the lines (show)"),),
     check=check,
     shown=ErrorsShown,
     stepwise=True,

@@ -33,7 +33,7 @@ from rotor.verbs.molecule import (
     with_some_dipole,
 )
 from rotor.verbs.observed_file import SeveralInput, is_catalogue
-from rotor.verbs.outputs import Output, Report, picture, tables
+from rotor.verbs.outputs import Report, picture, table_file, tables
 from rotor.verbs.subjects import beside, saved_molecule
 from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb
 
@@ -287,13 +287,7 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the lines", "lines"),
-        Output(
-            "profile_csv",
-            (".csv",),
-            "Write T_B and optical depth on the grid as CSV",
-            example="profile.csv",
-            of=lambda answer: answer.spectrum,
-        ),
+        table_file("profile_csv", "T_B and optical depth on the grid", "profile.csv", lambda answer: answer.spectrum),
         picture("Draw T_B of all molecules", "emission.png"),
     ),
     subject=SeveralMolecules(),

@@ -25,7 +25,7 @@ from rotor.verbs.observed_request import (
     sight_of,
     species_in,
 )
-from rotor.verbs.outputs import PICTURES, Output, Report
+from rotor.verbs.outputs import PICTURES, Output, Report, table_file
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import Note, Work
 
@@ -275,34 +275,19 @@ OBSERVED = Tool(
     table=lambda answer: answer.table,
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the lines, or the fitted parameters, as CSV", rule=SINGLE),
-        Output("parquet", (".parquet",), "Write them as Parquet", rule=SINGLE),
-        Output("profile_csv", (".csv",), "Write observed and modelled brightness as CSV", of=profile, rule=SINGLE),
+        table_file("csv", "the lines, or the fitted parameters,", rule=SINGLE),
+        table_file("parquet", "them", rule=SINGLE),
+        table_file("profile_csv", "observed and modelled brightness", of=profile, rule=SINGLE),
         Output("plot", PICTURES, "Draw pages of panels", draw, rule=SINGLE),
-        Output(
-            "diagram",
-            (".csv", *PICTURES),
-            "Rotational diagrams of the fitted species as CSV or picture",
-            draw_diagrams,
-            rule=SINGLE_FIT,
-        ),
-        Output(
-            "corner",
-            PICTURES,
-            "Draw the sample of every pair of parameters (extra sampling)",
-            draw_corner,
-            rule=Rule(("sample",), SINGLE.excludes, "a picture of draws"),
-        ),
-        Output(
-            "maps",
-            (".fits",),
-            "Fit every pixel of a cube and write maps of the parameters",
-            emission_cube.write,
-            rule=Rule(("fit",), why="belongs to a cube"),
-        ),
+        Output("diagram", (".csv", *PICTURES), "Rotational diagrams of the fitted species as CSV or picture", draw_diagrams,
+               rule=SINGLE_FIT),
+        Output("corner", PICTURES, "Draw the sample of every pair of parameters (extra sampling)", draw_corner,
+               rule=Rule(("sample",), SINGLE.excludes, "a picture of draws")),
+        Output("maps", (".fits",), "Fit every pixel of a cube and write maps of the parameters", emission_cube.write,
+               rule=Rule(("fit",), why="belongs to a cube")),
     ),
     check=emission_cube.refuse,
     withheld=withheld,
     workers="rows of a cube",
     instead="--over, --fit and their options",
-)
+)  # fmt: skip

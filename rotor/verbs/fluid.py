@@ -27,7 +27,7 @@ from rotor.requests.field import CONDITIONS, MOLECULE, OUTPUT, all_fields, decla
 from rotor.requests.fill import Entries, NamedError, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
-from rotor.verbs.outputs import Output, Report, draw_answer, picture
+from rotor.verbs.outputs import Output, Report, drawing, picture
 from rotor.verbs.subjects import beside
 from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb, Work
 
@@ -272,12 +272,6 @@ def _centres(answer: FluidAnswer, frames: str | None) -> Floats:
     return np.array([rigid_bodies(atoms, shapes=shapes)[1].centres for atoms in images[len(images) // 2 :]])
 
 
-def draw(answer: FluidAnswer, path: Path, report: Report) -> None:
-    """Draw temperatures, energy and the pair distribution."""
-    assert isinstance(answer, DrawnFluid)
-    draw_answer(answer, path, report, centres=answer.centres)
-
-
 def _thermometer_error(content: Mapping[str, Any], settings: Settings) -> str:
     """Statement on the thermometer's error; none under LAMMPS' thermostat noise, where it is not known."""
     return "" if content["engine"] == "lammps" and settings.ensemble != "nve" else ": no error of order h²"
@@ -362,7 +356,7 @@ VERB = Verb(
             example="run.npz",
             grows=True,
         ),
-        picture("Draw temperatures, energy and g(r)", "run.png", draw),
+        picture("Draw temperatures, energy and g(r)", "run.png", drawing(centres=lambda answer, _: answer.centres)),
     ),
     subject=Box(),
     shown=FluidShown,

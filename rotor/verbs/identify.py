@@ -17,7 +17,7 @@ from rotor.requests.field import CONDITIONS, REQUIRED, declared, identical, part
 from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
 from rotor.table import counted
 from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
-from rotor.verbs.outputs import PICTURES, Output, Report
+from rotor.verbs.outputs import PICTURES, Output, Report, table_file
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import ErrorsShown, Work
 
@@ -192,7 +192,7 @@ VERB = Tool(
     table=lambda answer: answer.identification,
     show=show,
     outputs=(
-        Output("csv", (".csv",), "Write the species as CSV"),
+        table_file("csv", "the species"),
         Output("plot", PICTURES, "Draw pages of panels with the model over the spectrum", draw),
     ),
     shown=ErrorsShown,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Text, Whole, whole_range
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY
-from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
+from rotor.verbs.outputs import Output, Report, drawing, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Shown, Verb
 
@@ -55,11 +54,6 @@ def _span(name: str) -> Any:
         return {f"observables.{name}min": first, f"observables.{name}max": last}
 
     return read
-
-
-def draw(answer: LevelsAnswer, path: Path, report: Report) -> None:
-    """Draw the term diagram."""
-    draw_answer(answer, path, report, unit=report.shown.unit)
 
 
 def show(answer: LevelsAnswer, report: Report) -> Iterable[Part | None]:
@@ -135,7 +129,7 @@ VERB = Verb(
     outputs=(
         *tables("all levels", "levels"),
         Output("egy", (".egy",), "Write all levels as SPCAT's list (.egy)", example="levels.egy"),
-        picture("Draw the term diagram", "levels.png", draw),
+        picture("Draw the term diagram", "levels.png", drawing(unit=lambda answer, report: report.shown.unit)),
     ),
     subject=OneMolecule((*DIPOLE, *POLARIZABILITY, "state_dipoles")),
     shown=LevelsShown,

@@ -159,12 +159,17 @@ class Files:
         ]
 
 
-def tables(what: str, stem: str) -> tuple[Output, Output]:
+def table_file(name: str, what: str, example: str = "", of: Callable[[Any], Any] | None = None, **more: Any) -> Output:
+    """Output for a table in the format that ends its name, such as csv, parquet or profile_csv."""
+    kind = name.rpartition("_")[2]
+    help_ = f"Write {what} as {'CSV' if kind == 'csv' else kind.title()}"
+    return Output(name, (f".{kind}",), help_, example=example, of=of, **more)
+
+
+def tables(what: str, stem: str, **more: Any) -> tuple[Output, Output]:
     """Outputs for a table as CSV and as Parquet. stem: of the file names in a template."""
-    return (
-        Output("csv", (".csv",), f"Write {what} as CSV", example=f"{stem}.csv"),
-        Output("parquet", (".parquet",), f"Write {what} as Parquet", example=f"{stem}.parquet"),
-    )
+    csv, parquet = (table_file(kind, what, f"{stem}.{kind}", **more) for kind in ("csv", "parquet"))
+    return csv, parquet
 
 
 def draw_answer(answer: Any, path: Path, report: Report, **options: Any) -> None:
@@ -172,6 +177,13 @@ def draw_answer(answer: Any, path: Path, report: Report, **options: Any) -> None
     from rotor.plots.show import write_picture
 
     write_picture(answer, path, report.command, **report.picture_options, **options)
+
+
+def drawing(**options: Callable[[Any, Report], Any]) -> Writer:
+    """Function that draws an answer with options that follow from it and its report."""
+    return lambda answer, path, report: draw_answer(
+        answer, path, report, **{name: option(answer, report) for name, option in options.items()}
+    )
 
 
 def picture(help: str, example: str = "", draw: Writer = draw_answer, rule: Rule | None = None) -> Output:

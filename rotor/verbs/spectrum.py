@@ -22,7 +22,7 @@ from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectr
 from rotor.verbs import int_files
 from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_output
 from rotor.verbs.molecule import POLARIZABILITY, range_without_unit, with_some_dipole
-from rotor.verbs.outputs import PICTURES, Output, Report, draw_answer, picture
+from rotor.verbs.outputs import PICTURES, Output, Report, draw_answer, picture, table_file, tables
 from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Place, Shown, Subject, Verb, Work
@@ -326,15 +326,8 @@ VERB = Verb(
             int_files.write_levels,
             scene=False,
         ),
-        Output("csv", (".csv",), "Write all lines as CSV", write_table, "lines.csv"),
-        Output("parquet", (".parquet",), "Write all lines as Parquet", write_table, "lines.parquet"),
-        Output(
-            "profile_csv",
-            (".csv",),
-            "Write the profile on its grid as CSV",
-            example="profile.csv",
-            of=lambda answer: answer.spectrum,
-        ),
+        *tables("all lines", "lines", write=write_table),
+        table_file("profile_csv", "the profile on its grid", "profile.csv", lambda answer: answer.spectrum),
         picture("Draw the spectrum", "lines.png", draw),
         Output(
             "loomis_wood",

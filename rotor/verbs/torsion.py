@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor import units
-from rotor.formats import write
 from rotor.reports import top_facts
 from rotor.reports.progress import progress_bar
 from rotor.reports.screen import Table, record_table, table_records
 from rotor.requests.field import Rule
 from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
-from rotor.verbs.outputs import Output, Report, picture
+from rotor.verbs.outputs import picture, table_file
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Shown, Verb, Work
 
@@ -93,11 +91,6 @@ def _classical_facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[t
     ]  # fmt: skip
 
 
-def write_motion(answer: TorsionAnswer, path: Path, report: Report) -> None:
-    """Write the classical gas against time."""
-    write(answer.classical, path, settings=dict(report.provenance))
-
-
 def _bond_text(answer: TorsionAnswer) -> str:
     symbols, rotation = answer.rotation.molecule.symbols, answer.rotation
     return f"{symbols[rotation.first]}{rotation.first + 1}-{symbols[rotation.last]}{rotation.last + 1}"
@@ -163,11 +156,10 @@ VERB = Verb(
     rows="levels",
     show=top_facts.report_on_top(_facts, _level_table, _thermo_table, _classical_facts),
     outputs=(
-        Output("csv", (".csv",), "Write the levels as CSV", example="levels.csv"),
-        Output("thermo_csv", (".csv",), "Write the thermodynamic functions of all methods as CSV", example="thermo.csv",
-               of=lambda answer: answer.functions),
-        Output("classical_csv", (".csv",), "Write the classical gas against time as CSV", write_motion, "gas.csv",
-               rule=Rule(("observables.classical",), why="a classical gas has a temperature, such as 300K")),
+        table_file("csv", "the levels", "levels.csv"),
+        table_file("thermo_csv", "the thermodynamic functions of all methods", "thermo.csv", lambda answer: answer.functions),
+        table_file("classical_csv", "the classical gas against time", "gas.csv", lambda answer: answer.classical,
+                   rule=Rule(("observables.classical",), why="a classical gas has a temperature, such as 300K")),
         picture("Draw potential, levels and wave functions", "torsion.png"),
     ),
     subject=OneMolecule(

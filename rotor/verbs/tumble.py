@@ -16,7 +16,7 @@ from rotor.requests.fill import NamedError
 from rotor.table import Table as Columns
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
-from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
+from rotor.verbs.outputs import Output, Report, drawing, picture, tables
 from rotor.verbs.turning_body import TurningBody, build
 from rotor.verbs.verb import Verb
 
@@ -61,12 +61,6 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
         raise NamedError(
             f"{{outputs.gif}} {path}: a film needs at least two different times; give more {{conditions.times}}"
         )
-
-
-def draw(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
-    """Draw the polhodes."""
-    assert isinstance(answer, TumbleAnswer)  # a declared rule of the file
-    draw_answer(answer, path, report, title=_picture_title(answer.request))
 
 
 def film(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
@@ -267,7 +261,7 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the motion", "tumble"),
-        picture("Draw the polhodes", "tumble.png", draw, FREE),
+        picture("Draw the polhodes", "tumble.png", drawing(title=lambda answer, _: _picture_title(answer.request)), FREE),
         Output("gif", (".gif", ".mp4"), "Animate the motion (.gif; .mp4 with ffmpeg)", film, "tumble.gif", rule=FREE),
     ),
     subject=TurningBody(
