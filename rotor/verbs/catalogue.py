@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -13,7 +13,6 @@ from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.top_facts import error_facts
-from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
 from rotor.table import Table as Columns
@@ -57,70 +56,51 @@ class CatalogueRequest:
 
 
 @dataclass(frozen=True)
-class Added:
-    """Sources added to a catalogue, and sources with faults."""
+class CatalogueAnswer:
+    """The content of the JSON, the parts of the report, and the table of an action."""
 
-    catalogue: str
-    added: list[Any]
-    faults: list[Any]
+    content: dict[str, Any]
+    parts: Sequence[Part]
+    table: Columns | None = None
 
     def facts(self) -> dict[str, Any]:
-        """Sources and faults, by the keys of docs/verbs."""
-        return {
-            "catalogue": self.catalogue,
-            "added": [
-                {"source": species.source, "species": species.species, "lines": species.lines} for species in self.added
-            ],
-            "faults": [{"source": entry.source, "fault": entry.fault} for entry in self.faults],
-        }
-
-    def parts(self) -> Iterable[Part]:
-        """Number of added lines and sources."""
-        total = f"{sum(species.lines for species in self.added)} lines from {len(self.added)} sources"
-        yield [("catalogue", self.catalogue), ("added", total), ("left out", str(len(self.faults)))]
+        """The content, by the keys of docs/verbs."""
+        return self.content
 
 
-def add(request: CatalogueRequest, work: Work) -> Added:
+def add(request: CatalogueRequest, work: Work) -> CatalogueAnswer:
     """Add sources; those with faults are reported and left out."""
     from rotor.formats.catalogue.build import SourceFacts, add_sources
 
     facts = SourceFacts(request.database, request.licence, request.citation)
     with rewritten_line(70) as progress:
         report = add_sources(request.catalogue, request.words, facts, catdir=request.catdir, progress=progress)
-    faults = [entry for entry in report if entry.fault]
+    added, faults = ([entry for entry in report if bool(entry.fault) == faulty] for faulty in (False, True))
     for entry in faults:
         work.note(f"left out: {entry.fault}")
-    return Added(request.catalogue, [entry for entry in report if not entry.fault], faults)
+    content = {
+        "catalogue": request.catalogue,
+        "added": [{"source": entry.source, "species": entry.species, "lines": entry.lines} for entry in added],
+        "faults": [{"source": entry.source, "fault": entry.fault} for entry in faults],
+    }
+    total = f"{sum(entry.lines for entry in added)} lines from {len(added)} sources"
+    shown = [("catalogue", request.catalogue), ("added", total), ("left out", str(len(faults)))]
+    return CatalogueAnswer(content, [shown])
 
 
-@dataclass(frozen=True)
-class Listed:
-    """The species of a catalogue, and its number of lines."""
-
-    catalogue: str
-    table: Columns
-    count: int
-
-    def facts(self) -> dict[str, Any]:
-        """A record for each species."""
-        columns = {name: column.tolist() for name, column in self.table.columns.items()}
-        records = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        return {"catalogue": self.catalogue, "lines": self.count, "species": records}
-
-    def parts(self) -> Iterable[Part]:
-        """The species by name."""
-        names = ("name", "formula", "tag", "database", "lines", "source", "date")
-        columns = {name: f"{{{name}}}" for name in names}
-        yield [("catalogue", self.catalogue), ("lines", str(self.count)), ("species", str(len(self.table)))]
-        yield record_table("species, by name", columns, table_records(self.table), {*names} - {"tag", "lines"})
-
-
-def list_species(request: CatalogueRequest, work: Work) -> Listed:
-    """The species of the catalogue."""
+def list_species(request: CatalogueRequest, work: Work) -> CatalogueAnswer:
+    """The species of the catalogue, by name."""
     from rotor.formats.catalogue.database import LineCatalogue
 
     with LineCatalogue(request.catalogue) as catalogue:
-        return Listed(request.catalogue, catalogue.species(), len(catalogue))
+        table, count = catalogue.species(), len(catalogue)
+    records = table_records(table)
+    columns = {name: f"{{{name}}}" for name in ("name", "formula", "tag", "database", "lines", "source", "date")}
+    shown = [("catalogue", request.catalogue), ("lines", str(count)), ("species", str(len(table)))]
+    by_name = record_table("species, by name", columns, records, columns.keys() - {"tag", "lines"})
+    return CatalogueAnswer(
+        {"catalogue": request.catalogue, "lines": count, "species": records}, [shown, by_name], table
+    )
 
 
 @dataclass(frozen=True, repr=False)
@@ -135,43 +115,19 @@ class StoredLines(Columns):
         return self.data
 
 
-@dataclass(frozen=True)
-class LinesInRange:
-    """Lines of a range, in order of frequency."""
-
-    request: CatalogueRequest
-    table: StoredLines
-    species: int
-
-    def facts(self) -> dict[str, Any]:
-        """A record for each line."""
-        return {
-            "catalogue": self.request.catalogue,
-            "lines": table_records(self.table),
-            "errors": self.errors.as_json(),
-        }
-
-    @property
-    def errors(self) -> ErrorBudget:
-        """Error budget of the frequencies, from the errors in their sources."""
-        names = ("frequency_mhz", "error_mhz", "log_intensity_300k")
-        return stored_budget(*(self.table.columns[name] for name in names))
-
-    def parts(self) -> Iterable[Part]:
-        """The strongest lines at 300 K, in order of frequency."""
-        count = f"{len(self.table)} of {self.species} species"
-        errors = error_facts(self.errors.as_json())
-        yield [("catalogue", self.request.catalogue), ("lines", count), *errors]
-        yield _table(self.table, self.request.top_lines)
-
-
-def find_lines(request: CatalogueRequest, work: Work) -> LinesInRange:
-    """Lines of a range."""
+def find_lines(request: CatalogueRequest, work: Work) -> CatalogueAnswer:
+    """Lines of a range, in order of frequency; the report has the strongest at 300 K."""
     from rotor.formats.catalogue.database import LineCatalogue
 
     with LineCatalogue(request.catalogue) as catalogue:
         species = catalogue.species_between(*request.range_mhz, list(request.words))
-    return LinesInRange(request, _stored_lines(species), len(species))
+    lines = _stored_lines(species)
+    # errors of the frequencies, from the errors in their sources
+    errors = stored_budget(*(lines.columns[name] for name in ("frequency_mhz", "error_mhz", "log_intensity_300k")))
+    budget, count = errors.as_json(), f"{len(lines)} of {len(species)} species"
+    content = {"catalogue": request.catalogue, "lines": table_records(lines), "errors": budget}
+    shown = [("catalogue", request.catalogue), ("lines", count), *error_facts(budget)]
+    return CatalogueAnswer(content, [shown, _table(lines, request.top_lines)], lines)
 
 
 def _stored_lines(species: Sequence[Any]) -> StoredLines:
@@ -227,7 +183,7 @@ VERB = Tool(
     of="catalogue",
     answer=lambda request, work: {ADD: add, LIST: list_species, SHOW: find_lines}[request.action](request, work),
     table=lambda answer: answer.table,
-    show=lambda answer, report: answer.parts(),
+    show=lambda answer, report: answer.parts,
     outputs=(table_file("csv", "the species (list) or the lines (show)"),),
     check=check,
     shown=ErrorsShown,

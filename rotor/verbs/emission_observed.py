@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -256,13 +256,17 @@ def _fit_parts(fit: SourceFit, needed: Sequence[Contribution], chain: Any) -> It
 
 
 def _parameter_table(fit: SourceFit) -> Table:
-    rows = []
-    for row in fit.parameters:
-        ends = [f"{end:.5g}" if row["determined"] else "" for end in row["interval"]]
-        error = f"{row['error']:.2g}" if row["determined"] else "undetermined"
-        rows.append((row["name"], f"{row['value']:.5g}", error, *ends))
-    columns = ("parameter", "value", "error", "from", "to")
-    return Table("fitted parameters, intervals of 68 %", columns, rows, LEFT)
+    def end(side: int) -> Callable[[Any], str]:
+        return lambda row: f"{row['interval'][side]:.5g}" if row["determined"] else ""
+
+    columns = {
+        "parameter": "{name}",
+        "value": "{value:.5g}",
+        "error": lambda row: f"{row['error']:.2g}" if row["determined"] else "undetermined",
+        "from": end(0),
+        "to": end(1),
+    }
+    return record_table("fitted parameters, intervals of 68 %", columns, fit.parameters, LEFT)
 
 
 OBSERVED = Tool(

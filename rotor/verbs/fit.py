@@ -257,28 +257,20 @@ def _advice(fit: Fit) -> list[tuple[str, str]] | None:
 
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
-    columns = [
-        "parameter",
-        f"value ({parameter_units(fit)})",
-        "error",
-        "from scatter",
-        *(["bootstrap"] if spread else []),
-    ]
-    rows = []
-    for i, name in enumerate(fit.parameters.names):
-        error = float(fit.errors[i])
-        text = (
-            value_text(float(fit.values[i]), error)
-            if error < float("inf")
-            else f"{float(fit.values[i])!r} (not determined)"
-        )
-        numbers = [
-            error_text(error, ".3g"),
-            scatter_text(float(fit.scaled_errors[i]), ".3g"),
-            *([f"{spread[i]:.3g}"] if spread else []),
-        ]
-        rows.append([name, text, *numbers])
-    return Table("", columns, rows, frozenset({"parameter"}))
+    values, errors, scaled = (numbers.tolist() for numbers in (fit.values, fit.errors, fit.scaled_errors))
+
+    def value(row: int) -> str:
+        known = errors[row] < float("inf")
+        return value_text(values[row], errors[row]) if known else f"{values[row]!r} (not determined)"
+
+    columns = {
+        "parameter": lambda row: fit.parameters.names[row],
+        f"value ({parameter_units(fit)})": value,
+        "error": lambda row: error_text(errors[row], ".3g"),
+        "from scatter": lambda row: scatter_text(scaled[row], ".3g"),
+        **({"bootstrap": lambda row: f"{spread[row]:.3g}"} if spread else {}),
+    }
+    return record_table("", columns, range(len(values)), {"parameter"})
 
 
 def _trial_table(title: str, trials: Sequence[Trial], poor_rms: float) -> Table:
