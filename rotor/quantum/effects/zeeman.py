@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -57,7 +57,8 @@ def zeeman_map(
     fields_tesla: ArrayLike,
     g: ArrayLike,
     *,
-    jmax: int | None = None,
+    magnetisability: ArrayLike | None = None,
+    effects: Sequence[QuantumEffect] = (),
     executor: Executor | None = None,
     **settings: Any,
 ) -> FieldMap:
@@ -71,12 +72,15 @@ def zeeman_map(
         Field strengths; the map has each once, in rising order.
     g : float, (3,) or (3, 3)
         Rotational g tensor along a, b, c; one number or three for a linear top, whose g_aa has no effect.
-    jmax : int, optional
-        Highest J of the basis; by default what the tolerance needs.
+    magnetisability : (3,) or (3, 3), optional
+        χ along a, b, c in 1e-6 erg/(G² mol), with its sign (diamagnetic: negative).
+    effects : sequence of QuantumEffect
+        Effects of a linear or asymmetric top with spins, the semi-rigid ones included; states are then |F M_F⟩.
     executor : Executor, optional
         Solves blocks in parallel.
     **settings
-        `magnetisability`, `effects`, `nuclear_g`, `j_highest` and `tolerance_mhz`, see `magnetic_map_request`.
+        Further fields of a `ZeemanRequest`: `j_highest`, `jmax`, `tolerance_mhz` and `nuclear_g` of nuclei of the effects; other nuclei
+        do not interact with the field.
 
     Returns
     -------
@@ -97,46 +101,12 @@ def zeeman_map(
     >>> (states.energy_mhz[rows] - 12000).round(4).tolist()  # 0.03 μ_N B
     [0.0, 0.2287]
     """
-    return field_map(magnetic_map_request(top, fields_tesla, g, **settings), jmax, executor)
-
-
-def magnetic_map_request(
-    top: Top,
-    fields_tesla: ArrayLike,
-    g: ArrayLike,
-    *,
-    magnetisability: ArrayLike | None = None,
-    effects: Sequence[QuantumEffect] = (),
-    nuclear_g: Mapping[str, float] | None = None,
-    j_highest: int = 2,
-    tolerance_mhz: float = DEFAULT_TOLERANCE_MHZ,
-) -> MapRequest:
-    """The Hamiltonian, fields and states of a map, with the errors of `zeeman_map`.
-
-    magnetisability: χ (3,) or (3, 3) along a, b, c in 1e-6 erg/(G² mol), with its sign (diamagnetic: negative). effects: of a linear or
-    asymmetric top with spins, the semi-rigid ones included; states are then |F M_F⟩. nuclear_g: g = μ/(μ_N I) of nuclei by the names of
-    their spins; other nuclei do not interact with the field. j_highest: highest J of the free levels in the map. tolerance_mhz: largest
-    truncation error of an energy.
-    """
-    tensor, nuclei = checked_g(top, g), dict(nuclear_g or {})
-    if nuclei and not effects:
+    chi = None if magnetisability is None else _axial_tensor(top, magnetisability, "χ").tolist()
+    if settings.get("nuclear_g") and not effects:
         raise ValueError("nuclear_g: give the effects that have these spins too")
-    terms = [FieldTerm(1, -NUCLEAR_MAGNETON_MHZ_PER_T, Magnet(tensor, nuclei))]
-    if magnetisability is not None:
-        chi = Contraction(_axial_tensor(top, magnetisability, "χ"), np.outer(Z, Z))
-        terms.append(FieldTerm(2, -0.5 * MHZ_PER_T2, chi))
-    positive = projections(top, effects, None, j_highest)
-    return MapRequest(
-        top=top,
-        effects=tuple(effects),
-        terms=tuple(terms),
-        observables={},
-        kind=MAGNETIC,
-        fields=MAGNETIC.checked(fields_tesla),
-        j_highest=j_highest,
-        m_values=tuple(sorted({*positive, *(-m for m in positive)})),
-        tolerance_mhz=tolerance_mhz,
-    )
+    turning = replace(top, magnetic=MagneticTensors(checked_g(top, g).tolist(), chi))
+    fields = tuple(MAGNETIC.checked(fields_tesla).tolist())
+    return answer_zeeman(ZeemanRequest(turning, fields, hamiltonian=tuple(effects), **settings), executor).states
 
 
 def checked_g(top: Top, g: ArrayLike) -> Floats:
@@ -173,7 +143,8 @@ class ZeemanRequest:
 
     top: with its g tensor in `magnetic`. fields_tesla: in any order. j_highest: highest J of the free levels in the map. jmax: highest J of
     the basis; None for what tolerance_mhz needs. hyperfine: include the spins of the top's constants. nuclear_g: g = μ/(μ_N I) by the names
-    of spins; by default that of the isotope. An electron spin needs a value.
+    of spins; by default that of the isotope. An electron spin needs a value. hamiltonian: effects of a top with spins, instead of those
+    that hyperfine means; g of their spins is then nuclear_g alone.
     """
 
     top: Top
@@ -190,13 +161,14 @@ class ZeemanRequest:
         "g = moment/(nuclear magneton x spin) of spins, 14N=0.4038,...; by default of the isotope", "magnetic.nuclear_g",
         example={"14N": 0.4038}, panel=SPINS,
     )  # fmt: skip
+    hamiltonian: tuple[QuantumEffect, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self)
         checked_j(self.j_highest)
         MAGNETIC.checked(self.fields_tesla)
         checked_g(self.top, self.magnetic.g)
-        if self.nuclear_g and not self.hyperfine:
+        if self.nuclear_g and not (self.hyperfine or self.hamiltonian):
             raise ValueError("nuclear_g: belongs to spins; ask for the hyperfine structure too")
         _ = self.effects, self.spin_g
 
@@ -212,19 +184,26 @@ class ZeemanRequest:
     @property
     def effects(self) -> tuple[QuantumEffect, ...]:
         """Effects with spins if these are requested; empty for the default Hamiltonian."""
-        return effects_of(self.top, True) if self.hyperfine else ()
+        return effects_of(self.top, True) if self.hyperfine else self.hamiltonian
 
     @property
     def map(self) -> MapRequest:
         """Hamiltonian, fields and states of the map."""
-        return magnetic_map_request(
-            self.top,
-            self.fields_tesla,
-            self.magnetic.g,
-            magnetisability=self.magnetic.magnetisability,
-            effects=self.effects,
-            nuclear_g=self.spin_g,
+        magnetic, effects = self.magnetic, self.effects
+        terms = [FieldTerm(1, -NUCLEAR_MAGNETON_MHZ_PER_T, Magnet(np.array(magnetic.g), self.spin_g))]
+        if magnetic.magnetisability is not None:
+            chi = Contraction(_axial_tensor(self.top, magnetic.magnetisability, "χ"), np.outer(Z, Z))
+            terms.append(FieldTerm(2, -0.5 * MHZ_PER_T2, chi))
+        positive = projections(self.top, effects, None, self.j_highest)
+        return MapRequest(
+            top=self.top,
+            effects=effects,
+            terms=tuple(terms),
+            observables={},
+            kind=MAGNETIC,
+            fields=MAGNETIC.checked(self.fields_tesla),
             j_highest=self.j_highest,
+            m_values=tuple(sorted({*positive, *(-m for m in positive)})),
             tolerance_mhz=self.tolerance_mhz,
         )
 
@@ -233,7 +212,7 @@ class ZeemanRequest:
         """g of each spin, from the request or the isotope; ValueError if it is not known."""
         constants = self.top.spin_constants
         if not self.hyperfine or constants is None:
-            return {}
+            return dict(self.nuclear_g or {})
         requested = dict(self.nuclear_g or {})
         if unknown := sorted(requested.keys() - constants.twice.keys()):
             raise ValueError(f"nuclear_g: {', '.join(unknown)}: the spins of this top are {', '.join(constants.twice)}")
