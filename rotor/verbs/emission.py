@@ -268,12 +268,6 @@ def _table(answer: EmissionAnswer, shown: int) -> Table:
     )
 
 
-def results(answer: Any) -> dict[str, Any]:
-    """Number of lines and the brightest of them, for a sweep."""
-    peak = answer.peak
-    return {"lines": len(answer.lines), "peak_k": peak.brightness_k, "peak_mhz": peak.observed_mhz}
-
-
 VERB = Verb(
     name="emission",
     about="Lines of a source as a radio telescope sees them: brightness temperature in local thermodynamic equilibrium.",
@@ -282,7 +276,11 @@ VERB = Verb(
     request=EmissionRequest,
     answer=lambda request, work: answer_emission(request),
     table=lambda answer: answer.lines,
-    results=results,
+    results=lambda answer: {
+        "lines": len(answer.lines),
+        "peak_k": answer.peak.brightness_k,
+        "peak_mhz": answer.peak.observed_mhz,
+    },
     rows="lines",
     show=show,
     outputs=(

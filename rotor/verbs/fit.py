@@ -313,12 +313,6 @@ def _stem(text: str) -> dict[str, str]:
     return {"report": f"{text}.fit", **{name: f"{text}.{name}" for name in CONSTANTS}}
 
 
-def results(answer: Any) -> dict[str, Any]:
-    """Number of lines and their residuals, for a sweep."""
-    fit = answer.fit
-    return {"lines_used": fit.used.sum(), "weighted_rms": fit.weighted_rms, "rms_mhz": fit.rms_mhz()}
-
-
 VERB = Verb(
     name="fit",
     about="Constants from measured lines, with errors, correlations and undetermined parameters; exit code 1 unless converged.",
@@ -327,7 +321,9 @@ VERB = Verb(
     request=FitInput,
     answer=answer,
     table=lambda answer: answer.parameters,
-    results=results,
+    results=lambda answer: {
+        "lines_used": answer.fit.used.sum(), "weighted_rms": answer.fit.weighted_rms, "rms_mhz": answer.fit.rms_mhz(),
+    },
     rows="parameters",
     records=lambda answer: Parameters(answer.fit),
     show=show,

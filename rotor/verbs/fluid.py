@@ -29,7 +29,7 @@ from rotor.requests.readers import Flag, Quantity, Text, Whole
 from rotor.temporary import locked_folder
 from rotor.verbs.outputs import Output, Report, drawing, picture
 from rotor.verbs.subjects import beside
-from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb, Work
+from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb, Work, facts_named
 
 if TYPE_CHECKING:
     from ase import Atoms
@@ -321,13 +321,6 @@ def _facts(content: Mapping[str, Any], settings: Settings) -> list[tuple[str, st
     return facts
 
 
-def results(answer: Any) -> dict[str, Any]:
-    """Means of the run and the drift of its conserved energy, for a sweep."""
-    facts = answer.facts()
-    means = {f"{mean['quantity']} ({mean['unit']})": mean["mean"] for mean in facts["means"]}
-    return means | {"conserved_drift_ev_per_ns": facts["conserved_drift_ev_per_ns"]}
-
-
 VERB = Verb(
     name="fluid",
     about="Rigid molecules in a periodic box: temperatures, energies, pressure, rotational correlation times and diffusion.",
@@ -335,7 +328,10 @@ VERB = Verb(
     request=FluidRequest,
     answer=answer,
     table=lambda answer: answer.record,
-    results=results,
+    results=lambda answer: (
+        {f"{mean['quantity']} ({mean['unit']})": mean["mean"] for mean in answer.facts()["means"]}
+        | facts_named(answer.facts(), "conserved_drift_ev_per_ns")
+    ),
     rows="record",
     show=show,
     outputs=(

@@ -9,30 +9,20 @@ from typing import Any
 from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
 from rotor.reports.screen import Table, record_table
-from rotor.requests.fill import Entries, read_fields
+from rotor.requests.fill import read_fields
 from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_info
 from rotor.tops.uncertain_numbers import known_digits
 from rotor.units import MHZ_PER_CM
 from rotor.verbs.molecule import POLARIZABILITY
 from rotor.verbs.outputs import tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Subject, Verb, Work
+from rotor.verbs.verb import Verb, facts_named
 
 EXAMPLES = """\b
 Examples:
   rotor info water
   rotor info my.sdf --isotope 1=2H --json info.json
   rotor info --constants "A=8.572 B=3.64 C=2.79 GHz" --temperature 10:300K:30"""
-
-
-def build(verb: Verb, entries: Entries, subject: Subject) -> InfoRequest:
-    """The request; a SMILES is passed on as text."""
-    return InfoRequest(**subject.values, **read_fields(InfoRequest, entries, subject), smiles=subject.text)
-
-
-def answer(request: InfoRequest, work: Work) -> InfoAnswer:
-    """The answer, with a progress line on a terminal while levels are summed."""
-    return answer_info(request, sum_progress() if work.progress else None)
 
 
 def _facts(answer: InfoAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -193,20 +183,14 @@ def _conformers_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
     return Table("", columns, rows)
 
 
-def results(answer: Any) -> dict[str, Any]:
-    """Rotational constants, mass and Ray's parameter, for a sweep."""
-    facts, columns = answer.facts(), answer.table.columns
-    constants = {name: columns[name][0] for name in ("a_mhz", "b_mhz", "c_mhz")}
-    return constants | {name: facts[name] for name in ("mass_u", "kappa")}
-
-
 VERB = Verb(
     name="info",
     about="Frame, constants, kind of top with its margin, moments, dipole, table of Q(T).",
     examples=EXAMPLES,
     request=InfoRequest,
-    answer=answer,
-    results=results,
+    answer=lambda request, work: answer_info(request, sum_progress() if work.progress else None),
+    results=lambda answer: {name: answer.table.columns[name][0] for name in ("a_mhz", "b_mhz", "c_mhz")}
+    | facts_named(answer.facts(), "mass_u", "kappa"),
     rows="partition_function",
     records=lambda answer: None,
     show=top_facts.report_on_top(
@@ -215,7 +199,9 @@ VERB = Verb(
     ),
     outputs=(*tables("the table of Q(T)", "q"),),
     subject=OneMolecule((*POLARIZABILITY, "internal_rotation")),
-    build=build,
+    build=lambda verb, entries, subject: InfoRequest(
+        **subject.values, **read_fields(InfoRequest, entries, subject), smiles=subject.text
+    ),
     drawn=None,
     accuracy="of the rotational constants",
     start={"molecule": "water", "outputs.csv": "q.csv"},

@@ -110,12 +110,6 @@ def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
     return record_table(f"{title}, in order of energy", columns, records)
 
 
-def results(answer: Any) -> dict[str, Any]:
-    """Number of levels, the lowest and the highest energy, for a sweep."""
-    energy = answer.table.energy_cm
-    return {"levels": len(energy), "lowest_cm": energy.min(), "highest_cm": energy.max()}
-
-
 VERB = Verb(
     name="levels",
     about="Energy levels of a molecule: quantum numbers, energies, degeneracies, term diagram.",
@@ -123,7 +117,11 @@ VERB = Verb(
     small_blocks=True,
     request=LevelsRequest,
     answer=lambda request, work: answer_levels(request, work.executor),
-    results=results,
+    results=lambda answer: {
+        "levels": len(answer.table),
+        "lowest_cm": answer.table.energy_cm.min(),
+        "highest_cm": answer.table.energy_cm.max(),
+    },
     rows="levels",
     show=show,
     outputs=(

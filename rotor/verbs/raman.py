@@ -32,11 +32,6 @@ class RamanShown(Shown):
     top_lines: int = declared(20, Whole(0), "Number of strongest lines shown", option="--top", panel=OUTPUT)
 
 
-def content(answer: RamanAnswer, shown: RamanShown) -> Mapping[str, Any]:
-    """Rows of the strongest lines, for the JSON."""
-    return {"strongest": answer.strongest(shown.top_lines)}
-
-
 def _facts(answer: RamanAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
     lines, top, least = answer.lines, answer.lines.top, record["min_relative"]
     count = f"{len(lines)}, together {record['band_cross_section_cm2_per_sr']:.4g} cm²/sr" if len(lines) else "none"
@@ -110,7 +105,7 @@ VERB = Verb(
         lambda top, reading, entries: with_known_polarizability(top, reading),
     ),
     shown=RamanShown,
-    content=content,
+    content=lambda answer, shown: {"strongest": answer.strongest(shown.top_lines)},
     notes=lambda answer: answer.lines.warnings,
     nothing=lambda answer: f"no lines: {answer.why_no_lines}" if answer.why_no_lines else "",
     drawn="cm-1",

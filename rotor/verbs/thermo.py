@@ -15,7 +15,7 @@ from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_the
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT
 from rotor.verbs.outputs import picture, tables
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Extra, Verb, Work
+from rotor.verbs.verb import Extra, Verb
 
 SHOWN = 25  # rows of the table in the report
 
@@ -26,11 +26,6 @@ Examples:
   rotor thermo HCN --hyperfine --temperature 0.0001,0.001,0.01,0.1,1
   rotor thermo H2 --species ortho --temperature 5:300K:60 --plot ortho.png
   rotor thermo water --gas --pressure 1bar --vibration 1595,3657,3756 --temperature 298.15"""
-
-
-def answer(request: ThermoRequest, work: Work) -> ThermoAnswer:
-    """The functions, with a progress line on a terminal while levels are summed."""
-    return answer_thermo(request, sum_progress() if work.progress else None)
 
 
 def _facts(answer: ThermoAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -123,21 +118,18 @@ def _gas_table(answer: ThermoAnswer, content: Mapping[str, Any]) -> Table | None
     return record_table(title, columns, sampled(functions, SHOWN)[0])
 
 
-def results(answer: Any) -> dict[str, Any]:
-    """Q, entropy and C_v at the last temperature, for a sweep."""
-    columns = answer.functions.columns
-    return {name: columns[name][-1] for name in ("temperature_k", "q_rot", "entropy_j_per_mol_k", "cv_over_r")}
-
-
 VERB = Verb(
     name="thermo",
     about="Rotational partition function, energy, entropy and heat capacity, quantum and classical.",
     examples=EXAMPLES,
     small_blocks=True,
     request=ThermoRequest,
-    answer=answer,
+    answer=lambda request, work: answer_thermo(request, sum_progress() if work.progress else None),
     table=lambda answer: answer.functions,
-    results=results,
+    results=lambda answer: {
+        name: answer.functions.columns[name][-1]
+        for name in ("temperature_k", "q_rot", "entropy_j_per_mol_k", "cv_over_r")
+    },
     rows="functions",
     show=top_facts.report_on_top(_facts, _rotation_table, _gas_table, sources=("constants", "spin weights")),
     notes=lambda answer: answer.notes,

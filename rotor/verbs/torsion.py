@@ -15,7 +15,7 @@ from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, 
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
 from rotor.verbs.outputs import picture, table_file
 from rotor.verbs.subjects import OneMolecule
-from rotor.verbs.verb import Shown, Verb, Work
+from rotor.verbs.verb import Verb, Work, facts_named
 
 if TYPE_CHECKING:
     pass
@@ -37,11 +37,6 @@ def answer(request: TorsionRequest, work: Work) -> TorsionAnswer:
         return answer_torsion(request)
     with progress_bar("angles of the scan") as show:
         return answer_torsion(request, show)
-
-
-def content(answer: TorsionAnswer, shown: Shown) -> Mapping[str, Any]:
-    """The thermodynamic functions of all methods, for the JSON."""
-    return {"functions": table_records(answer.functions)}
 
 
 def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -137,14 +132,6 @@ def _thermo_table(answer: TorsionAnswer, record: Mapping[str, Any]) -> Table:
     return record_table(title, columns, range(len(exact.temperature_k)))
 
 
-def results(answer: Any) -> dict[str, Any]:
-    """The barrier, the zero-point energy, and C_v by the levels at the last temperature, for a sweep."""
-    facts = answer.facts()
-    exact = answer.functions.for_method("levels")
-    names = ("barrier_cm", "zero_point_cm", "reduced_moment_u_angstrom2")
-    return {name: facts[name] for name in names} | {"cv_over_r": exact.cv_over_r[-1]}
-
-
 VERB = Verb(
     name="torsion",
     about="Rotation about a bond: potential, levels, tunnelling, thermodynamics.",
@@ -152,7 +139,8 @@ VERB = Verb(
     request=TorsionRequest,
     answer=answer,
     table=lambda answer: answer.levels,
-    results=results,
+    results=lambda answer: facts_named(answer.facts(), "barrier_cm", "zero_point_cm", "reduced_moment_u_angstrom2")
+    | {"cv_over_r": answer.functions.for_method("levels").cv_over_r[-1]},
     rows="levels",
     show=top_facts.report_on_top(_facts, _level_table, _thermo_table, _classical_facts),
     outputs=(
@@ -165,7 +153,7 @@ VERB = Verb(
     subject=OneMolecule(
         ("constants", *DIPOLE, *POLARIZABILITY, "spin_weights", *NUCLEI, *STATES, "hessian", "internal_rotation", "symmetry_tolerance"),
     ),
-    content=content,
+    content=lambda answer, shown: {"functions": table_records(answer.functions)},
     notes=lambda answer: answer.warnings,
     numerics="rotor.thermodynamics.numerics:TORSION",
     accuracy="of the levels",

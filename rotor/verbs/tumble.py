@@ -18,7 +18,7 @@ from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Output, Report, drawing, picture, tables
 from rotor.verbs.turning_body import TurningBody, build
-from rotor.verbs.verb import Verb
+from rotor.verbs.verb import Verb, facts_named
 
 SHOWN = 11  # rows of the motion in the report
 SMALL = 1e-4  # largest component of a column below which numbers are printed with digits instead of decimals
@@ -34,11 +34,6 @@ Examples:
   rotor tumble --moments "0.6,0.8,1.0 kg m2" --omega "0.1,60,0 rpm"
   rotor tumble --moments 0.6,0.8,1.0 --angular-momentum 1.8,0.4,-0.9 --times 0:10:101 --csv out.csv
   rotor tumble book --effect "linear drag coefficients=1e-4,1e-4,1e-4" --times 0:30:301 --csv slowed.csv"""
-
-
-def answer(request: TumbleRequest | DrivenRequest) -> TumbleAnswer | DrivenAnswer:
-    """The motion: exact if free, else integrated in steps."""
-    return answer_tumble(request) if isinstance(request, TumbleRequest) else answer_driven(request)
 
 
 def is_short(request: TumbleRequest | DrivenRequest) -> bool:
@@ -243,20 +238,15 @@ def _form(column: Floats) -> str:
     return ".6g" if 0 < float(max(abs(column.min()), abs(column.max()))) < SMALL else "z.6f"
 
 
-def results(answer: Any) -> dict[str, Any]:
-    """Energies and periods of the motion, for a sweep."""
-    facts = answer.facts()
-    names = ("energy", "period", "turning_rate", "energy_first", "energy_last", "energy_drift")
-    return {name: facts[name] for name in names if name in facts}
-
-
 VERB = Verb(
     name="tumble",
     about="Rotation of a molecule or a rigid body: exact free motion, conserved quantities, stable axes; motion under effects.",
     examples=EXAMPLES,
     request=MotionInput,
-    answer=lambda request, work: answer(request),
-    results=results,
+    answer=lambda request, work: (answer_tumble if isinstance(request, TumbleRequest) else answer_driven)(request),
+    results=lambda answer: facts_named(
+        answer.facts(), "energy", "period", "turning_rate", "energy_first", "energy_last", "energy_drift"
+    ),
     rows="motion",
     show=show,
     outputs=(

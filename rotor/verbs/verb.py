@@ -337,6 +337,11 @@ def verb_of(name: str) -> Verb:
     return verb
 
 
+def facts_named(facts: Mapping[str, Any], *names: str) -> dict[str, Any]:
+    """The facts with these names; those that an answer does not have are left out."""
+    return {name: facts[name] for name in names if name in facts}
+
+
 def check_early(structure: type, entries: Entries) -> None:
     """Raise ValueError for a value that is wrong for every subject, before any file is read."""
     for declaration in all_fields(structure).values():
