@@ -12,8 +12,7 @@ from rotor.frozen import dataclass
 from rotor.quantum.quanta import headings
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, record_table, table_records
-from rotor.reports.sources import short_source
-from rotor.reports.top_facts import error_facts, hyperfine_lines, left_out_facts
+from rotor.reports.top_facts import error_facts, hyperfine_lines, left_out_facts, short_source
 from rotor.requests.field import OUTPUT, REQUIRED, Field, all_fields, declared, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT

@@ -141,17 +141,12 @@ VERB = Verb(
     drawn="K",
     extras=(
         Extra(
-            "--gas",
-            "",
-            "Also functions of the ideal gas, with translation; at 1 bar unless --pressure is given",
-            lambda _: {"conditions.pressure": "1 bar"},
-            (),
-            CONDITIONS,
-            True,
+            "--gas", "", "Also functions of the ideal gas, with translation; at 1 bar unless --pressure is given",
+            lambda _: {"conditions.pressure": "1 bar"}, panel=CONDITIONS, common=True,
         ),
     ),
     numerics="rotor.thermodynamics.numerics:THERMO",
     accuracy="of Q, U and C_v",
     accuracy_example="0.1 %",
     start={"molecule": "water", "conditions.temperature": "10:1000K:100", "outputs.csv": "thermo.csv"},
-)
+)  # fmt: skip
