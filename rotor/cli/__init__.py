@@ -119,7 +119,7 @@ def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer
         from rotor.cli.shared.command import VerbCommand, command_of
 
         declared = declaration(verb)
-        app.command(verb, cls=VerbCommand, short_help=VERBS[verb] or declared.about, epilog=folded(declared.examples))(
+        app.command(verb, cls=VerbCommand, short_help=VERBS[verb] or declared.about, epilog=headed(declared.examples))(
             command_of(declared)
         )
     return app
@@ -134,6 +134,11 @@ def folded(examples: str, width: int = 76) -> str:
           --plot terms.png
     """
     return "\n".join(_folded_line(line, width) for line in examples.split("\n"))
+
+
+def headed(examples: str) -> str:
+    """Examples of a verb, folded, below a heading; typer leaves lines after \\b as they are."""
+    return f"\b\nExamples:\n{folded(examples)}" if examples and not examples.startswith("\b") else folded(examples)
 
 
 def _folded_line(line: str, width: int) -> str:

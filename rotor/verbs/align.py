@@ -43,8 +43,7 @@ _TEXTS = {
     ),
 }  # shape of the pulse, order of its numbers and help, by option
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor align OCS --pulse "1e13 W/cm2, 1 ps" --temperature 1 --until 200ps --plot ocs.png --csv ocs.csv
   rotor align --constants "B=6081.492 MHz" --anisotropy 4.04 --pulse "1e13 W/cm2, 50 fs"
   rotor align N2 --pulse "3e13 W/cm2, 0.1 ps" --pulse "3e13 W/cm2, 0.1 ps, 8.38 ps" --temperature 300 --classical 20000

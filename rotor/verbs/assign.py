@@ -23,8 +23,7 @@ from rotor.verbs.outputs import Output, Report, picture, table_file
 from rotor.verbs.subjects import saved_inputs
 from rotor.verbs.verb import Place, Subject, SubjectKind, Verb
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor assign peaks.csv
   rotor assign spectrum.csv --species 3 --plot found.png --csv peaks_assigned.csv --lin found.lin
   rotor assign peaks.csv --guess 2458,490,409 --temperature 2

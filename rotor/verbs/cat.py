@@ -38,8 +38,7 @@ from rotor.verbs.subjects import top_of_word
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import ErrorsShown, Note, Work
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor cat c018003.cat --range 0:1000GHz --min-lgint -5
   rotor cat predicted.cat --measured c060503.cat.gz --out merged.cat
   rotor cat c060503.cat.gz --compare OCS

@@ -21,8 +21,7 @@ from rotor.verbs.tool import Tool
 from rotor.verbs.verb import ErrorsShown, Work
 
 ADD, LIST, SHOW = ACTIONS = ("add", "list", "show")
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor catalogue add cdms/ jpl/ library --catalogue lines.rotorcat
   rotor catalogue add 1H2-16O__POKAZATEL.states --catalogue lines.rotorcat --licence "CC BY-SA 4.0"
   rotor catalogue list --catalogue lines.rotorcat

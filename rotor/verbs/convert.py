@@ -26,8 +26,7 @@ from rotor.verbs.subjects import top_of_word
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import ErrorsShown, Note, Work, silent
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor convert case.var constants.toml
   rotor convert constants.toml case.par --kmax 60
   rotor convert water water.var

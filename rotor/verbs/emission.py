@@ -36,8 +36,7 @@ from rotor.verbs.outputs import Report, picture, table_file, tables
 from rotor.verbs.subjects import beside, saved_molecule
 from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor emission CO --range 115.1:115.4GHz --column 1e17 --excitation 20 --width 2
   rotor emission CH3CN HC3N SO2 --band ALMA6 --column 1e15,3e14,1e15 --excitation 100 --width 5 --plot core.png
   rotor emission HCN --range 88.62:88.64GHz --hyperfine --width 0.3 --excitation 10

@@ -50,8 +50,7 @@ if TYPE_CHECKING:
     from rotor.fitting.choose import Suggestion, Trial
     from rotor.fitting.result import Fit
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor fit case.par --out fitted
   rotor fit lines.csv --start constants.toml --free A,B,C,DeltaJ --out fitted
   rotor fit c060503.cat.gz --constants "B=6081 D=0.001 H=0 MHz" --free B,D,H

@@ -38,8 +38,7 @@ if TYPE_CHECKING:
 
 FRAMES = (".traj", ".xyz", ".extxyz")
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor fluid water --molecules 216 --ensemble langevin --steps 20000 --trajectory liquid.traj --checkpoint run.npz
   rotor fluid water --molecules 216 --ensemble langevin --steps 40000 --trajectory liquid.traj --checkpoint run.npz --resume
   rotor fluid liquid.traj --ensemble nve --steps 50000 --every 10 --csv nve.csv --json -

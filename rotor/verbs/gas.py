@@ -21,8 +21,7 @@ from rotor.verbs.verb import Verb, Work
 
 SHOWN = 11  # rows of the correlation functions in the report
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor gas water --molecules 20000 --temperature 300 --seed 7 --json -
   rotor gas OCS --times 0:5:201 --csv ocs.csv --plot ocs.png"""
 

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 
 CAT = (".cat", ".cat.gz")
 source_field = partial(declared, panel=CONDITIONS)  # a field under this heading of --help
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor identify spectrum.fits --catalogue lines.rotorcat --plot pages.pdf
   rotor identify spectrum.txt --catalogue cdms/ --velocity 2.7 --width 1 --beam 0.5 --size 0.5
   rotor identify cube.fits --pixel 32,40 --catalogue lines.rotorcat --json -"""

@@ -18,8 +18,7 @@ from rotor.verbs.outputs import tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Verb, facts_named
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor info water
   rotor info my.sdf --isotope 1=2H --json info.json
   rotor info --constants "A=8.572 B=3.64 C=2.79 GHz" --temperature 10:300K:30"""

@@ -15,8 +15,7 @@ from rotor.verbs.outputs import Report, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import ErrorsShown, Verb
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor isotopologues water
   rotor isotopologues CH3Cl --min-abundance 0.01 --json family.json
   rotor isotopologues H2CO --each C=13C --each O=18O

@@ -27,8 +27,7 @@ COLUMNS = {
     "K": ("energy_k", "{energy:.6f}"),
 }
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor levels water
   rotor levels water --jmax 4 --unit K --csv water.csv --plot terms.png
   rotor levels CH3CN --k 0:3 --jmax 20 --egy levels.egy

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 WIDEST_NAME = 24
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor molecules
   rotor molecules water
   rotor molecules --json -"""

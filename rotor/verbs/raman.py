@@ -17,8 +17,7 @@ from rotor.verbs.outputs import picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Shown, Verb
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor raman N2
   rotor raman CO2 --laser 488 --temperature 500 --csv co2.csv --plot co2.png
   rotor raman HCN --polarizability 3.9,2.0 --temperature 10 --hyperfine

@@ -32,8 +32,7 @@ HITRAN_K = 296.0
 option_field = partial(declared, panel=OBSERVABLES)  # a field under this heading of --help
 _FILE_ALONE = ("as_spcat", "full_basis")  # options of .int files
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor spectrum water
   rotor spectrum "SMILES:C=O" --temperature 100
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --csv out.csv --plot out.png

@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from rotor.spectra.fields.stark_coefficients import StarkCoefficients
     from rotor.tops.top import Top
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor stark OCS --field 0:200kV/cm --states "J<=2" --plot ocs.png --csv ocs.csv
   rotor stark indole --field 0:200kV/cm --states "J<=2" --plot indole.png
   rotor stark --constants "A=5655.2654 B=1546.8759 C=1214.4040 MHz" --dipole-abc 4.5152,0,0 --field 0,100kV/cm

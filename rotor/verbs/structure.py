@@ -24,8 +24,7 @@ from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.subjects import file_name, saved_inputs
 from rotor.verbs.verb import ErrorsShown, Place, Subject, SubjectKind, Verb
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor structure ocs.toml
   rotor structure h2co.toml --method rs,r0 --leave-out c --plot h2co.png
   rotor structure water.toml --method re --xyz water_re.xyz"""

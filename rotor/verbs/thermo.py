@@ -19,8 +19,7 @@ from rotor.verbs.verb import Extra, Verb
 
 SHOWN = 25  # rows of the table in the report
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor thermo water
   rotor thermo water --temperature 10:1000K:100 --csv water.csv --plot water.png
   rotor thermo HCN --hyperfine --temperature 0.0001,0.001,0.01,0.1,1

@@ -20,8 +20,7 @@ from rotor.verbs.verb import Verb, Work, facts_named
 if TYPE_CHECKING:
     pass
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor torsion C2H6 --bond 1-2
   rotor torsion "SMILES:CC=O" --bond 1-2 --potential table --plot acetaldehyde.png
   rotor torsion C2H6 --bond 1-2 --potential "V3=1013 cm-1" --temperature 100:1000K:10

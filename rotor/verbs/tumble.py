@@ -25,8 +25,7 @@ SMALL = 1e-4  # largest component of a column below which numbers are printed wi
 _ATTITUDE = "qw", "qx", "qy", "qz"
 FEW_TIMES = 10_000  # plain Python takes half a second for them, as long as loading the compiler
 FREE = Rule(excludes=("effects",), why="needs a free motion (a table shows any)")  # of pictures
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor tumble water --plot water.png --gif water.gif
   rotor tumble water --times 0:20ps:401 --csv water.csv
   rotor tumble book --plot book.png

@@ -25,8 +25,7 @@ if TYPE_CHECKING:
     from rotor.tops.magnetic import Tensor
     from rotor.tops.top import Top
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor zeeman --constants "B=6081.492 MHz" --g -0.03 --field 0:5T --plot levels.png --csv levels.csv
   rotor zeeman --constants "A=10 B=6 C=4 GHz" --g 0.6,-0.2,0.3 --magnetisability -3,2,-7 --field 0:20T:41 --states "J<=1"
   rotor zeeman HC3N --g -0.01 --field 0:200G --states "J<=1" --spin-constants "chi_aa(14N)=-4.3 MHz" --plot hc3n.png
