@@ -307,11 +307,6 @@ def _suggestion_table(fit: Fit, suggestions: Sequence[Suggestion]) -> Table:
     return record_table("lines that would help most", columns, suggestions, {"upper - lower"})
 
 
-def _stem(text: str) -> dict[str, str]:
-    """The files that --out STEM writes, by output."""
-    return {"report": f"{text}.fit", **{name: f"{text}.{name}" for name in CONSTANTS}}
-
-
 VERB = Verb(
     name="fit",
     about="Constants from measured lines, with errors, correlations and undetermined parameters; exit code 1 unless converged.",
@@ -351,7 +346,10 @@ VERB = Verb(
     check=check,
     withheld=withheld,
     failure=failure,
-    extras=(Extra("--out", "STEM", "Write STEM.fit (report), .toml, .par and .var", files=_stem, panel=OUTPUT, common=True),),
+    extras=(
+        Extra("--out", "STEM", "Write STEM.fit (report), .toml, .par and .var", panel=OUTPUT, common=True,
+              files=lambda stem: {"report": f"{stem}.fit", **{name: f"{stem}.{name}" for name in CONSTANTS}}),
+    ),
     start={"lines.source": "lines.csv", "molecule": "water", "parameters.free": ["A", "B", "C"], "outputs.csv": "fit.csv",
            "outputs.report": "out.fit"},
 )  # fmt: skip

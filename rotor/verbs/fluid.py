@@ -271,11 +271,6 @@ def _centres(answer: FluidAnswer, frames: str | None) -> Floats:
     return np.array([rigid_bodies(atoms, shapes=shapes)[1].centres for atoms in images[len(images) // 2 :]])
 
 
-def _thermometer_error(content: Mapping[str, Any], settings: Settings) -> str:
-    """Statement on the thermometer's error; none under LAMMPS' thermostat noise, where it is not known."""
-    return "" if content["engine"] == "lammps" and settings.ensemble != "nve" else ": no error of order h²"
-
-
 def _hill(symbols: str) -> str:
     """A formula in Hill order: OH2 becomes H2O."""
     from ase.formula import Formula
@@ -302,6 +297,9 @@ def show(answer: FluidAnswer, report: Report) -> Iterable[Part | None]:
 
 def _facts(content: Mapping[str, Any], settings: Settings) -> list[tuple[str, str]]:
     degrees, rms, drift = content["degrees"], content["conserved_rms_ev"], content["conserved_drift_ev_per_ns"]
+    noisy = (
+        content["engine"] == "lammps" and settings.ensemble != "nve"
+    )  # the error under its thermostat noise is not known
     motions = (
         f"{degrees['translation']} of translation, {degrees['rotation']} of rotation; {degrees['removed']} removed"
     )
@@ -309,7 +307,7 @@ def _facts(content: Mapping[str, Any], settings: Settings) -> list[tuple[str, st
         ("model", f"{settings.model}, cutoff {settings.cutoff_angstrom:g} Å, {settings.electrostatics}"),
         ("start", content["start"]),
         ("degrees", motions),
-        ("thermometer", content["thermometer"] + _thermometer_error(content, settings)),
+        ("thermometer", content["thermometer"] + ("" if noisy else ": no error of order h²")),
         ("conserved", "not known from one row alone" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g} eV/ns"),
     ]
     if content["density_g_cm3"] is not None:

@@ -65,11 +65,8 @@ def _kind_text(kind: str, decision: Mapping[str, Any]) -> str:
         f"(equal within {decision['equal_within']:g})"
     )
     differs = "" if kind == decision["kind"] else f"; the constants are those of another kind, {kind}"
-    return f"the geometry is {decision['kind']} by {numbers}; margin: a factor of {_margin_text(decision['margin'])}{differs}"
-
-
-def _margin_text(margin: float) -> str:
-    return f"{margin:.3g}" if margin < 1e9 else "more than 1e9"
+    margin = f"{decision['margin']:.3g}" if decision["margin"] < 1e9 else "more than 1e9"
+    return f"the geometry is {decision['kind']} by {numbers}; margin: a factor of {margin}{differs}"
 
 
 def _constants_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
@@ -110,16 +107,11 @@ def _axes_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
     columns = ["axis", "I (u Å²)", "P (u Å²)"] + (["x", "y", "z"] if frame else [])
     rows = []
     for i, axis in enumerate("abc"):
-        numbers = [f"{moments[i]:.6f}", _fixed(planar[i])]
-        rows.append([axis, *numbers, *([_fixed(x) for x in frame["axes"][i]] if frame else [])])
+        vector = frame["axes"][i] if frame else ()
+        rows.append([axis, f"{moments[i]:.6f}", f"{planar[i]:z.6f}", *(f"{x:z.6f}" for x in vector)])
     if frame:
-        rows.append(["centre of mass (Å)", "", "", *(_fixed(x) for x in frame["centre_angstrom"])])
+        rows.append(["centre of mass (Å)", "", "", *(f"{x:z.6f}" for x in frame["centre_angstrom"])])
     return Table("", columns, rows, frozenset({"axis"}))
-
-
-def _fixed(number: float) -> str:
-    """Six decimals, without the sign of a number that rounds to 0."""
-    return f"{round(number, 6) + 0.0:.6f}"
 
 
 def _nuclei_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table | None:

@@ -188,7 +188,8 @@ def show(answer: SpectrumAnswer, report: Report) -> Iterable[Part | None]:
     lines, record = answer.lines, report.content
     part: Part
     if not len(lines):
-        part = f"no lines: {_why_none(answer, report.entries)}\n"
+        reason = answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
+        part = f"no lines: {reason}{range_without_unit(report.entries)}\n"
     elif record["patterns"] is not None:
         part = patterns_table(record["patterns"], headings(rotational_quanta(lines.levels.quanta)))
     else:
@@ -196,11 +197,6 @@ def show(answer: SpectrumAnswer, report: Report) -> Iterable[Part | None]:
     title = "" if lines.levels.has_named_constants else f"{lines.top.name}: levels of the file's own parameters"
     sources = ("constants", "dipole", "spin weights")
     return top_facts.top_parts(lines.top, _facts(answer, record), (part,), sources, report, title)
-
-
-def _why_none(answer: SpectrumAnswer, entries: Entries) -> str:
-    reason = answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
-    return reason + range_without_unit(entries)
 
 
 def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -16,7 +16,6 @@ from rotor.reports.top_facts import error_facts
 from rotor.requests.field import MOLECULE, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom
-from rotor.structures.consistency import PlanarMoment, Without
 from rotor.structures.family import Family
 from rotor.structures.substitution import SubstitutionStructure, Value
 from rotor.table import counted
@@ -106,7 +105,9 @@ def show(answer: StructureAnswer, report: Report) -> Iterable[Part | None]:
     """Planar moments, coordinates and the values of each method."""
     family = answer.request.file.family
     yield f"{family.name}: {counted(len(family.species), 'isotopologue')}, {family.top.kind} top"
-    yield _planar_table(answer.planar)
+    yield record_table(
+        "planar moments of substitutions in a plane", _PLANAR, answer.planar, {"isotopologue", "axis", ""}
+    )
     if answer.substitution:
         yield _coordinates_table(answer.substitution)
         yield _values_table("rs", answer.substitution.values)
@@ -119,26 +120,19 @@ def show(answer: StructureAnswer, report: Report) -> Iterable[Part | None]:
             ("worst", f"I_{worst.axis} of {worst.species}: obs - calc {worst.difference:+.3g} u Å²"),
             ("search", fit.minimum.reason),
         ]
-        yield _without_table(fit.method, answer.without.get(fit.method, ()))
+        yield record_table(f"{fit.method} without", _WITHOUT, answer.without.get(fit.method, ()), {"isotopologue"})
     yield error_facts(report.content.get("errors"))
 
 
-def _planar_table(moments: Sequence[PlanarMoment]) -> Table:
-    columns = {
-        "isotopologue": "{0.species}",
-        "axis": "{0.axis}",
-        "P (u Å²)": "{0.value:.5f}",
-        "from the parent": "{0.change:+.5f}",
-        "error": "{0.error:.5f}",
-        "": lambda moment: "doubtful" if moment.doubtful else "",
-    }
-    title = "planar moments of substitutions in a plane"
-    return record_table(title, columns, moments, {"isotopologue", "axis", ""})
-
-
-def _without_table(method: str, fits: Sequence[Without]) -> Table:
-    columns = {"isotopologue": "{0.species}", "rms (u Å²)": "{0.rms_u_angstrom2:.3g}", "by chance": "{0.chance:.2g}"}
-    return record_table(f"{method} without", columns, fits, {"isotopologue"})
+_PLANAR = {
+    "isotopologue": "{0.species}",
+    "axis": "{0.axis}",
+    "P (u Å²)": "{0.value:.5f}",
+    "from the parent": "{0.change:+.5f}",
+    "error": "{0.error:.5f}",
+    "": lambda moment: "doubtful" if moment.doubtful else "",
+}
+_WITHOUT = {"isotopologue": "{0.species}", "rms (u Å²)": "{0.rms_u_angstrom2:.3g}", "by chance": "{0.chance:.2g}"}
 
 
 def _coordinates_table(structure: SubstitutionStructure) -> Table:

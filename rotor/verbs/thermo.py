@@ -29,7 +29,8 @@ EXAMPLES = """\
 
 def _facts(answer: ThermoAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
     functions, top = answer.functions, answer.functions.top
-    corrections = content["classical_corrections"]
+    corrections, jmax = content["classical_corrections"], content["jmax"]
+    sums = f"to J = {jmax} at most" if jmax >= 0 else "none: classical with corrections"
     series = " ".join(
         f"{'-' if value < 0 else '+'} {abs(value):.6g}{unit}"
         for value, unit in zip(corrections.values(), ("/T", "/T²", " T", " T²"), strict=True)
@@ -43,7 +44,7 @@ def _facts(answer: ThermoAnswer, content: Mapping[str, Any]) -> list[tuple[str, 
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
         ("classical Q", _onset_text(content["classical_tolerance"], content["classical_above_k"])),
         ("corrected", f"classical Q times exp of the logarithm of 1 {series}, to that order"),
-        ("sums", f"{_summed_to(content['jmax'])}, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
+        ("sums", f"{sums}, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
         *_spin_facts(content["hyperfine"]),
         ("vibration", content["vibrations"] or "left out: no states given"),
     ]
@@ -62,10 +63,6 @@ def _onset_text(tolerance: float, above_k: float | None) -> str:
     if above_k is None:
         return f"the temperature above which it is good to {tolerance:.0%} of C_v is not known: no sum over levels reaches it"
     return f"good to {tolerance:.0%} of C_v above {above_k:.4g} K (rigid top, equilibrium)"
-
-
-def _summed_to(jmax: int) -> str:
-    return f"to J = {jmax} at most" if jmax >= 0 else "none: classical with corrections"
 
 
 def _species_text(functions: ThermoFunctions, content: Mapping[str, Any]) -> str:

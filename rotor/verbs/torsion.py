@@ -39,6 +39,8 @@ def answer(request: TorsionRequest, work: Work) -> TorsionAnswer:
 
 
 def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
+    symbols = answer.rotation.molecule.symbols
+    bond = "-".join(f"{symbols[atom]}{atom + 1}" for atom in (answer.rotation.first, answer.rotation.last))
     low, high = record["reduced_moment_range_u_angstrom2"]
     count = record["symmetry_number"]
     turn = (
@@ -53,7 +55,7 @@ def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, 
     quanta = sorted({round(well["harmonic_cm"], 1) for well in record["wells"]})
     harmonic = ", ".join(f"{quantum:g}" for quantum in quanta)
     facts = [
-        ("bond", f"{_bond_text(answer)}; {len(answer.rotation.top)} atoms turn"),
+        ("bond", f"{bond}; {len(answer.rotation.top)} atoms turn"),
         ("potential", f"{record['potential_source']}: {_terms_text(record)}"),
         ("barrier", f"{record['barrier_cm']:.6g} cm⁻¹ from the lowest to the highest point"),
         ("minima", ", ".join(wells) + f"; harmonic {harmonic} cm⁻¹" if wells else "none: a free rotor"),
@@ -83,11 +85,6 @@ def _classical_facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[t
         ("conserved", f"{conserved}; steps of {gas.step_ps * 1e3:.2g} fs"),
         *top_facts.error_facts(gas.errors.as_json()),
     ]  # fmt: skip
-
-
-def _bond_text(answer: TorsionAnswer) -> str:
-    symbols, rotation = answer.rotation.molecule.symbols, answer.rotation
-    return f"{symbols[rotation.first]}{rotation.first + 1}-{symbols[rotation.last]}{rotation.last + 1}"
 
 
 def _terms_text(record: Mapping[str, Any]) -> str:

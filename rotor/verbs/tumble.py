@@ -134,6 +134,8 @@ def _facts(request: TumbleRequest, content: Mapping[str, Any]) -> list[tuple[str
     size = f"{content['angular_momentum_size']:.8g}{_unit(units.angular_momentum)}"
     vector = f"({_numbers(content['angular_momentum'])})"
     ratio, growth = content["separatrix_ratio"], content["growth_rate"]
+    drifts = {"energy": "energy", "|L|": "momentum", "L in space": "space_momentum"}
+    conserved = ", ".join(f"{name} to {content['invariant_drift'][key]:.1e}" for name, key in drifts.items())
     facts += [
         ("|L|", f"{size}, {vector} in the body: {request.source}"),
         ("energy", f"{content['energy']:.10g}{_unit(units.energy)}"),
@@ -148,7 +150,7 @@ def _facts(request: TumbleRequest, content: Mapping[str, Any]) -> list[tuple[str
     facts += [
         ("chaos", content["chaos"]),
         ("times", content["times_source"]),
-        ("conserved", _drift_text(content["invariant_drift"])),
+        ("conserved", f"{conserved} relative: round-off, at all times of the request"),
     ]
     return facts
 
@@ -164,13 +166,6 @@ def _motion_text(request: TumbleRequest, content: Mapping[str, Any]) -> str:
         return period
     middle = sorted(zip(request.moments, request.axes, strict=True))[1][1]
     return f"{period}; its component along axis {middle} changes sign every half of it"
-
-
-def _drift_text(drift: Mapping[str, float]) -> str:
-    return (
-        f"energy to {drift['energy']:.1e}, |L| to {drift['momentum']:.1e}, L in space to "
-        f"{drift['space_momentum']:.1e} relative: round-off, at all times of the request"
-    )
 
 
 def _axes_table(request: TumbleRequest, content: Mapping[str, Any]) -> Table:
