@@ -64,8 +64,7 @@ NO_ANSWER, WRONG_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
 # click's ClickException, whether click is a package of its own or, in a newer typer, a part of it
 _UsageError = cast(type[Exception], typer.BadParameter.__mro__[2])
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor spectrum water
   rotor spectrum "SMILES:C=O" --temperature 100
   rotor spectrum my.xyz --dipole 0,0,1.85 --range 0:2000GHz --cat out.cat --plot out.png
@@ -103,7 +102,7 @@ def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer
         context_settings={"help_option_names": ["-h", "--help"]},
     )
 
-    @app.callback(help="A molecule goes in, a rotational spectrum comes out.", epilog=folded(EXAMPLES))
+    @app.callback(help="A molecule goes in, a rotational spectrum comes out.", epilog=headed(EXAMPLES))
     def start(
         version: bool = typer.Option(
             False, "--version", is_eager=True, help="Print the version and stop.", callback=_print_version
@@ -137,8 +136,8 @@ def folded(examples: str, width: int = 76) -> str:
 
 
 def headed(examples: str) -> str:
-    """Examples of a verb, folded, below a heading; typer leaves lines after \\b as they are."""
-    return f"\b\nExamples:\n{folded(examples)}" if examples and not examples.startswith("\b") else folded(examples)
+    """Examples of a command, folded, below a heading; typer leaves lines after \\b as they are."""
+    return f"\b\nExamples:\n{folded(examples)}" if examples else ""
 
 
 def _folded_line(line: str, width: int) -> str:

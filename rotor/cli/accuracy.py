@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from rotor.scenes.accuracy_sweep import WorkPrecision
 
 WIDTH = 70  # of the line that shows the setting
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor accuracy s.toml
   rotor accuracy s.toml --plot cost.png --csv cost.csv
   rotor accuracy s.toml --seconds 20 --json -"""

@@ -14,8 +14,7 @@ from rotor.verbs.outputs import Output
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import Work
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor new spectrum > s.toml
   rotor new align --out align.toml
   rotor new --schema > scene.schema.json"""

@@ -14,8 +14,7 @@ from rotor.verbs.verb import verb_of
 if TYPE_CHECKING:
     from rotor.requests.plan import Plan
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor plan s.toml
   rotor plan s.toml --json -"""
 

@@ -37,8 +37,7 @@ SHOWN = 20  # rows of the table, and reasons of failed points, in the report
 SHOWN_OF_REASON = 3  # points listed for one reason
 SHOWN_NOTES = 3  # notes on the molecules of a sweep
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor run s.toml
   rotor run s.toml --out results --json -
   rotor run sweep.toml --workers 4

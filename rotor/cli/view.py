@@ -18,8 +18,7 @@ from rotor.verbs.verb import Work
 if TYPE_CHECKING:
     from rotor.viewer.service import Service
 
-EXAMPLES = """\b
-Examples:
+EXAMPLES = """\
   rotor view spectrum.csv
   rotor view spectrum.csv water molecule.toml --temperature 2 --lines lines.lin
   rotor view spectrum.view.json

@@ -24,7 +24,7 @@ from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long
 from rotor.verbs.molecule import POLARIZABILITY, range_without_unit, with_some_dipole
 from rotor.verbs.outputs import PICTURES, Output, Report, draw_answer, picture, table_file, tables
 from rotor.verbs.over_spectrum import Comparison, draw_loomis_wood, draw_over, over_facts
-from rotor.verbs.subjects import OneMolecule
+from rotor.verbs.subjects import INT_FILE_IN_SCENE, OneMolecule
 from rotor.verbs.verb import Place, Shown, Subject, Verb, Work
 
 MOST_FACTS_OF_STATES = 10  # in the head of a line list; rotor info shows all
@@ -90,9 +90,7 @@ class MoleculeOrFile(OneMolecule):
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs of the molecule; an .int file cannot be saved in a scene."""
         if not subject.molecules:
-            raise ValueError(
-                "--save-scene: a scene cannot hold an .int file; the file and its .var already state the calculation"
-            )
+            raise ValueError(INT_FILE_IN_SCENE)
         return super().saved(request, subject, folder)
 
 

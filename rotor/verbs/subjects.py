@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
     from rotor.verbs.verb import Verb
 
+INT_FILE_IN_SCENE = (
+    "--save-scene: a scene cannot hold an .int file; the file and its .var already state the calculation"
+)
 FILES = ("source", "hessian")  # inputs of a molecule that may name a file
 MOLECULE = Field(
     Custom(str, scene_type=str | MoleculeInput), "a name, a file, SMILES:..., or a table", "molecule", default=REQUIRED,
@@ -110,9 +113,7 @@ def saved_molecule(molecule: MoleculeInput, folder: Path) -> dict[str, Any]:
             f"a scene cannot hold an object of type {type(molecule.source).__name__}; give a name, a file, SMILES:... or constants"
         )
     if molecule.source is not None and molecule.source.endswith(".int"):
-        raise ValueError(
-            "--save-scene: a scene cannot hold an .int file; the file and its .var already state the calculation"
-        )
+        raise ValueError(INT_FILE_IN_SCENE)
     content = written_fields(molecule)
     for name in FILES:
         key = f"molecule.{name}"

@@ -94,7 +94,7 @@ def answer_ring(request: RingRequest) -> RingAnswer:
 VERB = Verb(
     name="ring",
     about="A particle on a ring.",
-    examples="\b\nExamples:\n  rotor ring water --radius 2",
+    examples="  rotor ring water --radius 2",
     request=RingRequest,
     answer=lambda request, work: answer_ring(request),
     table=lambda answer: answer.table,
