@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
-from rotor.requests.fill import Entries, NamedError
+from rotor.requests.fill import Entries, NamedError, called
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
 from rotor.verbs.outputs import Report
 from rotor.verbs.verb import Note
@@ -59,8 +59,8 @@ def is_int_file(source: Any) -> bool:
     return isinstance(source, str) and source.lower().endswith(".int")
 
 
-def predicted(source: str, entries: Entries, note: Note, **basis: bool) -> Prediction:
-    """The prediction of an .int file. Inputs that the files determine are refused; notes are passed on.
+def predicted_request(source: str, entries: Entries, note: Note, **basis: bool) -> PredictedRequest:
+    """The request of an .int file, with its prediction. Inputs that the files determine are refused; notes are passed on.
 
     basis: as_spcat and full_basis.
     """
@@ -72,10 +72,23 @@ def predicted(source: str, entries: Entries, note: Note, **basis: bool) -> Predi
         raise NamedError(f"{flags}: {source} determines {them} ({fields}); change {them} there{_or_its_var(source)}")
     from rotor.formats.spcat.predict import predict_file
 
-    prediction = predict_file(source, **basis)
-    for text in prediction.notes:
+    unnamed = predict_file(source, **basis)
+    for text in unnamed.notes:
         note(text)
-    return with_names(prediction, Path(source))
+    prediction = with_names(unnamed, Path(source))
+    settings, lines = prediction.request, prediction.lines
+    with called(PredictedRequest, entries.style):
+        return PredictedRequest(
+            lines.top,
+            temperature_k=settings.temperature_k,
+            jmax=settings.fend,
+            min_lgint=settings.str0,
+            range_mhz=lines.range_mhz,
+            q=prediction.q,
+            prediction=prediction,
+            source=source,
+            basis=tuple(basis.items()),
+        )
 
 
 def _or_its_var(source: str) -> str:
@@ -103,23 +116,6 @@ def with_names(prediction: Prediction, source: Path) -> Prediction:
         return prediction
     levels = replace(lines.levels, effects=effects)
     return replace(prediction, lines=replace(lines, top=top, levels=levels))
-
-
-def request_of(prediction: Prediction, source: str, shape: dict[str, Any], **basis: bool) -> PredictedRequest:
-    """The request of a prediction's files; shape: profile, width and layer of gas."""
-    settings, lines = prediction.request, prediction.lines
-    return PredictedRequest(
-        lines.top,
-        temperature_k=settings.temperature_k,
-        jmax=settings.fend,
-        min_lgint=settings.str0,
-        range_mhz=lines.range_mhz,
-        q=prediction.q,
-        prediction=prediction,
-        source=source,
-        basis=tuple(basis.items()),
-        **shape,
-    )
 
 
 def answer_of(request: PredictedRequest) -> SpectrumAnswer:

@@ -84,8 +84,8 @@ class MoleculeOrFile(OneMolecule):
                 raise ValueError(f"{field.flag}: expected with an .int file, which SPCAT reads with the .var beside it")
             return super().read(entries, place, verb)
         path = str(Path(place.folder) / str(source)) if entries.style == "key" else str(source)
-        prediction = int_files.predicted(path, entries, place.note, **basis)
-        return Subject({"prediction": prediction, "source": path, **basis}, (), str(source), place.note)
+        request = int_files.predicted_request(path, entries, place.note, **basis)
+        return Subject({"request": request}, (), str(source), place.note)
 
     def saved(self, request: Any, subject: Subject, folder: Path) -> dict[str, Any]:
         """The inputs of the molecule; an .int file cannot be saved in a scene."""
@@ -100,8 +100,8 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> SpectrumRequest:
     if subject.molecules:
         return SpectrumRequest(**subject.values, **values)
     shape = {name: values.get(name) for name in ("profile", "fwhm_mhz", "layer")}
-    basis = {name: subject.values[name] for name in _FILE_ALONE}
-    return int_files.request_of(subject.values["prediction"], subject.values["source"], shape, **basis)
+    request: SpectrumRequest = replace(subject.values["request"], **shape)
+    return request
 
 
 def adapt(request: SpectrumRequest, outputs: Mapping[str, Any], entries: Entries) -> SpectrumRequest:
