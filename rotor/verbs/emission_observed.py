@@ -18,12 +18,7 @@ from rotor.verbs.observed_file import (
     SINGLE,
     SINGLE_FIT,
     ObservedRequest,
-    components_of,
-    each_species,
-    fit_choices,
     json_of,
-    sight_of,
-    species_in,
     spectrum_facts,
 )
 from rotor.verbs.outputs import PICTURES, Output, Report, table_file
@@ -136,10 +131,10 @@ def fitted_maps(request: ObservedRequest, work: Work) -> Mapped:
         cube.frequency_mhz, cube.intensity_k[:, y, x], noise=float(cube.noise_k[y, x]), beam_arcsec=cube.beam_arcsec,
         source=f"{cube.source}, pixel {x + 1},{y + 1}", rest_mhz=cube.rest_mhz, frame=cube.frame,
     )  # fmt: skip
-    sight = sight_of(brightest, request)
-    start = components_of(brightest, species_in(brightest, request, work.note), sight, request)
+    sight = request.sight(brightest)
+    start = request.components(brightest, request.species(brightest, work.note), sight)
     work.note(f"the search begins at the brightest pixel, {x + 1},{y + 1}")
-    choices = fit_choices(request)
+    choices = request.choices
     noise = np.where(chosen, cube.noise_k, 1.0)
     fit = fit_cube(
         cube.frequency_mhz, cube.intensity_k, noise, start, sight, choices, mask=chosen, executor=work.executor
@@ -211,11 +206,11 @@ def answer(request: ObservedRequest, work: Work) -> Observed | Mapped:
     spectrum = request.spectrum.read(request.fit or request.over or "", request.range_mhz, gas_cell=True)
     if in_absorbance := spectrum.unit == "absorbance":
         refuse_telescope(request, work.files)
-    sight = sight_of(spectrum, request)
+    sight = request.sight(spectrum)
     if in_absorbance and request.fit is not None:
         cell = cell_fit(spectrum, request, work.note)
         return Observed(request, spectrum, sight, list(cell.components), cell)
-    components = components_of(spectrum, species_in(spectrum, request, work.note), sight, request)
+    components = request.components(spectrum, request.species(spectrum, work.note), sight)
     if request.fit is None:
         return Observed(request, spectrum, sight, components)
     from rotor.observed.fit import contributions
@@ -244,8 +239,8 @@ def cell_fit(spectrum: ObservedSpectrum, request: ObservedRequest, note: Note) -
     from rotor.observed.gas_cell import fit_cell, start_cell
 
     kelvin, width = _single(request, "excitation_k"), _single(request, "fwhm_km_s")
-    species = species_in(spectrum, request, note)
-    columns = each_species("column_per_cm2", request, len(species))
+    species = request.species(spectrum, note)
+    columns = request.each_species("column_per_cm2", len(species))
     start = start_cell(spectrum, species, kelvin, width)
     if columns is not None:
         start = [replace(part, column_per_cm2=column) for part, column in zip(start, columns, strict=True)]
@@ -282,7 +277,7 @@ def _fitted(
 ) -> SourceFit:
     from rotor.observed.fit import fit_source
 
-    choices = fit_choices(request)
+    choices = request.choices
     if request.reject is None:
         return fit_source(spectrum, components, sight, choices)
     from rotor.observed.channels import fit_rejecting

@@ -259,59 +259,55 @@ class ObservedRequest:
         if not self.names:
             raise ValueError("SOURCE: expected one molecule or several, such as 'rotor emission CO HCN --band ALMA3'")
 
+    def sight(self, spectrum: ObservedSpectrum) -> Sight:
+        """Beam, background and redshift of the line of sight."""
+        background = self.background_k
+        if background is None:
+            background = declared_fields(LayerInput)["background_k"].default
+        return self.spectrum.sight(spectrum, background, self.redshift or 0.0)
 
-def sight_of(spectrum: ObservedSpectrum, request: ObservedRequest) -> Sight:
-    """Beam, background and redshift of the request."""
-    background = request.background_k
-    if background is None:
-        background = declared_fields(LayerInput)["background_k"].default
-    return request.spectrum.sight(spectrum, background, request.redshift or 0.0)
+    def species(self, spectrum: ObservedSpectrum, note: Note) -> list[SpeciesLines]:
+        """The named species, with their lines in the range of the spectrum."""
+        reach = padded(spectrum, self.redshift or 0.0)
+        species = species_of(self.names, self.catalogue, reach, self.sources.partition, note)
+        for lines in species:
+            if "note" in lines.identity:
+                note(f"{lines.name}: {lines.identity['note']}")
+        return species
 
+    def components(self, spectrum: ObservedSpectrum, species: Sequence[SpeciesLines], sight: Sight) -> list[Component]:
+        """Components from the typed options; for a fit, the rest is estimated from the spectrum."""
+        from rotor.observed.model import Component
+        from rotor.observed.start import start_components
 
-def species_in(spectrum: ObservedSpectrum, request: ObservedRequest, note: Note) -> list[SpeciesLines]:
-    """The named species, with their lines in the range of the spectrum."""
-    reach = padded(spectrum, request.redshift or 0.0)
-    species = species_of(request.names, request.catalogue, reach, request.sources.partition, note)
-    for lines in species:
-        if "note" in lines.identity:
-            note(f"{lines.name}: {lines.identity['note']}")
-    return species
+        count, size = len(species), self.spectrum.size_arcsec
+        typed = {name: self.each_species(name, count) for name in FREE.values() if name != "size_arcsec"}
+        if self.fit is None:
+            defaults = {name: declared_fields(LayerInput)[name].default * count for name in typed}
+            values = {name: numbers or defaults[name] for name, numbers in typed.items()}
+            rows: list[dict[str, Any]] = [{name: numbers[k] for name, numbers in values.items()} for k in range(count)]
+            return [Component(lines, **row, size_arcsec=size) for lines, row in zip(species, rows, strict=True)]
+        first = {name: (values[0] if values else None) for name, values in typed.items()}
+        del first["column_per_cm2"]
+        start = start_components(spectrum, species, sight, **first, size_arcsec=size)
+        changes = [{name: values[k] for name, values in typed.items() if values} for k in range(count)]
+        return [replace(component, **change) for component, change in zip(start, changes, strict=True)]  # type: ignore[arg-type]
 
+    def each_species(self, name: str, count: int) -> tuple[float, ...] | None:
+        """One number for each species, or one for all."""
+        values: tuple[float, ...] | None = getattr(self, name)
+        if values is not None and len(values) not in (1, count):
+            flag, text = declared_fields(LayerInput)[name].flag, ",".join(f"{number:g}" for number in values)
+            raise ValueError(
+                f"{flag} {text}: {len(values)} numbers for {count} species; expected one for all or one each"
+            )
+        return values * count if values is not None and len(values) == 1 else values
 
-def components_of(
-    spectrum: ObservedSpectrum, species: Sequence[SpeciesLines], sight: Sight, request: ObservedRequest
-) -> list[Component]:
-    """Components from the typed options; for a fit, the rest is estimated from the spectrum."""
-    from rotor.observed.model import Component
-    from rotor.observed.start import start_components
+    @property
+    def choices(self) -> FitChoices:
+        """Free and shared parameters, and the calibration error, of a fit."""
+        from rotor.observed.fit import FitChoices
+        from rotor.observed.variables import DEFAULT_FREE
 
-    count, size = len(species), request.spectrum.size_arcsec
-    typed = {name: each_species(name, request, count) for name in FREE.values() if name != "size_arcsec"}
-    if request.fit is None:
-        defaults = {name: declared_fields(LayerInput)[name].default * count for name in typed}
-        values = {name: numbers or defaults[name] for name, numbers in typed.items()}
-        rows: list[dict[str, Any]] = [{name: numbers[k] for name, numbers in values.items()} for k in range(count)]
-        return [Component(lines, **row, size_arcsec=size) for lines, row in zip(species, rows, strict=True)]
-    first = {name: (values[0] if values else None) for name, values in typed.items()}
-    del first["column_per_cm2"]
-    start = start_components(spectrum, species, sight, **first, size_arcsec=size)
-    changes = [{name: values[k] for name, values in typed.items() if values} for k in range(count)]
-    return [replace(component, **change) for component, change in zip(start, changes, strict=True)]  # type: ignore[arg-type]
-
-
-def each_species(name: str, request: ObservedRequest, count: int) -> tuple[float, ...] | None:
-    """One number for each species, or one for all."""
-    values: tuple[float, ...] | None = getattr(request, name)
-    if values is not None and len(values) not in (1, count):
-        flag, text = declared_fields(LayerInput)[name].flag, ",".join(f"{number:g}" for number in values)
-        raise ValueError(f"{flag} {text}: {len(values)} numbers for {count} species; expected one for all or one each")
-    return values * count if values is not None and len(values) == 1 else values
-
-
-def fit_choices(request: ObservedRequest) -> FitChoices:
-    """Free and shared parameters, and the calibration error, of a fit."""
-    from rotor.observed.fit import FitChoices
-    from rotor.observed.variables import DEFAULT_FREE
-
-    free, shared = (tuple(FREE[word] for word in words) for words in (request.free, request.shared))
-    return FitChoices(free=free or DEFAULT_FREE, shared=shared, calibration=request.calibration)
+        free, shared = (tuple(FREE[word] for word in words) for words in (self.free, self.shared))
+        return FitChoices(free=free or DEFAULT_FREE, shared=shared, calibration=self.calibration)
