@@ -94,8 +94,7 @@ class Result(Outcome):
 
     def facts(self) -> Mapping[str, Any]:
         """All content except the table, by the keys of the JSON."""
-        facts: Mapping[str, Any] = self.answer.facts()
-        return facts
+        return self.verb.facts(self.answer)
 
     def to_pandas(self) -> Any:
         """The table as a pandas DataFrame."""

@@ -12,7 +12,6 @@ from rotor.requests.readers import Flag, Text
 from rotor.verbs.names import SCENE_VERBS
 from rotor.verbs.outputs import Output
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Work
 
 EXAMPLES = """\
   rotor new spectrum > s.toml
@@ -28,25 +27,13 @@ class NewRequest:
     schema: bool = declared(False, Flag(), "Write the JSON Schema of scene files instead, for editors")
 
 
-@dataclass(frozen=True)
-class New:
-    """The text of a scene or schema. written: whether it went into a file."""
-
-    text: str
-    written: bool
-
-    def facts(self) -> dict[str, Any]:
-        """Empty: `rotor new` has no JSON."""
-        return {}
-
-
-def answer(request: NewRequest, work: Work) -> New:
+def answer(request: NewRequest, _: Any) -> str:
     """The scene, or the schema."""
     from rotor.scenes.template import template
 
     if (request.kind is None) != request.schema:
         raise ValueError(f"expected either a kind of scene, one of {', '.join(SCENE_VERBS)}, or --schema")
-    return New(_schema() if request.kind is None else template(request.kind), "out" in work.files)
+    return _schema() if request.kind is None else template(request.kind)
 
 
 def check(_: NewRequest, outputs: Mapping[str, Any], __: Any) -> None:
@@ -71,13 +58,13 @@ VERB = Tool(
     request=NewRequest,
     answer=answer,
     text=None,
-    show=lambda answer, report: () if answer.written else (answer.text.removesuffix("\n"),),
+    show=lambda answer, report: () if report.content["files"] else (answer.removesuffix("\n"),),
     outputs=(
         Output(
             "out",
             (".toml", ".json"),
             "Write to a file",
-            lambda answer, path, report: write_text(path, answer.text),
+            lambda answer, path, report: write_text(path, answer),
         ),
     ),
     check=check,

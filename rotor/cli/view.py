@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, declared
@@ -66,10 +66,6 @@ class Opened:
     request: ViewRequest
     service: Service
     page: Path | None
-
-    def facts(self) -> dict[str, Any]:
-        """Empty: `rotor view` has no JSON."""
-        return {}
 
 
 def answer(request: ViewRequest, work: Work) -> Opened:

@@ -161,7 +161,7 @@ class Outcome:
         """Data of the report, the JSON and the files."""
         verb, work, answer = self.verb, self.calculation.work, self.answer
         head = self.calculation.provenance
-        content = {"rotor_version": version(), **head, **answer.facts(), **verb.content(answer, work.shown)}
+        content = {"rotor_version": version(), **head, **verb.facts(answer), **verb.content(answer, work.shown)}
         stated = {name: plain(content[name]) for name in ("errors", *verb.stated) if name in content}
         with_spins = f"rotor {verb.name if HYPERFINE in verb.fields else 'spectrum'} --hyperfine"
         sources = bool(getattr(work.shown, "sources", False))

@@ -52,6 +52,10 @@ class Tool(Verb):
         """No context: the request was checked when it was read."""
         return nullcontext()
 
+    def facts(self, answer: Any) -> Mapping[str, Any]:
+        """What the JSON says of an answer; nothing without JSON."""
+        return super().facts(answer) if self.has_json else {}
+
     def json(self, answer: Any, content: Mapping[str, Any]) -> str:
         """The JSON text."""
         return "" if self.text is None else self.text(answer, content)

@@ -317,6 +317,11 @@ class Verb:
         """Content of a scene in the folder that repeats the request, by dotted key."""
         return {**self.subject.saved(request, subject, folder), **written_fields(request)}
 
+    def facts(self, answer: Any) -> Mapping[str, Any]:
+        """What the JSON says of an answer."""
+        facts: Mapping[str, Any] = answer.facts()
+        return facts
+
     def json(self, answer: Any, content: Mapping[str, Any]) -> str:
         """The content as JSON text, with all rows."""
         table = self.table(answer) if self.records is None else self.records(answer)

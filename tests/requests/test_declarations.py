@@ -250,7 +250,8 @@ def test_every_number_takes_a_unit_and_its_errors_name_the_option(kind):
     ]
     assert numbers or kind == "structure"  # whose settings are words
     for number in numbers:
-        text = f"1:2 {number.reader.unit}" if isinstance(number.reader, Range) else f"1 {number.reader.unit}"
+        value = f"{2 * (getattr(number.reader, 'above', None) or 0.5):g}"  # such as 100 nm of a laser, above 50
+        text = f"{'1:2' if isinstance(number.reader, Range) else value} {number.reader.unit}"
         assert number.read(text, "option") is not None
         for wrong in ("1 furlong", "x"):
             wrong = wrong.replace("1 ", "1:2 ") if isinstance(number.reader, Range) else wrong

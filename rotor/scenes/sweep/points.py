@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from rotor.frozen import dataclass
-from rotor.scenes.run import files_of, suffixes_of
+from rotor.scenes.run import file_names, files_of
 from rotor.scenes.scene import SCHEMA, Scene, scene_of
 from rotor.scenes.sweep.molecule_list import is_list, list_entries
 
@@ -78,11 +78,9 @@ class Points:
                 put(content, axis.name, axis.values[i])
             outputs = content.get("outputs", {})
             words = self._words(indices)
-            for name in suffixes_of(content["kind"]).keys() & outputs.keys():
-                texts = outputs[name]
-                outputs[name] = (
-                    [named(text, words) for text in texts] if isinstance(texts, list) else named(texts, words)
-                )
+            for name, texts in file_names(content, content["kind"]).items():
+                filled = [named(text, words) for text in texts]
+                outputs[name] = filled if isinstance(outputs[name], list) else filled[0]
             shown = {axis.name: axis.shown[i] for axis, i in zip(self.axes, indices, strict=True)}
             yield Point(shown, content)
 
@@ -98,7 +96,7 @@ class Points:
     def refuse_equal_names(self) -> None:
         """Raise ValueError if two points would write the same file."""
         seen: set[str] = set()
-        patterns = list(_output_names(self.base.get("outputs", {}), self.base["kind"]))
+        patterns = [text for texts in file_names(self.base, self.base["kind"]).values() for text in texts]
         for indices in self._indices():
             words = self._words(indices)
             names = {os.path.normpath(named(pattern, words)) for pattern in patterns}
@@ -177,12 +175,6 @@ def _combined(outputs: dict[str, Any], axes: tuple[Axis, ...]) -> dict[str, str]
         return {}
     names = [name for name in JOINED if isinstance(outputs.get(name), str) and not _PLACE.search(outputs[name])]
     return {name: outputs.pop(name) for name in names}
-
-
-def _output_names(outputs: Mapping[str, Any], kind: str) -> Iterator[str]:
-    for name in suffixes_of(kind).keys() & outputs.keys():
-        texts = outputs[name]
-        yield from texts if isinstance(texts, list) else [texts]
 
 
 def numbered(texts: Iterable[str]) -> Iterator[str]:
