@@ -27,12 +27,11 @@ def answer(request: SceneFile, _: Any) -> SceneAnswer:
 
 def show(answer: SceneAnswer, _: Any) -> Iterable[Part | None]:
     """The plan."""
-    from rotor.requests.plan import larger_items
+    from rotor.requests.plan import left_out_texts
 
     plan: Plan = answer.result
     yield answer.scene.heading
-    larger, others = larger_items(plan.left_out, lambda part: part.size, lambda part: part.name)
-    texts = [str(part) for part in larger] + ([others] if others else [])
+    texts = left_out_texts(plan.left_out, lambda part: part.size, lambda part: part.name)
     yield [*plan.rows(verb_of(plan.kind).invariants), *left_out_facts(texts)]
 
 

@@ -93,7 +93,7 @@ def model_facts(report: Any) -> list[tuple[str, str]]:
     if "limits" not in content:
         return [*error_facts(content.get("errors")), *left_out_facts(content.get("left_out", ()))]
     from rotor.quantum.estimates.beyond import Limit
-    from rotor.requests.plan import larger_items
+    from rotor.requests.plan import left_out_texts
 
     present = [f"{effect['name']} {effect['size_mhz']:.2g} MHz" for effect in content["effects"] if effect["present"]]
     sizes = (
@@ -102,9 +102,10 @@ def model_facts(report: Any) -> list[tuple[str, str]]:
     facts = [*error_facts(content.get("errors")), ("effects", sizes)]
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
-    larger, others = larger_items(content["limits"], lambda limit: limit["size_mhz"], lambda limit: str(limit["name"]))
-    limits = [Limit(**limit).sentence(report.with_spins) for limit in larger]
-    limits += [others] if others else []
+    known = [Limit(**limit) for limit in content["limits"]]
+    limits = left_out_texts(
+        known, lambda limit: limit.size_mhz, lambda limit: limit.name, lambda limit: limit.sentence(report.with_spins)
+    )
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
     )

@@ -42,19 +42,19 @@ def largest_first(parts: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
     return tuple(sorted(parts, key=lambda part: (part.size is None, -(part.size or 0.0))))
 
 
-def larger_items(
-    items: Sequence[T], size: Callable[[T], float | None], name: Callable[[T], str]
-) -> tuple[list[T], str]:
-    """Up to four items of at least a tenth of the largest size (or without a size), and a sentence that names the others.
+def left_out_texts(
+    items: Sequence[T], size: Callable[[T], float | None], name: Callable[[T], str], text: Callable[[T], str] = str
+) -> list[str]:
+    """Texts of up to four items of at least a tenth of the largest size (or without a size), and one that names the others.
 
-    >>> larger_items([5.0, 4.0, 0.1], lambda size: size, str)
-    ([5.0, 4.0], 'and smaller or not estimated: 0.1')
+    >>> left_out_texts([5.0, 4.0, 0.1], lambda size: size, str)
+    ['5.0', '4.0', 'and smaller or not estimated: 0.1']
     """
     least = SMALL * max((value for item in items if (value := size(item)) is not None), default=0.0)
     larger = [item for item in items if (value := size(item)) is None or value >= least]
     shown = larger if len(larger) <= MOST_LEFT_OUT else larger[: MOST_LEFT_OUT - 1]
     others = [name(item) for item in items if item not in shown]
-    return shown, f"and smaller or not estimated: {', '.join(others)}" if others else ""
+    return [*map(text, shown), *([f"and smaller or not estimated: {', '.join(others)}"] if others else [])]
 
 
 @dataclass(frozen=True)
