@@ -119,7 +119,9 @@ class AssignRequest:
             if not a > b > c > 0:
                 raise ValueError(f"guess_mhz: {self.guess_mhz}: expected A > B > C > 0")
         if self.isotopologues and self.molecule is None:
-            raise ValueError("isotopologues: a geometry of the first species is needed; give it as the molecule")
+            raise ValueError(
+                "isotopologues: a geometry of the first species is needed; give it as the molecule (--molecule FILE)"
+            )
 
     @property
     def each_guess(self) -> list[AssignRequest]:

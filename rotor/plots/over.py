@@ -34,6 +34,7 @@ MOST_NAMES = 24
 NAME_SHARE = 0.32  # part of the vertical axis that a name above the tallest peak may take
 LEAST_NAMED = 1e-2  # relative to the strongest line in view
 BESIDE = 500  # a peak belongs to a line nearer than the width of the picture divided by this
+BESIDE_PEAKS = 0.02  # of the band, left and right of the outermost peaks
 LEAST_SHOWN = 1e-3  # relative to the strongest line in the band
 
 
@@ -76,7 +77,9 @@ def over_figure(lines: Lines, heights: Floats, peaks: PeakList, title: str, view
         without_signs(axes)
         axes.set_title(title, loc="left")
         legend_below(figure, axes, ncols=2)
-        axes.set_xlim(*peaks.band_mhz)
+        first, last = peaks.band_mhz
+        margin = 0.0 if peaks.trace else BESIDE_PEAKS * (last - first)  # the band of a list ends at its outermost peaks
+        axes.set_xlim(first - margin, last + margin)
         low, tallest = -1.05 * float(heights.max(initial=0.0)), float(peaks.intensity.max())
         axes.set_ylim(low, (tallest - NAME_SHARE * low) / (1 - NAME_SHARE))
         show_part(axes, view)

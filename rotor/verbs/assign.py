@@ -114,7 +114,8 @@ def show(answer: AssignAnswer, report: Report) -> Iterable[Part | None]:
     for number, species in enumerate(answer.species, 1):
         yield _table(number, species)
         yield _facts(species)
-    yield error_facts(record.get("errors"))
+    if answer.species:
+        yield error_facts(record.get("errors"))
 
 
 def _hint(answer: AssignAnswer) -> str:

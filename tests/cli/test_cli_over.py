@@ -122,6 +122,10 @@ def test_strongest_lines_are_named_above_their_peaks() -> None:
     lines, peaks = known_lines(temperature_k=2.0, dipole=(0.0, 1.0, 0.6)), spectrum()
     heights = fit_intensities(lines, peaks).heights(lines)
     axes = over_figure(lines, heights, peaks, "", View()).axes[0]
+    first, last = axes.get_xlim()
+    assert (
+        first < peaks.band_mhz[0] < peaks.band_mhz[1] < last
+    )  # a list ends at its outermost peaks, which stand off the frame
     names = {text.get_text(): text.xy for text in axes.texts}
     at = {
         line_text(lines.levels.quanta, int(lines.upper[row]), int(lines.lower[row])): lines.frequency_mhz[row]
