@@ -44,10 +44,6 @@ class Phases(NamedTuple):
     settled: frozenset[str]
     between_i: bool = False
 
-    def has_i(self, axis: int) -> bool:
-        """Whether a dipole between states along a (1), b (2) or c (3) has the factor i."""
-        return ("abc"[axis - 1] in self.odd) != self.between_i
-
 
 def read_phases(options: Options, codes: Iterable[Digits], states: int, doubled: frozenset[int]) -> Phases:
     """The phases by PHASE of XOPT; without it an axis is odd if more parameters along it are odd than even.
@@ -184,5 +180,6 @@ def turned_moments(
 
 def _turned(moment: Moment, axis: int, turned: str, phases: Phases) -> Moment:
     """A moment along an axis (1 to 3) in functions that time reversal with a half turn leaves as they are."""
-    between = moment.states[0] != moment.states[1]
-    return _in_phases(moment, between and phases.has_i(axis), "" if "abc"[axis - 1] == turned else turned)
+    letter, between = "abc"[axis - 1], moment.states[0] != moment.states[1]
+    has_i = between and (letter in phases.odd) != phases.between_i
+    return _in_phases(moment, has_i, "" if letter == turned else turned)

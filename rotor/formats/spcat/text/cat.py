@@ -97,7 +97,8 @@ def _odd_line(catalogue: Catalogue, index: int) -> bytes:
     """A line with its stored spelling, or whose numbers do not fit the usual columns."""
     record, layout = _within_format(catalogue.record(index), index), catalogue.layout
     stored = layout.spelling.get(index)
-    if stored is not None and _stored_record(stored) == record:
+    line = next((line for line in (stored or b"").split(b"\n") if line.strip()), b"")  # behind blank ones
+    if stored is not None and read_record(Line(line.rstrip(b"\r").decode("ascii"), 0, "stored text")) == record:
         ends = stored.endswith(b"\n") or index == len(catalogue) - 1
         return stored if ends else stored + layout.newline
     try:
@@ -106,12 +107,6 @@ def _odd_line(catalogue: Catalogue, index: int) -> bytes:
         raise ValueError(f"line {index + 1} cannot be written: {error}") from None
     length = _length(layout, len(record.quanta_upper))
     return text.rstrip(" ").ljust(length).encode() + layout.newline
-
-
-def _stored_record(text: bytes) -> Columns:
-    """The record of a stored spelling, which may begin with blank lines."""
-    line = next(line for line in text.split(b"\n") if line.strip())
-    return read_record(Line(line.rstrip(b"\r").decode("ascii"), 0, "stored text"))
 
 
 def _within_format(record: Columns, index: int) -> Columns:
