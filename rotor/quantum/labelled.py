@@ -25,9 +25,10 @@ import numpy as np
 from rotor.arrays import Floats, Ints, Workspace
 from rotor.frozen import dataclass
 from rotor.quantum.effects.watson import operators_by_name
-from rotor.quantum.label_blocks import Chunk, chunks_of, expectations, occurring_blocks
+from rotor.quantum.label_blocks import Chunk, chunks_of, occurring_blocks
 from rotor.quantum.solvers.tridiagonal import vectors_of_values
 from rotor.quantum.wang.turn import order_beyond_the_turn, turned
+from rotor.quantum.wang.unit_diagonals import expectations
 from rotor.table import with_article
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS

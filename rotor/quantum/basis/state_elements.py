@@ -16,12 +16,12 @@ from rotor.arrays import Floats, Ints, distinct
 from rotor.quantum.basis.wang_functions import BetweenStates, WangElements, WangFunctions
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.effect import QuantumEffect, couplings_of
-from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, numbered
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.states import Coupling, State
 from rotor.quantum.wang.basis import SpeciesFactors, WangBlock, parts_of
+from rotor.quantum.wang.unit_diagonals import unit_diagonals
 from rotor.tops.operators import Operators, Powers
 
 if TYPE_CHECKING:

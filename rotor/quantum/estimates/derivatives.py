@@ -3,7 +3,7 @@
     ∂E_i/∂c = ⟨i|∂H/∂c|i⟩
 
 (H. Hellmann, Einführung in die Quantenchemie (1937) 285; R. P. Feynman, Phys. Rev. 56 (1939) 340), where ∂H/∂c is a sum of
-terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊. Their elements over Wang functions are those of fits (`label_blocks.unit_diagonals`); the states of
+terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊. Their elements over Wang functions are those of fits (`wang.unit_diagonals`); the states of
 blocks of like size are computed together.
 """
 
@@ -19,10 +19,10 @@ from rotor.arrays import Floats, Workspace, distinct, runs_of_similar_size
 from rotor.quantum.basis.state_elements import linear_blocks_of
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
-from rotor.quantum.label_blocks import expectations, unit_diagonals
 from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
+from rotor.quantum.wang.unit_diagonals import expectations, unit_diagonals
 from rotor.tops.operators import Operators, Powers
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.wang_functions import BetweenStates, WangFunctions
-from rotor.quantum.label_blocks import unit_diagonals
 from rotor.quantum.operators.algebra import Operator, change_of
 from rotor.quantum.spins.operators import (
     ByElements,
@@ -26,6 +25,7 @@ from rotor.quantum.spins.operators import (
 from rotor.quantum.symmetric_top_elements import closed_coupling
 from rotor.quantum.tensors import BodyTensor, overlap
 from rotor.quantum.wang.basis import SPECIES, Part, SpeciesFactors, WangBlock
+from rotor.quantum.wang.unit_diagonals import unit_diagonals
 
 MOST_RANK = 2  # highest rank with closed forms for many N at once
 
