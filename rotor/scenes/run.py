@@ -106,9 +106,8 @@ def suffixes_of(kind: str) -> dict[str, tuple[str, ...]]:
     return {output.name: output.suffixes for output in outputs if output.scene} | {"json": (".json",)}
 
 
-def file_names(content: Mapping[str, Any], kind: str) -> dict[str, list[str]]:
-    """The names of files in the tables of a scene, by output."""
-    outputs = content.get("outputs", {})
+def file_names(outputs: Mapping[str, Any], kind: str) -> dict[str, list[str]]:
+    """The names of files in the table [outputs] of a scene, by output."""
     named = {name: outputs[name] for name in suffixes_of(kind) if name in outputs}
     return {name: value if isinstance(value, list) else [value] for name, value in named.items()}
 
@@ -117,7 +116,7 @@ def paths_of(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
     """The files that a scene names, in the folder `out`."""
     return {
         name: tuple(Path(within(out, text)) for text in texts)
-        for name, texts in file_names(scene.content, scene.kind).items()
+        for name, texts in file_names(scene.outputs, scene.kind).items()
     }
 
 
@@ -141,7 +140,7 @@ def refuse_outside(scene: Scene, out: Where) -> None:
     ValueError: outputs.csv: ../a.csv: lies outside the folder results; name a file inside it, or give another folder as --out
     """
     inside = Path(os.path.abspath(out))
-    for name, texts in file_names(scene.content, scene.kind).items():
+    for name, texts in file_names(scene.outputs, scene.kind).items():
         for text in texts:
             if not Path(os.path.abspath(within(out, text))).is_relative_to(inside):
                 raise ValueError(

@@ -65,6 +65,12 @@ class Scene:
         return swept
 
     @property
+    def outputs(self) -> Mapping[str, Any]:
+        """The files to write, and their settings."""
+        outputs: Mapping[str, Any] = self.content.get("outputs", {})
+        return outputs
+
+    @property
     def accuracy(self) -> Stated:
         """The requested accuracy; None without one."""
         stated: Stated = self.content.get("accuracy")

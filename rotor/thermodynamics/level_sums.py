@@ -163,15 +163,11 @@ def level_sums(
             ladder.last = int(min(hottest, longest))
             enough = (relative_error, 2 * at_worst)
             parts[:, ~classical] = _summed(ladder, s, temperatures[~classical], enough, kinds)
-        sums.append(_as_sums(temperatures, ladder.ground[s][0], parts))
+        q, energy, cv, jmax, *estimated = parts
+        sums.append(LevelSums(temperatures, ladder.ground[s][0], q, energy, cv, jmax.astype(np.int64), *estimated))
         if refuse:
             _refuse_inexact(sums[-1], kinds, at_worst)
     return sums
-
-
-def _as_sums(temperatures: Floats, ground_k: float, parts: Floats) -> LevelSums:
-    q, energy, cv, jmax, error_q, error_energy, error_cv = parts
-    return LevelSums(temperatures, ground_k, q, energy, cv, jmax.astype(np.int64), error_q, error_energy, error_cv)
 
 
 def lowest_level_k(

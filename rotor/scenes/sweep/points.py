@@ -78,7 +78,7 @@ class Points:
                 put(content, axis.name, axis.values[i])
             outputs = content.get("outputs", {})
             words = self._words(indices)
-            for name, texts in file_names(content, content["kind"]).items():
+            for name, texts in file_names(outputs, content["kind"]).items():
                 filled = [named(text, words) for text in texts]
                 outputs[name] = filled if isinstance(outputs[name], list) else filled[0]
             shown = {axis.name: axis.shown[i] for axis, i in zip(self.axes, indices, strict=True)}
@@ -96,7 +96,9 @@ class Points:
     def refuse_equal_names(self) -> None:
         """Raise ValueError if two points would write the same file."""
         seen: set[str] = set()
-        patterns = [text for texts in file_names(self.base, self.base["kind"]).values() for text in texts]
+        patterns = [
+            text for texts in file_names(self.base.get("outputs", {}), self.base["kind"]).values() for text in texts
+        ]
         for indices in self._indices():
             words = self._words(indices)
             names = {os.path.normpath(named(pattern, words)) for pattern in patterns}
