@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Indices
+from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.symmetric_top_elements import coupling_of_existing
@@ -38,7 +38,7 @@ class ParityStates:
     js: range
     parity: int
     columns: Floats
-    rows: Indices
+    rows: Ints
 
     def selected(self, part: slice) -> ParityStates:
         """Those of some J."""
@@ -55,7 +55,7 @@ class Product(NamedTuple):
 
     moved: Floats
     low: Floats
-    rows: Indices
+    rows: Ints
 
     def part(self, up: slice, low: slice) -> Product:
         """That of some of the states."""
@@ -75,7 +75,7 @@ def stacked(blocks: Mapping[tuple[int, Sector], SolvedBlock], js: range) -> dict
     """The states of successive J by their parity; blocks that are not there have no states."""
     stacks, size = {}, js[-1] // 2 + 1
     for parity in (0, 1):
-        columns, rows = np.zeros((len(js), size, 2 * size)), np.full((len(js), 2 * size), -1, dtype=np.int32)
+        columns, rows = np.zeros((len(js), size, 2 * size)), np.full((len(js), 2 * size), -1)
         for place, j in enumerate(js):
             for sign, at in ((1, 0), (-1, size)):
                 block = blocks.get((j, (parity, sign)))
@@ -155,8 +155,8 @@ class Vector:
         out = np.empty(up.columns.shape)
         out[:, :first], out[:, last:] = 0.0, 0.0
         coupling = self.couplings[up.js[0] - low.js[0], step][low.js.start + 1 : low.js.stop + 1, low.parity :: 2]
-        scaled = size * coupling[:, first:last, None]
-        np.multiply(up.columns[:, first + offset : last + offset], scaled, out=out[:, first:last])
+        states = up.columns[:, first + offset : last + offset]
+        np.einsum("jkn,jk->jkn", states, size * coupling[:, first:last], out=out[:, first:last])
         return out
 
 

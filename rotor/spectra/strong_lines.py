@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Indices, Ints, runs_of_similar_size
+from rotor.arrays import Floats, Ints, runs_of_similar_size
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.stacked_blocks import ParityStates, Product, Vector, stacked
 from rotor.quantum.tensors import BodyTensor
@@ -23,7 +23,7 @@ ALIKE, SMALL = 1.3, 16  # ratio of the sizes of blocks of several J in one array
 AT_ONCE = 30_000  # elements between such blocks of one kind
 ROUND_OFF = 1e-9  # relative margin of a threshold for lines that are compared exactly later
 
-StrongLines = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²
+StrongLines = tuple[Ints, Ints, Floats]  # rows of both states, and S in D²
 
 
 def strong_lines(
@@ -135,7 +135,7 @@ class _Memory:
         return self._elements[:size].reshape(shape), self._keep[:size].reshape(shape)
 
 
-def _strong_lines(rows: Indices, products: list[tuple[Product, Floats]], memory: _Memory) -> StrongLines:
+def _strong_lines(rows: Ints, products: list[tuple[Product, Floats]], memory: _Memory) -> StrongLines:
     """Lines between upper states (J, n_up) and lower ones with at least the strengths (J, n_up, n_low) beside each product."""
     others = np.stack([product.rows for product, _ in products])
     strength, keep = memory.arrays(len(products), *rows.shape, others.shape[-1])
@@ -148,4 +148,5 @@ def _strong_lines(rows: Indices, products: list[tuple[Product, Floats]], memory:
     row = places // width
     block = row // rows.shape[1]
     column = places + (block - row) * width
-    return rows.ravel()[row % rows.size], others.ravel()[column], strength.reshape(-1)[places]
+    row -= row // rows.size * rows.size  # the remainder in a third of the time
+    return rows.ravel()[row], others.ravel()[column], strength.reshape(-1)[places]

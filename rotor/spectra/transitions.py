@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Indices, Workspace
+from rotor.arrays import Floats, Indices, Ints, Workspace
 from rotor.frozen import dataclass
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.moments import Moment
@@ -36,7 +36,8 @@ COMPILED = "rotor.spectra._kernels"
 BATCH = 30_000  # lines processed together
 
 Vector = tuple[float, float, float]
-Rows = tuple[Indices, Indices, Floats]  # rows of both states, and S in D²
+Places = Indices | Ints
+Rows = tuple[Places, Places, Floats]  # rows of both states, and S in D²
 Amplitudes = Callable[
     [Any, Sequence[Any]], Floats
 ]  # of a block with several others, side by side: (n_up, sum of n_low)
@@ -163,7 +164,8 @@ def _existing_blocks(levels: Levels) -> tuple[list[SolvedBlock], bool]:
 
 def _rows(lines: Transitions, chosen: NDArray[np.bool_]) -> Transitions:
     rows = np.flatnonzero(chosen)
-    return Transitions(lines.frequency_mhz[rows], lines.strength_debye2[rows], lines.upper[rows], lines.lower[rows])
+    upper, lower = (column[rows].astype(np.int32, copy=False) for column in (lines.upper, lines.lower))
+    return Transitions(lines.frequency_mhz[rows], lines.strength_debye2[rows], upper, lower)
 
 
 def _joined(pieces: Iterable[Transitions], cut: IntensityCut | None) -> Transitions:
@@ -305,7 +307,7 @@ def _side_to_side(pieces: list[Rows]) -> Rows:
 
 
 def _with_frequencies(
-    levels: Levels, first: Indices, second: Indices, strength: Floats, range_mhz: tuple[float, float],
+    levels: Levels, first: Places, second: Places, strength: Floats, range_mhz: tuple[float, float],
     cut: IntensityCut | None,
 ) -> Transitions:  # fmt: skip
     """Lines between rows of levels, in either order, that lie in the range and reach the cut."""
@@ -314,12 +316,12 @@ def _with_frequencies(
 
 
 def _upward_lines(
-    first: Indices, second: Indices, difference: Floats, strength: Floats, range_mhz: tuple[float, float],
+    first: Places, second: Places, difference: Floats, strength: Floats, range_mhz: tuple[float, float],
     cut: IntensityCut | None,
 ) -> Transitions:  # fmt: skip
     """Lines from energy differences (first minus second state), those in the range and above the cut, with ordered states."""
-    falls = difference < 0
-    upper, lower = np.where(falls, second, first), np.where(falls, first, second)
+    exchange = (first ^ second) * (difference < 0)  # a quarter of the time of np.where
+    upper, lower = first ^ exchange, second ^ exchange
     transitions = Transitions(np.abs(difference), strength, upper, lower)
     if cut is None:
         return transitions
