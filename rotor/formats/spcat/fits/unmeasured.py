@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import prod
+
 import numpy as np
 
 from rotor.arrays import Floats, Ints
@@ -19,7 +21,7 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
     """Labels (n, k) of both states of the lines with the same changes of quantum numbers as a measured line.
 
     The states are the same as the measured line's (v), N is at most the highest measured, the frequency within the measured range,
-    where spins do not count.
+    where spins do not count. Raises ValueError where a file has so many quantum numbers that labels cannot be counted.
 
     file: parameters near the fitted ones. measured: measured lines; F below 0 and energies are ignored.
     """
@@ -40,6 +42,8 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
     every = np.concatenate([labels, seen.upper, seen.lower])
     least = every.min(axis=0) + np.minimum(changes[:, 1:].min(axis=0, initial=0), 0)
     spans = every.max(axis=0) + np.maximum(changes[:, 1:].max(axis=0, initial=0), 0) - least + 1
+    if prod(spans.tolist()) > 2**62:
+        raise ValueError("so many quantum numbers cannot be counted: no line can be suggested for this file")
 
     def number(rows: Ints) -> Ints:
         return np.asarray(np.ravel_multi_index(tuple((rows - least).T), spans.tolist()))
