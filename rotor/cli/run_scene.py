@@ -167,9 +167,8 @@ def answer(options: Options, _: Work) -> SceneRun | SweepRun:
         raise ValueError(f"--out {options.out}: there is no such folder; make it first")
     scene = options.read()
     swept = is_sweep(scene, options.folder)
-    for name, set_by_user in (("--record", options.record is not None), ("--retry-failed", options.retry_failed)):
-        if set_by_user and not swept:
-            raise ValueError(f"{name}: this scene has no sweep")
+    if not swept and (options.record is not None or options.retry_failed):
+        raise ValueError(f"{'--retry-failed' if options.record is None else '--record'}: this scene has no sweep")
     if swept and options.errors:
         raise ValueError("--errors: needs a single scene; files of a sweep hold the errors of each point")
     refuse_outside(scene, options.out)

@@ -25,11 +25,7 @@ def dask_executor(address: str, security: Any = None) -> Iterator[Executor]:
     (`tls_security`); by default Dask's configuration. Raises ValueError if dask.distributed is not installed, with the command that
     installs it, or if no scheduler answers.
     """
-    try:
-        from distributed import Client
-    except ImportError:
-        raise ValueError(f"dask.distributed is not installed; {INSTALL} installs it") from None
-    client = _connected(Client, address, security)
+    client = _connected(_distributed().Client, address, security)
     pool = client.get_executor()
     try:
         yield pool
@@ -40,6 +36,14 @@ def dask_executor(address: str, security: Any = None) -> Iterator[Executor]:
         pool.shutdown()
     finally:
         client.close()
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise ValueError(f"dask.distributed is not installed; {INSTALL} installs it") from None
+    return distributed
 
 
 def _connected(client: Any, address: str, security: Any) -> Any:
@@ -67,8 +71,6 @@ def tls_security(authority: str, certificate: str, key: str) -> Any:
             raise ValueError(
                 f"{name}: no such file; expected PEM files of the authority, the client's certificate, its key"
             )
-    try:
-        from distributed import Security
-    except ImportError:
-        raise ValueError(f"dask.distributed is not installed; {INSTALL} installs it") from None
-    return Security(tls_ca_file=authority, tls_client_cert=certificate, tls_client_key=key, require_encryption=True)
+    return _distributed().Security(
+        tls_ca_file=authority, tls_client_cert=certificate, tls_client_key=key, require_encryption=True
+    )

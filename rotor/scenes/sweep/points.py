@@ -13,14 +13,14 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from copy import deepcopy
-from dataclasses import field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from rotor.frozen import dataclass
 from rotor.scenes.run import file_names, files_of
 from rotor.scenes.scene import SCHEMA, Scene, scene_of
-from rotor.scenes.sweep.molecule_list import is_list, list_entries
+from rotor.scenes.sweep.molecule_list import Entry, is_list, list_entries
 
 _NOT_IN_NAMES = re.compile(r"[^\w.+-]+")
 _PLACE = re.compile(r"\{([^{}]*)\}")
@@ -30,16 +30,16 @@ _MOLECULE = ("molecule", "molecule.source")  # swept names whose values may be l
 
 @dataclass(frozen=True)
 class Axis:
-    """The values of a swept name. shown: values in tables. words: distinct texts in file names."""
+    """The values of a swept name. shown: values in tables."""
 
     name: str
     values: tuple[Any, ...]
     shown: tuple[Any, ...]
-    words: tuple[str, ...] = field(init=False)
 
-    def __post_init__(self) -> None:
-        texts = (_NOT_IN_NAMES.sub("_", str(cell(value))) for value in self.shown)
-        object.__setattr__(self, "words", tuple(numbered(texts)))
+    @cached_property
+    def words(self) -> tuple[str, ...]:
+        """Distinct texts of the values in file names."""
+        return tuple(numbered(_NOT_IN_NAMES.sub("_", str(cell(value))) for value in self.shown))
 
     @property
     def key(self) -> str:
@@ -157,18 +157,13 @@ def _axis(name: str, values: list[Any], folder: str | os.PathLike[str]) -> Axis:
         if twice := next((text for text, count in counts.items() if count > 1), None):
             raise ValueError(f"sweep.{name}: {twice} stands there twice; each point is one combination of values")
         return Axis(name, tuple(values), tuple(values))
-    sources: list[Any] = []
-    shown: list[Any] = []
+    entries: list[Entry] = []
     for value in values:
-        if isinstance(value, str) and is_list(value, folder):
-            entries = list_entries(value, folder)
-            sources += [entry.source for entry in entries]
-            shown += [entry.name for entry in entries]
-        else:
-            sources.append(value)
-            shown.append(value)
+        listed = isinstance(value, str) and is_list(value, folder)
+        entries += list_entries(value, folder) if listed else [Entry(value, value)]
+    shown = [entry.name for entry in entries]
     texts = all(isinstance(value, str) for value in shown)
-    return Axis(name, tuple(sources), tuple(numbered(shown)) if texts else tuple(shown))
+    return Axis(name, tuple(entry.source for entry in entries), tuple(numbered(shown) if texts else shown))
 
 
 def _combined(outputs: dict[str, Any], axes: tuple[Axis, ...]) -> dict[str, str]:
