@@ -107,7 +107,10 @@ def _moved(name: str) -> Any:
     if name not in api.MOVED:
         from rotor.checks import did_you_mean
 
-        raise AttributeError(f"module 'rotor' has no attribute {name!r}{did_you_mean(name, [*__all__, *api.MOVED])}")
+        inside = f"; there is rotor.api.{name}" if name in api.modules() else ""
+        raise AttributeError(
+            f"module 'rotor' has no attribute {name!r}{inside or did_you_mean(name, [*__all__, *api.MOVED])}"
+        )
     import warnings
 
     warnings.warn(

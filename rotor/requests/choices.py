@@ -47,7 +47,9 @@ class Choices(Reader):
         name, texts = _words(line)
         kinds = self.load()
         if name not in kinds:
-            raise ValueError(f"{line!r}: no {self.word} is named {name!r}; {nearest(name, kinds)}")
+            raise ValueError(
+                f"{line!r}: no {self.word} is named {name!r}; {nearest(name, kinds)} (a name, then key=value)"
+            )
         fields = {field.last: field for field in all_fields(kinds[name]).values()}
         for key in texts:
             if key not in fields:

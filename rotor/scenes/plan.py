@@ -11,7 +11,7 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, Run, timed
 from rotor.scenes.run import Where, files_of, scene_calculation
-from rotor.scenes.scene import Scene
+from rotor.scenes.scene import Scene, checked_scene
 from rotor.scenes.sweep.points import is_sweep
 from rotor.verbs.calculation import Calculation, NoResultError
 from rotor.verbs.verb import Verb
@@ -47,6 +47,7 @@ def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
     >>> plan_of(LevelsScene(molecule="CO")).counts
     {'levels': 11}
     """
+    checked_scene(scene)
     if scene.sweep:
         raise ValueError("sweep: a plan is of one point; plan the scene without its sweep")
     if is_sweep(scene, folder):

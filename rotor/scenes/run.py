@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from rotor.scenes.scene import SCHEMA, Scene, keyed, scene_of, scene_text, within
+from rotor.scenes.scene import SCHEMA, Scene, checked_scene, keyed, scene_of, scene_text, within
 from rotor.verbs.calculation import Calculation, Outcome
 from rotor.verbs.outputs import Files
 from rotor.verbs.verb import Work, verb_of
@@ -53,6 +53,7 @@ def run_scene(
     >>> len(run_scene(LevelsScene(molecule="CO")).table)
     11
     """
+    checked_scene(scene)
     if scene.sweep:
         raise ValueError("sweep: this scene has several points; run_sweep runs them")
     files = files_of(scene, out)

@@ -196,6 +196,12 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
     return parse_scene(text, str(path))
 
 
+def checked_scene(scene: Any) -> None:
+    """TypeError for what is no scene, such as the path of one."""
+    if not isinstance(scene, Scene):
+        raise TypeError(f"{scene!r:.60}: expected a scene: read_scene reads one from its file, make_scene makes one")
+
+
 def parse_scene(text: str, where: str = "scene") -> Scene:
     """The scene of a TOML text; `where` names the text in errors.
 

@@ -191,6 +191,22 @@ def test_methods_with_new_names_warn_and_answer_under_their_former_names(call, a
         assert call() == answer
 
 
+@pytest.mark.parametrize("function", ["run_scene", "run_sweep", "plan_of"])
+def test_the_path_of_a_scene_is_told_from_a_scene(function):
+    with pytest.raises(TypeError, match=r"'s\.toml': expected a scene: read_scene reads one from its file"):
+        getattr(rotor, function)("s.toml")
+
+
+def test_a_command_without_a_function_names_the_building_block():
+    with pytest.raises(AttributeError, match=r"no attribute 'identify'; there is rotor\.api\.identify"):
+        rotor.identify  # noqa: B018
+
+
+def test_a_pulse_as_a_line_says_how_it_is_written():
+    with pytest.raises(ValueError, match=r"no shape is named .*; there are gaussian, .* \(a name, then key=value\)"):
+        rotor.align("OCS", pulses=["1e13 W/cm2, 1 ps"])
+
+
 def test_further_building_blocks_are_in_one_place():
     assert sorted(api.modules()) == dir(api)
     for name in set(api.modules()) - api.MOVED:

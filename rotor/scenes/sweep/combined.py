@@ -104,7 +104,8 @@ class CombinedFile:
         from rotor.formats.sorted_pieces import engine_in, listed
         from rotor.formats.tables import quoted, run
 
-        waiting = self._waiting()
+        order = {key[:KEY_LENGTH]: number for number, key in enumerate(keys)}  # columns of the first point come first
+        waiting = dict(sorted(self._waiting().items(), key=lambda item: order.get(item[0], len(order))))
         before = self._joined() - waiting.keys()
         with ExitStack() as stack:
             unfinished = [stack.enter_context(atomic_path(target)) for target in self.targets]

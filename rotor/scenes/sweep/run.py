@@ -16,7 +16,7 @@ from rotor.checks import NoAnswerError
 from rotor.formats.atomic_write import FULL
 from rotor.frozen import dataclass
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import Scene, scene_text
+from rotor.scenes.scene import Scene, checked_scene, scene_text
 from rotor.scenes.sweep.combined import KEY_LENGTH, CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
 from rotor.scenes.sweep.points import Point, check_first, points
@@ -83,6 +83,7 @@ def run_sweep(
     ValueError
         Before any point runs: for swept names that the scene does not have, and files that cannot be written.
     """
+    checked_scene(scene)
     sweep = points(scene, folder)
     check_first(sweep, out)
     joined = CombinedFile.of(tuple(sweep.combined.values()), out)

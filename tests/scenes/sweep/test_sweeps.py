@@ -741,3 +741,15 @@ def test_a_table_of_a_list_that_is_not_there_is_refused(name, rule):
     scene = parse_scene(TWO_PULSES + f'[sweep]\n"{name}" = ["4 ps"]\n')
     with pytest.raises(ValueError, match=rule):
         list(points(scene))
+
+
+def test_columns_of_a_joined_file_are_in_the_order_of_the_points(tmp_path):
+    """Of a bent and a linear molecule, whatever their keys: a hash of the version among other things decided it."""
+    bent, linear = run_scene(LevelsScene(molecule="water")).table, run_scene(LevelsScene(molecule="CO")).table
+    for first, second in (("0" * 16, "f" * 16), ("f" * 16, "0" * 16)):
+        joined = CombinedFile.of([f"{first[0]}.csv"], tmp_path)
+        joined.open_folder()
+        joined.write_part(first, {"molecule": "water"}, bent)
+        joined.write_part(second, {"molecule": "CO"}, linear)
+        joined.join([first, second], "{}")
+        assert (tmp_path / f"{first[0]}.csv").read_text().startswith("point,molecule,j,ka,kc,energy_mhz,")
