@@ -11,7 +11,7 @@ from rotor.classical.euler import checked_moments
 from rotor.classical.tumble import Three
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, NUMERICS, all_fields, declared
-from rotor.requests.readers import Custom, Grid, Quantity, Reader, Whole
+from rotor.requests.readers import Custom, Quantity, Reader, Whole
 from rotor.units import parse_grid
 
 _UNIT_AT_END = re.compile(r"[A-Za-z][\w ²*^/]*$")
@@ -63,29 +63,16 @@ def _units(raw: Any) -> str:
     return str(raw)
 
 
-class Vector(Reader):
-    """Three numbers in the body's units. Text is read once the body is known."""
+@dataclass(frozen=True, eq=False, repr=False)
+class InBodyUnits(Reader):
+    """Numbers in the body's units. Text is read once the body is known."""
 
+    metavar: str
     scene_type: Any = list[float]
 
-    def __init__(self, metavar: str) -> None:
-        self.metavar = metavar
-
-    def write(self, value: Any) -> list[float]:
-        """The numbers as a list."""
-        return [float(number) for number in value]
-
-
-class Times(Grid):
-    """Times in the body's unit. Text is read once the body is known."""
-
-    def read(self, raw: Any) -> Any:
-        """The input unchanged."""
-        return raw
-
     def write(self, value: Any) -> Any:
-        """Text unchanged, numbers as a list."""
-        return value if isinstance(value, str) else super().write(value)
+        """Text and a single number unchanged, several numbers as a list."""
+        return value if isinstance(value, str | int | float) else [float(number) for number in value]
 
 
 @dataclass(frozen=True)
@@ -104,14 +91,15 @@ class BodyInput:
     units: str = declared("", Custom(_units), '"SI" (kg m², s, J), or "" for any coherent set', "body.units", option="")
     angular_momentum: Three | None = declared(
         None,
-        Vector("L1,L2,L3"),
+        InBodyUnits("L1,L2,L3"),
         "Angular momentum at time 0, in principal axes",
         "body.angular_momentum",
         option="",
         example=[1.8, 0.4, -0.9],
     )
     angular_velocity: Three | None = declared(
-        None, Vector("W1,W2,W3"), "Angular velocity at time 0, in principal axes, instead of the angular momentum: 0.1,10,0 (rad/s; rad/ps "
+        None, InBodyUnits("W1,W2,W3"),
+        "Angular velocity at time 0, in principal axes, instead of the angular momentum: 0.1,10,0 (rad/s; rad/ps "
         "for a molecule; also rpm, deg/s)", "body.angular_velocity", option="--omega", common=True, example=[0.1, 15.0, 0.1],
     )  # fmt: skip
     attitude: tuple[float, float, float, float] | None = declared(
@@ -129,12 +117,12 @@ class MotionInput:
         "conditions.temperature", common=True,
     )  # fmt: skip
     angular_momentum: Three | None = declared(
-        None, Vector("L1,L2,L3"), "Angular momentum at time 0, in principal axes (ħ for a molecule; by default the thermal mean)",
+        None, InBodyUnits("L1,L2,L3"), "Angular momentum at time 0, in principal axes (ħ for a molecule; by default the thermal mean)",
         "conditions.angular_momentum", common=True, example=[10.0, 0.1, 0.1],
     )  # fmt: skip
     times: Any = declared(
-        None, Times(), "Times (ps for a molecule, s with SI units); by default two periods", "conditions.times", common=True,
-        example="0:2:201",
+        None, InBodyUnits("GRID", list[float] | str), "Times (ps for a molecule, s with SI units); by default two periods",
+        "conditions.times", common=True, example="0:2:201",
     )  # fmt: skip
     effects: tuple[Any, ...] = declared(
         (), BODY_EFFECTS, 'Torque or other effect: its name and parameters, such as "linear drag coefficients=0.1,0.1,0.2"; repeatable',
@@ -145,7 +133,7 @@ class MotionInput:
         typed=DEFAULT_TOLERANCE,
     )  # fmt: skip
     step: float | None = declared(
-        None, Custom(lambda raw: raw, scene_type=float | str, metavar="T"),
+        None, InBodyUnits("T", float | str),
         "With effects: step of a splitting instead, where no torque depends on the angular velocity", "numerics.step", panel=NUMERICS,
         example=0.01,
     )  # fmt: skip

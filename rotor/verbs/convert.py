@@ -89,9 +89,7 @@ def refuse_overwriting(request: ConvertRequest, outputs: Mapping[str, Any], _: A
 def parameters_of(source: str) -> Path:
     """The file of a source; for an .int file, the parameter file beside it."""
     path = Path(source)
-    if path.suffix.lower() != ".int":
-        return path
-    return parameters_beside(path)
+    return parameters_beside(path) if path.suffix.lower() == ".int" else path
 
 
 def top_with_errors(source: str, note: Note = silent) -> Top:
@@ -99,7 +97,6 @@ def top_with_errors(source: str, note: Note = silent) -> Top:
     path = parameters_of(source)
     if path.suffix.lower() != ".var" or not path.exists():
         return top_of_word(source, note)
-
     return read_spcat_top(path, errors=True)
 
 
@@ -133,19 +130,10 @@ def molecule_file(top: Top, source: str, stem: str) -> MoleculeFile:
     sources = {table: text or f"converted from {Path(source).name}" for table, text in sources.items()}
     if not top.dipole_abc_debye:
         del sources["dipole"]
-    file = MoleculeFile(
-        name=top.name or stem,
-        constants=top.constants,
-        covariance=top.covariance,
-        dipole_abc_debye=top.dipole_abc_debye,
-        spin_weights=top.spin_weights,
-        states=top.states,
-        internal_rotation=top.internal_rotation,
-        spin_constants=top.spin_constants,
-        polarizability_abc_angstrom3=top.polarizability_abc_angstrom3,
-        magnetic=top.magnetic,
-        sources=sources,
-    )
+    shared = ("constants", "covariance", "dipole_abc_debye", "spin_weights", "states", "internal_rotation", "spin_constants",
+              "polarizability_abc_angstrom3", "magnetic")  # fmt: skip
+    contents: dict[str, Any] = {name: getattr(top, name) for name in shared}
+    file = MoleculeFile(name=top.name or stem, sources=sources, **contents)
     _refuse_unreadable(file, source)
     return file
 
