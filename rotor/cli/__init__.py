@@ -206,7 +206,10 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return _fail(_exit_code(error), _message(error), arguments)
     except MemoryError:
         return _fail(NO_ANSWER, "not enough memory for this; fewer atoms, levels, lines or times need less", arguments)
-    except Exception as error:  # a defect of the program, not of the input
+    except Exception as error:
+        if isinstance(error, ImportError) and " is not installed" in str(error):  # an extra, named with its command
+            return _fail(NO_ANSWER, str(error), arguments)
+        # a defect of the program, not of the input
         text = f"{type(error).__name__}: {error}"
         return _fail(NO_ANSWER, f"{text}; this is a defect, please report it with the output of --debug", arguments)
     finally:

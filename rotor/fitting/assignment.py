@@ -254,7 +254,7 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
     if first.names != second.names:
         raise ValueError(f"lines by {', '.join(first.names)} and by {', '.join(second.names)} cannot be merged")
     here = {_key(first, i): i for i in range(len(first))}
-    chosen, notes, same = [], list[str](), list[int]()
+    chosen, notes, same, differing = [], list[str](), list[int](), list[tuple[float, int]]()
     for i in range(len(second)):
         twin = here.get(_key(second, i))
         if twin is None:
@@ -264,8 +264,14 @@ def merged(first: Assignments, second: Assignments, *, same_within_mhz: float = 
         if apart <= same_within_mhz:
             same.append(i)
         else:
-            notes.append(f"{second.text(i)}: in both, {apart:.4f} MHz apart; both stay")
+            differing.append((apart, i))
             chosen.append(i)
+    if differing:
+        apart, i = max(differing)
+        notes.append(
+            f"{counted(len(differing), 'line is', 'lines are')} in both with different frequencies; both entries stay; the largest "
+            f"difference is {apart:.4f} MHz, of {second.text(i)}"
+        )
     if same:
         notes.insert(
             0,

@@ -22,7 +22,7 @@ from rotor.observed.model import KM_PER_S, Component, Sight, escape, model
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.spectra.emission import planck_k
 from rotor.spectra.opacity import NM2_IN_CM2
-from rotor.table import Table
+from rotor.table import Table, counted
 
 _REACH = 2.0  # range of integration on either side of a line, in line widths
 _OTHERS = 0.1  # contribution of other lines, relative to a line, above which it is a blend
@@ -93,7 +93,7 @@ def rotational_diagram(
     lines = _integrated(spectrum, components, number, sight)
     if len(lines) < 2:
         raise ValueError(
-            f"{component.species.name}: {len(lines)} lines above three standard deviations in the model; a diagram needs two"
+            f"{component.species.name}: {counted(len(lines), 'line')} above three standard deviations in the model; a diagram needs two"
         )
     rows, area, sigma = (np.array(column) for column in zip(*lines, strict=True))
     species = component.species.where(rows.astype(int))

@@ -208,5 +208,7 @@ def test_a_picture_of_draws_without_its_package_is_refused_before_the_fit(call, 
     picture = folder / "corner.png"
     code, out, err = call(*command(folder, "--pixel", "2,2", "--sample", "20", "--corner", str(picture)))
     assert (code, out, len(err.splitlines())) == (1, "", 1)  # not a mistake of the input
-    assert "corner is not installed" in err
+    assert (
+        err == 'error: corner is not installed: python -m pip install "molrotor[sampling]"\n'
+    )  # no defect of the program
     assert not picture.exists()

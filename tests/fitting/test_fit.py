@@ -240,6 +240,16 @@ def test_a_blend_is_one_frequency_the_weighted_mean():
     assert fit.calculated_mhz[2:] == pytest.approx(ends[2:], rel=1e-10)
 
 
+def test_lines_of_two_lists_with_different_frequencies_are_one_note():
+    labels = [[1], [2], [3]], [[0], [1], [2]]
+    first = assignments(("j",), *labels, [100.0, 200.0, 300.0], 0.1)
+    both, notes = merged(first, assignments(("j",), *labels, [100.1, 200.3, 300.2], 0.1))
+    assert len(both) == 6
+    assert notes == [
+        "3 lines are in both with different frequencies; both entries stay; the largest difference is 0.3000 MHz, of 2 - 1"
+    ]
+
+
 def test_a_blend_of_known_width_weighs_how_far_its_components_lie_apart(tmp_path):
     """χ² = (obs - mean)²/σ² + Σ w (calc - mean)²/width², w of the sum 1; the width stands in a .lin behind the blend."""
     upper, lower = (

@@ -99,7 +99,10 @@ def _refuse_wrong_count(rows: list[tuple[int, list[str]]], count: int, n_lines: 
     if len(rows) > count:
         number, words = rows[count]
         if len(words) == 1 and words[0].isdecimal():
-            raise ValueError(f"{where}, line {number}: a second structure begins here; keep one structure in the file")
+            raise ValueError(
+                f"{where}, line {number}: a second structure begins here; keep one structure in the file, or in Python give each "
+                "ase.Atoms of ase.io.iread(file)"
+            )
         raise ValueError(
             f"{where}, line {number}: {' '.join(words)!r:.60} comes after the {count} atoms that the file announces; "
             "correct the count or remove the line"
