@@ -7,12 +7,14 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rotor.formats import line_tables
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import parse_scene
 from rotor.verbs import long_lists
@@ -334,6 +336,7 @@ def test_the_lines_that_are_written_are_counted(folder, monkeypatch, short):
 # the peak of this program: `ru_maxrss` of a child is at least what its parent had
 MEASURED = """
 import sys
+import threading
 from pathlib import Path
 from rotor.cli import run
 code = run(sys.argv[1:])
@@ -363,3 +366,21 @@ def test_all_lines_to_j_300_take_less_than_1_gb(tmp_path):
     assert count > 30_000_000
     assert falls == 0
     assert (tmp_path / "a.cat").stat().st_size > 80 * 30_000_000
+
+
+def test_pieces_come_in_order_and_an_error_ends_the_threads():
+    def doubled(start: int) -> int:
+        if start == 14:
+            raise ValueError("piece 14")
+        return 2 * start
+
+    assert list(line_tables._in_order(doubled, range(3, 14))) == [2 * k for k in range(3, 14)]
+    others = set(threading.enumerate())
+    pieces = line_tables._in_order(doubled, range(0, 400, 2))
+    assert [next(pieces) for _ in range(7)] == [4 * k for k in range(7)]
+    started = set(threading.enumerate()) - others
+    with pytest.raises(ValueError, match="piece 14"):
+        next(pieces)
+    for thread in started:
+        thread.join(10)
+    assert not any(thread.is_alive() for thread in started)

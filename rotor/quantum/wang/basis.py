@@ -12,6 +12,7 @@ In any representation (-1)^Ka and (-1)^Kc are the characters under C2a and C2c, 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -123,9 +124,15 @@ def wang_blocks(j: int, representation: str) -> list[WangBlock]:
     >>> [(b.species, b.size) for b in wang_blocks(1, "Ir")]
     [('eo', 1), ('oe', 1), ('oo', 1)]
     """
+    kinds = _kinds_of_blocks(j % 2, representation)
+    return [WangBlock(j, species, k, sign, (j - k) // 2 + 1) for species, k, sign in kinds if j >= k]
+
+
+@lru_cache(maxsize=2 * len(REPRESENTATIONS))
+def _kinds_of_blocks(parity_of_j: int, representation: str) -> list[tuple[str, int, int]]:
+    """Species, lowest K and sign of the blocks of an even or odd J in the order of their species."""
     axes = axis_order(representation)
-    sized = [(first, sign, (j - first) // 2 + 1) for first, sign in _WANG if j >= first]
-    return sorted(WangBlock(j, _species(j, first, sign, axes), first, sign, size) for first, sign, size in sized)
+    return sorted((_species(parity_of_j, first, sign, axes), first, sign) for first, sign in _WANG)
 
 
 def first_name(j: int, species: str) -> tuple[int, int]:
