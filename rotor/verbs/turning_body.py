@@ -71,8 +71,10 @@ class TurningBody(OneMolecule):
             entered = MotionInput(angular_momentum=request.angular_momentum)
             start = entered if kelvin is None else MotionInput(temperature_k=kelvin)
             return saved_molecule(subject.molecules[0], folder) | times | written_fields(start)
+        named = subject.values["body"].named
         units = "SI" if request.units.time else ""
-        body = BodyInput(moments=request.moments, units=units, angular_momentum=request.angular_momentum)
+        body = BodyInput(body=named) if named else BodyInput(moments=request.moments, units=units)
+        body = replace(body, angular_momentum=request.angular_momentum)
         if not hasattr(request, "effects"):
             return written_fields(body) | times
         attitude = None if request.attitude == AT_REST else request.attitude

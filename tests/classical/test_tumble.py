@@ -359,3 +359,14 @@ def test_moments_of_a_molecule_in_its_unit(call):
     moments = [value * 1.66053906892e-47 for value in (0.614, 1.154, 1.768)]
     _, si, _ = call("tumble", "--moments", ",".join(map(repr, moments)) + " kg m2", *start, "--json", "-")
     assert json.loads(text)["energy"] == pytest.approx(json.loads(si)["energy"], rel=1e-14)  # round-off
+
+
+def test_the_scene_of_an_everyday_body_keeps_its_name(call, tmp_path):
+    """Its sizes and the names of its axes: saved as moments, a book was a body with axes 1, 2, 3."""
+    code, out, _ = call("tumble", "wing-nut", "--omega", "0.01,0,20", "--save-scene", "s.toml")
+    assert code == 0
+    assert '[body]\nname = "wing nut"\n' in (tmp_path / "s.toml").read_text(encoding="utf-8")
+    again = call("run", "s.toml")[1]
+    for said in ("wing nut: asymmetric top", "Lbolt (kg m²/s)"):
+        assert said in out
+        assert said in again
