@@ -17,6 +17,8 @@ from rotor.quantum.effects.spin_rotation import SpinRotation
 from rotor.quantum.effects.spin_spin import SpinSpin
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
+from rotor.quantum.fields.operators import Magnet
+from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.hyperfine_method import HyperfineMethod
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Scheme, Spin
@@ -315,3 +317,18 @@ def test_tensors_that_are_axial_alone():
     ]
     assert computed[0] == pytest.approx(computed[1], abs=1e-7)  # the small elements, and round-off
     assert np.unique(computed[0].round(4)).size > 9  # levels of N and K are split
+
+
+def test_the_magnetic_moment_of_three_nuclei_is_that_of_their_total():
+    """N = 0 has F = I_tot and the reduced element g √(F(F+1)(2F+1)) of the total spin, but for admixtures of 1e-8 of N = 2."""
+    levels = solve_levels(PROLATE, 2, effects=(*SEMI_RIGID, *_effects(1)))
+    elements = ReducedElements(levels)
+    magnet = Magnet(np.zeros((3, 3)), {f"X{k}": 5.58 for k in (1, 2, 3)})
+    place = int(np.flatnonzero(levels.rotational == 0)[0])
+    number = next(i for i, b in enumerate(elements.blocks) if b.start <= place < b.start + len(b.energies_mhz))
+    twice_f = int(levels.quanta["f"][place])
+    assert twice_f == 3
+    state = place - elements.blocks[number].start
+    f = twice_f / 2
+    expected = 5.58 * np.sqrt(f * (f + 1) * (2 * f + 1))
+    assert elements.between(magnet, number, number)[state, state] == pytest.approx(expected, rel=1e-6)
