@@ -23,8 +23,9 @@ _DECIMALS = (6, 6, 4, 4)
 
 
 def files_in_mhz(parameters: ParameterFile, intensities: IntensityFile) -> tuple[ParameterFile, IntensityFile]:
-    """Both files converted to MHz: values and errors of parameters, limits of the request.
+    r"""Both files converted to MHz: values and errors of parameters, limits of the request.
 
+    >>> from rotor.formats.spcat.text.int_file import Request
     >>> from rotor.formats.spcat.text.par import read_par
     >>> file = read_par(b"CO\n 1 0 0 0\nl -1 1 0 0\n 100 1.9225 1e-37\n")
     >>> file, intensities = files_in_mhz(file, IntensityFile("", Request(flags=1001, fqlim_ghz=100.0), ()))

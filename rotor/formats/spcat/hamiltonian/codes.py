@@ -98,7 +98,7 @@ def file_constants(file: ParameterFile, *, errors: bool = False) -> Constants:
 
 
 def constants_and_matrix(file: ParameterFile, *, errors: bool = False) -> tuple[Constants, NDArray[np.float64]]:
-    """The constants of a file, and M (constants, parameters) with constants = M @ values of the parameters.
+    r"""The constants of a file, and M (constants, parameters) with constants = M @ values of the parameters.
 
     >>> from rotor.formats.spcat.text.par import read_par
     >>> file = read_par(b"x\n 2 1 1\ns -1 1 0 20\n 1000 4.0 1\n 100 5.0 1\n")
