@@ -111,16 +111,22 @@ def _factors_of_pairs(factors: SpeciesFactors, left: Section, right: Section, pa
 def _elements_of_operator(rotor: ByElements, left: Section, right: Section, pairs: Pairs) -> Floats | None:
     """Elements of any operator between two sections."""
     up, low = (
-        WangFunctions([section.parts[place].basis for place in places.tolist()])
+        tuple([section.parts[place].basis for place in places.tolist()])
         for section, places in ((left, pairs.up), (right, pairs.low))
     )
     shifts = [each for each in rotor.operator.shifts if dict(each.change).get("J", 0) == pairs.rise]
-    elements, _ = BetweenStates(up, low).elements(Operator(tuple(shifts)))
+    elements, _ = _between_functions(up, low).elements(Operator(tuple(shifts)))
     if not len(elements.rows):
         return None
     out = np.zeros((len(pairs.up), left.basis.size, right.basis.size))
     out[elements.up, elements.rows, elements.columns] = elements.values
     return out
+
+
+@lru_cache(maxsize=64)
+def _between_functions(up: tuple[WangBlock, ...], low: tuple[WangBlock, ...]) -> BetweenStates:
+    """The writer of elements between functions, which several operators share."""
+    return BetweenStates(WangFunctions(up), WangFunctions(low))
 
 
 def _elements_with_n(
@@ -170,7 +176,7 @@ def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, 
     if rank > MOST_RANK:
         raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
     if pairs.k is not None:
-        elements = _of_one_sign(tensor, pairs, *pairs.k)
+        elements = _axial_tensor_elements(tensor, pairs, *pairs.k)
         return None if elements is None else elements * both_signs(pairs)
     steps, parts_of_n = _signed_parts(tensor, up, low, rise)
     if abs(rise) > rank or not steps:
@@ -245,15 +251,15 @@ def _axial_elements(rotor: Rotor, pairs: Pairs, k_up: Ints, k: Ints, representat
         along = [factor * x**p * squared**q for (p, q, _), factor in rotor.operators]
         return np.sum(along, axis=0) if same_k and not rise else None
     if isinstance(rotor, Cosines):
-        elements = _of_one_sign(tensor_of(rotor.components, rotor.rank, representation), pairs, k_up, k)
+        elements = _axial_tensor_elements(tensor_of(rotor.components, rotor.rank, representation), pairs, k_up, k)
         return -elements if elements is not None and rotor.rank == 1 else elements
     if abs(rise) > 1:
         return None
     stretch, change, length = factors_with_n(n + rise, n)
     trace = float(np.trace(np.array(rotor.components))) / 3
     parts = [
-        (stretch, _of_one_sign(tensor_of(rotor.components, 2, representation), pairs, k_up, k)),
-        (change, _of_one_sign(axis_tensor(rotor.components, representation), pairs, k_up, k)),
+        (stretch, _axial_tensor_elements(tensor_of(rotor.components, 2, representation), pairs, k_up, k)),
+        (change, _axial_tensor_elements(axis_tensor(rotor.components, representation), pairs, k_up, k)),
         (trace, length if same_k and not rise and trace else None),
     ]
     acting = [factor * elements for factor, elements in parts if elements is not None]
@@ -272,7 +278,7 @@ def _axial_elements_of_operator(rotor: ByElements, pairs: Pairs, k_up: Ints, k: 
     return np.asarray(total.real - total.imag)[:, None, None] if np.any(total) else None
 
 
-def _of_one_sign(tensor: BodyTensor | None, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
+def _axial_tensor_elements(tensor: BodyTensor | None, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
     """⟨N'K'‖T‖N K⟩ (pairs, 1, 1) of one sign of K; a component across the axis enters with its absolute value."""
     q = int(k_up[0] - k[0])
     if tensor is None or max(abs(q), abs(pairs.rise)) > tensor.rank or not (part := tensor.components[tensor.rank + q]):
