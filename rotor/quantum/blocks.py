@@ -178,9 +178,9 @@ def blocks_of_elements(
     rows, columns, values = rank[elements.rows[lower]], rank[elements.columns[lower]], elements.values[:, lower]
     if np.iscomplexobj(values) and np.abs(values.imag).max(initial=0.0) <= ROUND_OFF * np.abs(values).max(initial=0.0):
         values = np.ascontiguousarray(values.real)
-    factors, every, unit = values.T, np.arange(len(values)), np.eye(len(values))
+    factors, terms, unit = values.T, np.arange(len(values)), np.eye(len(values))
     blocks = {
-        number: LinearBlock(size, rows[first:stop], columns[first:stop], factors[first:stop], unit, every)
+        number: LinearBlock(size, rows[first:stop], columns[first:stop], factors[first:stop], unit, terms)
         for number, size, (first, stop) in zip(numbers.tolist(), sizes.tolist(), pairwise(bounds), strict=True)
     }
     return LinearBlocks({name: np.asarray(column) for name, column in labels.items()}, block, rank, members, blocks)

@@ -139,8 +139,8 @@ def report_on_top(
     def show(answer: Any, report: Any) -> Iterable[Part | None]:
         """The parts of the report."""
         top, content = answer.request.top, report.content
-        made = [part(answer, content) for part in parts]
-        return top_parts(top, facts(answer, content), made, sources, report, title(top))
+        tables = [part(answer, content) for part in parts]
+        return top_parts(top, facts(answer, content), tables, sources, report, title(top))
 
     return show
 

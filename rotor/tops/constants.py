@@ -23,9 +23,9 @@ from rotor.tops.kind_of_constants import (
     resolve_representation,
     vocabulary,
 )
-from rotor.tops.operators import Powers, published_name, spelled_powers, spelled_term
+from rotor.tops.operators import KINDS, Powers, published_name, spelled_powers, spelled_term
 from rotor.tops.uncertain_numbers import known_digits, parse_named, write_number
-from rotor.units import parse_quantity
+from rotor.units import ROTATIONAL_MHZ_U_ANGSTROM2, parse_quantity
 
 # letters that look alike: U+0394 and U+2206, φ and ϕ
 _GREEK = {"Δ": "Delta", "∆": "Delta", "δ": "delta", "Φ": "Phi", "φ": "phi", "ϕ": "phi"}
@@ -407,3 +407,20 @@ def _refuse_disorder(kind: str, values: Mapping[str, float]) -> None:
 
 def _rebuilt(settings: dict[str, Any], values: dict[str, Any]) -> Constants:
     return Constants(**settings, **values)
+
+
+def constants_from_moments(moments: Iterable[float], kind: str) -> Constants:
+    """Rigid constants for a kind of top, from moments in u Å²; degenerate moments are averaged."""
+    if kind not in KINDS:
+        raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
+    ia, ib, ic = (float(moment) for moment in moments)
+    f = ROTATIONAL_MHZ_U_ANGSTROM2
+    if kind == "linear":
+        return Constants(B=f / ((ib + ic) / 2), kind=kind)
+    if kind == "spherical":
+        return Constants(B=f / ((ia + ib + ic) / 3), kind=kind)
+    if kind == "prolate":
+        return Constants(A=f / ia, B=f / ((ib + ic) / 2), kind=kind)
+    if kind == "oblate":
+        return Constants(B=f / ((ia + ib) / 2), C=f / ic, kind=kind)
+    return Constants(A=f / ia, B=f / ib, C=f / ic, kind=kind)

@@ -26,13 +26,12 @@ from rotor.tops.allowed import (
     refuse_forbidden_polarizability,
 )
 from rotor.tops.components import Tensor, dipole_line, dipole_vector, in_frame, symmetric_tensor, tensor_in_frame
-from rotor.tops.constants import Constants
+from rotor.tops.constants import Constants, constants_from_moments
 from rotor.tops.covariance import Covariance
 from rotor.tops.internal_rotation import InternalRotationConstants
 from rotor.tops.kind import KindOfTop, kind_from_moments, kind_with_symmetry
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.named_values import constants_from_names, parse_fields
-from rotor.tops.operators import KINDS
 from rotor.tops.quadrupole import computed_couplings
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
@@ -414,23 +413,6 @@ def _electrons(molecule: Molecule, weights: SpinWeights) -> str:
     electrons = sum(nucleus.element_number for nucleus in molecule.nuclei) - molecule.charge
     odd = "; their number is odd, so that the state may differ" if electrons % 2 else ""
     return f", electrons assumed to form a closed shell{odd}"
-
-
-def constants_from_moments(moments: ArrayLike, kind: str) -> Constants:
-    """Rigid constants for a kind of top, from moments in u Å²; degenerate moments are averaged."""
-    if kind not in KINDS:
-        raise ValueError(f"kind {kind!r} is none of {', '.join(KINDS)}")
-    ia, ib, ic = (float(m) for m in np.asarray(moments))
-    f = units.ROTATIONAL_MHZ_U_ANGSTROM2
-    if kind == "linear":
-        return Constants(B=f / ((ib + ic) / 2), kind=kind)
-    if kind == "spherical":
-        return Constants(B=f / ((ia + ib + ic) / 3), kind=kind)
-    if kind == "prolate":
-        return Constants(A=f / ia, B=f / ((ib + ic) / 2), kind=kind)
-    if kind == "oblate":
-        return Constants(B=f / ((ia + ib) / 2), C=f / ic, kind=kind)
-    return Constants(A=f / ia, B=f / ib, C=f / ic, kind=kind)
 
 
 def require_single_state(top: Top, what: str) -> Top:

@@ -82,10 +82,10 @@ def test_wrong_arguments_are_named():
 
 
 def test_notes_of_the_command_are_those_of_the_result(call):
-    told = [line.removeprefix("note: ") for line in call("spectrum", "water")[2].splitlines()]
+    printed = [line.removeprefix("note: ") for line in call("spectrum", "water")[2].splitlines()]
     assert (
         list(rotor.spectrum("water").notes)
-        == told
+        == printed
         == ["15 lines of levels beyond the reach of the distortion constants are left out"]
     )
     assert rotor.spectrum("SMILES:C=O", jmax=1).notes[0].startswith("geometry from MMFF94, not measured")

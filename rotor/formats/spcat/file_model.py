@@ -54,6 +54,7 @@ from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.frozen import dataclass
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.levels import Levels
+from rotor.quantum.moments import Moment
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.spins.operators import ByElements, is_axial
@@ -299,14 +300,8 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     coupled = coupled_spins(states[0], first)
     turned = _turned(usable, light, doubled)
     if light.phases.odd:
-        fixed = light.phases._replace(odd=turned_odd_axes(turned)) if turned else light.phases
-        axes_of_vectors = [code.axis if is_vector(code) else 0 for _, code in acting]
-        moments, beside = turned_moments(
-            moments,
-            list(zip(beside, axes_of_vectors, strict=True)),
-            turned,
-            with_dipoles(fixed, light.axes_within_states, oblate, False),
-        )
+        with_codes = [(moment, code) for moment, (_, code) in zip(beside, acting, strict=True)]
+        moments, beside = _moments_in_odd_phases(moments, with_codes, turned, light, oblate)
     elif light.phases.between_i:
         moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
     apart = _apart(states, pairs)
@@ -324,6 +319,15 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=coded.file.title)
     kmax = states[0].kmax if kind in ("prolate", "oblate") else ALL_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.spind < 0)
+
+
+def _moments_in_odd_phases(
+    moments: Dipoles, beside: Iterable[tuple[Moment, DipoleCode]], turned: str, light: Light, oblate: bool
+) -> tuple[Dipoles, tuple[Moment, ...]]:
+    """Plain dipoles and other moments where operators within one state are odd under time reversal (`phases.turned_moments`)."""
+    fixed = light.phases._replace(odd=turned_odd_axes(turned)) if turned else light.phases
+    with_axes = [(moment, code.axis if is_vector(code) else 0) for moment, code in beside]
+    return turned_moments(moments, with_axes, turned, with_dipoles(fixed, light.axes_within_states, oblate, False))
 
 
 def _apart(states: list[StateOptions], pairs: tuple[Pair, ...]) -> dict[tuple[int, int], SpeciesPairs]:

@@ -96,16 +96,16 @@ class ReducedElements:
         first = self.blocks[0]
         if first.moments is not None or (first.spins is not None and first.spins.rotor.moments is not None):
             _refuse_turning_group()
-        of_rotation, every = CosinesWithN(_matrix(magnet.g)), (EVERY_STATE, EVERY_STATE)
+        rotation, states = CosinesWithN(_matrix(magnet.g)), (EVERY_STATE, EVERY_STATE)
         if first.spins is None:
-            piece = Piece(1.0, of_rotation, *every, 0, 0)
+            piece = Piece(1.0, rotation, *states, 0, 0)
             (contracted,) = operators_of_stacks(stacks_of(self.blocks), 1, [[piece]], self.representation)
             return connections_of_stacks(self.blocks, contracted)
         scheme = first.spins.shared.scheme
-        moments = [Moment(1.0, every, of_rotation, electric=False)]
+        moments = [Moment(1.0, states, rotation, electric=False)]
         for name, value in magnet.nuclei.items():
             share = value / scheme.count_of((scheme.place(name),))
-            moments.append(Moment(share, every, Scalar(), name, electric=False))
+            moments.append(Moment(share, states, Scalar(), name, electric=False))
         return connections_of(self.blocks, spin_moments(first.spins.shared, moments))
 
 

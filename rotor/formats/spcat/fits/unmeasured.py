@@ -39,9 +39,9 @@ def unmeasured_lines(file: ParameterFile, measured: Assignments) -> tuple[Ints, 
     v = form.rotation if form.states else 0
     state = seen.lower[:, v] if form.states else np.zeros(len(seen), dtype=np.int64)
     changes = np.unique(np.column_stack([state, seen.upper - seen.lower]), axis=0)
-    every = np.concatenate([labels, seen.upper, seen.lower])
-    least = every.min(axis=0) + np.minimum(changes[:, 1:].min(axis=0, initial=0), 0)
-    spans = every.max(axis=0) + np.maximum(changes[:, 1:].max(axis=0, initial=0), 0) - least + 1
+    all_labels = np.concatenate([labels, seen.upper, seen.lower])
+    least = all_labels.min(axis=0) + np.minimum(changes[:, 1:].min(axis=0, initial=0), 0)
+    spans = all_labels.max(axis=0) + np.maximum(changes[:, 1:].max(axis=0, initial=0), 0) - least + 1
     if prod(spans.tolist()) > 2**62:
         raise ValueError("so many quantum numbers cannot be counted: no line can be suggested for this file")
 

@@ -195,10 +195,8 @@ def line_moment(
         operator = _with_n2(moment_operator(typ, code.axis, axes, as_spcat=as_spcat), code.typ)
         if as_spcat and _is_left_out(code, axes):
             value = 0.0
-        if (
-            code.typ == 5 and states[0] == states[1]
-        ):  # not Hermitian: from the higher F to the lower elements are those of ½[N², φ]
-            value = -value
+        if code.typ == 5 and states[0] == states[1]:
+            value = -value  # not Hermitian: from the higher F to the lower elements are those of ½[N², φ]
     rotor = ByElements(1, (1j if code.axis else 1.0) * operator)
     return Moment(value, states[::-1], rotor, electric=bool(code.axis))
 
