@@ -17,10 +17,11 @@ from rotor.fitting.resampling import bootstrap
 from rotor.formats.spcat.file_quanta import quanta_format
 from rotor.formats.spcat.fits.fit_input import error_factor, fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit, quanta_names
+from rotor.formats.spcat.fits.fit_table import publication_rows
 from rotor.formats.spcat.predict import predict
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.int_file import read_int
-from rotor.formats.spcat.text.lin import read_lin
+from rotor.formats.spcat.text.lin import LineList, read_lin
 from rotor.formats.spcat.text.par import read_par
 from rotor.formats.spcat.variances import variance_factor
 from rotor.quantum.estimates.contracted import ContractedLevels
@@ -186,6 +187,23 @@ def test_the_linear_blocks_are_the_cores_levels_and_derivatives():
         assert slopes[:, i] == pytest.approx(
             (up - down) / (2 * step), abs=2e-5 * size
         )  # third derivatives at a step of 1e-3
+
+
+def test_a_table_names_the_states_of_parameters_also_where_one_option_line_stands_for_all():
+    file = read_par(TWO_STATES)
+    labels = np.array([[2, 1, 1, 0, 3, 1, 1, 0, 0, 2, -32768, -32768]])
+    read = spfit_input(file, LineList(labels, np.array([20000.0]), np.array([0.1]), np.ones(1)))
+    held = replace(read, columns=(-1,) * len(file.parameters))
+    rows = [(row.name, row.states) for row in publication_rows(held, fit=None)]
+    assert rows == [
+        ("A", "all"),
+        ("B", "all"),
+        ("C", "all"),
+        ("dE", "1"),
+        ("Fac", "0, 1"),
+        ("1.5chi_aa", "all"),
+        ("chi_-", "all"),
+    ]
 
 
 def test_labels_follow_their_states_where_energies_cross():

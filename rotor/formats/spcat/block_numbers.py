@@ -23,7 +23,7 @@ import numpy as np
 from rotor.arrays import Ints
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import pattern_numbers, pattern_steps
-from rotor.formats.spcat.hamiltonian.code_table import TURNS, Digits, Kind, split_code
+from rotor.formats.spcat.hamiltonian.code_table import TURNS, Digits, Kind, file_codes
 from rotor.formats.spcat.hamiltonian.states import SPECIES, StateOptions, species_numbers
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.frozen import dataclass
@@ -103,7 +103,7 @@ def numbered_blocks(file: ParameterFile, groups: Sequence[Group]) -> Blocks | No
     states = {state.number: state for group in groups for state in group.states}
     if any(state.equivalent or state.l_code for state in states.values()):
         return None
-    oblate = file.options[0].nvib < 0
+    oblate = file.options[0].oblate
     rises = {v: _rises(state.spins) for v, state in states.items()}
     subs = [
         SubBlock(v, species, pattern)
@@ -112,8 +112,7 @@ def numbered_blocks(file: ParameterFile, groups: Sequence[Group]) -> Blocks | No
         if _exists(states[v], species, oblate)
         for pattern in range(len(rises[v]))
     ]
-    digits = [split_code(parameter.code, len(states)) for parameter in file.parameters]
-    reaches = {_reach(d, len(states), oblate) for d in digits if not d.is_constant}
+    reaches = {_reach(d, oblate) for d in file_codes(file) if not d.is_constant}
     weights = [_weight(states[sub.v], sub.species, oblate) for sub in subs]
     parts = _connected(subs, weights, [rises[sub.v][sub.pattern] for sub in subs], reaches, file.options[0].ixx)
     members = [
@@ -160,15 +159,15 @@ class _Reach(NamedTuple):
     ranks: tuple[int, ...]
 
 
-def _reach(d: Digits, states: int, oblate: bool) -> _Reach:
+def _reach(d: Digits, oblate: bool) -> _Reach:
     """The sub-blocks that a code connects; sums of angular momenta change up to the last coupled of the acting spins."""
     species = int(species_numbers(*TURNS[d.symmetry(oblate).axis], oblate))
     spins = (1,) if d.projects_spin else tuple(sorted(d.spins))
     if not spins:
-        return _Reach(d.states(states), species, ())
+        return _Reach(d.states, species, ())
     rotational_rank = 0 if d.kind is Kind.SCALAR and not d.projects_spin else 1 if len(spins) == 1 else 2
     ranks = (*([2 * rotational_rank] * spins[0]), *([2] * (spins[-1] - spins[0])))
-    return _Reach(d.states(states), species, ranks)
+    return _Reach(d.states, species, ranks)
 
 
 _UNLIKE = 10_000  # stands for sums of angular momenta that a state does not have

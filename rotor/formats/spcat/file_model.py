@@ -289,7 +289,7 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
         axes,
     )
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
-    kind = _kind(states, usable, oblate, first.spind < 0)
+    kind = _kind(states, usable, oblate, first.by_k)
     if kind in ("prolate", "oblate") and beside:
         kind = "asymmetric"  # |N K⟩ does not distinguish K from -K, which such moments may exchange
     limits = {
@@ -318,7 +318,7 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
         effect.couplings(_ANY_TOP, basis_of(axes))
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=coded.file.title)
     kmax = states[0].kmax if kind in ("prolate", "oblate") else ALL_K
-    return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.spind < 0)
+    return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.by_k)
 
 
 def _moments_in_odd_phases(

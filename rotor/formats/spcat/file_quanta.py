@@ -84,7 +84,7 @@ def quanta_format(file: ParameterFile, groups: list[Group]) -> Format:
     rotation = 3 if first.spind > 0 else 1 if linear else 2
     spins = max(len(group.spins) for group in groups)
     equivalent = max(state.equivalent for group in groups for state in group.states)
-    return Format(rotation, abs(first.nvib) > 1, spins, 10 if file.header.nline < 0 else 6, equivalent)
+    return Format(rotation, file.states > 1, spins, 10 if file.header.nline < 0 else 6, equivalent)
 
 
 def listed_quanta(group: Group, levels: Levels, form: Format, negative: bool = False) -> Ints:

@@ -36,8 +36,8 @@ def option_weights(options: Options, symmetric: bool = True) -> SpinWeights:
         if options.iax == 1:  # a turn about the axis leaves every level even
             return SpinWeights()
         return SpinWeights.from_mapping({"even": plus, "odd": minus})
-    if options.spind < 0:
-        along = 1 if options.nvib > 0 else 3
+    if options.by_k:
+        along = 3 if options.oblate else 1
         if options.iax != along:
             raise ValueError(
                 f"IAX = {options.iax} in a symmetric top: weights that tell the two states of one K: these {NO_NAME}"

@@ -13,10 +13,10 @@ from rotor import units
 from rotor.arrays import Floats, Ints, end_to_end
 from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format
-from rotor.formats.spcat.hamiltonian.code_table import split_code
+from rotor.formats.spcat.hamiltonian.code_table import file_codes
 from rotor.formats.spcat.hamiltonian.coded_file import line_names
 from rotor.formats.spcat.hamiltonian.codes import file_constants
-from rotor.formats.spcat.hamiltonian.states import file_states
+from rotor.formats.spcat.hamiltonian.states import file_states, options_alone
 from rotor.formats.spcat.text.int_file import Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.formats.spcat.variances import variance_factor
@@ -153,15 +153,12 @@ def _column(levels: Levels, name: str, most: Levels) -> Ints:
 
 def _shown(parameters: ParameterFile, group: Group) -> Top:
     """The top of the lowest state with named constants, if they have names; else the top that represents its symmetry."""
-    states = max(abs(parameters.options[0].nvib), 1)
-    digits = [split_code(parameter.code, states) for parameter in parameters.parameters]
     parameters_of_state = [
         replace(parameter, code=d.in_lowest_state, constrained=False, text="")
-        for parameter, d in zip(parameters.parameters, digits, strict=True)
-        if d.is_orthorhombic and not d.is_energy and d.states(states) in ((0, 0), None)
+        for parameter, d in zip(parameters.parameters, file_codes(parameters), strict=True)
+        if d.is_orthorhombic and not d.is_energy and d.states in ((0, 0), None)
     ]
-    first = parameters.options[0]
-    option = replace(first, spind=-1 if first.spind < 0 else 1, nvib=-1 if first.nvib < 0 else 1, knmin=0, text="")
+    option = replace(options_alone(parameters, 0), knmin=0)
     if group.states[0].linear:
         option = replace(option, spind=-1, knmax=0)
     try:

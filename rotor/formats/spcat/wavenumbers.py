@@ -11,7 +11,7 @@ import math
 from dataclasses import replace
 
 from rotor import units
-from rotor.formats.spcat.hamiltonian.code_table import split_code
+from rotor.formats.spcat.hamiltonian.code_table import Digits, file_codes
 from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW
 from rotor.formats.spcat.text.catalogue import Catalogue, Layout
 from rotor.formats.spcat.text.int_file import IntensityFile
@@ -32,7 +32,7 @@ def files_in_mhz(parameters: ParameterFile, intensities: IntensityFile) -> tuple
     >>> round(file.parameters[0].value, 3), round(intensities.request.fqlim_ghz, 6)
     (57635.1, 2997.92458)
     """
-    states, request = max(abs(parameters.options[0].nvib), 1), intensities.request
+    request = intensities.request
     request = replace(
         request,
         flags=request.flags % FROM,
@@ -40,12 +40,12 @@ def files_in_mhz(parameters: ParameterFile, intensities: IntensityFile) -> tuple
         str1=request.str1 - 2.0 * math.log10(units.MHZ_PER_CM),
         text="",
     )
-    in_mhz = tuple(_in_mhz(parameter, states) for parameter in parameters.parameters)
+    in_mhz = tuple(map(_in_mhz, parameters.parameters, file_codes(parameters)))
     return replace(parameters, parameters=in_mhz), replace(intensities, request=request)
 
 
-def _in_mhz(parameter: Parameter, states: int) -> Parameter:
-    if split_code(parameter.code, states).is_constant:  # ρ, a and b of a series are pure numbers
+def _in_mhz(parameter: Parameter, digits: Digits) -> Parameter:
+    if digits.is_constant:  # ρ, a and b of a series are pure numbers
         return parameter
     error = parameter.error
     if error is not None and error >= HELD_BELOW:

@@ -72,7 +72,7 @@ def test_patterns_of_spins_stand_in_order_of_n():
 )
 def test_a_sine_has_the_other_species(ff, typ, species):
     """cos(2πFF ρK/3) is even in K, a sine (FF 11 to 20, 31 to 40) odd: times Bz of N."""
-    assert _reach(Digits(0, ff, 0, 0, 0, typ, 0, 0, 1, 0), 2, False).species == species
+    assert _reach(Digits(0, ff, 0, 0, 0, typ, 0, 0, 1, 0, 2), False).species == species
 
 
 def test_a_file_of_transition_dipoles_is_refused_by_name():

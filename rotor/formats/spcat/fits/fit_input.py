@@ -110,7 +110,7 @@ def _named_constants(file: ParameterFile) -> tuple[Constants, Floats] | None:
     # diagonal elements, over the functions of the codes
     if file.options[0].diag < 0 and constants.kind in ("asymmetric", "spherical"):
         return None
-    by_k = file.options[0].spind < 0
+    by_k = file.options[0].by_k
     return None if (constants.kind in ("asymmetric", "spherical")) == by_k else (constants, matrix)
 
 

@@ -73,7 +73,7 @@ def stay_at_zero(file: ParameterFile) -> list[str]:
 
 def _edges(coded: CodedFile, digits: Digits) -> list[tuple[int, int]]:
     """The pairs of sets 4 v + symmetry that a code without spins connects between definite states; none for others."""
-    both = digits.states(len(coded.states))
+    both = digits.states
     if both is None or max(both) >= len(coded.states) or any(state.spins for state in coded.states) or coded.pairs:
         return []
     if digits.is_series or digits.is_constant or digits.kind is Kind.LEVEL:

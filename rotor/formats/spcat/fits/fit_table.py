@@ -5,7 +5,7 @@ from __future__ import annotations
 from rotor.fitting.publication import Row, value_text
 from rotor.fitting.result import Fit
 from rotor.formats.spcat.fits.fit_input import SpfitInput
-from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, split_code
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, file_codes
 from rotor.formats.spcat.hamiltonian.codes import (
     A_REDUCTION,
     LINEAR,
@@ -26,13 +26,12 @@ def publication_rows(fit_input: SpfitInput, fit: Fit) -> list[Row]:
     """Rows of all parameters: published constants with their names and signs, others with their labels."""
     file, rows = fit_input.file, list[Row]()
     published = {item.code: item for item in _names(file)}
-    for place, parameter in enumerate(file.parameters):
-        digits = split_code(parameter.code, len(file.options))
+    for place, (parameter, digits) in enumerate(zip(file.parameters, file_codes(file), strict=True)):
         named = published.get(_rotational(digits))
         name = named.name if named else parameter.label or str(parameter.code)
         sign = named.sign if named else 1
         value, error, follows = _numbers(fit_input, fit, place)
-        rows.append(Row(name, sign * value, error, follows, _states(digits, len(file.options))))
+        rows.append(Row(name, sign * value, error, follows, _states(digits)))
     return rows
 
 
@@ -68,8 +67,7 @@ def _rotational(digits: Digits) -> int:
 
 def _names(file: ParameterFile) -> tuple[Named, ...]:
     """The published names of the codes of a file; empty if its terms fit no single reduction."""
-    digits = [split_code(p.code, len(file.options)) for p in file.parameters]
-    rotational = [d for d in digits if _rotational(d) >= 0]
+    rotational = [d for d in file_codes(file) if _rotational(d) >= 0]
     if all(is_linear(options) for options in file.options):
         return (_B, *LINEAR)
     if all(d.kind is Kind.SCALAR for d in rotational):
@@ -81,10 +79,8 @@ def _names(file: ParameterFile) -> tuple[Named, ...]:
     return (*rigid, *(A_REDUCTION if "A" in letters else S_REDUCTION))
 
 
-def _states(digits: Digits, count: int) -> str:
+def _states(digits: Digits) -> str:
     """The states of a term: all of a file with several, one, or the two that it connects."""
-    if count == 1:
+    if digits.state_count == 1:
         return ""
-    if digits.v1 == digits.v2:
-        return f"{digits.v1}" if digits.v1 < count else "all"
-    return f"{digits.v2}, {digits.v1}" if digits.v2 < digits.v1 else f"{digits.v1}, {digits.v2}"
+    return "all" if digits.states is None else ", ".join(map(str, dict.fromkeys(digits.states)))

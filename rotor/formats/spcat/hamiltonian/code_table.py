@@ -12,6 +12,7 @@ from enum import Enum
 from functools import lru_cache
 from typing import NamedTuple
 
+from rotor.formats.spcat.text.par import ParameterFile
 from rotor.frozen import dataclass
 
 
@@ -99,7 +100,7 @@ class Symmetry(NamedTuple):
 
 
 class Digits(NamedTuple):
-    """The fields of a code."""
+    """The fields of a code, and the number of states of its file, on which the number of digits and the code of all states depend."""
 
     ex: int = 0
     ff: int = 0
@@ -111,6 +112,7 @@ class Digits(NamedTuple):
     nsq: int = 0
     v2: int = 0
     v1: int = 0
+    state_count: int = 1
 
     @property
     def row(self) -> Row:
@@ -168,12 +170,12 @@ class Digits(NamedTuple):
     @property
     def has_name(self) -> bool:
         """Whether the operator is one of the lowest state, or of all, that may have a named constant."""
-        return self.is_orthorhombic and not self.is_energy and self.states(1) in ((0, 0), None)
+        return self.is_orthorhombic and not self.is_energy and self.states in ((0, 0), None)
 
     @property
     def in_lowest_state(self) -> int:
         """The code of the operator in the lowest state of a file with few states."""
-        return join_code(self._replace(v1=0, v2=0))
+        return join_code(self._replace(v1=0, v2=0, state_count=1))
 
     @property
     def is_constant(self) -> bool:
@@ -239,19 +241,22 @@ class Digits(NamedTuple):
         axis = axis_product(tensor.axis, z) if sine else tensor.axis
         return Symmetry(axis, (odd != sine) != commutator, delta_k, self.kind is Kind.SQUARE and not sine)
 
-    def states(self, count: int) -> tuple[int, int] | None:
-        """The two states of the code in a file with this number of them, lower first; None for all states."""
+    @property
+    def states(self) -> tuple[int, int] | None:
+        """The two states of the code, lower first; None for all states."""
         low, high = sorted((self.v1, self.v2))
-        return None if low == all_states_digit(count) else (low, high)
+        return None if low == all_states_digit(self.state_count) else (low, high)
 
-    def is_place_holder(self, count: int) -> bool:
+    @property
+    def is_place_holder(self) -> bool:
         """Whether the code stands between a state and all (9, 99, 999)."""
-        return (self.v1 == all_states_digit(count)) != (self.v2 == all_states_digit(count))
+        return (self.v1 == all_states_digit(self.state_count)) != (self.v2 == all_states_digit(self.state_count))
 
-    def missing_state(self, count: int) -> int | None:
+    @property
+    def missing_state(self) -> int | None:
         """The number of a state that does not exist; None if both do."""
         high = max(self.v1, self.v2)
-        return high if count <= high != all_states_digit(count) else None
+        return high if self.state_count <= high != all_states_digit(self.state_count) else None
 
 
 SPIN_ALONG_Z = 5  # NS from here on: N_z S_z in place of the 1 of TYP 0
@@ -305,7 +310,7 @@ def split_code(code: int, states: int = 1) -> Digits:
     """The fields of a code in a file with this number of vibrational states.
 
     >>> split_code(110010099)
-    Digits(ex=0, ff=0, i2=1, i1=1, ns=0, typ=1, ksq=0, nsq=0, v2=9, v1=9)
+    Digits(ex=0, ff=0, i2=1, i1=1, ns=0, typ=1, ksq=0, nsq=0, v2=9, v1=9, state_count=1)
     """
     left, fields = code, []
     for width in (state_digits(states), state_digits(states), 1, 1, 2, 1, 1, 1, 2, 1):
@@ -315,14 +320,19 @@ def split_code(code: int, states: int = 1) -> Digits:
         raise ValueError(
             f"parameter code {code}: a code has at most {10 + 2 * state_digits(states)} digits and no sign"
         )
-    return Digits._make(reversed(fields))
+    return Digits._make([*reversed(fields), states])
 
 
-def join_code(digits: Digits, states: int = 1) -> int:
+def file_codes(file: ParameterFile) -> tuple[Digits, ...]:
+    """The fields of the code of each parameter of a file."""
+    return tuple(split_code(parameter.code, file.states) for parameter in file.parameters)
+
+
+def join_code(digits: Digits) -> int:
     """The code with these fields, the inverse of `split_code`."""
-    widths = (1, 2, 1, 1, 1, 2, 1, 1, state_digits(states), state_digits(states))
+    widths = (1, 2, 1, 1, 1, 2, 1, 1, state_digits(digits.state_count), state_digits(digits.state_count))
     code = 0
-    for value, width, name in zip(digits, widths, Digits._fields, strict=True):
+    for value, width, name in zip(digits, widths, Digits._fields, strict=False):
         if not 0 <= value < 10**width:
             raise ValueError(f"{name.upper()} = {value} does not fit {width} digit{'s' if width > 1 else ''} of a code")
         code = code * 10**width + value

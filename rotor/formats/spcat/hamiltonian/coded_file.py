@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
-from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Symmetry, split_code
+from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind, Symmetry, file_codes
 from rotor.formats.spcat.hamiltonian.codes import basis_axes
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, l_doubled_pairs
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator
@@ -90,7 +90,7 @@ class CodedFile:
     @property
     def oblate(self) -> bool:
         """Whether z is the c axis."""
-        return self.options.nvib < 0
+        return self.options.oblate
 
     @property
     def axes(self) -> str:
@@ -100,7 +100,7 @@ class CodedFile:
     @cached_property
     def digits(self) -> tuple[Digits, ...]:
         """The fields of each code."""
-        return tuple(split_code(parameter.code, len(self.states)) for parameter in self.file.parameters)
+        return file_codes(self.file)
 
     @cached_property
     def pairs(self) -> list[Pair]:
@@ -140,11 +140,11 @@ class CodedFile:
             raise ValueError(f"XOPT = {xopt}: expected PHASE + 10 NEWLZ + 20 NOFC + 40 G12, 0 to 79")
         series = self.series
         for place, (digits, parameter) in enumerate(zip(self.digits, self.file.parameters, strict=True), 1):
-            missing = digits.is_place_holder(count) or digits.missing_state(count) is not None
+            missing = digits.is_place_holder or digits.missing_state is not None
             # a line without a value, or for no state of the file, adds nothing
             if parameter.value == 0.0 or digits.is_constant or missing:
                 continue
-            symmetry, states = digits.symmetry(self.oblate), digits.states(count)
+            symmetry, states = digits.symmetry(self.oblate), digits.states
             targets = [(v, v) for v in range(count)] if states is None and digits.is_series else [states]
             try:
                 for target in targets:
@@ -205,7 +205,7 @@ class CodedFile:
         """A sentence for each parameter that SPCAT ignores: symmetry forbids it, or its spins or states do not exist."""
         reasons, count = list[str](), len(self.states)
         for digits, parameter in zip(self.digits, self.file.parameters, strict=True):
-            missing = digits.missing_state(count)
+            missing = digits.missing_state
             if missing is not None and parameter.value:
                 reasons.append(_left_out(parameter, f"state {missing} does not exist, NVIB = {count} counts from 0"))
         return reasons + self._selected[2]

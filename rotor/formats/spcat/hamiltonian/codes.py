@@ -110,7 +110,7 @@ def constants_and_matrix(file: ParameterFile, *, errors: bool = False) -> tuple[
     values = dict.fromkeys(codes, 0.0)
     for code, parameter in zip(codes, file.parameters, strict=True):
         values[code] += parameter.value
-    kind, representation = _kind(file.options[0], values), "Ir" if file.options[0].nvib > 0 else "IIIl"
+    kind, representation = _kind(file.options[0], values), "IIIl" if file.options[0].oblate else "Ir"
     distortion = [code for code in values if code not in _RIGID]
     reduction = _reduction(file.options[0], distortion) if kind == "asymmetric" else None
     rigid = _rigid_factors(kind, AXES[representation])

@@ -50,13 +50,13 @@ def read_phases(options: Options, codes: Iterable[Digits], states: int, doubled:
 
     A parameter of all states counts once for each state, even if its value is 0. Parameters of l-doubled states do not count.
     """
-    oblate = options.nvib < 0
+    oblate = options.oblate
     if options.phase:
         odd = frozenset(axis for bit, axis in enumerate(AXES_OF_PHASE[oblate]) if options.phase >> bit & 1)
         return Phases(odd, frozenset("abc"))
     more: dict[str, int] = {}
     for d in codes:
-        concerned = range(states) if d.states(states) is None else [d.v1] * (d.v1 < states)
+        concerned = range(states) if d.states is None else [d.v1] * (d.v1 < states)
         count = len(set(concerned) - doubled)
         kind = d.symmetry(oblate)
         if d.v1 == d.v2 and count and kind.axis and not d.is_constant:

@@ -61,8 +61,7 @@ def file_series(
     """
     series = Series(nofc=options.nofc, g12=options.g12)
     for d, parameter in constants:
-        both = d.states(states)  # constants of a series without states hold for all
-        for pair in [both] if both else [(v, v) for v in range(states)]:
+        for pair in [d.states] if d.states else [(v, v) for v in range(states)]:
             _set(series, d, parameter, pair)
     for pair in pairs:
         lower, other = min(pair), max(pair)

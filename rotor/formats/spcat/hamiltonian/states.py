@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.formats.spcat.hamiltonian.code_table import split_code
+from rotor.formats.spcat.hamiltonian.code_table import file_codes
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
@@ -167,7 +167,7 @@ def doubled_spins(spind: int) -> tuple[int, ...]:
 def file_states(file: ParameterFile) -> tuple[StateOptions, ...]:
     """The options of all states; ValueError for an unsupported axis of weights or l-doubled states."""
     first = file.options[0]
-    return tuple(_state(v, state_options(file, v), first) for v in range(max(abs(first.nvib), 1)))
+    return tuple(_state(v, state_options(file, v), first) for v in range(file.states))
 
 
 def state_options(file: ParameterFile, v: int) -> Options:
@@ -180,6 +180,13 @@ def state_options(file: ParameterFile, v: int) -> Options:
     # digits of VSYM count states from the right
     swapped = not file.options[1:] and v < len(digits) and int(digits[v]) % 2 == 1
     return replace(first, wtpl=first.wtmn, wtmn=first.wtpl) if swapped else first
+
+
+def options_alone(file: ParameterFile, v: int) -> Options:
+    """The option line of a state as that of a file with this state alone and without spins."""
+    first = file.options[0]
+    sign, kind = (-1 if negative else 1 for negative in (first.oblate, first.by_k))
+    return replace(state_options(file, v), nvib=sign, spind=kind, vsym=0, text="")
 
 
 def _state(v: int, line: Options, first: Options) -> StateOptions:
@@ -247,11 +254,11 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
     first = parameters.options[0]
     if not is_single_state(parameters) or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
         return False
-    if first.spind < 0 and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
+    if first.by_k and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
         return False
     if min(first.wtpl, first.wtmn) < 0 or (first.iax in _FOLDS and first.wtpl != first.wtmn):
         return False
-    digits = [split_code(parameter.code) for parameter in parameters.parameters]
+    digits = file_codes(parameters)
     mixed = len(frozenset().union(*(d.reductions for d in digits))) > 1  # terms of both reductions
     plain_dipoles = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
     return all(d.has_name for d in digits) and plain_dipoles and not mixed

@@ -63,14 +63,14 @@ def _rotational_codes(constants: TopConstants) -> Codes:
     for v in range(states):
         values: dict[str, Any] = dict(top.constants.values) if v == 0 or top.states is None else top.states.for_state(v)
         if v:
-            out[join_code(Digits(v2=v, v1=v), states)] = {f"E[{v}]": 1.0}
+            out[join_code(Digits(v2=v, v1=v, state_count=states))] = {f"E[{v}]": 1.0}
             values.pop("E", None)
         state_constants = Constants(
             kind=constants.kind, reduction=constants.reduction, representation=constants.representation, **values
         )
         suffix = f"[{v}]" if v else ""
         for code, factors in code_factors(state_constants).items():
-            full = join_code(split_code(code)._replace(v1=v, v2=v), states)
+            full = join_code(split_code(code)._replace(v1=v, v2=v, state_count=states))
             out[full] = {f"{name}{suffix}": factor for name, factor in factors.items()}
     return out
 
@@ -94,13 +94,13 @@ def _interaction_codes(constants: TopConstants) -> Codes:
             assert parts.states is not None
             typ, (low, high) = TYPES_BETWEEN[parts.symbol], parts.states
             sign = -1.0 if oblate and parts.symbol.startswith("G") else 1.0
-            factors = {Digits(typ=typ, ksq=parts.nz2, nsq=parts.n2, v2=low, v1=high): sign}
+            factors = {Digits(typ=typ, ksq=parts.nz2, nsq=parts.n2, v2=low, v1=high, state_count=states): sign}
         for digits, factor in factors.items():
             if digits.nsq > 9 or digits.ksq > 9:
                 raise ValueError(
                     f"{name}: SPFIT's codes have powers of N² and of Nz² up to 9 (J and K to the power 18)"
                 )
-            out.setdefault(join_code(digits, states), {})[name] = factor
+            out.setdefault(join_code(digits), {})[name] = factor
     return out
 
 
@@ -112,7 +112,7 @@ def _spin_codes(
     i1, i2 = max(places), (min(places) if len(places) == 2 else 0)
     wild = 0 if states == 1 else all_states_digit(states)
     v1, v2 = (wild, wild) if parts.states is None else (max(parts.states), min(parts.states))
-    base = Digits(i2=i2, i1=i1, ns=parts.ns, ksq=parts.nz2, nsq=parts.n2, v2=v2, v1=v1)
+    base = Digits(i2=i2, i1=i1, ns=parts.ns, ksq=parts.nz2, nsq=parts.n2, v2=v2, v1=v1, state_count=states)
     rotor = term.rotor
     if not isinstance(rotor, Cosines | CosinesWithN):
         return {base: term.factor}

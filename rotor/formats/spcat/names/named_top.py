@@ -29,7 +29,7 @@ from rotor.formats.spcat.hamiltonian.codes import (
 )
 from rotor.formats.spcat.hamiltonian.dipole_codes import split_dipoles
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator
-from rotor.formats.spcat.hamiltonian.states import StateOptions, is_single_state, state_options
+from rotor.formats.spcat.hamiltonian.states import StateOptions, is_single_state, options_alone
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
 from rotor.formats.spcat.model import fold_parts, option_weights
 from rotor.formats.spcat.text.int_file import IntensityFile
@@ -67,14 +67,13 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
     parameters_of_states = _parameters_by_state(coded)
     constants, energies = [], []
     for v, parameters in enumerate(parameters_of_states):
-        option = replace(state_options(file, v), chr=letter, spind=-1 if first.spind < 0 else 1)
-        option = replace(option, nvib=-1 if first.nvib < 0 else 1, vsym=0, text="")
+        option = replace(options_alone(file, v), chr=letter)
         energies.append(sum(p.value for p in parameters if split_code(p.code).is_energy))
         plain = tuple(p for p in parameters if not split_code(p.code).is_energy)
         constants.append(_state_constants(v, replace(file, options=(option,), parameters=plain), errors))
     if len(kinds := dict.fromkeys(state_constants.kind for state_constants in constants)) > 1:
         raise ValueError(f"states of the kinds {' and '.join(kinds)} in one file: a top has one kind of constants")
-    turned = (constants[0].kind, first.nvib < 0) in (("prolate", True), ("oblate", False))
+    turned = (constants[0].kind, first.oblate) in (("prolate", True), ("oblate", False))
     weights = _weights(file, states, constants[0].kind in ("prolate", "oblate"))
     couplings, dipoles = _couplings(rows, first, turned), _dipoles(intensities, len(states), turned)
     of_one_state = [low == high for (low, high), mu in dipoles.items() if any(mu)]
@@ -87,7 +86,7 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
         spin_weights=weights[0],
         symmetry_checked=False,
         states=_states(constants, energies, couplings, weights, dipoles),
-        spin_constants=_spins(rows, states, turned, first.nvib < 0, errors),
+        spin_constants=_spins(rows, states, turned, first.oblate, errors),
     )
     return replace(top, notes=(*top.notes, *coded.left_out))
 
@@ -150,7 +149,7 @@ def _parameters_by_state(coded: CodedFile) -> list[list[Parameter]]:
 def _couplings(rows: list[CodedLine], first: Options, turned: bool) -> dict[str, float]:
     """Interactions of two states without spins, by name; values of equal names are added."""
     values: dict[str, float] = {}
-    sign = -1.0 if first.nvib < 0 else 1.0  # of G in an oblate basis
+    sign = -1.0 if first.oblate else 1.0  # of G in an oblate basis
     for line in rows:
         parameter = line.parameter
         if line.operator.rotor is not None or not line.is_between:
@@ -183,8 +182,8 @@ def _weights(file: ParameterFile, states: tuple[StateOptions, ...], symmetric: b
     """The weights of all states; ValueError if states have different common divisors."""
     weights, divisors = [], []
     for v, state in enumerate(states):
-        option = replace(state_options(file, v), vsym=0, spind=-1 if file.options[0].spind < 0 else 1)
-        option = replace(option, nvib=-1 if file.options[0].nvib < 0 else 1, iax=abs(option.iax))
+        option = options_alone(file, v)
+        option = replace(option, iax=abs(option.iax))
         if state.equivalent == 3:
             weights.append(SpinWeights())  # with their spins all levels are of A species
             divisors.append(2 * max(state.plus, 1))

@@ -60,6 +60,16 @@ class Options:
     text: str = field(default="", compare=False)
 
     @property
+    def oblate(self) -> bool:
+        """Whether c is the axis z of the basis."""
+        return self.nvib < 0
+
+    @property
+    def by_k(self) -> bool:
+        """Whether levels have the quantum numbers of a symmetric top."""
+        return self.spind < 0
+
+    @property
     def phase(self) -> int:
         """PHASE of XOPT = PHASE + 10 NEWLZ + 20 NOFC + 40 G12."""
         return self.xopt % 10
@@ -106,6 +116,11 @@ class ParameterFile:
     parameters: tuple[Parameter, ...]
     rest: str = ""
     title_text: str = field(default="", compare=False)
+
+    @property
+    def states(self) -> int:
+        """Number of vibrational states."""
+        return max(abs(self.options[0].nvib), 1)
 
 
 MOST_STATES = 999
