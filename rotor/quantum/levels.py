@@ -245,6 +245,11 @@ class Levels(Table):
         return np.asarray(self.weight / self.components)
 
     @property
+    def shares(self) -> Floats:
+        """`mixing`, 1 where no blocks are mixed, (n,)."""
+        return np.ones(len(self)) if self.mixing is None else self.mixing
+
+    @property
     def ground_mhz(self) -> float:
         """The lowest energy of a level that exists (spin weight above zero)."""
         return float(self.energy_mhz[self.weight > 0].min())

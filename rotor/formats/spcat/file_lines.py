@@ -251,7 +251,6 @@ def as_level_list(solved: Sequence[SolvedGroup], form: Format, blocks: Blocks | 
     tables: list[list[Any]] = []
     for group, levels, spread in solved:
         error = np.zeros(len(levels)) if spread is None else np.linalg.norm(spread, axis=1) / units.MHZ_PER_CM
-        mixing = np.ones(len(levels)) if levels.mixing is None else levels.mixing
         for negative in (False, True) if (levels.components > 1).any() else (False,):
             rows = np.flatnonzero((levels.weight > 0) & (levels.components > int(negative)))
             g = levels.multiplicity * (levels.weight // levels.components)
@@ -262,7 +261,7 @@ def as_level_list(solved: Sequence[SolvedGroup], form: Format, blocks: Blocks | 
             numbers = np.ones((2, len(rows)), dtype=np.int64)
             if blocks is not None:
                 numbers = np.array(blocks.numbers(group, levels, rows, negative))
-            tables.append([*numbers, *(column[rows] for column in (energy, error, mixing, g, quanta, pattern))])
+            tables.append([*numbers, *(column[rows] for column in (energy, error, levels.shares, g, quanta, pattern))])
     block, rank, energy, error, mixing, g, quanta, pattern = (
         np.concatenate(parts) for parts in zip(*tables, strict=True)
     )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Ints
 from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, CodedLine
-from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET, basis_of
+from rotor.formats.spcat.hamiltonian.codes import NOT_YET, PLURAL_NOT_YET
 from rotor.formats.spcat.hamiltonian.dipole_codes import (
     EVEN_ORDER,
     DipoleCode,
@@ -23,6 +23,7 @@ from rotor.formats.spcat.hamiltonian.dipole_codes import (
     line_moment,
     split_dipoles,
 )
+from rotor.formats.spcat.hamiltonian.entries import Connected
 from rotor.formats.spcat.hamiltonian.file_effect import FileEffect
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import (
@@ -42,13 +43,7 @@ from rotor.formats.spcat.hamiltonian.phases import (
     with_dipoles,
 )
 from rotor.formats.spcat.hamiltonian.states import ALL_K, StateOptions, file_states
-from rotor.formats.spcat.hamiltonian.symmetry import (
-    SpeciesPairs,
-    exchange_part,
-    halved_across,
-    species_pairs,
-    weights_agree,
-)
+from rotor.formats.spcat.hamiltonian.symmetry import weights_agree
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.frozen import dataclass
@@ -57,7 +52,7 @@ from rotor.quantum.levels import Levels
 from rotor.quantum.moments import Moment
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
-from rotor.quantum.spins.operators import ByElements, is_axial
+from rotor.quantum.spins.operators import is_axial
 from rotor.quantum.spins.scheme import Spin
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
@@ -282,12 +277,11 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
         )
         for dipole, code in acting
     )
-    usable = coupled_spin_lines(
-        [line for line in coded.usable if line.states is None or set(line.states) <= set(here)],
-        states,
-        not doubled,
-        axes,
-    )
+    usable = [
+        line
+        for line in coded.usable
+        if (line.states is None or set(line.states) <= set(here)) and line.highest_spin <= len(spins)
+    ]
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.by_k)
     if kind in ("prolate", "oblate") and beside:
@@ -304,7 +298,6 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
         moments, beside = _moments_in_odd_phases(moments, with_codes, turned, light, oblate)
     elif light.phases.between_i:
         moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
-    apart = _apart(states, pairs)
     seconds = {pair.second for pair in doubled}
     lines = tuple(
         line._replace(states=line.states and (here[line.states[0]], here[line.states[1]]))
@@ -312,10 +305,9 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
         # the program takes no operator of K l ≤ 0 alone
         if not line.states or line.is_between or line.states[0] not in seconds
     )
-    effect = FileEffect(lines, len(states), coupled, moments, limits, beside, first.ixx, pairs, axes, turned, apart)
-    if pairs:  # raises for operators forbidden between l-doubled states, before levels are solved
-        effect.spin_terms(_ANY_TOP)
-        effect.couplings(_ANY_TOP, basis_of(axes))
+    values = {line.name: line.parameter.value for line in lines}
+    entries = Connected(tuple(states), pairs, axes, turned).entries(lines)
+    effect = FileEffect(values, entries, len(states), coupled, moments, limits, beside, first.ixx, pairs)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=coded.file.title)
     kmax = states[0].kmax if kind in ("prolate", "oblate") else ALL_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.by_k)
@@ -328,16 +320,6 @@ def _moments_in_odd_phases(
     fixed = light.phases._replace(odd=turned_odd_axes(turned)) if turned else light.phases
     with_axes = [(moment, code.axis if is_vector(code) else 0) for moment, code in beside]
     return turned_moments(moments, with_axes, turned, with_dipoles(fixed, light.axes_within_states, oblate, False))
-
-
-def _apart(states: list[StateOptions], pairs: tuple[Pair, ...]) -> dict[tuple[int, int], SpeciesPairs]:
-    """Species with elements by pairs of states, where weights forbid others."""
-    second = {pair.second for pair in pairs}
-    pairs_of_states = [(v, w) for v in range(len(states)) for w in range(v, len(states))]
-    allowed_species = {
-        (v, w): species_pairs(states[v], states[w], (v in second, w in second)) for v, w in pairs_of_states
-    }
-    return {both: species for both, species in allowed_species.items() if species is not None}
 
 
 def _turned(lines: Iterable[CodedLine], light: Light, doubled: list[Pair]) -> str:
@@ -359,10 +341,8 @@ _STANDS_FOR = {
     ("asymmetric", True): Constants(A=3.0, B=2.0, C=1.0, representation="IIIl"),
 }  # fmt: skip
 
-_ANY_TOP = Top(Constants(B=1.0))
 
-
-def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool, symmetric: bool) -> str:
+def _kind(states: list[StateOptions], lines: Sequence[CodedLine], oblate: bool, symmetric: bool) -> str:
     """Kind of top: linear; symmetric about the axis of the basis if K is good; else asymmetric."""
     alone = len(states) == 1
     plain = [powers for line in lines if line.operator.plain for powers in line.operator.plain]
@@ -384,49 +364,6 @@ def _kind(states: list[StateOptions], lines: tuple[CodedLine, ...], oblate: bool
 
 
 # spins
-
-
-def coupled_spin_lines(
-    lines: Iterable[CodedLine], states: Sequence[StateOptions], by_exchange: bool, axes: str
-) -> tuple[CodedLine, ...]:
-    """The lines of connected states in functions of the total spin of equivalent nuclei.
-
-    lines: all lines between these states and within them. states: the connected states, which have the same spins. by_exchange: whether
-    levels of a state with even and odd total spin of two nuclei have different weights; not for l-doubled states. axes: axes x, y, z of
-    the basis.
-    Returns: lines without those of spins that these states do not have.
-    """
-    first = states[0]
-    usable = tuple(line for line in lines if line.highest_spin <= len(first.spins))
-    if first.equivalent == 2 and by_exchange:
-        state_of = {state.number: state for state in states}
-        return tuple(part for line in usable for part in _by_exchange(line, state_of))
-    if first.equivalent == 3:
-        return tuple(_with_threefold_factors(line, first, axes) for line in usable)
-    return usable
-
-
-def _by_exchange(line: CodedLine, state_of: Mapping[int, StateOptions]) -> list[CodedLine]:
-    """A line restricted to the part that connects levels of equal weight, with one line for each state if this part differs."""
-    if not line.operator.spins:
-        return [line]
-    if line.states:
-        return [line._replace(exchange=exchange_part(line.symmetry.axis, *(state_of[v] for v in line.states)))]
-    part_by_state = {v: exchange_part(line.symmetry.axis, state, state) for v, state in state_of.items()}
-    if len(set(part_by_state.values())) == 1:
-        return [line._replace(exchange=next(iter(part_by_state.values())))]
-    return [line._replace(states=(v, v), exchange=part) for v, part in part_by_state.items()]
-
-
-def _with_threefold_factors(line: CodedLine, state: StateOptions, axes: str) -> CodedLine:
-    """A line with SPCAT's factors for three equivalent spins."""
-    if not state.is_threefold(line.operator.spins):
-        return line
-    if isinstance(line.operator.rotor, ByElements):
-        raise ValueError(
-            f"parameter {line.parameter.code}: a term of higher order or of a series with three equivalent spins {NOT_YET}"
-        )
-    return line._replace(operator=halved_across(line.operator, axes))
 
 
 def coupled_spins(state: StateOptions, first: Options) -> tuple[Spin, ...]:

@@ -6,15 +6,21 @@ from collections.abc import Mapping
 
 from rotor.formats.spcat.hamiltonian.code_table import state_digits
 from rotor.formats.spcat.hamiltonian.codes import NO_NAME, PLURAL_NOT_YET, is_linear, is_oblate
+from rotor.formats.spcat.hamiltonian.states import FOLDS, SPECIES, odd_under
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import Options
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
 
-# the classes of (Ka, Kc) that are even under a half turn about the axis: Ka, Ka + Kc and Kc tell a, b and c
-_EVEN = {1: ("ee", "eo"), 2: ("ee", "oo"), 3: ("ee", "oe")}
-FOLD = {6: 3, 9: 5}  # IAX of tops with one kind of E levels
+FOLD = {iax: fold.n for iax, fold in FOLDS.items() if len(fold.paired) == fold.n - 1 > 1}  # one kind of E levels
+_IAX = {n: iax for iax, n in FOLD.items()}
+_HALF_TURNS = (1, 2, 3)  # IAX of half turns
+
+
+def _is_odd(iax: int) -> dict[str, bool]:
+    """Whether the levels of each class of (Ka, Kc) change their sign under the half turn of an IAX."""
+    return {"eo"[ka] + "eo"[kc]: bool(odd_under(iax, ka, kc)) for ka, kc in SPECIES}
 
 
 def option_weights(options: Options, symmetric: bool = True) -> SpinWeights:
@@ -28,7 +34,7 @@ def option_weights(options: Options, symmetric: bool = True) -> SpinWeights:
     plus, minus = (options.wtpl, options.wtmn) if options.vsym % 2 == 0 else (options.wtmn, options.wtpl)
     if options.iax in FOLD:
         return _fold_weights(options, plus, minus, symmetric)
-    if options.iax not in _EVEN:
+    if options.iax not in _HALF_TURNS:
         raise ValueError(f"IAX = {options.iax}: spin weights other than by IAX 1, 2, 3, 6 or 9: these {NO_NAME}")
     if plus == minus:
         return SpinWeights()
@@ -43,8 +49,7 @@ def option_weights(options: Options, symmetric: bool = True) -> SpinWeights:
                 f"IAX = {options.iax} in a symmetric top: weights that tell the two states of one K: these {NO_NAME}"
             )
         return SpinWeights.from_mapping({"0": plus, "1": minus})
-    even = _EVEN[options.iax]
-    return SpinWeights.from_mapping({name: plus if name in even else minus for name in ("ee", "eo", "oe", "oo")})
+    return SpinWeights.from_mapping({name: minus if odd else plus for name, odd in _is_odd(options.iax).items()})
 
 
 def _fold_weights(options: Options, plus: int, minus: int, symmetric: bool) -> SpinWeights:
@@ -103,19 +108,19 @@ def _coded_weights(weights: SpinWeights, oblate: bool) -> tuple[int, int, int, i
         return 2, by_class["even"], by_class["odd"], 0
     if weights.rule == "K" and "0even" in by_class:
         others = {weight for name, weight in by_class.items() if not name.startswith("0")}
-        iax = {4: 6, 6: 9}.get(len(by_class), 0)
+        iax = _IAX.get(len(by_class) - 1, 0)
         plus, minus = by_class["0even"], by_class["0odd"]
         if iax and len(others) == 1:  # if one of the two is 0, SPCAT lists only one level of each E pair
             return iax, plus, minus, others.pop() * (1 if min(plus, minus) else 2)
     elif weights.rule == "K":
         others = set(weights.values[1:])
-        iax = {2: 3 if oblate else 1, 3: 6, 5: 9}.get(len(weights.values), 0)
+        iax = (_IAX | {2: 3 if oblate else 1}).get(len(weights.values), 0)
         if iax and len(others) == 1:
             ewt = others.pop()
             return (iax, weights.values[0], ewt, 0) if iax < 6 else (iax, weights.values[0], weights.values[0], ewt)
-    for iax, even in _EVEN.items():
+    for iax in _HALF_TURNS:
         if weights.rule == "KaKc":
-            sides = [{w for name, w in by_class.items() if (name in even) == side} for side in (True, False)]
+            sides = [{by_class[name] for name, odd in _is_odd(iax).items() if odd == side} for side in (False, True)]
             if all(len(side) == 1 for side in sides):
                 return iax, sides[0].pop(), sides[1].pop(), 0
     raise ValueError(f"spin weights {dict(by_class)}: one option line of SPFIT cannot say these")

@@ -134,8 +134,9 @@ def _joined(solved: Sequence[SolvedGroup], form: Format) -> Levels:
         name: np.concatenate([getattr(levels, name) for levels in tables])
         for name in ("energy_mhz", "multiplicity", "components", "weight")
     }
-    mixing = [np.ones(len(levels)) if levels.mixing is None else levels.mixing for levels in tables]
-    return replace(most, quanta=quanta, blocks=(), mixing=np.concatenate(mixing), **joined)
+    return replace(
+        most, quanta=quanta, blocks=(), mixing=np.concatenate([levels.shares for levels in tables]), **joined
+    )
 
 
 def _column(levels: Levels, name: str, most: Levels) -> Ints:

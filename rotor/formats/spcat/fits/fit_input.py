@@ -198,9 +198,9 @@ def _columns(parameters: Sequence[Parameter]) -> tuple[tuple[int, ...], tuple[fl
             leader = parameter
             free += [] if is_held(parameter) else [i]
         elif not i:
-            raise ValueError(f"parameter -{parameter.code}: the first one has none before it to keep a ratio to")
+            raise parameter.refusal("the first one has none before it to keep a ratio to")
         elif not leader.value:
-            raise ValueError(f"parameter -{parameter.code}: no ratio to {leader.code}, which is 0")
+            raise parameter.refusal(f"no ratio to {leader.code}, which is 0")
         columns.append(-1 if is_held(leader) else len(free) - 1)
         ratios.append(parameter.value / leader.value if parameter.constrained else 1.0)
     return tuple(columns), tuple(ratios), free

@@ -22,11 +22,7 @@ from rotor.frozen import dataclass
 
 
 class CodedLine(NamedTuple):
-    """One parameter line: its place in the file, from 1, its operator, and the two states, lower first (None: all states).
-
-    exchange: part of an operator with one of two equivalent spins that acts: 1 the part that is even under their exchange, -1 the odd
-    part, 0 both.
-    """
+    """One parameter line: its place in the file, from 1, its operator, and the two states, lower first (None: all states)."""
 
     place: int
     parameter: Parameter
@@ -34,7 +30,6 @@ class CodedLine(NamedTuple):
     symmetry: Symmetry
     operator: CodedOperator
     states: tuple[int, int] | None
-    exchange: int = 0
 
     @property
     def name(self) -> str:
@@ -152,8 +147,7 @@ class CodedFile:
                     line = CodedLine(place, parameter, digits, symmetry, operator, target)
                     lines.append(self._within_pairs(line))
             except ValueError as error:
-                label = f" /{parameter.label}" if parameter.label else ""
-                raise ValueError(f"parameter {parameter.code}{label}: {error}") from None
+                raise parameter.refusal(str(error)) from None
         return lines
 
     def _within_pairs(self, line: CodedLine) -> CodedLine:
@@ -236,9 +230,8 @@ class CodedFile:
         if line.is_between or (line.states and line.states[0] in self.members) or odd == (axis in self.phases.odd):
             return ""
         if not axis:
-            raise ValueError(
-                f"parameter {line.parameter.code}: the operator changes sign under time reversal and under no half turn; it can only "
-                "connect different states"
+            raise line.parameter.refusal(
+                "the operator changes sign under time reversal and under no half turn; it can only connect different states"
             )
         kind, others = ("odd", "even") if odd else ("even", "odd")
         why = f"it is {kind} under time reversal; within one state those along {axis} are {others} ones here"

@@ -81,8 +81,7 @@ def _whole_code(parameter: Parameter) -> int:
     """The code for the lowest state; ValueError unless it is that of a rotational operator of this state alone."""
     d = split_code(parameter.code)
     if not d.has_name:
-        label = f" /{parameter.label}" if parameter.label else ""
-        raise ValueError(f"parameter {parameter.code}{label}: its operator {NO_NAME}")
+        raise parameter.refusal(f"its operator {NO_NAME}")
     return d.in_lowest_state
 
 

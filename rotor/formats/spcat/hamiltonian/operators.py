@@ -185,7 +185,6 @@ def _refuse(d: Digits) -> None:
     commutator = "a commutator of a spin term with N² (the program's is not ½i[N², S], which C_ab-ba names here)"
     reasons = {
         commutator: d.i1 == 0 and d.i2 > 0,
-        "a term of a series without the constants of its file": d.ff or d.ex or d.kind in (Kind.EULER, Kind.LEVEL),
         "N_z S_z together with another operator": d.projects_spin and (d.kind is not Kind.SCALAR or d.spins),
     }
     for reason, applies in reasons.items():

@@ -75,7 +75,7 @@ def _set(series: Series, d: Digits, parameter: Parameter, pair: tuple[int, int])
     """Store the constant of a series."""
     number = d.ladder
     if d.has_spin or d.ff or d.ex:
-        raise ValueError(f"parameter {parameter.code}: a constant of a series has no spin, no FF and no EX")
+        raise parameter.refusal("a constant of a series has no spin, no FF and no EX")
     if (d.ksq, d.nsq) == (1, 0):
         series.a[number, *pair] = parameter.value
     elif (d.ksq, d.nsq) == (0, 1):
@@ -83,8 +83,8 @@ def _set(series: Series, d: Digits, parameter: Parameter, pair: tuple[int, int])
     elif (number, d.ksq, d.nsq) == (0, 0, 0) and pair[0] == pair[1]:
         series.rho[pair[0]] = parameter.value
     elif (d.typ, d.ksq, d.nsq) != (d.row.last, 0, 0):  # a place holder
-        raise ValueError(
-            f"parameter {parameter.code}: TYP {d.typ} with KSQ = {d.ksq}, NSQ = {d.nsq} is no constant of a series; expected "
+        raise parameter.refusal(
+            f"TYP {d.typ} with KSQ = {d.ksq}, NSQ = {d.nsq} is no constant of a series; expected "
             "9100 (ρ of one state), 9110 (a) or 9101 (b), and for further series 93, 95, 97, 99 in place of 91"
         )
 
@@ -96,17 +96,18 @@ def coded_operator(d: Digits, axes: str, series: Series, states: tuple[int, int]
     lower first; None for all.
     Raises ValueError as `code_operator`, and for two series at once.
     """
-    if states is None or not d.is_series:
-        return level_term(d, axes) if d.kind is Kind.LEVEL else code_operator(d, axes)
     euler = d.kind is Kind.EULER
     if euler and d.spins and d.typ != d.row.first:
         raise ValueError(f"a spin with TYP {d.typ}, which SPCAT passes over: EX with TYP 4 and above has one")
-    if d.kind is Kind.LEVEL or (d.ff and (d.ex or euler)) or (d.ex and euler):
+    if sum(map(bool, (d.ff, d.ex, euler, d.kind is Kind.LEVEL))) > 1:
         raise ValueError("a code has one series alone, and no energy of one K (TYP 80 to 89) with it")
+    if d.kind is Kind.LEVEL:
+        return level_term(d, axes)
+    if states is None or not d.is_series:
+        return code_operator(d, axes)
     if not d.ff:
         return _euler(d, axes, series, states)
-    base = code_operator(d._replace(ff=0), axes)
-    return _multiplied(base, k_factor(d.harmonic, d.sine, series, states), d.sine, axes)
+    return _multiplied(code_operator(d.base, axes), k_factor(d.harmonic, d.sine, series, states), d.sine, axes)
 
 
 def level_term(d: Digits, axes: str, sine: bool = False) -> CodedOperator:
@@ -118,7 +119,7 @@ def level_term(d: Digits, axes: str, sine: bool = False) -> CodedOperator:
         chosen = (np.abs(above) == 10 * (d.typ - d.row.first) + d.ksq) & (above == below)
         return np.asarray(chosen * (np.sign(above) if sine else 1.0))
 
-    return _multiplied(code_operator(d._replace(typ=0, ksq=0), axes), factor_for_k, sine, axes)
+    return _multiplied(code_operator(d.base, axes), factor_for_k, sine, axes)
 
 
 def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Weight:

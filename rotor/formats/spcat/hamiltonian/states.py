@@ -32,13 +32,18 @@ class Fold(NamedTuple):
     paired: tuple[int, ...]
 
 
-_FOLDS = {
+FOLDS = {
     4: Fold(2, 0, ()), 5: Fold(2, 1, ()), 6: Fold(3, 0, (1, 2)), 7: Fold(4, 0, (1, 3)), 8: Fold(4, 2, ()),
     9: Fold(5, 0, (1, 2, 3, 4)), 10: Fold(6, 0, (2, 4)), 11: Fold(6, 3, (1, 5)),
 }  # fmt: skip  # by IAX
 
 
 ALL_K = 10**6  # a KNMAX without effect
+
+
+def odd_under(iax: int, ka: Ints | int, kc: Ints | int) -> Ints | int:
+    """1 for levels that the half turn of IAX 1, 2, 3 (about a, b, c), or across the axis of IAX 4 to 11, changes in sign, else 0."""
+    return {1: ka, 3: kc}.get(iax, ka + kc) % 2
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,7 @@ class StateOptions:
     @property
     def fold(self) -> int:
         """n of the n-fold axis of the weights, 0 for weights of a half turn."""
-        return _FOLDS[self.iax].n if self.iax in _FOLDS else 0
+        return FOLDS[self.iax].n if self.iax in FOLDS else 0
 
     @property
     def equivalent(self) -> int:
@@ -104,7 +109,7 @@ class StateOptions:
         Returns: WTPL, WTMN or EWT, by the axis of the file.
         """
         weight = self.class_weight(ka, kc, odd_spins)
-        fold = _FOLDS.get(self.iax)
+        fold = FOLDS.get(self.iax)
         if fold is None or self.equivalent == 3:  # with their spins all levels are of A species
             return weight
         class_of = (k - self.l_code) % fold.n
@@ -124,12 +129,11 @@ class StateOptions:
 
     def class_weight(self, ka: Ints, kc: Ints, odd_spins: Ints | int = 0) -> Ints:
         """WTPL or WTMN by the parities of Ka and Kc, (n,), without E levels."""
-        odd = {1: ka % 2, 2: (ka + kc) % 2, 3: kc % 2}.get(self.iax, (ka + kc) % 2)
-        return np.where((odd + odd_spins) % 2 == 0, self.plus, self.minus)
+        return np.where((odd_under(self.iax, ka, kc) + odd_spins) % 2 == 0, self.plus, self.minus)
 
     def block_weights(self, ka: Ints, kc: Ints, k: Ints) -> Ints:
         """Weights of the A (or B) and of the E levels in the Wang block of a level, (n, 2), for an n-fold axis; 0 if there are none."""
-        fold, class_weight = _FOLDS[self.iax], np.where((ka + kc) % 2 == 0, self.plus, self.minus)
+        fold, class_weight = FOLDS[self.iax], np.where((ka + kc) % 2 == 0, self.plus, self.minus)
         steps = np.arange(0, 2 * fold.n, 2)  # K that stand in one Wang block, modulo n
         classes = (k[:, None] - self.l_code + steps) % fold.n
         alone = (classes == fold.alone).any(axis=1)
@@ -141,7 +145,7 @@ class StateOptions:
 
     def is_e(self, k: Ints) -> NDArray[np.bool_]:
         """Whether levels are of E species; their K has no sign."""
-        fold = _FOLDS.get(self.iax)
+        fold = FOLDS.get(self.iax)
         if fold is None or fold.n < 3 or self.equivalent == 3:
             return np.zeros(np.shape(k), dtype=bool)
         return np.asarray((k - self.l_code) % fold.n % (fold.n / 2) != 0)
@@ -194,7 +198,7 @@ def _state(v: int, line: Options, first: Options) -> StateOptions:
     factor = 100 if first.ewt >= 0 else 1000
     code, weight = divmod(abs(line.ewt), factor)  # EWT has two or three digits for the weight, by its sign
     iax, spins = abs(line.iax), doubled_spins(line.spind)
-    if iax not in (0, 1, 2, 3, *_FOLDS):
+    if iax not in (0, 1, 2, 3, *FOLDS):
         raise ValueError(f"IAX = {line.iax} of state {v}: expected an axis or fold of weights, 1 to 11")
     if line.iax < 0:
         _check_total(v, line, spins, (code % 10, weight))
@@ -215,7 +219,7 @@ def _state(v: int, line: Options, first: Options) -> StateOptions:
 
 def _check_total(v: int, line: Options, spins: tuple[int, ...], e_species: tuple[int, int]) -> None:
     """Raise ValueError for an unsupported total spin: not of two or three spins, of unequal spins, or with levels of E species."""
-    fold = _FOLDS[-line.iax].n if -line.iax in _FOLDS else 2
+    fold = FOLDS[-line.iax].n if -line.iax in FOLDS else 2
     together = f"IAX = {line.iax} of state {v} couples {'two' if fold == 2 else 'three'} spins to a total"
     ewt = f"EWT = {line.ewt} of state {v}"
     reasons = {
@@ -256,7 +260,7 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
         return False
     if first.by_k and first.knmax and first.wtpl != first.wtmn:  # the two levels of one K weigh differently
         return False
-    if min(first.wtpl, first.wtmn) < 0 or (first.iax in _FOLDS and first.wtpl != first.wtmn):
+    if min(first.wtpl, first.wtmn) < 0 or (first.iax in FOLDS and first.wtpl != first.wtmn):
         return False
     digits = file_codes(parameters)
     mixed = len(frozenset().union(*(d.reductions for d in digits))) > 1  # terms of both reductions

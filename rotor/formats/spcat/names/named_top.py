@@ -128,7 +128,7 @@ def _parameters_by_state(coded: CodedFile) -> list[list[Parameter]]:
         if line.operator.rotor is not None or line.is_between:
             continue
         if line.operator.plain is None:
-            raise ValueError(f"parameter {line.parameter.code}: a term of this kind in one state {NO_NAME}")
+            raise line.parameter.refusal(f"a term of this kind in one state {NO_NAME}")
         plain = replace(line.parameter, code=line.digits.in_lowest_state, constrained=False, text="")
         parts = [plain]
         if line.digits.kind is Kind.SQUARE and len(line.operator.plain) == 2:  # across an axis of more than two folds
@@ -155,7 +155,7 @@ def _couplings(rows: list[CodedLine], first: Options, turned: bool) -> dict[str,
         if line.operator.rotor is not None or not line.is_between:
             continue
         if turned:
-            raise ValueError(f"parameter {parameter.code}: a coupling of states whose symmetry axis is not z {NO_NAME}")
+            raise parameter.refusal(f"a coupling of states whose symmetry axis is not z {NO_NAME}")
         digits, terms = line.digits, dict[str, float]()
         if digits.typ in _BETWEEN:
             factor = sign if digits.tensor.odd else 1.0
@@ -166,7 +166,7 @@ def _couplings(rows: list[CodedLine], first: Options, turned: bool) -> dict[str,
                 break
             terms[_with_powers(_LADDERS[n], p, q)] = factor
         if not terms:
-            raise ValueError(f"parameter {parameter.code}: this coupling of two states {NO_NAME}")
+            raise parameter.refusal(f"this coupling of two states {NO_NAME}")
         for name, factor in terms.items():
             full = f"{name}[{','.join(map(str, line.states or ()))}]"
             values[full] = values.get(full, 0.0) + factor * parameter.value
@@ -285,7 +285,7 @@ def _spins(
             threefold = states[0].is_threefold(line.operator.spins)
             kind, matrix = _tensor(halved_across(line.operator, basis_axes(oblate)) if threefold else line.operator)
         except ValueError as reason:
-            raise ValueError(f"parameter {parameter.code}: {reason}") from None
+            raise parameter.refusal(str(reason)) from None
         o, value = line.operator, parameter.value
         state_suffix = (
             "" if line.states is None or len(states) == 1 else f"[{','.join(map(str, dict.fromkeys(line.states)))}]"

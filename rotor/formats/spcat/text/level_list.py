@@ -51,13 +51,12 @@ def level_list(table: SelectedLevels) -> LevelList:
     starts = np.searchsorted(block[order], block[order], side="left")
     rank[order] = np.arange(len(levels)) - starts + 1
     chosen = rows[np.lexsort((rank[rows], block[rows]))]
-    mixing = np.ones(len(levels)) if levels.mixing is None else levels.mixing
     return LevelList(
         block=block[chosen].astype(np.int32),
         rank=rank[chosen].astype(np.int32),
         energy_cm=levels.energy_mhz[chosen] / units.MHZ_PER_CM,
         error_cm=np.zeros(len(chosen)),
-        mixing=mixing[chosen],
+        mixing=levels.shares[chosen],
         degeneracy=levels.degeneracy[chosen].astype(np.int32),
         quanta=np.stack(doubled, axis=1)[chosen].astype(np.int16),
     )

@@ -105,6 +105,11 @@ class Parameter:
     constrained: bool = False
     text: str = field(default="", compare=False)
 
+    def refusal(self, why: str) -> ValueError:
+        """An error that names the parameter by code and label."""
+        label = f" /{self.label}" if self.label else ""
+        return ValueError(f"parameter {'-' * self.constrained}{self.code}{label}: {why}")
+
 
 @dataclass(frozen=True)
 class ParameterFile:
