@@ -6,6 +6,7 @@ which is not imported here because it would double the time of `import rotor`.
 
 import math
 import re
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,27 +114,35 @@ def _unit_kind(unit: str) -> str:
     return next(kind for kind, table in _KINDS.items() if unit in table)
 
 
-def _factor(unit: str | None, expected: str, text: str) -> float:
-    """The factor from a unit to the expected one; 1 without a unit."""
-    if not unit:
-        return 1.0
+def _factor(unit: str, expected: str) -> float:
+    """The factor from a unit to the expected one."""
     unit = _ALIASES.get(unit, unit)
     table = _KINDS[_unit_kind(expected)]
-    if expected in ("", "fraction") and unit not in table:
-        raise ValueError(f"{text!r}: expected plain numbers here, without the unit {unit!r}")
-    if unit not in table:
-        is_unit = any(unit in other for other in _KINDS.values())
-        what = "does not measure the same thing as" if is_unit else "is not a known unit; the default is"
-        raise ValueError(f"{text!r}: unit {unit!r} {what} {expected!r}; use one of {', '.join(table)}")
-    return table[unit] / table[expected]
+    if unit in table:
+        return table[unit] / table[expected]
+    if expected in ("", "fraction"):
+        raise ValueError(f"expected plain numbers here, without the unit {unit!r}")
+    is_unit = any(unit in other for other in _KINDS.values())
+    what = "does not measure the same thing as" if is_unit else "is not a known unit; the default is"
+    raise ValueError(f"unit {unit!r} {what} {expected!r}; use one of {', '.join(table)}")
 
 
-def _number(text: str) -> tuple[float, str | None]:
-    """Number and unit (if any) of a text such as "9.2 GHz"; a Unicode minus is accepted."""
-    match = _NUMBER.match(text.replace("−", "-"))
-    if not match:
-        raise ValueError(f"{text!r} is not a number with an optional unit, such as '9.2' or '9.2 GHz'")
-    return float(match[1]), match[2]
+def _numbers(items: Sequence[str], unit: str, text: str) -> list[float]:
+    """Numbers in `unit` of the items of a text, such as "9.2 GHz"; one without a unit has the last that the text names.
+
+    A Unicode minus is accepted.
+    """
+    parts: list[tuple[float, str]] = []
+    for item in items:
+        match = _NUMBER.match(item.replace("−", "-"))
+        if not match:
+            raise ValueError(f"{item!r} is not a number with an optional unit, such as '9.2' or '9.2 GHz'")
+        parts.append((float(match[1]), match[2] or ""))
+    shared = next((typed for _, typed in reversed(parts) if typed), "")
+    try:
+        return [number * (_factor(typed or shared, unit) if typed or shared else 1.0) for number, typed in parts]
+    except ValueError as error:
+        raise ValueError(f"{text!r}: {error}") from None
 
 
 def parse_quantity(value: float | str, unit: str) -> float:
@@ -147,8 +156,7 @@ def parse_quantity(value: float | str, unit: str) -> float:
     29979.2458
     """
     if isinstance(value, str):
-        number, typed_unit = _number(value)
-        value = number * _factor(typed_unit, unit, value)
+        (value,) = _numbers([value], unit, value)
     if not math.isfinite(value):
         raise ValueError(f"{value!r} is not a finite number of {unit}")
     return float(value)
@@ -157,22 +165,16 @@ def parse_quantity(value: float | str, unit: str) -> float:
 _BETWEEN = re.compile(r"\s*((?:\d+\.?\d*|\.\d+)\s*(?:[kMGT]?Hz|[kM]?V/cm|K|ps)?)\s*[-–]\s*(\d\S*(?:\s[^:]*)?)")
 
 
-def _with_colon(text: str) -> str:
-    """A range written with a hyphen between two numbers without signs, `90-100GHz`, as `90:100GHz`; any other text as it is."""
-    match = _BETWEEN.fullmatch(text)
-    return f"{match[1]}:{match[2]}" if match else text
-
-
 def _bounds(text: str, unit: str) -> tuple[float, float, str | None]:
-    """Both ends of `start:stop` in `unit`, and the text of the count; a unit at one end serves both."""
-    parts = _with_colon(text).split(":")
+    """Both ends of `start:stop` in `unit`, and the text of the count; a unit at one end serves both.
+
+    A hyphen between two numbers without signs is a colon, `90-100GHz`.
+    """
+    hyphen = _BETWEEN.fullmatch(text)
+    parts = (f"{hyphen[1]}:{hyphen[2]}" if hyphen else text).split(":")
     if len(parts) not in (2, 3) or not all(part.strip() for part in parts):
         raise ValueError(f"{text!r} is not a range; write start:stop or start:stop:count, such as '2:18GHz'")
-
-    (start, unit_1), (stop, unit_2) = _number(parts[0]), _number(parts[1])
-    shared = unit_2 or unit_1
-    ends = ((start, unit_1), (stop, unit_2))
-    first, last = (number * _factor(end_unit or shared, unit, text) for number, end_unit in ends)
+    first, last = _numbers(parts[:2], unit, text)
     if not first < last:
         numbers = f"{first:g} is not below {last:g} {unit}".rstrip()
         raise ValueError(f"{text!r}: the range must rise, but {numbers}")
@@ -192,7 +194,7 @@ def parse_range(text: str, unit: str) -> tuple[float, float]:
 
 
 def parse_grid(text: str, unit: str, points: int | None = None) -> NDArray[np.float64]:
-    """Points in `unit` from `start:stop:count`, or from a comma list whose last item may carry the unit; points: default count.
+    """Points in `unit` from `start:stop:count`, or from a comma list with a unit at any item; points: default count.
 
     >>> parse_grid("0:200kV/cm:3", "kV/cm")
     array([  0., 100., 200.])
@@ -201,10 +203,8 @@ def parse_grid(text: str, unit: str, points: int | None = None) -> NDArray[np.fl
     >>> parse_grid("1,2,5 GHz", "MHz")
     array([1000., 2000., 5000.])
     """
-    if ":" not in _with_colon(text):
-        numbers = [_number(item) for item in text.split(",")]
-        shared = numbers[-1][1]
-        return np.array([n * _factor(u or shared, unit, text) for n, u in numbers])
+    if ":" not in text and not _BETWEEN.fullmatch(text):
+        return np.array(_numbers(text.split(","), unit, text))
 
     first, last, count = _bounds(text, unit)
     count = str(points) if count is None and points is not None else count

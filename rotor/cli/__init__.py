@@ -189,12 +189,22 @@ def run(arguments: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if arguments is None else list(arguments)
     if "--debug" in arguments:  # typer expects it first; users add it at the end
         arguments = ["--debug", *(word for word in arguments if word != "--debug")]
+    words = [word for word in arguments[:2] if word != "--debug"]
+    is_verb = bool(words) and words[0] in VERBS
+    if is_verb and has_small_blocks(words[0]):  # the limit must be set before numpy is loaded
+        jmax = re.search(r"--jmax[= ](\d+)(?!\S)", " ".join(arguments))  # before anything is read
+        process.one_thread_of_blas(int(jmax[1]) if jmax else None)
+    # undecodable bytes of file names are read as UTF-8, or shown as �
+    provenance = shlex.join(["rotor", *arguments]).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
     try:
-        return _run(arguments)
-    except _UsageError as error:
-        return _fail(WRONG_INPUT, _usage_text(error, arguments), arguments)
-    except (NoAnswerError, RunStopped) as error:
-        return _fail(NO_ANSWER, str(error), arguments)
+        # modules of other verbs are not loaded
+        command = typer.main.get_command(_application(words[:1] if is_verb else VERBS, listed=not is_verb))
+        with command.make_context("rotor", [*arguments] or ["--help"], obj=provenance) as context:
+            command.invoke(context)
+        sys.stdout.flush()
+        return 0
+    except typer.Exit as end:
+        return end.exit_code
     except BrokenPipeError:  # the reader closed the pipe: write nothing more, also at exit
         _close_output()
         return 0
@@ -202,37 +212,27 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return TERMINATED
     except KeyboardInterrupt:
         return INTERRUPTED
-    except (ValueError, OSError) as error:
-        return _fail(_exit_code(error), _message(error), arguments)
-    except MemoryError:
-        return _fail(NO_ANSWER, "not enough memory for this; fewer atoms, levels, lines or times need less", arguments)
     except Exception as error:
-        if isinstance(error, ImportError) and " is not installed" in str(error):  # an extra, named with its command
-            return _fail(NO_ANSWER, str(error), arguments)
-        # a defect of the program, not of the input
-        text = f"{type(error).__name__}: {error}"
-        return _fail(NO_ANSWER, f"{text}; this is a defect, please report it with the output of --debug", arguments)
+        return _fail(*_failure(error, arguments), arguments)
     finally:
         release_files()
 
 
-def _run(arguments: list[str]) -> int:
-    words = [word for word in arguments[:2] if word != "--debug"]
-    is_verb = bool(words) and words[0] in VERBS
-    verbs = words[:1] if is_verb else VERBS  # modules of other verbs are not loaded
-    if is_verb and has_small_blocks(words[0]):  # the limit must be set before numpy is loaded
-        jmax = re.search(r"--jmax[= ](\d+)(?!\S)", " ".join(arguments))  # before anything is read
-        process.one_thread_of_blas(int(jmax[1]) if jmax else None)
-    command = typer.main.get_command(_application(verbs, listed=not is_verb))
-    # undecodable bytes of file names are read as UTF-8, or shown as �
-    provenance = shlex.join(["rotor", *arguments]).encode("utf-8", "surrogateescape").decode("utf-8", "replace")
-    try:
-        with command.make_context("rotor", [*arguments] or ["--help"], obj=provenance) as context:
-            command.invoke(context)
-        sys.stdout.flush()
-        return 0
-    except typer.Exit as end:
-        return end.exit_code
+def _failure(error: Exception, arguments: list[str]) -> tuple[int, str]:
+    """Exit code and message of an error."""
+    if isinstance(error, _UsageError):
+        return WRONG_INPUT, _usage_text(error, arguments)
+    if isinstance(error, NoAnswerError | RunStopped):
+        return NO_ANSWER, str(error)
+    if isinstance(error, ValueError | OSError):
+        return _exit_code(error), _message(error)
+    if isinstance(error, MemoryError):
+        return NO_ANSWER, "not enough memory for this; fewer atoms, levels, lines or times need less"
+    if isinstance(error, ImportError) and " is not installed" in str(error):  # an extra, named with its command
+        return NO_ANSWER, str(error)
+    # a defect of the program, not of the input
+    text = f"{type(error).__name__}: {error}"
+    return NO_ANSWER, f"{text}; this is a defect, please report it with the output of --debug"
 
 
 def _usage_text(error: Exception, arguments: list[str]) -> str:

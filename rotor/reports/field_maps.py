@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, record_table
 from rotor.requests.fill import NamedError
+from rotor.table import counted
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap
@@ -14,11 +15,21 @@ if TYPE_CHECKING:
 SHOWN = 24  # states on screen
 
 
-def accuracy_fact(content: Mapping[str, Any]) -> tuple[str, str]:
+def field_fact(states: FieldMap, direction: str) -> tuple[str, str]:
+    """The fields of a map, as a line of the report."""
+    first, last = states.fields[0], states.fields[-1]
+    return (
+        "field",
+        f"{first:g} to {last:g} {states.request.kind.unit} {direction}, {counted(len(states.fields), 'value')}",
+    )
+
+
+def accuracy_fact(states: FieldMap) -> tuple[str, str]:
     """J max, the error of the energies and the population at the edge of the basis, as a line of the report."""
-    accuracy = f"J max {content['jmax']}; energies to {content['accuracy_mhz']:.1e} MHz"
-    rounding = f"round-off {content['round_off_mhz']:.1e} MHz of it"
-    return "numerical error", f"{accuracy}, {rounding}; edge population {content['edge_population']:.1e}"
+    record = states.provenance
+    accuracy = f"J max {record['jmax']}; energies to {record['accuracy_mhz']:.1e} MHz"
+    rounding = f"round-off {record['round_off_mhz']:.1e} MHz of it"
+    return "numerical error", f"{accuracy}, {rounding}; edge population {record['edge_population']:.1e}"
 
 
 def refuse_picture_of_one_field(fields: Sequence[float], outputs: Collection[str]) -> None:

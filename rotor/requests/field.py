@@ -134,18 +134,6 @@ class Field:
         """The value as a scene holds it; None is left out."""
         return self.none if value is None else self.reader.write(value)
 
-    def check(self, value: Any) -> None:
-        """Raise ValueError, with the field's name, if the value is out of bounds."""
-        check = getattr(self.reader, "check", None)
-        if value is None or check is None:
-            return
-        try:
-            check(value)
-        except TypeError:
-            raise ValueError(f"{self.name}: {value!r}: expected a number") from None
-        except ValueError as error:
-            raise ValueError(f"{self.name}: {error}") from None
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Part:
@@ -235,7 +223,14 @@ def check_fields(request: Any) -> None:
     """Raise ValueError, with the field's name, if a value of a request is out of its declared bounds."""
     structure: Any = type(request)
     for name, field in declared_fields(structure).items():
-        field.check(getattr(request, name))
+        value, check = getattr(request, name), getattr(field.reader, "check", None)
+        try:
+            if value is not None and check is not None:
+                check(value)
+        except TypeError:
+            raise ValueError(f"{name}: {value!r}: expected a number") from None
+        except ValueError as error:
+            raise ValueError(f"{name}: {error}") from None
 
 
 def changed_fields(instance: Any, names: Iterable[str] = ()) -> list[Field]:

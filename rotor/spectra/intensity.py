@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,11 +44,20 @@ def require_cut(min_lgint: float | None) -> None:
         )
 
 
-def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k: float, q: float, cut: float) -> int:
-    """The J beyond which all lines are weaker than 10^cut nm² MHz at this temperature.
+def highest_j(
+    top: Top,
+    dipole_abc: tuple[float, float, float],
+    temperature_k: float,
+    q: float,
+    cut: float,
+    jmax: int | None = None,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+) -> int:
+    """The J max of a line list: the given one, else the J beyond which all lines are weaker than 10^cut nm² MHz.
 
     Bounds for a rigid top: the lowest level of each J lies above C J(J+1), the strength of a line is at most (J+1) μ² times the spin
-    weight; the frequency is taken as 2A(J+1).
+    weight; the frequency is taken as 2A(J+1). A top with a table of energies has lines between its levels alone, so that levels beyond
+    both the table and the cut are left out below a given J max too.
 
     Parameters
     ----------
@@ -63,6 +71,10 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
         Partition function.
     cut : float
         log10 of nm² MHz; -inf (no cut) uses the usual cut of -12.
+    jmax : int, optional
+        The given J max.
+    effects : sequence of QuantumEffect, optional
+        The Hamiltonian.
 
     Returns
     -------
@@ -72,8 +84,11 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
     Raises
     ------
     ValueError
-        If more than J = 600 would be needed.
+        If none is given and more than J = 600 would be needed.
     """
+    table = top.level_table if tuple(effects) == SEMI_RIGID else None
+    if jmax is not None and table is None:
+        return jmax
     constants = top.rotational_constants_mhz
     a, c = max(x for x in constants if math.isfinite(x)), constants[2]  # a linear molecule has an infinite A
     kt_mhz = temperature_k * units.MHZ_PER_K
@@ -87,6 +102,8 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
         population = weight * math.exp(-c * j * (j - 1) / kt_mhz) / q
         if j > 1 and LGINT_NM2_MHZ * frequency * (j + 1) * dipole2 * photon * population < least and c * j * j > kt_mhz:
             break
+    if jmax is not None and table is not None:
+        return min(jmax, max(int(table.quanta["j"].max()), j))
     if j > JMAX_DEFAULT_LIMIT:
         largest_mhz = f"a largest constant of {a:g} MHz is small for a molecule"
         unit = f"; {largest_mhz}: numbers without a unit are MHz; write GHz or cm-1 if that is meant"
@@ -96,28 +113,6 @@ def jmax_for_cut(top: Top, dipole_abc: tuple[float, float, float], temperature_k
             + (unit if a < SUSPECT_BELOW_MHZ else "")
         )
     return j
-
-
-def highest_j(
-    top: Top,
-    dipole_abc: tuple[float, float, float],
-    temperature_k: float,
-    q: float,
-    cut: float,
-    jmax: int | None = None,
-    effects: Sequence[QuantumEffect] = SEMI_RIGID,
-) -> int:
-    """The J max of a line list: the given one, else `jmax_for_cut`.
-
-    A top with a table of energies has lines between its levels alone. Levels beyond both the table and the cut are not needed.
-    """
-    table = top.level_table
-    if jmax is None or table is None or tuple(effects) != SEMI_RIGID:
-        return jmax_for_cut(top, dipole_abc, temperature_k, q, cut) if jmax is None else jmax
-    last = int(table.quanta["j"].max())
-    with suppress(ValueError):  # a hot gas, whose lines reach far
-        return min(jmax, max(last, jmax_for_cut(top, dipole_abc, temperature_k, q, cut)))
-    return jmax
 
 
 def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float | None = None) -> Floats:

@@ -88,7 +88,7 @@ def _line_numerics(
 
 def _spectrum_jmax(request: Any) -> tuple[int, str]:
     """J max of a line list, and the reason."""
-    from rotor.spectra.intensity import jmax_for_cut
+    from rotor.spectra import intensity
     from rotor.thermodynamics import partition_function
 
     if request.jmax is not None:
@@ -97,7 +97,7 @@ def _spectrum_jmax(request: Any) -> tuple[int, str]:
     cut = -math.inf if request.min_lgint is None else request.min_lgint
     q = request.q or partition_function(top, kelvin).q
     dipole = top.dipole_abc_debye or (0.0, 0.0, 0.0)
-    return jmax_for_cut(top, dipole, kelvin, q * request.vibrational_factor, cut), "as the cut requires"
+    return intensity.highest_j(top, dipole, kelvin, q * request.vibrational_factor, cut), "as the cut requires"
 
 
 def allowed_lines(top: Top, jmax: int) -> int:

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from rotor.thermodynamics.partition import PartitionFunction as PartitionFunction
     from rotor.thermodynamics.partition import PartitionFunctions as PartitionFunctions
     from rotor.thermodynamics.partition import partition_function as partition_function
-    from rotor.thermodynamics.partition import partition_functions as partition_functions
     from rotor.thermodynamics.species import implied_symmetry_number as implied_symmetry_number
     from rotor.thermodynamics.species import spin_species as spin_species
     from rotor.thermodynamics.vibration import VibrationalStates as VibrationalStates
@@ -47,7 +46,6 @@ _MODULES = {
     "classical_partition_function": "classical_limit",
     "implied_symmetry_number": "species",
     "partition_function": "partition",
-    "partition_functions": "partition",
     "rotational_temperatures_k": "classical_limit",
     "species_names": "functions",
     "spin_species": "species",

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
@@ -76,7 +76,13 @@ class PartitionFunctions(Table):
 
 @overload
 def partition_function(
-    top: Top, temperature_k: float, relative_error: float = 1e-6, effects: Sequence[QuantumEffect] = SEMI_RIGID
+    top: Top,
+    temperature_k: float,
+    relative_error: float = 1e-6,
+    effects: Sequence[QuantumEffect] = SEMI_RIGID,
+    *,
+    refuse: bool = True,
+    progress: Progress | None = None,
 ) -> PartitionFunction: ...
 
 
@@ -86,6 +92,9 @@ def partition_function(
     temperature_k: Sequence[float] | Floats,
     relative_error: float = 1e-6,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
+    *,
+    refuse: bool = True,
+    progress: Progress | None = None,
 ) -> PartitionFunctions: ...
 
 
@@ -94,8 +103,11 @@ def partition_function(
     temperature_k: float | Sequence[float] | Floats,
     relative_error: float = 1e-6,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
+    *,
+    refuse: bool = True,
+    progress: Progress | None = None,
 ) -> PartitionFunction | PartitionFunctions:
-    """Q(T) of a top: a single value for a number, a table for a list or array of temperatures.
+    """Q(T) of a top: a single value for a number, a table for a list or array of temperatures, from one set of levels.
 
     Q is summed over levels until the relative tail is below `relative_error`. If the sum would be long and the corrected
     classical limit is as accurate, that is used; see `rotor.thermodynamics.level_sums`.
@@ -105,51 +117,7 @@ def partition_function(
     top : Top
         Constants and spin weights.
     temperature_k : float or (n,) array
-        One temperature or many.
-    relative_error : float, optional
-        Largest relative error of Q.
-    effects : sequence of QuantumEffect, optional
-        Effects in the Hamiltonian.
-
-    Returns
-    -------
-    PartitionFunction or PartitionFunctions
-        Q with J max, error and source. The error can exceed `relative_error` if levels beyond the range of the distortion
-        constants are populated.
-
-    Raises
-    ------
-    ValueError
-        For an error above 10 %, and for a temperature not above 0 K.
-
-    Examples
-    --------
-    >>> from rotor.tops.top import Top
-    >>> top = Top.from_constants("B=57635.968 MHz")
-    >>> round(partition_function(top, 300.0).q, 2), partition_function(top, [10.0, 300.0]).q.round(2).tolist()
-    (108.79, [3.97, 108.79])
-    """
-    functions = partition_functions(top, temperature_k, relative_error, effects)
-    return functions if np.ndim(temperature_k) else functions[0]
-
-
-def partition_functions(
-    top: Top,
-    temperatures_k: ArrayLike,
-    relative_error: float = 1e-6,
-    effects: Sequence[QuantumEffect] = SEMI_RIGID,
-    *,
-    refuse: bool = True,
-    progress: Progress | None = None,
-) -> PartitionFunctions:
-    """Q at several temperatures from one set of levels; see `partition_function`.
-
-    Parameters
-    ----------
-    top : Top
-        Constants and spin weights.
-    temperatures_k : (n,) array
-        Above 0 K.
+        One temperature or many, above 0 K.
     relative_error : float, optional
         Largest relative error of Q.
     effects : sequence of QuantumEffect, optional
@@ -161,15 +129,23 @@ def partition_functions(
 
     Returns
     -------
-    PartitionFunctions
-        (n,) arrays of Q, J max and error, with the source of each.
+    PartitionFunction or PartitionFunctions
+        Q with J max, error and source. The error can exceed `relative_error` if levels beyond the range of the distortion
+        constants are populated.
 
     Raises
     ------
     ValueError
         For an error above 10 %, unless `refuse` is False, and for a temperature not above 0 K.
+
+    Examples
+    --------
+    >>> from rotor.tops.top import Top
+    >>> top = Top.from_constants("B=57635.968 MHz")
+    >>> round(partition_function(top, 300.0).q, 2), partition_function(top, [10.0, 300.0]).q.round(2).tolist()
+    (108.79, [3.97, 108.79])
     """
-    temperatures = checked_temperatures(temperatures_k)
+    temperatures = checked_temperatures(temperature_k)
     weights = [top.spin_weights]
     rotation = rotational_sum(top, effects)
     settings: dict[str, Any] = {"energies": False, "refuse": refuse, "progress": progress}
@@ -179,7 +155,8 @@ def partition_functions(
         from rotor.thermodynamics.spin_sums import spin_sums
 
         sums = spin_sums(top, weights, temperatures, relative_error, effects, **settings).sums[0]
-    return PartitionFunctions(temperatures, sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
+    functions = PartitionFunctions(temperatures, sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
+    return functions if np.ndim(temperature_k) else functions[0]
 
 
 def _sources(sums: LevelSums, relative_error: float) -> tuple[str, ...]:

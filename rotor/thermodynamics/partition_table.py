@@ -9,7 +9,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.thermodynamics.classical_limit import ClassicalLimit, classical_limit, classical_partition_function
 from rotor.thermodynamics.level_sums import AT_WORST, Progress, is_quick, refusal
-from rotor.thermodynamics.partition import PartitionFunction, partition_function, partition_functions
+from rotor.thermodynamics.partition import PartitionFunction, partition_function
 from rotor.thermodynamics.spin_factor import spin_functions
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def partition_table(
         rows |= dict(zip(rest, partition_table(top, rest, progress), strict=True)) if rest else {}
         return [rows[t] for t in temperatures_k]
     try:
-        functions = partition_functions(top, temperatures_k, refuse=False, progress=progress)
+        functions = partition_function(top, temperatures_k, refuse=False, progress=progress)
         limit = classical_limit(top)
         return [_unless_refused(partition_facts(top, function, limit=limit)) for function in functions]
     except ValueError:  # the levels of one temperature cannot be solved: try each temperature separately

@@ -218,7 +218,7 @@ def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str,
         *top_facts.hyperfine_lines(record["hyperfine"]),
         ("lines", _count_text(answer, record["line_count"])),
         *_error_column(answer),
-        *_layer_facts(record),
+        *([] if record["column_per_cm2"] is None else [_layer_fact(record)]),
         *(over_facts(record["over"]) if "over" in record else []),
     ]
 
@@ -236,12 +236,10 @@ def _error_column(answer: SpectrumAnswer) -> list[tuple[str, str]]:
     return [("column error", f"from {errors} of the constants alone{without}; effects left out are not in it")]
 
 
-def _layer_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
-    if record["column_per_cm2"] is None:
-        return []
+def _layer_fact(record: Mapping[str, Any]) -> tuple[str, str]:
     width = "Doppler's width" if record["fwhm_mhz"] is None else f"FWHM {record['fwhm_mhz']:g} MHz"
     layer = f"{record['pressure_bar']:g} bar, {record['path_cm']:g} cm: {record['column_per_cm2']:.6g} molecules/cm²"
-    return [("layer", f"{layer}; optical depths τ at line centres, {record['profile']} profile, {width}")]
+    return "layer", f"{layer}; optical depths τ at line centres, {record['profile']} profile, {width}"
 
 
 def _range_text(range_mhz: tuple[float, float]) -> str:

@@ -11,11 +11,17 @@ from typing import TYPE_CHECKING, Any
 from rotor.frozen import dataclass
 from rotor.quantum.effects.stark import StarkAnswer, StarkRequest, answer_stark
 from rotor.reports import top_facts
-from rotor.reports.field_maps import SHOWN, accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
+from rotor.reports.field_maps import (
+    SHOWN,
+    accuracy_fact,
+    field_fact,
+    refuse_picture_of_one_field,
+    results_of_map,
+    table_of_states,
+)
 from rotor.reports.screen import Part, Table, record_table
 from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
-from rotor.table import counted
 from rotor.verbs.molecule import REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.outputs import PICTURES, Output, Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
@@ -80,7 +86,7 @@ def show(answer: StarkAnswer, report: Report) -> Iterable[Part | None]:
     top, content = answer.request.top, report.content
     table = _table(answer.states, mixed=bool(content["field_direction"][0] or content["field_direction"][1]))
     further = [_coefficient_table(report.cache["coefficients"])] if "coefficients" in report.cache else []
-    return top_facts.top_parts(top, _facts(top, content), (table, *further), ("constants", "dipole"), report)
+    return top_facts.top_parts(top, _facts(answer, content), (table, *further), ("constants", "dipole"), report)
 
 
 def _coefficient_table(coefficients: StarkCoefficients) -> Table:
@@ -113,16 +119,16 @@ def _along(direction: list[float]) -> str:
     return f"at {math.degrees(math.atan2(x, z)):g}° with Z"
 
 
-def _facts(top: Top, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    first, last, count = content["field_kv_per_cm"]
+def _facts(answer: StarkAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    top, states = answer.request.top, answer.states
     facts = [
         ("constants", top_facts.constants_text(top)),
         ("dipole", top_facts.dipole_text(top)),
-        ("field", f"{first:g} to {last:g} kV/cm {_along(content['field_direction'])}, {counted(count, 'value')}"),
+        field_fact(states, _along(content["field_direction"])),
     ]
     if content["intensity_w_per_cm2"]:
         facts.append(("laser", f"{content['intensity_w_per_cm2']:g} W/cm² along Z"))
-    return [*facts, accuracy_fact(content)]
+    return [*facts, accuracy_fact(states)]
 
 
 VERB = Verb(

@@ -9,12 +9,17 @@ from typing import TYPE_CHECKING, Any
 from rotor.frozen import dataclass
 from rotor.quantum.effects.zeeman import ZeemanAnswer, ZeemanRequest, answer_zeeman
 from rotor.reports import top_facts
-from rotor.reports.field_maps import accuracy_fact, refuse_picture_of_one_field, results_of_map, table_of_states
+from rotor.reports.field_maps import (
+    accuracy_fact,
+    field_fact,
+    refuse_picture_of_one_field,
+    results_of_map,
+    table_of_states,
+)
 from rotor.reports.screen import Table
 from rotor.requests.field import CONDITIONS, declared, names_of
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Numbers
-from rotor.table import counted
 from rotor.tops.magnetic import MagneticTensors, tensor_for
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
 from rotor.verbs.outputs import picture, tables
@@ -76,17 +81,16 @@ def _table(answer: ZeemanAnswer, content: Mapping[str, Any]) -> Table:
 
 
 def _facts(answer: ZeemanAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    first, last, count = content["field_tesla"]
     facts = [
         ("constants", top_facts.constants_text(answer.request.top)),
         ("g", _tensor_text(content["g_abc"])),
-        ("field", f"{first:g} to {last:g} T along Z, {counted(count, 'value')}"),
+        field_fact(answer.states, "along Z"),
     ]
     if content["magnetisability_abc"] is not None:
         facts.append(("magnetisability", f"{_tensor_text(content['magnetisability_abc'])} 1e-6 erg/(G² mol)"))
     if content["nuclear_g"]:
         facts.append(("g of spins", ", ".join(f"{name} {value:g}" for name, value in content["nuclear_g"].items())))
-    return [*facts, accuracy_fact(content)]
+    return [*facts, accuracy_fact(answer.states)]
 
 
 def _tensor_text(tensor: Tensor) -> str:

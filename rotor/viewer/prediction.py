@@ -26,7 +26,7 @@ from rotor.formats.assigned_lines import QUANTA
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.labelled import MissingLevelsError
 from rotor.quantum.quanta import SPECIES_NUMBERS
-from rotor.spectra.intensity import jmax_for_cut
+from rotor.spectra.intensity import highest_j
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.thermodynamics import partition_function
 from rotor.tops.constants import Constants
@@ -313,7 +313,7 @@ def _highest_j(model: Model) -> int:
     assert top.dipole_abc_debye is not None
     q = partition_function(top, temperature, effects=model.effects).q
     try:
-        return min(jmax_for_cut(top, top.dipole_abc_debye, temperature, q, DEFAULT_MIN_LGINT), MOST_J)
+        return min(highest_j(top, top.dipole_abc_debye, temperature, q, DEFAULT_MIN_LGINT), MOST_J)
     except ValueError:  # far above what is computed while a page waits
         return MOST_J
 

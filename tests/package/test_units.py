@@ -50,6 +50,13 @@ def test_quantities_are_converted_to_the_expected_unit(text, unit, value):
     assert units.parse_quantity(text, unit) == pytest.approx(value, rel=1e-15)
 
 
+def test_a_unit_at_any_item_of_a_list_serves_the_items_without_one():
+    """As at either end of a range; `1GHz,2` was 1000 and 2 MHz."""
+    for text in ("1,2 GHz", "1GHz,2", "1 GHz, 2 GHz"):
+        assert units.parse_grid(text, "MHz").tolist() == [1000.0, 2000.0]
+    assert units.parse_grid("1 GHz,2 THz", "MHz").tolist() == [1e3, 2e6]
+
+
 @given(st.floats(1e-6, 1e6), st.sampled_from(["Hz", "kHz", "MHz", "GHz", "THz", "cm-1"]))
 def test_there_and_back(value, unit):
     assert units.parse_quantity(units.parse_quantity(f"{value!r} {unit}", "MHz"), "MHz") * units.parse_quantity(

@@ -12,7 +12,7 @@ from rotor.quantum.wang import wang_matrix
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, diagonalise, lowest_energies
 from rotor.thermodynamics.level_sums import level_sums
-from rotor.thermodynamics.partition import partition_functions
+from rotor.thermodynamics.partition import partition_function
 from rotor.thermodynamics.partition_table import partition_table
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
 from rotor.tops.top import Top
@@ -61,17 +61,17 @@ def test_levels_left_out_of_a_sum_do_not_count(monkeypatch):
 
 def test_a_table_of_q_sums_once_where_one_temperature_is_out_of_reach(monkeypatch):
     monkeypatch.setattr(sums_module, "MOST_J", {"asymmetric": 40})
-    monkeypatch.setattr(table_module, "partition_function", None)  # none by itself
+    monkeypatch.setattr(table_module, "_row_alone", None)  # none by itself
     top = of(CUT_SHORT)
     rows = partition_table(top, [0.5, 30.0, 1.0])
     assert [row["q"] is None for row in rows] == [False, True, False]
     assert rows[1]["source"].startswith("Q(30 K): populated levels lie beyond the reach")
     assert rows[1]["jmax"] is rows[1]["relative_error"] is None
     assert rows[1]["classical"] > 1000
-    alone = partition_functions(top, [0.5, 1.0])
+    alone = partition_function(top, [0.5, 1.0])
     assert [rows[0]["q"], rows[2]["q"]] == pytest.approx(alone.q.tolist(), rel=1e-14)  # the same sums
     with pytest.raises(ValueError, match=r"Q\(30 K\).*can be had up to 1 K"):
-        partition_functions(top, [0.5, 30.0, 1.0])
+        partition_function(top, [0.5, 30.0, 1.0])
 
 
 def test_an_onset_that_no_sum_reaches_is_said_and_not_an_error(monkeypatch):

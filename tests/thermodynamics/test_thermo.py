@@ -18,7 +18,6 @@ from rotor.thermodynamics import (
     classical_partition_function,
     level_sums,
     partition_function,
-    partition_functions,
     vibrational_partition_function,
 )
 from rotor.thermodynamics.trusted_levels import trusted_energies_mhz
@@ -159,7 +158,7 @@ def test_a_long_sum_is_replaced_where_that_is_as_good():
 def test_a_long_sum_reports_its_progress():
     seen = []
     top = Top.from_constants("A=9 B=3 C=2.5 GHz DeltaJ=1e-4 GHz")  # too much distortion for the expansion
-    partition_functions(top, [20.0], progress=lambda j, last: seen.append((j, last)))
+    partition_function(top, [20.0], progress=lambda j, last: seen.append((j, last)))
     assert [j for j, _ in seen] == sorted(j for j, _ in seen)
     assert len(seen) > 2
     assert seen[-1][0] <= seen[-1][1] <= 1000
@@ -174,7 +173,7 @@ def test_many_temperatures_at_once():
         assert together.q.tolist() == one_by_one
         assert together.temperature_k.tolist() == [10.0, 100.0]
         assert together.relative_error.shape == together.jmax.shape == (2,)
-    assert [f.q for f in partition_functions(top, [10.0, 100.0])] == one_by_one
+    assert [f.q for f in partition_function(top, [10.0, 100.0])] == one_by_one
     assert together.to_pandas()["q"].tolist() == one_by_one
     assert isinstance(partition_function(top, 10).q, float)
     assert classical_partition_function(top, np.array([10.0, 100.0])).tolist() == [

@@ -64,38 +64,25 @@ def _left_out(verb: Verb) -> set[str]:
 
 def command_of(verb: Verb) -> Callable[..., None]:
     """A function for typer that runs a verb, with one parameter for each of its options."""
-    options = options_of(verb)
-    identities = {re.sub(r"\W", "_", field.flag.strip("-").lower()) + "_": name for name, field in options.items()}
-
-    def call(context: typer.Context, help_all: bool = False, **typed: Any) -> None:
-        """Refuse empty texts and repeated single values, and run the verb with the others by identity."""
-        texts = {}
-        for name, value in typed.items():
-            if value is not None and value != [] and value != ():
-                field = options[identities[name]]
-                several = tuple(value) if isinstance(value, list | tuple) else (value,)
-                if any(isinstance(text, str) and not text.strip() for text in several):
-                    raise ValueError(
-                        f"{field.flag}: the text given is empty; expected one that is not, or leave it out"
-                    )
-                if len(several) > 1 and not field.reader.many:
-                    raise ValueError(f"{field.flag}: given more than once; it has one value")
-                texts[identities[name]] = several if field.reader.many else several[0]
-        run_verb(verb, context, texts)
-
-    defaults: dict[str, tuple[Any, Any]] = {"context": (inspect.Parameter.empty, typer.Context)}
-    defaults |= {name: _parameter_of(options[identity]) for name, identity in identities.items()}
-    few = all(field.common for field in options.values())  # --help shows them all, and --help-all the same
+    options = {
+        re.sub(r"\W", "_", field.flag.strip("-").lower()) + "_": (name, field)
+        for name, field in options_of(verb).items()
+    }
+    few = all(field.common for _, field in options.values())  # --help shows them all, and --help-all the same
     show = typer.Option(False, "--help-all", is_eager=True, callback=_show_all, help="Show all options.", hidden=few)
-    defaults["help_all"] = show, bool
-    parameters = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
-        for name, (default, kind) in defaults.items()
-    ]
-    call.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    defaults = {"context": (inspect.Parameter.empty, typer.Context), "help_all": (show, bool)}
+    defaults |= {parameter: _parameter_of(field) for parameter, (_, field) in options.items()}
+    call: Any = partial(run_verb, verb, options)
+    call.__signature__ = inspect.Signature(
+        [
+            inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+            for name, (default, kind) in defaults.items()
+        ]
+    )
     call.__annotations__ = {name: kind for name, (_, kind) in defaults.items()}
     call.__doc__ = verb.about
-    return call
+    command: Callable[..., None] = call
+    return command
 
 
 def _parameter_of(field: Field) -> tuple[Any, Any]:
@@ -181,15 +168,31 @@ def _show_all(context: typer.Context, value: bool) -> None:
         raise typer.Exit
 
 
-def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> None:
-    """Carry out a verb. typed: texts of the options by identity."""
-    verb = verb.verb_for(typed.keys())
+def run_verb(
+    verb: Verb, options: Mapping[str, tuple[str, Field]], context: typer.Context, help_all: bool = False, **typed: Any
+) -> None:
+    """Read the inputs of a verb and carry it out. options: identity and field by parameter. typed: texts by parameter.
+
+    Empty texts and repeated single values are refused.
+    """
+    texts: dict[str, Any] = {}
+    for parameter, value in typed.items():
+        if value is None or value == [] or value == ():
+            continue
+        name, field = options[parameter]
+        several = tuple(value) if isinstance(value, list | tuple) else (value,)
+        if any(isinstance(text, str) and not text.strip() for text in several):
+            raise ValueError(f"{field.flag}: the text given is empty; expected one that is not, or leave it out")
+        if len(several) > 1 and not field.reader.many:
+            raise ValueError(f"{field.flag}: given more than once; it has one value")
+        texts[name] = several if field.reader.many else several[0]
+    verb = verb.verb_for(texts.keys())
     files_alone = {output.name for output in verb.outputs}
-    values = {name: value for name, value in typed.items() if name in verb.fields.keys() - files_alone}
-    extras = {each.option: typed[each.option] for each in verb.extras if each.files is None and each.option in typed}
+    values = {name: value for name, value in texts.items() if name in verb.fields.keys() - files_alone}
+    extras = {each.option: texts[each.option] for each in verb.extras if each.files is None and each.option in texts}
     entries = Entries({**fields_of_extras(verb, extras, values.keys()), **values}, "option")
     inputs = values | extras
-    places = with_files(verb, {name: value for name, value in typed.items() if name not in inputs})
+    places = with_files(verb, {name: value for name, value in texts.items() if name not in inputs})
     shown = verb.read_shown(entries)
     with as_typed(verb, places):
         files = files_of_options(verb, places)
@@ -198,7 +201,12 @@ def run_verb(verb: Verb, context: typer.Context, typed: Mapping[str, Any]) -> No
     view = picture_settings(verb, places, "plot" in files.paths)
     outputs = {**files.paths, **dict.fromkeys(files.on_screen, ())}
     work = Work(None, shown, outputs, note, True, {"command": str(context.obj)}, view, at_end)
-    calculation = Calculation(verb, entries, work)
+    _carry_out(Calculation(verb, entries, work), files, places)
+
+
+def _carry_out(calculation: Calculation, files: Files, places: Mapping[str, Any]) -> None:
+    """Answer, then write the files, JSON and report. places: texts of the options of files, pictures and processes."""
+    verb = calculation.verb
     if verb.short(calculation.request):
         process.leave_compiler_out()
     process.begin_work()
