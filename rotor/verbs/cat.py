@@ -7,24 +7,11 @@ import math
 from collections.abc import Iterable, Mapping
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor.checks import NoAnswerError
-from rotor.formats.spcat.catalogue_budget import catalogue_budget
-from rotor.formats.spcat.compare import (
-    Comparison,
-    agreement,
-    compare,
-    in_mhz,
-    likely_temperature_k,
-    with_measured_lines,
-    within,
-)
-from rotor.formats.spcat.text.cat import read_cat, write_cat
-from rotor.formats.spcat.text.catalogue import Catalogue
-from rotor.formats.spcat.text.fields import BLANK
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, json_text, record_table
 from rotor.reports.top_facts import error_facts
@@ -37,6 +24,10 @@ from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.subjects import top_of_word
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import ErrorsShown, Note, Work
+
+if TYPE_CHECKING:
+    from rotor.formats.spcat.compare import Comparison
+    from rotor.formats.spcat.text.catalogue import Catalogue
 
 EXAMPLES = """\
   rotor cat c018003.cat --range 0:1000GHz --min-lgint -5
@@ -92,6 +83,8 @@ class CatRequest:
 
     def chosen(self, lines: Catalogue) -> Catalogue:
         """The lines in the range and above the intensity cut."""
+        from rotor.formats.spcat.compare import in_mhz
+
         frequency, _ = in_mhz(lines)
         least = -np.inf if self.min_lgint is None else self.min_lgint
         return lines.take((frequency >= self.range_mhz[0]) & (frequency <= self.range_mhz[1]) & (lines.lgint >= least))
@@ -108,11 +101,15 @@ class Compared:
     @cached_property
     def likely_temperature_k(self) -> float:
         """The temperature (K) at which the intensities agree best; nan if they do not determine it."""
+        from rotor.formats.spcat.compare import likely_temperature_k
+
         return likely_temperature_k(self.comparison, self.temperature_k or FORMAT_K)
 
 
 def beside(lines: Catalogue, request: CatRequest, note: Note) -> Compared:
     """Compare the lines of a file with those of OTHER."""
+    from rotor.formats.spcat.compare import compare, within
+
     other = request.compare or ""
     if not len(lines):
         raise NoAnswerError("--compare: no lines are left to compare")
@@ -134,6 +131,8 @@ def beside(lines: Catalogue, request: CatRequest, note: Note) -> Compared:
 
 def read_catalogue(path: str) -> Catalogue:
     """Read a catalogue; ValueError for another kind of file."""
+    from rotor.formats.spcat.text.cat import read_cat
+
     if not path.lower().endswith((".cat", ".cat.gz")):
         raise ValueError(f"{path}: expected a catalogue, .cat or .cat.gz")
     return read_cat(path)
@@ -157,6 +156,7 @@ def temperature_of(file: str, option: float | None) -> tuple[float, str]:
 def predicted(lines: Catalogue, request: CatRequest, kelvin: float, note: Note) -> Catalogue:
     """Lines of a molecule up to the highest J and down to the weakest line of the catalogue, somewhat beyond its range."""
     from rotor.formats.line_tables import catalogue
+    from rotor.formats.spcat.compare import in_mhz
     from rotor.spectra.lines import line_list
 
     source = request.compare or ""
@@ -179,6 +179,8 @@ def predicted(lines: Catalogue, request: CatRequest, kelvin: float, note: Note) 
 
 def comparison_record(compared: Compared, other: str, shown: int) -> dict[str, Any]:
     """Counts of matched, missing and extra lines, and differences (OTHER minus the catalogue), for JSON."""
+    from rotor.formats.spcat.compare import agreement
+
     comparison = compared.comparison
     measured = agreement(comparison)
     return {
@@ -221,6 +223,8 @@ def _spread(difference: np.ndarray[Any, Any]) -> dict[str, float] | None:
 
 def line_record(lines: Catalogue, row: int) -> dict[str, Any]:
     """A line by the fields of the format, without blank quantum numbers."""
+    from rotor.formats.spcat.text.fields import BLANK
+
     record = lines.record(row)._asdict()
     for side in ("quanta_upper", "quanta_lower"):
         record[side] = [q for q in record[side] if q != BLANK]
@@ -268,6 +272,8 @@ class CatAnswer:
 
     def facts(self) -> dict[str, Any]:
         """Number, range and species of the lines, by the keys of docs/verbs."""
+        from rotor.formats.spcat.compare import in_mhz
+
         lines, (frequency, _) = self.lines, in_mhz(self.lines)
         facts = {
             "line_count": len(lines),
@@ -283,11 +289,15 @@ class CatAnswer:
     @property
     def errors(self) -> ErrorBudget:
         """Error budget of the frequencies, from the errors in the file."""
+        from rotor.formats.spcat.catalogue_budget import catalogue_budget
+
         return catalogue_budget(self.lines)
 
 
 def answer(request: CatRequest, work: Work) -> CatAnswer:
     """The selected lines, and the comparison if one is requested."""
+    from rotor.formats.spcat.compare import with_measured_lines
+
     if request.compare is not None and work.view.vertical is not None:
         raise ValueError("--plot-vertical: cannot be combined with --compare, whose picture fixes its vertical axis")
     lines = request.chosen(read_catalogue(request.file))
@@ -298,6 +308,8 @@ def answer(request: CatRequest, work: Work) -> CatAnswer:
 
 def write_lines(answer: CatAnswer, path: Path, report: Report) -> None:
     """Write the lines as a catalogue."""
+    from rotor.formats.spcat.text.cat import write_cat
+
     write_cat(answer.lines, path)
 
 
@@ -339,6 +351,8 @@ def show(answer: CatAnswer, report: Report) -> Iterable[Part | None]:
 
 def _table(prefix: str, lines: Catalogue, shown: int) -> Table:
     """The strongest lines in order of frequency."""
+    from rotor.formats.spcat.compare import in_mhz
+
     strongest = np.sort(np.argsort(-lines.lgint, kind="stable")[:shown]).tolist()
     frequency, error = in_mhz(lines)
     records = [line_record(lines, row) | {"frequency": frequency[row], "error": error[row]} for row in strongest]

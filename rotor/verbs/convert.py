@@ -4,27 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rotor.formats.molecules.molecule_file import MoleculeFile, parse_molecule_file
-from rotor.formats.molecules.molecule_writer import molecule_file_text, write_molecule_file
-from rotor.formats.read_write import file_top, read_spcat_top
-from rotor.formats.spcat.text.int_file import IntensityFile, Request, write_int
-from rotor.formats.spcat.text.par import parameters_beside, read_par, write_par
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part
 from rotor.reports.top_facts import error_facts
-from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Text, Whole
-from rotor.tops.constants_budget import constants_budget
 from rotor.tops.facts import top_facts
-from rotor.tops.top import Top, without_internal_rotation
 from rotor.verbs.molecule import refuse_weights_of_another_kind
 from rotor.verbs.outputs import Output, Report
 from rotor.verbs.subjects import top_of_word
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import ErrorsShown, Note, Work, silent
+
+if TYPE_CHECKING:
+    from rotor.formats.molecules.molecule_file import MoleculeFile
+    from rotor.formats.spcat.text.int_file import IntensityFile
+    from rotor.requests.budget import ErrorBudget
+    from rotor.tops.top import Top
 
 EXAMPLES = """\
   rotor convert case.var constants.toml
@@ -58,6 +56,8 @@ class Converted:
     @property
     def errors(self) -> ErrorBudget | None:
         """Error budget of the constants; None for an .int file, which holds no constants."""
+        from rotor.tops.constants_budget import constants_budget
+
         return None if self.target.lower().endswith(".int") else constants_budget([self.top])
 
 
@@ -88,12 +88,16 @@ def refuse_overwriting(request: ConvertRequest, outputs: Mapping[str, Any], _: A
 
 def parameters_of(source: str) -> Path:
     """The file of a source; for an .int file, the parameter file beside it."""
+    from rotor.formats.spcat.text.par import parameters_beside
+
     path = Path(source)
     return parameters_beside(path) if path.suffix.lower() == ".int" else path
 
 
 def top_with_errors(source: str, note: Note = silent) -> Top:
     """The top of a source; uncertainties of its constants come from the errors in a .var file."""
+    from rotor.formats.read_write import read_spcat_top
+
     path = parameters_of(source)
     if path.suffix.lower() != ".var" or not path.exists():
         return top_of_word(source, note)
@@ -102,6 +106,12 @@ def top_with_errors(source: str, note: Note = silent) -> Top:
 
 def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Callable[[Path], None]:
     """Function that writes the top in the target's format; content that the format cannot hold is refused or noted."""
+    from rotor.formats.molecules.molecule_writer import write_molecule_file
+    from rotor.formats.spcat.names.named_parameters import named_parameter_file
+    from rotor.formats.spcat.text.int_file import write_int
+    from rotor.formats.spcat.text.par import write_par
+    from rotor.tops.top import without_internal_rotation
+
     suffix = Path(target).suffix
     if suffix.lower() == ".toml":
         file = molecule_file(top, request.source, Path(target).stem)
@@ -118,14 +128,14 @@ def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Cal
     if any(map(any, moments)):
         dipole = ", ".join(f"{mu:g}" for mu in moments[0])
         note(f"a {suffix} file cannot hold the dipole ({dipole} D); an .int file can")
-    from rotor.formats.spcat.names.named_parameters import named_parameter_file
-
     parameters = named_parameter_file(top, request.kmax)
     return lambda path: write_par(parameters, path)
 
 
 def molecule_file(top: Top, source: str, stem: str) -> MoleculeFile:
     """The molecule file of a top, checked to be readable again. stem: its name if the top has none."""
+    from rotor.formats.molecules.molecule_file import MoleculeFile
+
     sources = {"constants": top.source, "dipole": top.dipole_source, "spin_weights": top.weights_source}
     sources = {table: text or f"converted from {Path(source).name}" for table, text in sources.items()}
     if not top.dipole_abc_debye:
@@ -140,6 +150,9 @@ def molecule_file(top: Top, source: str, stem: str) -> MoleculeFile:
 
 def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
     """Raise ValueError if reading the .toml would fail, as for dipoles or couplings that the spin weights forbid."""
+    from rotor.formats.molecules.molecule_file import parse_molecule_file
+    from rotor.formats.molecules.molecule_writer import molecule_file_text
+    from rotor.formats.read_write import file_top
     from rotor.quantum.effects.of_top import effects_of
 
     try:
@@ -156,6 +169,8 @@ def _refuse_unreadable(file: MoleculeFile, source: str) -> None:
 
 def lost_options(top: Top, request: ConvertRequest, target: str) -> list[str]:
     """Note on options of SPFIT's files (DIAG, KNMAX, NLINE) that the target does not keep."""
+    from rotor.formats.spcat.text.par import read_par
+
     path = parameters_of(request.source)
     if path.suffix.lower() not in (".par", ".var") or not path.is_file() or target.lower().endswith(".int"):
         return []
@@ -182,6 +197,7 @@ def lost_options(top: Top, request: ConvertRequest, target: str) -> list[str]:
 def _intensities(top: Top, highest: int) -> IntensityFile:
     """The .int file at 300 K with F up to `highest`; Q is summed over the levels and spins of the top."""
     from rotor.formats.spcat.model import intensity_file
+    from rotor.formats.spcat.text.int_file import Request
     from rotor.quantum.effects.of_top import effects_of
     from rotor.thermodynamics import partition_function
 
