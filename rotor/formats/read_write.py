@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.formats.packed import HARMLESS_BYTES, refuse_bomb
 from rotor.formats.registry import find_reader, find_writer
-from rotor.molecules.readers.sdf_entries import parse_entry
+from rotor.molecules.readers.sdf_entries import BUILT, parse_entry
 from rotor.tops.constants import Constants
 from rotor.tops.magnetic import MagneticTensors
 from rotor.tops.top import Top
@@ -29,7 +29,7 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
     ----------
     source : str, Path, Top, Constants, Molecule, ase.Atoms or rdkit.Chem.Mol
         A word is a path that exists, else a molecule of the library (`"water"`, `"H2CO"`), else one of ASE's g2 set;
-        a path and a molecule of one name are an error. `"SMILES:C=O"` is built with RDKit; `"-"` reads a geometry
+        a path and a molecule of one name are an error. `"SMILES:C=O"` and `"InChI=1S/..."` are built with RDKit; `"-"` reads a geometry
         (xyz, sdf) or a TOML of constants from standard input. Paths: .xyz, .extxyz, .mol, .sdf (of several molecules
         `"many.sdf#3"` is the third), whatever
         `ase.io.read` knows; .toml: a molecule file or constants alone; .par, .var, .int: input of SPFIT and SPCAT;
@@ -59,7 +59,7 @@ def read(source: Any, *, isotopes: Isotopes | None = None) -> Any:
         return _with_isotopes(Top.from_constants(source), isotopes)
     if isinstance(source, str) and not source.strip():
         raise ValueError("an empty text names no molecule: give a path, 'SMILES:...' or a name")
-    if isinstance(source, str) and source != "-" and not source.startswith("SMILES:"):
+    if isinstance(source, str) and source != "-" and not source.startswith(BUILT):
         source = _meaning(source)
     if isinstance(source, Path):
         return _read_path(source, isotopes)
@@ -126,11 +126,16 @@ def _isotopologues(word: str, known: Iterable[str]) -> Iterable[str]:
 
     >>> list(_isotopologues("DCl", ["HCl"])), list(_isotopologues("13C18O", ["CO"])), list(_isotopologues("CH2DOH", ["CH3OH"]))
     (['HCl --isotope H=2H'], ['CO --isotope C=13C --isotope O=18O'], [])
+    >>> list(_isotopologues("HDO", ["H2O"]))
+    ['H2O --isotope N=2H, N the number of an H']
     """
     isotopes = dict.fromkeys((match[2] or "H", match[1] or "2") for match in _ISOTOPE.finditer(word))
     parent = _ISOTOPE.sub(lambda match: match[2] or "H", word)
     if isotopes and parent in known and all(len(re.findall(rf"{e}(?![a-z])", parent)) == 1 for e, _ in isotopes):
         yield " ".join([parent, *(f"--isotope {element}={mass}{element}" for element, mass in isotopes)])
+    half = re.sub(r"HH(?![a-z0-9])", "H2", parent)
+    if half != parent and half in known and list(isotopes) == [("H", "2")]:
+        yield f"{half} --isotope N=2H, N the number of an H"
 
 
 _SMILES = re.compile(r"(?=.*[=#()\[\]])[A-Za-z0-9@+\-\[\]()=#]+")  # letters with a bond or a branch among them

@@ -121,7 +121,11 @@ def start_ahead(scene_text: str = "") -> None:
     from multiprocessing import forkserver
 
     kinds = tuple(f"rotor.verbs.{name}" for name in _KIND.findall(scene_text)[:1])
-    smiles = _SMILES_MODULES if any(sign in scene_text for sign in ("SMILES:", ".csv", ".smi", ".sdf", ".mol")) else ()
+    smiles = (
+        _SMILES_MODULES
+        if any(sign in scene_text for sign in ("SMILES:", "InChI=", ".csv", ".smi", ".sdf", ".mol"))
+        else ()
+    )
     forkserver.set_forkserver_preload([*_COMMON, *kinds, *smiles])
     with _one_thread():
         forkserver.ensure_running()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.frozen import dataclass
+from rotor.molecules.readers.sdf_entries import BUILT
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.limits import limit_facts, populated_j
 from rotor.requests.budget import ErrorBudget
@@ -57,9 +58,9 @@ class InfoRequest:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.conformers is not None and not self.smiles.startswith("SMILES:"):
+        if self.conformers is not None and not self.smiles.startswith(BUILT):
             raise ValueError(
-                f"conformers: {self.smiles or 'constants'!r} is a single geometry; conformers need a SMILES"
+                f"conformers: {self.smiles or 'constants'!r} is a single geometry; conformers need a SMILES or InChI"
             )
 
 

@@ -53,7 +53,7 @@ class MoleculeInput:
     source: Any = declared(
         None,
         Source(),
-        "File, name, SMILES:... or - for standard input",
+        "File, name, SMILES:..., InChI=... or - for standard input",
         "molecule.source",
         option="SOURCE",
         example="water",

@@ -399,6 +399,8 @@ MISTAKES = {
     "temperature of emission": ("emission CO --temperature 20", "--temperature; the temperature of the molecules is --excitation"),
     "guess of a file": ("assign water.csv --guess water.toml", "'water.toml': expected three numbers for each guess"),
     "name of an isotopologue": ("info DCl", "did you mean HCl --isotope H=2H?"),
+    "one of two hydrogens": ("info HD", "did you mean H2 --isotope N=2H, N the number of an H?"),
+    "broken InChI": ("info InChI=1S/CH2O/c1-", "'InChI=1S/CH2O/c1-' cannot be read"),
     "hyphen before a negative number": ("spectrum water --range=-5-3GHz", "--range: '-5-3GHz' is not a range"),
     "wavenumber is no range": ("spectrum water --range 5cm-1", "--range: '5cm-1' is not a range"),
     "unknown option": ("spectrum water --colour red", "--colour"),

@@ -1,4 +1,4 @@
-"""Read a molecule from SMILES, xyz, sdf, a file that ASE reads, ASE and RDKit objects, or a g2 name."""
+"""Read a molecule from SMILES, InChI, xyz, sdf, a file that ASE reads, ASE and RDKit objects, or a g2 name."""
 
 import difflib
 import sys
@@ -11,12 +11,11 @@ import numpy as np
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import element_symbol, isotope, isotope_by_mass
 from rotor.molecules.readers.quantum_chemistry import WITHOUT_CCLIB, has_cclib, is_output, needs_no_cclib, read_output
-from rotor.molecules.readers.sdf_entries import entry_bytes, parse_entry
+from rotor.molecules.readers.sdf_entries import BUILT, entry_bytes, parse_entry
 from rotor.molecules.readers.smiles import from_rdkit, from_smiles, parse_sdf
 from rotor.molecules.readers.xyz import decode, parse_xyz
 from rotor.units import DEBYE_PER_E_ANGSTROM
 
-_PREFIX = "SMILES:"
 _SDF_SUFFIXES = (".mol", ".sdf", ".sd", ".mdl")
 _OUTPUT_SUFFIXES = (".log", ".out", ".dat", ".c4", ".g09", ".g16")
 
@@ -27,7 +26,7 @@ def read_molecule(source: Any, *, isotopes: dict[int | str, str] | str | None = 
     Parameters
     ----------
     source : str, Path, Molecule, ase.Atoms or rdkit.Chem.Mol
-        `"SMILES:CO"` (methanol); the path of an xyz, mol or sdf file, or of another that `ase.io.read` knows;
+        `"SMILES:CO"` (methanol); an InChI; the path of an xyz, mol or sdf file, or of another that `ase.io.read` knows;
         `"-"` for xyz or sdf text on standard input; a name of ASE's g2 set (`"H2O"`).
     isotopes : mapping or str, optional
         Substitutions for `Molecule.with_isotopes`, such as `"1=2H"` or `{"O": "18O"}`.
@@ -70,8 +69,8 @@ def _read(source: Any) -> Molecule:
 def _read_word(word: str) -> Molecule:
     if word == "-":
         return parse_molecule(decode(sys.stdin.buffer.read(), "standard input"), "standard input")
-    if word.startswith(_PREFIX):
-        return from_smiles(word.removeprefix(_PREFIX).strip())
+    if word.startswith(BUILT):
+        return from_smiles(word.removeprefix("SMILES:").strip())
     path = Path(word)
     if parse_entry(word) is not None:
         return _read_file(path)

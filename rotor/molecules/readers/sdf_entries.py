@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 SDF_SUFFIXES = (".sdf", ".sd")
+BUILT = ("SMILES:", "InChI=")  # beginnings of texts from which RDKit builds a molecule
 LIST_SUFFIXES = (".csv", ".smi", ".smiles")  # of lists of molecules by names and SMILES
 _ENTRY = re.compile(r"(.+\.sdf?)#(\d+)", flags=re.IGNORECASE | re.DOTALL)
 

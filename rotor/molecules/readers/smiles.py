@@ -46,7 +46,7 @@ class Conformer:
 
 
 def from_smiles(text: str) -> Molecule:
-    """A molecule from SMILES: the lowest of ten ETKDG conformers, optimised with MMFF94.
+    """A molecule from SMILES or InChI: the lowest of ten ETKDG conformers, optimised with MMFF94.
 
     Isotopes are given by labels (`"[2H]O[2H]"`, `"[13CH4]"`). The dipole is estimated from the force field's charges. If MMFF94 has
     no parameters, UFF is used, with a note.
@@ -54,7 +54,7 @@ def from_smiles(text: str) -> Molecule:
     Parameters
     ----------
     text : str
-        SMILES of a single molecule or atom, without the prefix `SMILES:`.
+        SMILES of a single molecule or atom, without the prefix `SMILES:`, or its InChI.
 
     Returns
     -------
@@ -256,21 +256,22 @@ def _parsed(text: str) -> Any:
     if not text.strip():
         raise ValueError("SMILES: nothing follows the prefix; write for example 'SMILES:CO' for methanol")
     with rdBase.BlockLogs(), rdBase.CaptureErrorLog() as log:
-        mol = Chem.MolFromSmiles(text)
+        mol = (Chem.MolFromInchi if text.startswith("InChI=") else Chem.MolFromSmiles)(text)
+    kind = "" if text.startswith("InChI=") else "SMILES "
     if mol is None or not mol.GetNumAtoms():
         place = re.search(r"position (\d+)", log.messages)
         at = f" at character {place[1]}" if place else ""
         raise ValueError(
-            f"SMILES {text!r:.80} cannot be read{at}: {_reason(log.messages)}; correct it or give an xyz file"
+            f"{kind}{text!r:.80} cannot be read{at}: {_reason(log.messages)}; correct it or give an xyz file"
         )
     if any(atom.GetAtomicNum() == 0 for atom in mol.GetAtoms()):
-        raise ValueError(f"SMILES {text!r:.80}: '*' stands for any atom; write the element")
+        raise ValueError(f"{kind}{text!r:.80}: '*' stands for any atom; write the element")
     if len(Chem.GetMolFrags(mol)) > 1:
-        raise ValueError(f"SMILES {text!r:.80} has several molecules; give one, or their geometry as an xyz file")
+        raise ValueError(f"{kind}{text!r:.80} has several molecules; give one, or their geometry as an xyz file")
     whole = Chem.AddHs(mol)
     if whole.GetNumAtoms() > MOST_ATOMS:
         raise ValueError(
-            f"SMILES {text!r:.80}: {whole.GetNumAtoms()} atoms with their hydrogens, but conformers are searched for at most "
+            f"{kind}{text!r:.80}: {whole.GetNumAtoms()} atoms with their hydrogens, but conformers are searched for at most "
             f"{MOST_ATOMS}; give the geometry as an xyz file"
         )
     return whole

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from rotor.molecules.readers.sdf_entries import entry_bytes, parse_entry
+from rotor.molecules.readers.sdf_entries import BUILT, entry_bytes, parse_entry
 from rotor.scenes.scene import within
 from rotor.version import version
 
@@ -57,7 +57,7 @@ class InputHashes:
                     str(file.relative_to(self._folder) if file.is_relative_to(self._folder) else file),
                     self._hash(file),
                 )
-        if key in _MOLECULE_KEYS and not word.startswith("SMILES:"):
+        if key in _MOLECULE_KEYS and not word.startswith(BUILT):
             from rotor.formats.molecules.library import library_file
 
             known = library_file(word)

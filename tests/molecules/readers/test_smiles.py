@@ -84,6 +84,17 @@ def test_the_lowest_of_ten_conformers_is_taken():
     assert ends > 3.8  # Å: trans (3.9), which lies below gauche (3.1)
 
 
+def test_an_inchi_is_the_molecule_of_its_smiles(call):
+    """Formaldehyde, also with its isotopes; the text names the molecule."""
+    inchi, smiles = from_smiles("InChI=1S/CH2O/c1-2/h1H2"), from_smiles("C=O")
+    assert (inchi.formula, inchi.name) == (smiles.formula, "InChI=1S/CH2O/c1-2/h1H2")
+    assert smallest_constant_cm1(inchi) == pytest.approx(smallest_constant_cm1(smiles), rel=1e-3)
+    assert from_smiles("InChI=1S/H2O/h1H2/i/hD2").formula == "[2H]2O"
+    code, out, _ = call("info", "InChI=1S/CH2O/c1-2/h1H2")
+    assert code == 0
+    assert "CH2O" in out
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
