@@ -18,14 +18,25 @@ _WORTH_MEASURING = 1e-2  # smallest S μ² (D², for μ = 1 D) of a suggested li
 _WIDER = 0.01  # fraction by which a line may lie beyond the lowest and highest measured frequency
 
 
+def measured_range(lines: Assignments) -> tuple[int, tuple[float, float]]:
+    """The highest J or N of measured lines, and frequencies a little beyond theirs, within which others are suggested."""
+    highest = int(max(lines.upper[:, 0].max(), lines.lower[:, 0].max()))
+    low, high = float(lines.frequency_mhz.min()), float(lines.frequency_mhz.max())
+    return highest, (low * (1 - _WIDER), high * (1 + _WIDER))
+
+
+def without_measured(upper: Ints, lower: Ints, lines: Assignments) -> tuple[Ints, Ints]:
+    """The labels (n, k) of both states of the lines that are not measured."""
+    known = set(zip(map(tuple, lines.upper.tolist()), map(tuple, lines.lower.tolist()), strict=True))
+    pairs = zip(map(tuple, upper.tolist()), map(tuple, lower.tolist()), strict=True)
+    new = np.array([pair not in known for pair in pairs], dtype=bool)
+    return upper[new], lower[new]
+
+
 def unmeasured(fit: Fit) -> tuple[Ints, Ints]:
     """Labels (n, k) of both states of unmeasured lines, within the kinds, frequencies and J of the measured ones."""
     measured, named = fit.lines, fit.named
-    jmax = int(max(measured.upper[:, 0].max(), measured.lower[:, 0].max()))
-    seen_mhz = (
-        float(measured.frequency_mhz.min()) * (1 - _WIDER),
-        float(measured.frequency_mhz.max()) * (1 + _WIDER),
-    )
+    jmax, seen_mhz = measured_range(measured)
     if isinstance(named, TopConstants):
         top, effects = _bright_top(named.top, measured, _components(fit)), named.effects
     else:
@@ -33,12 +44,7 @@ def unmeasured(fit: Fit) -> tuple[Ints, Ints]:
     lines = line_list(top, jmax=jmax, min_lgint=None, q=1.0, range_mhz=seen_mhz, effects=effects)
     strong = lines.strength_debye2 > _WORTH_MEASURING
     labels = np.stack([lines.levels.quanta[name] for name in measured.names], axis=1)
-    upper, lower = labels[lines.upper[strong]], labels[lines.lower[strong]]
-    measured_labels = {(*u, *low) for u, low in zip(measured.upper.tolist(), measured.lower.tolist(), strict=True)}
-    new = np.array(
-        [(*u, *low) not in measured_labels for u, low in zip(upper.tolist(), lower.tolist(), strict=True)], dtype=bool
-    )
-    return upper[new], lower[new]
+    return without_measured(labels[lines.upper[strong]], labels[lines.lower[strong]], measured)
 
 
 def _bright_top(top: Top, lines: Assignments, dipole_abc_debye: tuple[float, float, float]) -> Top:
