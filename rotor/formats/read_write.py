@@ -186,7 +186,11 @@ def read_spcat_top(path: Path, *, errors: bool = False, alone: bool = True) -> T
     file, light = read_par(parameters), read_int(intensities) if intensities.exists() else None
     if light is not None and light.request.flags >= FROM:
         file, light = files_in_mhz(file, light)
-    top = named_top(file, light, errors=errors)
+    try:
+        top = named_top(file, light, errors=errors)
+    except ValueError as error:
+        files = f"{path} with {(intensities if path == parameters else parameters).name}" if light else str(path)
+        raise ValueError(f"{files}: {error}") from None
     notes = range_notes(file_states(file), parameters.name) if alone else []
     return replace(top, notes=(*top.notes, *notes), symmetry_checked=False)
 

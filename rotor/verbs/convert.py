@@ -101,7 +101,10 @@ def top_with_errors(source: str, note: Note = silent) -> Top:
     path = parameters_of(source)
     if path.suffix.lower() != ".var" or not path.exists():
         return top_of_word(source, note)
-    return read_spcat_top(path, errors=True)
+    top = read_spcat_top(path, errors=True)
+    for text in top.notes:
+        note(text)
+    return top
 
 
 def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Callable[[Path], None]:

@@ -159,7 +159,7 @@ class MeasuredLines(SubjectKind):
         if is_par:
             _refuse_start(entries, verb)
             return Subject(values, (lines, None), text, place.note)
-        molecule = _start(entries)
+        molecule = _start(entries, Path(place.folder) / lines.source if is_file else None)
         values["top"] = top_of(Reading(molecule, entries.style, place.folder, place.note))
         if molecule.source is not None:
             file = Path(place.folder) / str(molecule.source)
@@ -193,13 +193,15 @@ def _refuse_start(entries: Entries, verb: Verb) -> None:
         raise NamedError(f"{names}: a .par file states the free parameters and the start")
 
 
-def _start(entries: Entries) -> MoleculeInput:
+def _start(entries: Entries, source: Path | None) -> MoleculeInput:
     """The molecule whose constants start the fit."""
     molecule = read_molecule(entries) if any(entries.has(field) for field in FIELDS.values()) else MoleculeInput()
     if (molecule.source is None) == (molecule.constants is None):
         if entries.style == "key" and molecule.source is None:
             raise ValueError("molecule: expected the starting constants, as source or constants")
-        raise NamedError("expected the starting constants; give either {start} or {constants}")
+        par = source and source.with_suffix(".par")
+        both = f", or {par.name} as the source, which states them for lines beside it" if par and par.is_file() else ""
+        raise NamedError(f"expected the starting constants; give either {{start}} or {{constants}}{both}")
     if molecule.source is not None and str(molecule.source).lower().endswith((".csv", ".lin")):
         raise NamedError(
             f"{{start}} {molecule.source}: a list of lines has no constants; give a .toml, .var or the name of a molecule"

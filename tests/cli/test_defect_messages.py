@@ -212,7 +212,7 @@ def test_a_state_far_from_zero_is_named(call, folder, energy):
     Path("a.int").write_text("OCS\n 0 60503 1028.6 0 3 -9 -9 99 300\n 1 0.71519\n")
     code, _, err = call("spectrum", "a.int", "--csv", "x.csv")
     assert code == 2
-    assert "error: the lowest level lies at" in err
+    assert "error: a.int with a.var: the lowest level lies at" in err
     assert "give states energies near zero" in err
     assert not Path("x.csv").exists()
 

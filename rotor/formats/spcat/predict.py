@@ -68,7 +68,16 @@ def predict_file(path: str | os.PathLike[str], *, as_spcat: bool = False, full_b
 
     as_spcat, full_basis: see `predict`. Raises ValueError, with file and line, for unreadable or unsupported input.
     """
-    return predict(read_par(parameters_beside(path)), read_int(path), as_spcat=as_spcat, full_basis=full_basis)
+    beside = parameters_beside(path)
+    parameters, intensities = read_par(beside), read_int(path)
+    try:
+        prediction = predict(parameters, intensities, as_spcat=as_spcat, full_basis=full_basis)
+    except ValueError as error:
+        raise ValueError(f"{path} with {beside.name}: {error}") from None
+    if beside.suffix.lower() != ".par" or prediction.lines.stated_spread is None:
+        return prediction
+    a_priori = f"errors of lines are from the a-priori errors of {beside.name}; SPFIT writes those of a fit into a .var"
+    return replace(prediction, noting=lambda: (*prediction.notes, a_priori))
 
 
 def predict(

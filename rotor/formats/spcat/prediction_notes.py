@@ -14,6 +14,7 @@ from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, coded_file
 from rotor.formats.spcat.hamiltonian.dipole_codes import (
     EVEN_ORDER,
     deviates_in_spcat,
+    split_dipole,
     split_dipoles,
 )
 from rotor.formats.spcat.hamiltonian.phases import with_dipoles
@@ -27,7 +28,22 @@ SAME_MHZ = 1e-6  # round-off of energies
 def file_notes(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes that follow from the files without their levels."""
     coded = coded_file(parameters)
-    return [*npar_notes(parameters), *coded.left_out, *_moment_notes(coded, intensities, as_spcat)]
+    return [
+        *npar_notes(parameters),
+        *coded.left_out,
+        *_empty_states(coded),
+        *_moment_notes(coded, intensities, as_spcat),
+    ]
+
+
+def _empty_states(coded: CodedFile) -> list[str]:
+    """A note for each state beyond the first without parameters of its own, whose levels are those of another state."""
+    named = {v for digits in coded.digits for v in digits.states or ()} | coded.members
+    return [
+        f"state {v} has no parameter of its own, not even an energy (V1 = V2 = {v}), alone those of all states; NVIB says that it exists"
+        for v in range(1, len(coded.states))
+        if v not in named
+    ]
 
 
 def request_notes(request: Request, as_spcat: bool) -> list[str]:
@@ -54,10 +70,14 @@ def _choice(program: str, as_spcat: bool) -> str:
 
 def _moment_notes(coded: CodedFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes on dipole lines for which SPCAT deviates from its documentation, and on their phases."""
-    dipoles, others = split_dipoles(intensities.dipoles, len(coded.states))
-    oblate = coded.oblate
+    count, oblate = len(coded.states), coded.oblate
+    notes = [
+        f"dipole {dipole.code} is left out, as SPCAT does: state {v} does not exist, NVIB = {count} counts from 0"
+        for dipole in intensities.dipoles
+        if (v := split_dipole(dipole.code, count).states[1]) >= count
+    ]
+    dipoles, others = split_dipoles(intensities.dipoles, count)
     wrong = [str(dipole.code) for dipole, code in others if deviates_in_spcat(code, coded.axes)]
-    notes = []
     if wrong:
         lines = f"dipole{'s' if len(wrong) > 1 else ''} {', '.join(dict.fromkeys(wrong))}"
         program = "SPCAT computes another moment than its documentation says (docs/spcat_codes.md)"

@@ -72,6 +72,8 @@ def read_fit(par: str | os.PathLike[str], lin: str | os.PathLike[str] | None = N
     except ValueError as error:
         raise ValueError(f"{par}: {error}") from None
     lines = read_lin(beside, len(names), abs(file.header.nline))
+    if not len(lines):
+        raise ValueError(f"{beside}: no line; a blank line ends the list")
     try:
         return spfit_input(file, lines, Path(beside).name)
     except LineWidthError as error:
@@ -145,6 +147,11 @@ def spfit_input(file: ParameterFile, lines: LineList, source: str = "") -> Spfit
     if not free:
         raise ValueError(
             "no parameter is free: every a-priori error is below 1e-30; give one that is to be fitted 1e36"
+        )
+    count, needed = abs(file.header.nline), sum(_prior(file.parameters[i]) == np.inf for i in free)
+    if count < min(needed, len(lines)):
+        raise ValueError(
+            f"NLINE = {file.header.nline}: fewer lines count than the {needed} parameters that are free; the .lin file has {len(lines)}"
         )
     options = FitOptions(
         reject_above=file.header.errtst if file.header.errtst > 0 else _NO_ERRTST,
@@ -239,7 +246,7 @@ def _assigned(lines: LineList, names: Sequence[str], header: Header, source: str
     if len(wrong := np.flatnonzero(used & (lines.counts != len(names)))):
         raise LineWidthError(
             f"line {wrong[0] + 1} has {lines.counts[wrong[0]]} quantum numbers for each state; these constants have "
-            f"{len(names)} ({', '.join(names)})"
+            f"{len(names)} ({', '.join(names)}), as NVIB and SPIND of the .par say"
         )
     wavenumber = lines.error < 0
     scale = np.where(wavenumber, header.cal, 1.0)  # SPFIT multiplies what it calculates in cm⁻¹ by CAL

@@ -115,6 +115,13 @@ class Digits(NamedTuple):
     state_count: int = 1
 
     @property
+    def text(self) -> str:
+        """The fields that are not 0."""
+        return ", ".join(
+            f"{name.upper()} = {value}" for name, value in zip(self._fields[:10], self, strict=False) if value
+        )
+
+    @property
     def row(self) -> Row:
         """The row of TYP."""
         return _ROW_OF_TYP[self.typ]

@@ -147,7 +147,9 @@ class CodedFile:
                     line = CodedLine(place, parameter, digits, symmetry, operator, target)
                     lines.append(self._within_pairs(line))
             except ValueError as error:
-                raise parameter.refusal(str(error)) from None
+                raise parameter.refusal(
+                    f"{error}; leave it out, or correct the code, which reads {digits.text}"
+                ) from None
         return lines
 
     def _within_pairs(self, line: CodedLine) -> CodedLine:

@@ -93,9 +93,11 @@ def named_top(file: ParameterFile, intensities: IntensityFile | None = None, *, 
 
 def _refuse(coded: CodedFile) -> None:
     """Raise ValueError for options and operators without named constants."""
-    first, states, digits = coded.options, coded.states, coded.digits
+    first, states = coded.options, coded.states
+    for digits, parameter in zip(coded.digits, coded.file.parameters, strict=True):
+        if digits.is_series or digits.is_constant:
+            raise parameter.refusal(f"FF, EX, TYP 90 to 99: a Fourier or Euler series {NO_NAME}")
     reasons = {
-        "FF, EX, TYP 90 to 99: a Fourier or Euler series": any(d.is_series or d.is_constant for d in digits),
         f"IXX = {first.ixx}: a sum of angular momenta that is held for conserved": first.ixx != 0,
         f"IAX = {first.iax}: a total spin of three nuclei with unlike weights": any(
             s.equivalent == 3 and s.plus != s.minus for s in states

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -136,6 +137,15 @@ def read_code(line: Line, start: int = 0) -> tuple[list[Word], int]:
 
 def _ends(text: str, at: int) -> bool:
     return at == len(text) or text[at] in _GAP + ",/"
+
+
+@contextmanager
+def expecting(rule: str) -> Iterator[None]:
+    """Reading what has a rule, which errors state behind what is wrong."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{error}; {rule}") from None
 
 
 def number(line: Line, words: Sequence[Word], index: int, name: str, default: float | None = None) -> float:

@@ -85,8 +85,10 @@ def read_int(source: str | os.PathLike[str] | bytes) -> IntensityFile:
 
 
 def _request(line: Line) -> Request:
-    words, _ = freeform.read_words(line, 0, len(_REQUEST))
-    values = freeform.numbers(line, words, _REQUEST, _NAMES)
+    names = " ".join(_NAMES.get(key, key.upper()) for key in _REQUEST)
+    with freeform.expecting(f"line 2, behind a title, is {names}"):
+        words, _ = freeform.read_words(line, 0, len(_REQUEST))
+        values = freeform.numbers(line, words, _REQUEST, _NAMES)
     for key in ("str0", "str1"):
         if values[key] > MOST_LOG10:
             raise line.error(

@@ -331,7 +331,8 @@ def _fields(line: Line, width: int) -> tuple[int, ...]:
         except ValueError as error:
             if BLANK in quanta:
                 break
-            raise line.error(column, f"quantum number reads {part!r}; {error}") from None
+            rule = "quantum numbers fill three columns each, from the first column on"
+            raise line.error(column, f"quantum number reads {part!r}; {error}; {rule}") from None
     while quanta and quanta[-1] == BLANK:
         quanta.pop()
     return tuple(quanta)

@@ -30,6 +30,11 @@ class _Field(NamedTuple):
     read: Callable[[str], Any]
     may_be_blank: bool = False
 
+    @property
+    def with_columns(self) -> str:
+        """The name with the columns, counted from 1."""
+        return f"{self.name} (columns {self.part.start + 1} to {self.part.stop})"
+
     def number(self, text: str) -> Any:
         """The number in the text of the field."""
         return 0 if self.may_be_blank and not text.strip(" ") else self.read(text)
@@ -76,7 +81,7 @@ def read_record(line: Line) -> Columns:
         raise line.error(
             len(line.text), f"the line ends; FREQ to QNFMT fill columns 1 to {QUANTA}, quantum numbers follow"
         )
-    numbers = [line.read(field.part, field.name, field.number) for field in _FIELDS]
+    numbers = [line.read(field.part, field.with_columns, field.number) for field in _FIELDS]
     qnfmt = numbers[-1]
     if qnfmt < 0:
         raise line.error(QNFMT.start, f"QNFMT is {qnfmt}; it counts quantum numbers and is not negative")

@@ -17,6 +17,7 @@ from rotor.table import counted
 
 _LETTER = re.compile(r"[ \t]*(?:'([A-Za-z])'|([A-Za-z])?)")  # some write it in apostrophes
 _DIGIT = re.compile(r"[0-9]")
+_LIKE_PARAMETER = re.compile(r"[ \t]*-?\d+[ \t,]+[+-]?(?:\d|\.\d)")
 
 
 @dataclass(frozen=True)
@@ -153,12 +154,14 @@ def read_par(source: str | os.PathLike[str] | bytes) -> ParameterFile:
         name = lines[0].file if lines else source_name(source)
         raise ValueError(f"{name}: {counted(len(lines), 'line')}; expected a title, limits, options and parameters")
     header = _header(lines[1])
-    options = [_options(lines[2], Options())]
+    with freeform.expecting(f"this is the option line, CHR {' '.join(map(str.upper, _OPTIONS))}"):
+        options = [_options(lines[2], Options())]
     while options[-1].vsym < 0:
         at = 2 + len(options)
         if at == len(lines):
             raise lines[-1].error(0, "VSYM is negative, so that another option line should follow; the file ends here")
-        options.append(_options(lines[at], options[0]))
+        with freeform.expecting("VSYM below 0 in the line before says that this is another option line"):
+            options.append(_options(lines[at], options[0]))
 
     first = 2 + len(options)
     end = first
@@ -208,11 +211,15 @@ def _parameter(line: Line) -> Parameter:
 
 
 def npar_notes(file: ParameterFile) -> list[str]:
-    """A note for a file with fewer parameters than NPAR says."""
-    count = len(file.parameters)
-    if file.header.npar <= count:
-        return []
-    return [f"NPAR = {file.header.npar}, but the file has {counted(count, 'parameter')}: all count"]
+    """A note for a file with fewer parameters than NPAR says, or with another one behind them."""
+    count, behind = len(file.parameters), file.rest.partition("\n")[0]
+    if file.header.npar > count:
+        return [f"NPAR = {file.header.npar}, but the file has {counted(count, 'parameter')}: all count"]
+    if _LIKE_PARAMETER.match(behind):
+        return [
+            f"NPAR = {file.header.npar}: the line behind so many parameters, {' '.join(behind.split())}, does not count"
+        ]
+    return []
 
 
 def format_par(file: ParameterFile) -> bytes:

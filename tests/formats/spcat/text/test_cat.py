@@ -239,11 +239,11 @@ def test_what_has_no_place_in_a_line_is_refused(column, value, words):
     ("wrong", "words"),
     [
         (LINE[:52] + b"\n", "line 2, column 53: the line ends"),
-        (b"x" + LINE[1:], r"line 2, column 1: FREQ reads 'x"),
+        (b"x" + LINE[1:], r"line 2, column 1: FREQ \(columns 1 to 13\) reads 'x"),
         (LINE[:4] + b" " + LINE[5:], "column 1: FREQ .*blank inside"),
         (b" " * 13 + LINE[13:], "column 1: FREQ"),
         (LINE[:21] + b" " * 8 + LINE[29:], "column 22: LGINT"),
-        (LINE[:41] + b"a02" + LINE[44:], "column 42: GUP reads 'a02'"),
+        (LINE[:41] + b"a02" + LINE[44:], r"column 42: GUP \(columns 42 to 44\) reads 'a02'"),
         (LINE[:55] + b"1 " + LINE[57:], "column 56: quantum number reads '1 '"),
         (LINE[:55] + b"  " + LINE[57:], "column 56: blank, but QNFMT 101 says that 1"),
         (LINE[:30] + b"\t" + LINE[31:], "column 31: byte 0x09"),
