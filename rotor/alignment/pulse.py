@@ -26,14 +26,14 @@ from numpy.typing import ArrayLike
 from rotor import units
 from rotor.arrays import Floats
 from rotor.checks import Renamed
-from rotor.requests.field import REQUIRED, declared
+from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.readers import Custom, Numbers, Quantity
 
 Complexes = np.typing.NDArray[np.complex128]
 Axis = tuple[complex, complex, complex]
 
 Z_AXIS: Axis = (0.0, 0.0, 1.0)
-HIGHEST_W_PER_CM2 = 1e17  # far beyond the ionisation of any molecule
+INTENSITY = Quantity("W/cm2", least=0, most=1e17)  # the bound is far beyond the ionisation of any molecule
 HIGHEST_KV_PER_CM = 1e6  # 10 V/Å: molecules are ionised below 1 V/Å; models of kicks may go beyond that
 # 2π I/(cħ) in rad/ps for 1 Å³ and 1 W/cm²; Å³ → m³ 1e-30, W/cm² → W/m² 1e4, 1/s → 1/ps 1e-12
 RAD_PER_PS_ANGSTROM3_W_PER_CM2 = (
@@ -87,6 +87,10 @@ class Pulse(ABC):
 
     acts_on: ClassVar[str]  # "polarizability" or "dipole"
 
+    def __post_init__(self) -> None:
+        check_fields(self)
+        object.__setattr__(self, "axis", polarization(self.axis))
+
     @property
     @abstractmethod
     def window_ps(self) -> tuple[float, float]:
@@ -137,28 +141,6 @@ def elliptical(ratio: float) -> Axis:
     return polarization([1j * math.sqrt(ratio), 0, 1])
 
 
-def checked_intensity(intensity: float) -> float:
-    """Check an intensity in W/cm²; ValueError if it is negative, infinite or above 1e17 W/cm²."""
-    if not (math.isfinite(intensity) and 0 <= intensity <= HIGHEST_W_PER_CM2):
-        raise ValueError(
-            f"intensity {intensity:g} W/cm²: a number from 0 to {HIGHEST_W_PER_CM2:g} W/cm² is expected; check the unit"
-        )
-    return float(intensity)
-
-
-def checked_duration(duration_ps: float, what: str) -> float:
-    """Check a duration in ps; ValueError unless it is above zero."""
-    if not (math.isfinite(duration_ps) and duration_ps > 0):
-        raise ValueError(f"{what} {duration_ps:g} ps: a finite time above 0 is expected")
-    return float(duration_ps)
-
-
-def _checked_time(time_ps: float) -> float:
-    if not math.isfinite(time_ps):
-        raise ValueError(f"middle of a pulse {time_ps} ps: a finite time is expected")
-    return float(time_ps)
-
-
 @dataclass(frozen=True)
 class GaussianPulse(Pulse):
     """I(t) = I0 exp(-4 ln2 (t-t0)²/τ²): `fwhm_ps` is the full width at half maximum of the intensity.
@@ -170,24 +152,12 @@ class GaussianPulse(Pulse):
 
     acts_on: ClassVar[str] = "polarizability"
 
-    peak_w_per_cm2: float = declared(
-        REQUIRED,
-        Quantity("W/cm2", least=0, most=HIGHEST_W_PER_CM2),
-        "Peak intensity (W/cm2)",
-        "peak",
-        example="1e13 W/cm2",
-    )
+    peak_w_per_cm2: float = declared(REQUIRED, INTENSITY, "Peak intensity (W/cm2)", "peak", example="1e13 W/cm2")
     fwhm_ps: float = declared(
         REQUIRED, Quantity("ps", above=0), "Full width at half maximum of the intensity (ps)", "fwhm", example="1 ps"
     )
     centre_ps: float = declared(0.0, Quantity("ps"), "Time of the peak (ps)", "centre")
     axis: Axis = axis_field()
-
-    def __post_init__(self) -> None:
-        checked_intensity(self.peak_w_per_cm2)
-        checked_duration(self.fwhm_ps, "width of a pulse")
-        _checked_time(self.centre_ps)
-        object.__setattr__(self, "axis", polarization(self.axis))
 
     @property
     def window_ps(self) -> tuple[float, float]:
@@ -209,13 +179,7 @@ class SwitchedPulse(Pulse):
 
     acts_on: ClassVar[str] = "polarizability"
 
-    peak_w_per_cm2: float = declared(
-        REQUIRED,
-        Quantity("W/cm2", least=0, most=HIGHEST_W_PER_CM2),
-        "Peak intensity (W/cm2)",
-        "peak",
-        example="1e12 W/cm2",
-    )
+    peak_w_per_cm2: float = declared(REQUIRED, INTENSITY, "Peak intensity (W/cm2)", "peak", example="1e12 W/cm2")
     rise_ps: float = declared(REQUIRED, Quantity("ps", least=0), "Rise (ps)", "rise", example="1 ps")
     plateau_ps: float = declared(REQUIRED, Quantity("ps", least=0), "Plateau (ps)", "plateau", example="10 ps")
     fall_ps: float = declared(REQUIRED, Quantity("ps", least=0), "Fall (ps)", "fall", example="1 ps")
@@ -223,13 +187,9 @@ class SwitchedPulse(Pulse):
     axis: Axis = axis_field()
 
     def __post_init__(self) -> None:
-        checked_intensity(self.peak_w_per_cm2)
-        _checked_time(self.start_ps)
-        for what, value in (("rise", self.rise_ps), ("plateau", self.plateau_ps), ("fall", self.fall_ps)):
-            if not (math.isfinite(value) and value >= 0):
-                raise ValueError(f"{what} of a switched pulse {value:g} ps: a finite time of 0 or more is expected")
-        checked_duration(self.rise_ps + self.plateau_ps + self.fall_ps, "duration of a switched pulse")
-        object.__setattr__(self, "axis", polarization(self.axis))
+        super().__post_init__()
+        if not self.rise_ps + self.plateau_ps + self.fall_ps > 0:
+            raise ValueError("rise_ps, plateau_ps, fall_ps: 0 ps in all: expected a finite time above 0")
 
     @property
     def breaks_ps(self) -> tuple[float, ...]:
@@ -270,12 +230,15 @@ class TabulatedPulse(Pulse):
                 f"table of a pulse: expected as many intensities as times, 2 or more; got {times.shape}, {values.shape}"
             )
         if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
-            raise ValueError("the times of a pulse's table must be finite and rise")
-        for value in (values.min(), values.max()):
-            checked_intensity(float(value))
+            raise ValueError("times_ps: expected finite times that rise")
+        try:
+            for value in (values.min(), values.max()):
+                INTENSITY.check(float(value))
+        except ValueError as error:
+            raise ValueError(f"intensities_w_per_cm2: {error}") from None
         object.__setattr__(self, "times_ps", times)
         object.__setattr__(self, "intensities_w_per_cm2", values)
-        object.__setattr__(self, "axis", polarization(self.axis))
+        super().__post_init__()
 
     @property
     def breaks_ps(self) -> tuple[float, ...]:
@@ -316,12 +279,6 @@ class Kick(Pulse):
     time_ps: float = declared(0.0, Quantity("ps"), "Time (ps)", "time")
     axis: Axis = axis_field()
 
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.fluence_j_per_cm2) and self.fluence_j_per_cm2 >= 0):
-            raise ValueError(f"fluence {self.fluence_j_per_cm2} J/cm²: a finite number of 0 or more is expected")
-        _checked_time(self.time_ps)
-        object.__setattr__(self, "axis", polarization(self.axis))
-
     @classmethod
     def from_strength(cls, p: float, anisotropy_angstrom3: float, time_ps: float = 0.0) -> Kick:
         """The kick with P = `p` for a linear molecule with this polarizability anisotropy."""
@@ -354,7 +311,13 @@ class DipolePulse(Pulse):
 
     acts_on: ClassVar[str] = "dipole"
 
-    peak_kv_per_cm: float = declared(REQUIRED, Quantity("kV/cm"), "Peak field (kV/cm)", "peak", example="100 kV/cm")
+    peak_kv_per_cm: float = declared(
+        REQUIRED,
+        Quantity("kV/cm", least=-HIGHEST_KV_PER_CM, most=HIGHEST_KV_PER_CM),
+        "Peak field (kV/cm)",
+        "peak",
+        example="100 kV/cm",
+    )
     fwhm_ps: float = declared(
         REQUIRED, Quantity("ps", above=0), "Full width of the envelope (ps)", "fwhm", example="1 ps"
     )
@@ -365,20 +328,9 @@ class DipolePulse(Pulse):
     shape: Callable[[Floats], Floats] | None = None
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.peak_kv_per_cm) and abs(self.peak_kv_per_cm) <= HIGHEST_KV_PER_CM):
-            raise ValueError(
-                f"field {self.peak_kv_per_cm:g} kV/cm: a number up to {HIGHEST_KV_PER_CM:g} kV/cm is expected; check the unit"
-            )
-        if not (math.isfinite(self.frequency_thz) and self.frequency_thz >= 0.0):
-            raise ValueError(
-                f"frequency {self.frequency_thz:g} THz: expected a finite number of 0 or more; the phase reverses the field"
-            )
-        checked_duration(self.fwhm_ps, "width of a pulse")
-        _checked_time(self.centre_ps)
-        axis = polarization(self.axis)
-        if np.array(axis).imag.any():
-            raise ValueError(f"a field that acts on the dipole has a real direction; got {axis}")
-        object.__setattr__(self, "axis", axis)
+        super().__post_init__()
+        if np.array(self.axis).imag.any():
+            raise ValueError(f"a field that acts on the dipole has a real direction; got {self.axis}")
 
     @property
     def window_ps(self) -> tuple[float, float]:

@@ -225,7 +225,7 @@ def check_fields(request: Any) -> None:
     for name, field in declared_fields(structure).items():
         value, check = getattr(request, name), getattr(field.reader, "check", None)
         try:
-            if value is not None and check is not None:
+            if check is not None and not (value is None and (field.default is None or field.none)):
                 check(value)
         except TypeError:
             raise ValueError(f"{name}: {value!r}: expected a number") from None

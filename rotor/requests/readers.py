@@ -150,8 +150,9 @@ class Quantity(Reader):
 
     def check(self, value: float, typed: Any = None) -> None:
         """ValueError for a number out of bounds; typed: the text to quote."""
+        finite = math.isfinite(value)  # a TypeError for a text
         text = typed if isinstance(typed, str) else f"{value:g}"
-        if not math.isfinite(value):
+        if not finite:
             raise ValueError(f"{text}: expected a finite number")
         low, high = self._ends
         if (low is not None and (value < low or value == self.above)) or (

@@ -155,7 +155,7 @@ def withheld(answer: FitAnswer, names: Sequence[str]) -> dict[str, str]:
     reasons = {}
     if fit.constants is None and "toml" in names:
         reasons["toml"] = "spins or several states; the .par and .var hold everything"
-    for name in {"par", "var"} & set(names):
+    for name in (name for name in ("par", "var") if name in names):
         try:
             fitted_par(answer, variances=name == "var")
         except ValueError as error:

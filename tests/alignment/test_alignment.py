@@ -424,13 +424,16 @@ def test_a_long_elliptical_pulse_takes_the_j_that_it_needs():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: GaussianPulse(-1e12, 1.0), "intensity -1e\\+12"),
-        (lambda: GaussianPulse(1e30, 1.0), "check the unit"),
-        (lambda: GaussianPulse(1e12, 0.0), "width of a pulse"),
-        (lambda: SwitchedPulse(1e12, -1.0, 0.0, 1.0), "rise"),
+        (lambda: GaussianPulse(-1e12, 1.0), "peak_w_per_cm2: -1e\\+12: expected a number from 0 to 1e\\+17 W/cm2"),
+        (lambda: GaussianPulse(1e30, 1.0), "peak_w_per_cm2: 1e\\+30: expected a number from 0 to 1e\\+17 W/cm2"),
+        (lambda: GaussianPulse(1e12, 0.0), "fwhm_ps: 0: expected a finite number above 0 ps"),
+        (lambda: SwitchedPulse(1e12, -1.0, 0.0, 1.0), "rise_ps: -1: expected"),
+        (lambda: SwitchedPulse(1e12, 0.0, 0.0, 0.0), "plateau_ps, fall_ps: 0 ps in all"),
         (lambda: TabulatedPulse([0, 1, 1], [0, 1e12, 0]), "rise"),
-        (lambda: TabulatedPulse([0, 1], [0, -1e12]), "intensity"),
-        (lambda: DipolePulse(1e9, 1.0), "check the unit"),
+        (lambda: TabulatedPulse([0, 1], [0, -1e12]), "intensities_w_per_cm2: -1e\\+12: expected a number from 0"),
+        (lambda: DipolePulse(1e9, 1.0), "peak_kv_per_cm: 1e\\+09: expected a number from -1e\\+06 to 1e\\+06 kV/cm"),
+        (lambda: DipolePulse(1.0, 1.0, frequency_thz=-1.0), "frequency_thz: -1: expected"),
+        (lambda: Kick(-1.0), "fluence_j_per_cm2: -1: expected"),
         (lambda: DipolePulse(1.0, 1.0, axis=(1, 1j, 0)), "real direction"),
         (lambda: elliptical(-1.0), "ratio"),
         (lambda: align(OCS, GaussianPulse(1e12, 10.0), [0.0, 5.0]), "give later times, or a shorter pulse"),
@@ -482,7 +485,7 @@ def test_planar_cosine_of_an_asymmetric_top_goes_over_into_that_of_a_symmetric_o
 @pytest.mark.parametrize(
     ("make", "said"),
     [
-        (lambda: DipolePulse(1e7, 1.0), "field 1e.07 kV/cm: a number up to 1e.06"),  # 1e12 V/m
+        (lambda: DipolePulse(1e7, 1.0), "peak_kv_per_cm: 1e.07: expected a number from -1e.06"),  # 1e12 V/m
         (lambda: align(OCS, GaussianPulse(1e16, 1.0), [10.0], state={"j": 0}), "the pulses need J up to about 14"),
     ],
 )

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 HIGHEST_KV_PER_CM = 1e5  # 1 V/Å is 1e5 kV/cm: molecules are ionised
-HIGHEST_W_PER_CM2 = 1e17
+INTENSITY = Quantity("W/cm2", least=0, most=1e17, metavar="I")  # of light; no molecule survives more
 DEFAULT_TOLERANCE_MHZ = 1e-6
 ELECTRIC = FieldKind(
     "kV/cm", "fields_kv_per_cm", "field_kv_per_cm", "mu_eff_debye", units.MHZ_PER_DEBYE_KV_PER_CM, HIGHEST_KV_PER_CM
@@ -164,10 +164,6 @@ def acting(
     Each of several states has its dipole; dipoles between states act too.
     """
     name = top.name or "this top"
-    if not 0 <= intensity_w_per_cm2 <= HIGHEST_W_PER_CM2:
-        raise ValueError(
-            f"intensity_w_per_cm2: {intensity_w_per_cm2:g} W/cm²: expected a number from 0 to {HIGHEST_W_PER_CM2:g}"
-        )
     if top.kind == "spherical":
         raise ValueError(
             f"{name} is a spherical top: it has no dipole and no anisotropy, so that a field does not split its levels"
@@ -226,7 +222,7 @@ class StarkRequest:
         "observables.m", common=True, example=[0, 1],
     )  # fmt: skip
     intensity_w_per_cm2: float = declared(
-        0.0, Quantity("W/cm2", metavar="I"), "Of a laser along Z, far from resonance (W/cm2)", "conditions.intensity"
+        0.0, INTENSITY, "Of a laser along Z, far from resonance (W/cm2)", "conditions.intensity"
     )
     direction: tuple[float, float, float] = declared(
         Z, Custom(read_direction, list, "ANGLE", list[float] | float | str),
