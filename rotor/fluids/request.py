@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.checks import require_choice, require_positive, require_whole
+from rotor.checks import require_positive, require_whole
 from rotor.fluids.engines.results import ENGINES
 from rotor.fluids.equilibration import Equilibration, equilibrate
 from rotor.fluids.forces.models import find_model, find_models, model_shapes
@@ -20,7 +20,7 @@ from rotor.fluids.run import Outputs, Progress, bodies_and_degrees, make_calcula
 from rotor.fluids.settings import Settings
 from rotor.fluids.summary import Mean, conserved, means
 from rotor.requests.budget import ErrorBudget
-from rotor.requests.field import declared, identical, part
+from rotor.requests.field import check_fields, declared, identical, part
 from rotor.requests.readers import Text, Whole
 from rotor.table import TextOf
 from rotor.units import ATOMIC_MASS_KG
@@ -76,10 +76,9 @@ class FluidRequest:
     box_equilibration_ps: float | None = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if self.box_equilibration_ps:
             require_positive("box_equilibration_ps", self.box_equilibration_ps, "ps")
-        require_whole("threads", self.threads, 1)
-        require_choice("engine", self.engine, ("rotor", *ENGINES))
         models = find_models(self.settings.model)
         if isinstance(self.box, NewBox) and len(models) > 1:
             raise ValueError(

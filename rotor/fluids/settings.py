@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
-from rotor.requests.field import declared
+from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Custom, Quantity, Text, Whole
 
 ENSEMBLES = ("nve", "langevin", "nose-hoover")
@@ -21,7 +20,7 @@ def _read_model(text: Any) -> str:
     return str(text)
 
 
-LARGEST = 1e30  # largest number in any setting: higher powers must not overflow
+LARGEST = 1e30  # powers of larger settings overflow
 
 
 @dataclass(frozen=True)
@@ -54,21 +53,27 @@ class Settings:
         common=True,
     )
     step_fs: float = declared(
-        2.0, Quantity("fs", above=0, metavar="T"), "Length of a step (fs)", "numerics.step", common=True
+        2.0, Quantity("fs", above=0, most=LARGEST, metavar="T"), "Length of a step (fs)", "numerics.step", common=True
     )
     steps: int = declared(1000, Whole(0), "How many steps", "conditions.steps", common=True)
     every: int = declared(10, Whole(1), "Steps between rows", "conditions.every", common=True)
     cutoff_angstrom: float = declared(
-        9.0, Quantity("Å", above=0, metavar="R"), "Of Lennard-Jones and of charges in real space (Å)", "numerics.cutoff"
+        9.0,
+        Quantity("Å", above=0, most=LARGEST, metavar="R"),
+        "Of Lennard-Jones and of charges in real space (Å)",
+        "numerics.cutoff",
     )
     electrostatics: str = declared(
         "reaction-field", Text(ELECTROSTATICS, "NAME"), "reaction-field, ewald or shifted", "numerics.electrostatics"
     )
     friction_per_ps: float = declared(
-        1.0, Quantity("1/ps", above=0, metavar="F"), "Of langevin (1/ps)", "conditions.friction"
+        1.0, Quantity("1/ps", above=0, most=LARGEST, metavar="F"), "Of langevin (1/ps)", "conditions.friction"
     )
     relaxation_fs: float = declared(
-        100.0, Quantity("fs", above=0, metavar="T"), "Time constant of nose-hoover (fs)", "conditions.relaxation"
+        100.0,
+        Quantity("fs", above=0, most=LARGEST, metavar="T"),
+        "Time constant of nose-hoover (fs)",
+        "conditions.relaxation",
     )
     seed: int = declared(1, Whole(0), "Of the lattice, the velocities and the noise", "numerics.seed")
     ewald_tolerance: float = declared(
@@ -76,20 +81,4 @@ class Settings:
     )
 
     def __post_init__(self) -> None:
-        for name in ("temperature_k", "step_fs", "cutoff_angstrom", "friction_per_ps", "relaxation_fs"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} = {value}: expected a number above 0")
-            if value > LARGEST:
-                raise ValueError(f"{name} = {value}: expected at most {LARGEST:g}; its powers overflow")
-        if not 1e-14 < self.ewald_tolerance < 1.0:
-            raise ValueError(f"ewald_tolerance = {self.ewald_tolerance}: expected a number between 1e-14 and 1")
-        for name, least in (("steps", 0), ("every", 1), ("seed", 0)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name} = {getattr(self, name)}: expected at least {least}")
-        if self.ensemble not in ENSEMBLES:
-            raise ValueError(f"{self.ensemble!r} is no ensemble; there are {', '.join(ENSEMBLES)}")
-        if self.electrostatics not in ELECTROSTATICS:
-            raise ValueError(
-                f"{self.electrostatics!r}: expected a treatment of charges, one of {', '.join(ELECTROSTATICS)}"
-            )
+        check_fields(self)

@@ -66,11 +66,15 @@ class Text(Reader):
 
     def read(self, raw: Any) -> str:
         """The text."""
-        if not isinstance(raw, str):
-            raise ValueError(f"{raw!r}: expected a text")
-        if self.words and raw not in self.words:
-            raise ValueError(f"{raw!r}: expected one of {', '.join(self.words)}")
-        return raw
+        self.check(raw)
+        return str(raw)
+
+    def check(self, value: Any) -> None:
+        """ValueError for a value that is no text or none of the words."""
+        if not isinstance(value, str):
+            raise ValueError(f"{value!r}: expected a text")
+        if self.words and value not in self.words:
+            raise ValueError(f"{value!r}: expected one of {', '.join(self.words)}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -15,7 +15,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints
-from rotor.checks import require_choice, require_top
+from rotor.checks import require_top
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.limits import all_limits, limit_facts, populated_j
@@ -167,7 +167,6 @@ class SpectrumRequest:
         self._check_shape()
 
     def _check_shape(self) -> None:
-        require_choice("profile", self.shape, PROFILES)
         if self.shape == "sticks" and self.fwhm_mhz is not None:
             raise ValueError("fwhm_mhz: sticks have no width; leave it out or choose another profile")
         if self.shape == "sticks" and self.layer is not None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.checks import require_choice
 from rotor.quantum.effects.stark import StarkRequest
 from rotor.requests.field import CONDITIONS, OBSERVABLES, Rule, check_fields, declared
 from rotor.requests.readers import Custom, Quantity, Range, Text
@@ -107,7 +106,6 @@ class FieldSample:
     def __post_init__(self) -> None:
         light_components(self.light)
         check_fields(self)
-        require_choice("populations", self.populations, POPULATIONS)
         if self.range_mhz is not None and not 0 <= self.range_mhz[0] < self.range_mhz[1]:
             raise ValueError(f"range_mhz: {self.range_mhz}: expected two rising frequencies")
 
