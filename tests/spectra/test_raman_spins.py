@@ -38,7 +38,10 @@ def both(top: Top, constants: str, spins: str | None = None, jmax: int = 4) -> t
 
 def by_rotation(lines: RamanLines) -> dict[tuple[int, ...], tuple[float, float]]:
     """Strength and cross section between two rotational levels."""
-    numbers = ["n" if "n" in lines.levels.quanta else "j", *({"k", "ka", "kc"} & set(lines.levels.quanta))]
+    numbers = [
+        "n" if "n" in lines.levels.quanta else "j",
+        *(name for name in ("k", "ka", "kc") if name in lines.levels.quanta),
+    ]
     rows = np.column_stack([lines.levels.quanta[n][rows] for rows in (lines.initial, lines.final) for n in numbers])
     results: dict[tuple[int, ...], tuple[float, float]] = {}
     for key, *values in zip(
