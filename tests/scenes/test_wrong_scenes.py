@@ -84,7 +84,10 @@ def test_a_point_of_a_sweep_that_cannot_be_costs_itself(call, folder):
 OPTIONS = [
     (["stark", "OCS", "--field", "1kV/cm", "--m", "7"], "--m: [7]"),
     (["stark", "OCS", "--field", "1kV/cm", "--states", "101"], "--states: states up to J = 101"),
-    (["stark", "OCS", "--field", "1kV/cm", "--intensity", "-1 W/cm2"], "--intensity: -1 W/cm2: expected a number from 0"),
+    (
+        ["stark", "OCS", "--field", "1kV/cm", "--intensity", "-1 W/cm2"],
+        "--intensity: -1 W/cm2: expected a number from 0",
+    ),
     (["stark", "OCS", "--field", "1e9kV/cm"], "--field: a field of 1e+09 kV/cm"),
     (["zeeman", "HC3N", "--field", "1T", "--g", "nan"], "--g: 'nan' is not a number"),
     (["align", "OCS", "--pulse", "1e12 W/cm2, 1 ps", "--m", "3"], "--m: 3 belongs to one state"),
