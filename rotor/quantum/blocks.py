@@ -14,7 +14,7 @@ A level is named by its block and its rank in it, and stands in all arrays at th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise, product
 from typing import Any, NamedTuple
@@ -48,6 +48,7 @@ class LinearBlocks:
 
     labels: quantum numbers of the functions. block, rank: (functions,) number of each function's block, and its place in it; -1 for
     functions of blocks that are left out. members, blocks: by number, the rows of the functions of a block, in order, and its elements.
+    states: energies (n,) and vectors (size, n) by number, of blocks that `solve` has solved at some values.
     """
 
     labels: dict[str, Ints]
@@ -55,9 +56,10 @@ class LinearBlocks:
     rank: Ints
     members: dict[int, Ints]
     blocks: dict[int, LinearBlock]
+    states: dict[int, tuple[Floats, NDArray[Any]]] = field(default_factory=dict, repr=False)
 
-    def solve(self, coefficients: ArrayLike, mostly_in: NDArray[np.bool_] | None = None) -> SolvedBlocks:
-        """All blocks solved at coefficients (terms,).
+    def solve(self, coefficients: ArrayLike, mostly_in: NDArray[np.bool_] | None = None) -> LinearBlocks:
+        """These blocks with their states at coefficients (terms,).
 
         mostly_in: some of the functions (functions,), of which each block has as many states with the largest shares in them solved, where
         this is faster than all.
@@ -69,7 +71,7 @@ class LinearBlocks:
             if chosen is not None and is_dominated(block.size, len(chosen)):
                 few = dominated_states(block.sparse(values), chosen)
             states[number] = few or eigenstates(block.lower(values))
-        return SolvedBlocks(self, states)
+        return replace(self, states=states)
 
     def between_blocks(self, elements: Elements, blocks: Ints | None = None) -> dict[tuple[int, int], Entries]:
         """Elements of operators between the functions of blocks, by default of all, by the numbers of the blocks of rows and columns."""
@@ -94,34 +96,21 @@ class LinearBlocks:
             energies[rows] = eigenvalues(self.blocks[number].lower(values))
         return energies
 
-
-@dataclass(frozen=True, eq=False)
-class SolvedBlocks:
-    """Linear blocks solved at some values: energies (n,) and vectors (size, n) by the number of a block."""
-
-    linear: LinearBlocks
-    states: dict[int, tuple[Floats, NDArray[Any]]]
-
     @cached_property
-    def energies(self) -> Floats:
-        """Energies (functions,) at the row of the function of the same rank; nan for states that were not solved."""
-        energies = np.full(len(self.linear.block), np.nan)
+    def energies_mhz(self) -> Floats:
+        """Energies (functions,) of the states at the row of the function of the same rank; nan for states that were not solved."""
+        energies = np.full(len(self.block), np.nan)
         for number, (values, _) in self.states.items():
-            energies[self.linear.members[number][: len(values)]] = values
+            energies[self.members[number][: len(values)]] = values
         return energies
-
-    def vectors(self, block: int) -> tuple[Ints, NDArray[Any]]:
-        """The rows of a block's functions, and its eigenvectors in columns."""
-        return self.linear.members[block], self.states[block][1]
 
     def slopes_of(self, elements: Elements, levels: Ints) -> Floats:
         """⟨ψ|O|ψ⟩ (levels, operators) of the levels at these rows, of Hermitian operators between the functions of these blocks."""
-        linear = self.linear
-        slopes, blocks = np.zeros((len(levels), len(elements.values))), linear.block[levels]
-        entries = linear.between_blocks(elements, np.unique(blocks))
+        slopes, blocks = np.zeros((len(levels), len(elements.values))), self.block[levels]
+        entries = self.between_blocks(elements, np.unique(blocks))
         for block in {up for up, low in entries if up == low}:  # blocks of H may be finer than those of O
             chosen = np.flatnonzero(blocks == block)
-            vectors = self.vectors(block)[1][:, None, linear.rank[levels[chosen]]]
+            vectors = self.states[block][1][:, None, self.rank[levels[chosen]]]
             slopes[chosen] = expectations(entries, {block: vectors}, len(elements.values))
         return slopes
 

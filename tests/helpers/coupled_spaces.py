@@ -90,12 +90,11 @@ def _moved(entries, part_of, vectors):
     return out
 
 
-def contracted_elements(solved, tensors):
-    """The eigenfunctions of linear blocks of one J each as a space; tensors: rank and reduced elements by name."""
-    linear = solved.linear
+def contracted_elements(linear, tensors):
+    """The eigenfunctions of solved linear blocks of one J each as a space; tensors: rank and reduced elements by name."""
     present = list(linear.members)
-    states = [solved.vectors(block) for block in present]
-    sectors = [Sector(2 * int(linear.labels["J"][rows[0]]), solved.energies[rows]) for rows, _ in states]
+    states = [(linear.members[block], linear.states[block][1]) for block in present]
+    sectors = [Sector(2 * int(linear.labels["J"][rows[0]]), linear.energies_mhz[rows]) for rows, _ in states]
     number = {block: i for i, block in enumerate(present)}
     reduced = {}
     for name, (rank, elements) in tensors.items():

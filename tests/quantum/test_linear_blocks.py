@@ -149,7 +149,7 @@ def test_slopes_are_those_of_finite_differences_and_sum_to_the_energy():
     solved = blocks.solve(values)
     slopes = solved.slopes_of(basis.elements(list(terms.values())), rows)
     assert np.allclose(
-        slopes @ values, solved.energies[rows], rtol=1e-11
+        slopes @ values, solved.energies_mhz[rows], rtol=1e-11
     )  # Euler's theorem, rounding of sums of 8 terms
     for i, value in enumerate(values):
         step = 1e-3 * abs(value)
@@ -296,11 +296,11 @@ def test_a_toy_effect_of_one_operator_reaches_levels_slopes_spins_and_fields():
     blocks = linear_blocks(basis, terms | {"toy": toy})
     solved = blocks.solve([*values, 2.0])
     for j in range(1, 9):
-        ours = np.sort(solved.energies[blocks.labels["J"] == j])
+        ours = np.sort(solved.energies_mhz[blocks.labels["J"] == j])
         assert np.abs(ours - np.sort(levels.energy_mhz[levels.quanta["j"] == j])).max() <= ROUNDING * ours.max()
     rows = np.arange(len(blocks.block))
     slopes = solved.slopes_of(basis.elements([*terms.values(), toy]), rows)
-    assert np.allclose(slopes @ [*values, 2.0], solved.energies, atol=1e-8)  # rounding of 1e6 MHz
+    assert np.allclose(slopes @ [*values, 2.0], solved.energies_mhz, atol=1e-8)  # rounding of 1e6 MHz
     vector = body_tensor(spherical_components([1.0, 0.0, 0.0], 1, "Ir"))
     space = contracted(solved, basis, {"chi": quadrupole(CL, "35Cl"), "mu": (1, vector)})
     hyperfine = coupled(space, spin_space(3), {"chi": ("chi", "Q")}, {"mu": ("mu", 1)}, range(1, 8, 2)).solve(

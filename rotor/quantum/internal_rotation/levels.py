@@ -100,11 +100,10 @@ class TorsionMoments(SpeciesMoments):
     @cached_property
     def states(self) -> dict[int, tuple[Ints, NDArray[Any]]]:
         """Rows of the levels of each block, and their vectors over its functions."""
-        species, linear = self.levels, self.levels.solved.linear
-        number_of = linear.block[species.rows]
+        species, solved = self.levels, self.levels.solved
+        number_of = solved.block[species.rows]
         rows = {number: species.rows[number_of == number] for number in species.blocks}
-        vectors = species.solved.vectors
-        return {number: (r, vectors(number)[1][:, linear.rank[r]]) for number, r in rows.items() if len(r)}
+        return {number: (r, solved.states[number][1][:, solved.rank[r]]) for number, r in rows.items() if len(r)}
 
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of mixtures of states, by the constants of the top and of the internal rotor."""
@@ -122,7 +121,7 @@ class TorsionMoments(SpeciesMoments):
     def _terms(self) -> list[tuple[ByBlocks, int]]:
         """Elements of the terms, and of further operators, by pairs of blocks, and the number of operators."""
         operators = [self.levels.source.elements, *([] if self.further is None else [self.further])]
-        return [(self.levels.solved.linear.between_blocks(each), len(each.values)) for each in operators]
+        return [(self.levels.solved.between_blocks(each), len(each.values)) for each in operators]
 
     def _between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
         """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
@@ -142,7 +141,7 @@ class TorsionMoments(SpeciesMoments):
     def _entries(self, operator: Operator, rank: int, time_odd: bool = False) -> ByBlocks:
         """Reduced elements of a tensor of the rotation from J to J' ≥ J by pairs of blocks."""
         elements = self.levels.functions.elements([[Product(operator)]], rank, time_odd, half=True)
-        return self.levels.solved.linear.between_blocks(elements)
+        return self.levels.solved.between_blocks(elements)
 
 
 def _contracted(entries: Entries, bra: NDArray[Any], ket: NDArray[Any]) -> NDArray[Any]:
@@ -213,7 +212,7 @@ def energies_alone(
             populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
             if constants.tops > 2 and populated > MOST_POPULATED:
                 _refuse_long_sums((2 * jmax + 1) * constants.functions)
-            each = linear.solve([1.0], linear.labels["t"] < populated).energies
+            each = linear.solve([1.0], linear.labels["t"] < populated).energies_mhz
             solved = ~np.isnan(each)
         energies.append(each[solved])
         labels = {key: column[solved] for key, column in linear.labels.items()}
@@ -361,10 +360,10 @@ def species_rotors(moments: TorsionMoments, components: int) -> list[SolvedBlock
     """Blocks of one species with the states that are levels, in the order of its rows."""
     solved, blocks, places = moments.levels.solved, list[SolvedBlock](), Counter[int]()
     for number, (rows, vectors) in moments.states.items():
-        j = int(solved.linear.labels["J"][rows[0]])
+        j = int(solved.labels["J"][rows[0]])
         parts = (Part(0, SpeciesFunctions(j, number, places[j]), 0),)
         places[j] += 1
-        blocks.append(SolvedBlock(parts, solved.energies[rows], vectors, moments=moments, components=components))
+        blocks.append(SolvedBlock(parts, solved.energies_mhz[rows], vectors, moments=moments, components=components))
     return blocks
 
 

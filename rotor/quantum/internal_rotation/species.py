@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.elements import Elements
-from rotor.quantum.blocks import LinearBlocks, SolvedBlocks, blocks_of_elements
+from rotor.quantum.blocks import LinearBlocks, blocks_of_elements
 from rotor.quantum.internal_rotation.contracted import Product, Terms
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.labels import (
@@ -101,7 +101,7 @@ class SpeciesLevels:
     """Labelled levels of one species with v_t ≤ vt_max, by block in order of energy; `rows` are their places in the arrays of `solved`."""
 
     source: SpeciesHamiltonian
-    solved: SolvedBlocks
+    solved: LinearBlocks
     zeroth_order: Floats
     vt_max: int
     by_energy: bool = False
@@ -117,7 +117,7 @@ class SpeciesLevels:
         t = self.functions.labels["t"]
         rows, numbers, names = [], [], []
         for block in self.blocks:
-            members, vectors = self.solved.vectors(block)
+            members, (_, vectors) = self.solved.members[block], self.solved.states[block]
             v = torsional_numbers(vectors, t[members])
             if self.functions.torsion.sigma and self.functions.torsion.is_near_free:
                 name = named_by_overlap(v, t[members], vectors)
@@ -132,7 +132,7 @@ class SpeciesLevels:
     @property
     def blocks(self) -> list[int]:
         """Numbers of the blocks."""
-        return list(self.solved.linear.members)
+        return list(self.solved.members)
 
     @property
     def rows(self) -> Ints:
@@ -142,7 +142,7 @@ class SpeciesLevels:
     @property
     def energies(self) -> Floats:
         """Energies in MHz above the minimum of the torsional potential."""
-        return np.asarray(self.solved.energies[self.rows])
+        return np.asarray(self.solved.energies_mhz[self.rows])
 
     @cached_property
     def quanta(self) -> dict[str, Ints]:
