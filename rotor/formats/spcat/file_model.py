@@ -105,7 +105,7 @@ class Group:
         else:
             levels = solve_levels(self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,))
         levels = self.named(levels)
-        return replace(levels, weight=self._weights(levels))
+        return replace(levels, weight=self.weights(levels))
 
     def named(self, levels: Levels) -> Levels:
         """Levels as DIAG says: with its names or, where it is below 0, the functions of the basis with their diagonal elements."""
@@ -149,8 +149,8 @@ class Group:
         totals = {"i_tot": labels[:, -2] // 2, "i_sym": labels[:, -3] // 2} if self.states[0].i_tot else {}
         return self._component_weights(v, ka, kc, kc if self.oblate else ka, totals) > 0
 
-    def _weights(self, levels: Levels) -> Ints:
-        """Weights of levels, summed over components."""
+    def weights(self, levels: Levels) -> Ints:
+        """Weights of levels in the file, summed over components."""
         total, v = np.zeros(len(levels), dtype=np.int64), levels.quantum("v")
         for ka, kc, k, alike in _components(levels, self.oblate):
             total += np.where(alike, self._component_weights(v, ka, kc, k, levels.quanta), 0)

@@ -14,7 +14,7 @@ from functools import cached_property, partial
 from rotor.formats.spcat import wavenumbers
 from rotor.formats.spcat.block_numbers import numbered_blocks
 from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, group_lines, group_transitions
-from rotor.formats.spcat.file_model import Group, connected_groups
+from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.file_quanta import quanta_format
 from rotor.formats.spcat.hamiltonian.labels import UNDIAGONALIZED_NOTE
 from rotor.formats.spcat.hamiltonian.states import file_states
@@ -25,7 +25,7 @@ from rotor.formats.spcat.prediction_notes import (
     full_basis_notes,
     request_notes,
 )
-from rotor.formats.spcat.solved_groups import highest_n, joined_lines, solved_groups
+from rotor.formats.spcat.solved_groups import SolvedGroup, highest_n, joined_lines, solved_groups
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
@@ -126,7 +126,7 @@ def predict(
         joined_lines(parameters, solved, [lines.transitions for lines in listed], form, request),
         request.qrot,
         request,
-        partial(_notes, parameters, intensities, as_spcat, full_basis, further, present),
+        partial(_notes, parameters, intensities, as_spcat, full_basis, further, without_vectors),
         lambda: as_level_list(without_vectors, form, numbered_blocks(parameters, present)),
     )
 
@@ -150,16 +150,17 @@ def _notes(
     as_spcat: bool,
     full_basis: bool,
     further: Iterable[str],
-    groups: list[Group],
+    solved: list[SolvedGroup],
 ) -> Iterator[str]:
     """The notes on the files and on their groups that have levels, then further ones."""
+    groups = [each.group for each in solved]
     highest = highest_n(parameters, intensities.request)
     yield from file_notes(parameters, intensities, as_spcat)
     if any(group.diag < 0 and not group.is_diagonal for group in groups):
         yield UNDIAGONALIZED_NOTE
     if any(state.is_cut for group in groups for state in group.states):
         whole = connected_groups(parameters, intensities, as_spcat=as_spcat, full_basis=True, highest_n=highest)
-        yield from basis_notes(groups, whole, intensities.request)
+        yield from basis_notes(solved, whole, intensities.request)
     yield from falling_diagonal_notes(groups, parameters.options[0].diag, highest)
     if full_basis:
         yield from full_basis_notes(file_states(parameters), highest)

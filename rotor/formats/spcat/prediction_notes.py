@@ -19,8 +19,10 @@ from rotor.formats.spcat.hamiltonian.dipole_codes import (
 )
 from rotor.formats.spcat.hamiltonian.phases import with_dipoles
 from rotor.formats.spcat.hamiltonian.states import StateOptions
+from rotor.formats.spcat.solved_groups import SolvedGroup
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile, npar_notes
+from rotor.quantum.levels import Levels
 
 SAME_MHZ = 1e-6  # round-off of energies
 
@@ -97,25 +99,26 @@ def _moment_notes(coded: CodedFile, intensities: IntensityFile, as_spcat: bool) 
     return notes
 
 
-def basis_notes(groups: list[Group], whole: list[Group], request: Request) -> list[str]:
+def basis_notes(solved: Iterable[SolvedGroup], whole: list[Group], request: Request) -> list[str]:
     """Levels that KNMIN and KNMAX exclude, and the shifts of the remaining levels.
 
-    groups: groups with the basis of the file. whole: groups with all K. request: highest F.
+    solved: groups with the basis of the file, and their levels. whole: groups with all K. request: highest F.
     Returns: one sentence for each group whose basis is cut.
     """
     notes = []
-    for group in [group for group in groups if any(state.is_cut for state in group.states)]:
-        numbers = {state.number for state in group.states}
-        others = [other for other in whole if any(state.number in numbers for state in other.states)]
-        notes.append(_cut_note(group, others, request))
+    for group, levels, _ in solved:
+        if any(state.is_cut for state in group.states):
+            numbers = {state.number for state in group.states}
+            others = [other for other in whole if any(state.number in numbers for state in other.states)]
+            notes.append(_cut_note(group, levels, others, request))
     return notes
 
 
-def _cut_note(group: Group, whole: list[Group], request: Request) -> str:
+def _cut_note(group: Group, levels_of_file: Levels, whole: list[Group], request: Request) -> str:
     half = sum(group.spins) % 2
     twice_f = 2 * request.fend - half
-    levels, count = _energies([group], twice_f)
-    all_energies, total = _energies(whole, twice_f)
+    levels, count = _energies([(group, levels_of_file)], twice_f)
+    all_energies, total = _energies([(other, other.levels((twice_f, twice_f))) for other in whole], twice_f)
     shift = max(
         (abs(energy - all_energies[label]) for label, energy in levels.items() if label in all_energies), default=0.0
     )
@@ -139,16 +142,15 @@ def _k_limits(state: StateOptions) -> str:
     return f"{' and '.join(filter(None, (low, high)))} of state {state.number}"
 
 
-def _energies(groups: Iterable[Group], twice_f: int) -> tuple[dict[tuple[int, ...], float], int]:
+def _energies(solved: Iterable[tuple[Group, Levels]], twice_f: int) -> tuple[dict[tuple[int, ...], float], int]:
     """Energies (MHz) of the existing levels of one F by state and quantum numbers, and their number, counting ±K as two."""
     energies, count = dict[tuple[int, ...], float](), 0
-    for group in groups:
-        levels = group.levels((twice_f, twice_f))
-        exist = levels.weight > 0
-        others = [values for name, values in levels.quanta.items() if name != "v"]
-        labels = np.column_stack([group.numbers(levels), *others])[exist]
-        energies |= dict(zip(map(tuple, labels.tolist()), levels.energy_mhz[exist].tolist(), strict=True))
-        count += int(levels.components[exist].sum())
+    for group, levels in solved:
+        rows = np.flatnonzero((levels.multiplicity == twice_f + 1) & (group.weights(levels) > 0))
+        others = [values[rows] for name, values in levels.quanta.items() if name != "v"]
+        labels = np.column_stack([group.numbers(levels)[rows], *others])
+        energies |= dict(zip(map(tuple, labels.tolist()), levels.energy_mhz[rows].tolist(), strict=True))
+        count += int(levels.components[rows].sum())
     return energies, count
 
 
