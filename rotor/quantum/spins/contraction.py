@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
 from rotor.quantum.levels import SolvedBlock, SpeciesMoments
-from rotor.quantum.spins.operators import Rotor
+from rotor.quantum.spins.operators import Fixed, Rotor
 from rotor.quantum.spins.rotor import Piece, acts
-from rotor.quantum.spins.stack_elements import Pairs, Section, both_signs, rotor_elements, tensor_elements_of_pairs
-from rotor.quantum.tensors import Tensors, rank_of, tensor_between
+from rotor.quantum.spins.stack_elements import Pairs, Section, both_signs, rotor_elements
+from rotor.quantum.tensors import Tensors, rank_of
 from rotor.quantum.wang.basis import WangBlock
 
 _REACH, _RISES_OF_K = 2, range(-2, 3)  # largest differences of N and of K that an operator connects
@@ -163,67 +163,64 @@ def operators_of_stacks(
 
     Between blocks whose N differ by at most `reach`, each pair once, the higher number first: c(p', p) = (-1)^(N'-N) c(p, p').
     """
-    between = [[piece for piece in pieces if piece.bra != piece.ket] for pieces in operators]
     if stacks[0].is_species:
         return [list(_between_species(stacks, reach, partial(_species_pieces, pieces))) for pieces in operators]
     out: list[list[Contracted]] = [[] for _ in operators]
     for up, low, pairs in _near(stacks, reach):
         forward, back = _Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)
-        for contracted, pieces, others in zip(out, operators, between, strict=True):
-            elements = forward.contracted(pieces)
-            turned = back.contracted(others) if others else None
-            if turned is not None:
-                elements = _added(elements, turned.turned((-1.0) ** pairs.rise))
+        for contracted, pieces in zip(out, operators, strict=True):
+            elements = _with_conjugates(forward, back, pieces, (-1.0) ** pairs.rise)
             if elements is not None:
                 contracted.append(elements)
     return out
 
 
-def pieces_in_both_orders(stacks: Sequence[Stack], piece: Piece, sign: float, representation: str) -> list[Contracted]:
-    """⟨r'‖X‖r⟩ between blocks for both orders of each pair, squares of those of |N K⟩ for both signs of K.
+def pieces_in_both_orders(
+    stacks: Sequence[Stack], pieces: Sequence[Piece], sign: float | None, representation: str
+) -> list[Contracted]:
+    """Σ value ⟨r'‖X‖r⟩ of pieces of one rank between blocks for both orders of each pair, which are squared for both signs of K of |N K⟩.
 
-    Between different states the conjugate is added: `sign` times (-1)^(N'-N) times the transpose.
+    sign: the conjugates of pieces between different states are added, this times (-1)^(N'-N) times the transpose; None where the pieces
+    contain them. A block with itself occurs in both orders; the last entry counts.
     """
-    out = list[Contracted]()
-    for up, low, pairs in _near(stacks, min(piece.rotor.rank, _REACH), _RISES_OF_K if stacks[0].axial else range(1)):
-        orders = [_Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)]
-        elements = [order.contracted([piece]) for order in orders]
-        if piece.bra != piece.ket:
-            turned = [None if each is None else each.turned(sign * (-1.0) ** pairs.rise) for each in elements]
-            elements = [_added(each, other) for each, other in zip(elements, turned[::-1], strict=True)]
-        factor = both_signs(pairs)
-        out += [each._replace(matrices=each.matrices * factor) for each in elements[::-1] if each is not None]
+    axial, out = stacks[0].axial, list[Contracted]()
+    for up, low, pairs in _near(stacks, min(pieces[0].rotor.rank, _REACH), _RISES_OF_K if axial else range(1)):
+        orders = _Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)
+        phase = None if sign is None else sign * (-1.0) ** pairs.rise
+        forward = _with_conjugates(*orders, pieces, phase)
+        if phase is None or axial:
+            back = _with_conjugates(*orders[::-1], pieces, phase)
+        else:
+            back = None if forward is None else forward.turned(phase)
+        each = [elements for elements in (back, forward) if elements is not None]
+        out += [e._replace(matrices=e.matrices * both_signs(pairs)) for e in each] if axial else each
     return out
 
 
-def _added(elements: Contracted | None, others: Contracted | None) -> Contracted | None:
-    """The sum of elements between the same blocks."""
-    if elements is None or others is None:
-        return others if elements is None else elements
-    return elements._replace(matrices=elements.matrices + others.matrices)
+def _with_conjugates(forward: _Pieces, back: _Pieces, pieces: Sequence[Piece], sign: float | None) -> Contracted | None:
+    """The sum of pieces and of the conjugates of those between different states: `sign` times the transpose of `back`, none for None."""
+    elements = forward.contracted(pieces)
+    between = [piece for piece in pieces if sign is not None and piece.bra != piece.ket]
+    others = back.contracted(between) if between else None
+    if others is None or sign is None:
+        return elements
+    turned = others.turned(sign)
+    return turned if elements is None else elements._replace(matrices=elements.matrices + turned.matrices)
 
 
-def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors) -> list[Contracted]:
+def tensors_of_stacks(stacks: Sequence[Stack], tensors: Tensors, representation: str) -> list[Contracted]:
     """⟨r'‖T‖r⟩ between blocks for both orders of each pair, of tensors of one rank by pairs of states.
 
-    A block with itself occurs in both orders; the last entry counts.
+    Those between two states may change their sign with the order of the states.
     """
     rank = rank_of(tensors)
     if stacks[0].is_species:
         forth = list(_between_species(stacks, rank, partial(_species_tensor, tensors)))
         return [e.turned((-1.0) ** (e.pairs.rise + rank * e.up.blocks[0].combined)) for e in forth] + forth
-    axial = stacks[0].axial
-    alike = not axial and all(tensors.get((v, w), tensor) == tensor for (w, v), tensor in tensors.items())
-    forward, back = list[Contracted | None](), list[Contracted | None]()
-    for up, low, pairs in _near(stacks, rank, range(-rank, rank + 1) if axial else range(1)):
-        elements = _contracted(up, low, pairs, _tensor_elements(tensors, up, low, pairs))
-        forward.append(elements)
-        if alike:
-            back.append(None if elements is None else elements.turned((-1.0) ** (pairs.rise + rank)))
-        else:
-            turned = pairs.turned()
-            back.append(_contracted(low, up, turned, _tensor_elements(tensors, low, up, turned)))
-    return [elements for elements in (*back, *forward) if elements is not None]
+    both = {(w, v): tensor for (v, w), tensor in tensors.items()} | dict(tensors)
+    alike = all(both[w, v] == tensor for (v, w), tensor in both.items())
+    pieces = [Piece(1.0, Fixed(tensor), v, w, 0, 0) for (v, w), tensor in both.items() if v >= w or not alike]
+    return pieces_in_both_orders(stacks, pieces, (-1.0) ** rank if alike else None, representation)
 
 
 def _between_species(
@@ -284,17 +281,6 @@ def within_blocks(stack: Stack, matrices: Sequence[Floats]) -> Contracted:
     for place, (number, size) in enumerate(zip(stack.numbers.tolist(), stack.sizes, strict=True)):
         out[place, :size, :size] = matrices[number]
     return Contracted(stack, stack, Pairs(places, places, stack.n[:, None], stack.n[:, None]), out)
-
-
-def _tensor_elements(tensors: Tensors, up: Stack, low: Stack, pairs: Pairs) -> list[Element]:
-    """Elements between all sections that the tensors connect."""
-    return [
-        (left, right, element)
-        for left in up.sections
-        for right in low.sections
-        if (tensor := tensor_between(tensors, left.v, right.v)) is not None
-        and (element := tensor_elements_of_pairs(tensor, left.basis, right.basis, pairs)) is not None
-    ]
 
 
 def _near(

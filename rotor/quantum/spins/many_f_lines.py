@@ -130,7 +130,8 @@ class GroupStates:
 def tensor_moments(shared: Shared, tensors: Tensors) -> Moments:
     """A tensor of the molecule by pairs of states."""
     rank, frame = rank_of(tensors), shared.cache["frame"]
-    return Moments(rank, [[Acting(tables_of(tensors_of_stacks(shared.stacks, tensors), frame), rank)]])
+    elements = tensors_of_stacks(shared.stacks, tensors, shared.representation)
+    return Moments(rank, [[Acting(tables_of(elements, frame), rank)]])
 
 
 def amplitudes_of_groups(

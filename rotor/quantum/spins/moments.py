@@ -27,7 +27,7 @@ def spin_moments(shared: Shared, moments: Sequence[Moment]) -> Moments:
     kinds: dict[tuple[bool, bool], list[Acting]] = {}
     for moment in moments:
         piece = Piece(moment.value_debye, moment.rotor, *moment.states, 0, 0)
-        elements = pieces_in_both_orders(shared.stacks, piece, moment.conjugate_sign, shared.representation)
+        elements = pieces_in_both_orders(shared.stacks, [piece], moment.conjugate_sign, shared.representation)
         place = shared.scheme.place(moment.spin) if moment.spin else None
         acting = Acting(tables_of(elements, shared.cache["frame"]), moment.rotor.rank, place)
         kinds.setdefault((moment.electric, moment.imaginary), []).append(acting)

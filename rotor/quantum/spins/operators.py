@@ -11,6 +11,7 @@ X^K contains N and the direction cosines φ_pi between space-fixed p and molecul
 | `Cosines` of a matrix | T² of the symmetric traceless c_ij, K = 2 | quadrupole, dipolar spin-spin |
 | `CosinesWithN` | Σ_ij c_ij ½{φ_pi, N_j}, K = 1 | spin-rotation |
 | `ByElements` | any, by its elements over |N k⟩ | higher orders, series |
+| `Fixed` | a tensor of the molecule by its spherical components | - |
 | `BySpecies` | one of these times a factor for each pair of species | phases |
 
 Real elements over the functions of `tensors` are those of X, of vectors (`Cosines`) those of i X, which is Hermitian and invariant under
@@ -116,6 +117,19 @@ class ByElements:
 
 
 @dataclass(frozen=True)
+class Fixed:
+    """A tensor of the molecule by its spherical components; moments have it, terms do not."""
+
+    tensor: BodyTensor
+    odd = False
+
+    @property
+    def rank(self) -> int:
+        """Rank of the tensor."""
+        return self.tensor.rank
+
+
+@dataclass(frozen=True)
 class BySpecies:
     """An operator whose elements are multiplied by a factor for each pair of species of Wang blocks.
 
@@ -134,8 +148,8 @@ class BySpecies:
         return self.operator.rank
 
 
-Rotor = Scalar | Cosines | CosinesWithN | ByElements | BySpecies
-_ALONE = Scalar | ByElements | BySpecies  # operators that are not added to others
+Rotor = Scalar | Cosines | CosinesWithN | ByElements | BySpecies | Fixed
+_ALONE = Scalar | ByElements | BySpecies | Fixed  # operators that are not added to others
 
 
 @lru_cache(maxsize=256)
@@ -163,7 +177,7 @@ def is_axial(rotor: Rotor, axis: str) -> bool:
     """
     if isinstance(rotor, Scalar):
         return all(n == 0 for (_, _, n), _ in rotor.operators)
-    if isinstance(rotor, ByElements | BySpecies):
+    if isinstance(rotor, ByElements | BySpecies | Fixed):
         return False
     c = np.array(rotor.components, dtype=float)
     across = (1, 2) if axis == "a" else (0, 1)

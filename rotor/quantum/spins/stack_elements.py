@@ -16,6 +16,7 @@ from rotor.quantum.spins.operators import (
     BySpecies,
     Cosines,
     CosinesWithN,
+    Fixed,
     Rotor,
     Scalar,
     axis_tensor,
@@ -73,20 +74,27 @@ def power_matrices(section: Section, units: Sequence[tuple[int, int]]) -> Floats
 
 
 def rotor_elements(rotor: Rotor, left: Section, right: Section, pairs: Pairs, representation: str) -> Floats | None:
-    """Elements (pairs, functions', functions) of an operator between two sections; None where it does not act."""
-    if pairs.k is not None:
-        return _axial_elements(rotor, pairs, *pairs.k, representation)
+    """Elements (pairs, functions', functions) of an operator between two sections; None where it does not act.
+
+    Between functions |N K⟩ they are those of one sign of K, in the phases of Wang functions; factors of species do not occur.
+    """
     if isinstance(rotor, Cosines):
         tensor = tensor_of(rotor.components, rotor.rank, representation)
-        elements = None if tensor is None else tensor_elements_of_pairs(tensor, left.basis, right.basis, pairs)
+        elements = None if tensor is None else _tensor_elements(tensor, left.basis, right.basis, pairs)
         return -elements if elements is not None and rotor.rank == 1 else elements
+    if isinstance(rotor, Fixed):
+        return _tensor_elements(rotor.tensor, left.basis, right.basis, pairs)
     if isinstance(rotor, CosinesWithN):
-        return _elements_with_n(rotor, left, right, pairs, representation)
-    if isinstance(rotor, Scalar):
-        return _scalar_elements(rotor, left, right, pairs)
+        return _elements_with_n(rotor, left.basis, right.basis, pairs, representation)
     if isinstance(rotor, BySpecies):
         elements = rotor_elements(rotor.operator, left, right, pairs, representation)
-        return None if elements is None else elements * _factors_of_pairs(rotor.factors, left, right, pairs)
+        if elements is None or pairs.k is not None:
+            return elements
+        return elements * _factors_of_pairs(rotor.factors, left, right, pairs)
+    if isinstance(rotor, Scalar):
+        return _scalar_elements(rotor, left, right, pairs) if pairs.k is None else _axial_powers(rotor, pairs, *pairs.k)
+    if pairs.k is not None:
+        return _axial_elements_of_operator(rotor, pairs, *pairs.k)
     return _elements_of_operator(rotor, left, right, pairs)
 
 
@@ -130,27 +138,30 @@ def _between_functions(up: tuple[WangBlock, ...], low: tuple[WangBlock, ...]) ->
 
 
 def _elements_with_n(
-    rotor: CosinesWithN, left: Section, right: Section, pairs: Pairs, representation: str
+    rotor: CosinesWithN, up: WangBlock, low: WangBlock, pairs: Pairs, representation: str
 ) -> Floats | None:
-    """Elements of `CosinesWithN` between two sections."""
-    m, n = pairs.m[:, :, None].astype(float), pairs.n[:, :, None].astype(float)
-    rise = pairs.rise
-    if abs(rise) > 1:
+    """Elements of `CosinesWithN` between two kinds of functions."""
+    if abs(pairs.rise) > 1:
         return None
-    up, low = left.basis, right.basis
+    m, n = pairs.m[:, :, None].astype(float), pairs.n[:, :, None].astype(float)
     stretch, change, length = factors_with_n(m, n)
     parts = [
         (stretch, tensor_of(rotor.components, 2, representation)),
         (change, axis_tensor(rotor.components, representation)),
     ]
-    terms = [
-        (factor, tensor_elements_of_pairs(tensor, up, low, pairs)) for factor, tensor in parts if tensor is not None
-    ]
+    terms = [(factor, _tensor_elements(tensor, up, low, pairs)) for factor, tensor in parts if tensor is not None]
     acting = [factor * matrix for factor, matrix in terms if matrix is not None]
     scalar = float(np.trace(np.array(rotor.components))) / 3
-    if scalar and not rise and (up.first_k, up.sign) == (low.first_k, low.sign):
+    if scalar and not pairs.rise and _alike(up, low, pairs):
         acting.append(scalar * length * np.eye(up.size, low.size))
     return np.asarray(sum(acting)) if acting else None
+
+
+def _alike(up: WangBlock, low: WangBlock, pairs: Pairs) -> bool:
+    """Whether both kinds of functions are the same at one N."""
+    if pairs.k is not None:
+        return bool((pairs.k[0] == pairs.k[1]).all())
+    return (up.first_k, up.sign) == (low.first_k, low.sign)
 
 
 def _scalar_elements(rotor: Scalar, left: Section, right: Section, pairs: Pairs) -> Floats | None:
@@ -170,14 +181,13 @@ def _scalar_elements(rotor: Scalar, left: Section, right: Section, pairs: Pairs)
     return elements
 
 
-def tensor_elements_of_pairs(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) -> Floats | None:
-    """`tensors.block_elements` for all pairs: (pairs, up.size, low.size)."""
+def _tensor_elements(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) -> Floats | None:
+    """`tensors.block_elements` for all pairs, (pairs, up.size, low.size); between functions |N K⟩ those of one sign of K."""
     rank, rise = tensor.rank, pairs.rise
     if rank > MOST_RANK:
         raise ValueError(f"a tensor of rank {rank}: expected at most {MOST_RANK} with spins")
     if pairs.k is not None:
-        elements = _axial_tensor_elements(tensor, pairs, *pairs.k)
-        return None if elements is None else elements * both_signs(pairs)
+        return _axial_tensor_elements(tensor, pairs, *pairs.k)
     steps, parts_of_n = _signed_parts(tensor, up, low, rise)
     if abs(rise) > rank or not steps:
         return None
@@ -239,31 +249,13 @@ def _add_folded(
                 elements[:, row, column] += low.sign * turned * parts[:, rank + k + k_up]
 
 
-def _axial_elements(rotor: Rotor, pairs: Pairs, k_up: Ints, k: Ints, representation: str) -> Floats | None:
-    """⟨N'K'‖X‖N K⟩ (pairs, 1, 1) of an operator for one sign of K, in the phases of Wang functions; factors of species do not occur."""
-    n, rise, same_k = pairs.n[:, :, None].astype(float), pairs.rise, not (k_up != k).any()
-    if isinstance(rotor, BySpecies):
-        return _axial_elements(rotor.operator, pairs, k_up, k, representation)
-    if isinstance(rotor, ByElements):
-        return _axial_elements_of_operator(rotor, pairs, k_up, k)
-    if isinstance(rotor, Scalar):
-        x, squared = n * (n + 1), (k**2.0)[:, None, None]
-        along = [factor * x**p * squared**q for (p, q, _), factor in rotor.operators]
-        return np.sum(along, axis=0) if same_k and not rise else None
-    if isinstance(rotor, Cosines):
-        elements = _axial_tensor_elements(tensor_of(rotor.components, rotor.rank, representation), pairs, k_up, k)
-        return -elements if elements is not None and rotor.rank == 1 else elements
-    if abs(rise) > 1:
+def _axial_powers(rotor: Scalar, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
+    """Elements of powers of N within functions |N K⟩."""
+    if pairs.rise or (k_up != k).any():
         return None
-    stretch, change, length = factors_with_n(n + rise, n)
-    trace = float(np.trace(np.array(rotor.components))) / 3
-    parts = [
-        (stretch, _axial_tensor_elements(tensor_of(rotor.components, 2, representation), pairs, k_up, k)),
-        (change, _axial_tensor_elements(axis_tensor(rotor.components, representation), pairs, k_up, k)),
-        (trace, length if same_k and not rise and trace else None),
-    ]
-    acting = [factor * elements for factor, elements in parts if elements is not None]
-    return np.asarray(sum(acting)) if acting else None
+    n, squared = pairs.n[:, :, None].astype(float), (k**2.0)[:, None, None]
+    powers = [factor * (n * (n + 1)) ** p * squared**q for (p, q, _), factor in rotor.operators]
+    return np.asarray(np.sum(powers, axis=0))
 
 
 def _axial_elements_of_operator(rotor: ByElements, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
@@ -278,10 +270,10 @@ def _axial_elements_of_operator(rotor: ByElements, pairs: Pairs, k_up: Ints, k: 
     return np.asarray(total.real - total.imag)[:, None, None] if np.any(total) else None
 
 
-def _axial_tensor_elements(tensor: BodyTensor | None, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
+def _axial_tensor_elements(tensor: BodyTensor, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:
     """⟨N'K'‖T‖N K⟩ (pairs, 1, 1) of one sign of K; a component across the axis enters with its absolute value."""
     q = int(k_up[0] - k[0])
-    if tensor is None or max(abs(q), abs(pairs.rise)) > tensor.rank or not (part := tensor.components[tensor.rank + q]):
+    if max(abs(q), abs(pairs.rise)) > tensor.rank or not (part := tensor.components[tensor.rank + q]):
         return None
     closes = (pairs.m + pairs.n)[:, 0] >= tensor.rank
     out = np.zeros((len(k), 1, 1))
@@ -292,5 +284,5 @@ def _axial_tensor_elements(tensor: BodyTensor | None, pairs: Pairs, k_up: Ints, 
 
 def both_signs(pairs: Pairs) -> Floats:
     """√(number of components) of functions |N K⟩ (pairs, 1, 1), so that squares of elements count both signs of K."""
-    k_up, k = pairs.k if pairs.k is not None else (np.zeros(1), np.zeros(1))
-    return np.where((k_up > 0) | (k > 0), np.sqrt(2.0), 1.0)[:, None, None]
+    assert pairs.k is not None
+    return np.where(np.any(pairs.k, axis=0), np.sqrt(2.0), 1.0)[:, None, None]

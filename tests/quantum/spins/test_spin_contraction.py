@@ -125,7 +125,7 @@ def test_dipoles_are_those_of_pairs(sign):
     along = np.array([1.2, 0.7, 0.4])
     tensors = {(v, w): body_tensor((1 + v + w) * along, 1, representation) for v, w in ((0, 0), (1, 1), (0, 1))}
     tensors[1, 0] = body_tensor(sign * 2 * along, 1, representation)
-    computed = by_numbers(tensors_of_stacks(stacks_of(blocks), tensors))
+    computed = by_numbers(tensors_of_stacks(stacks_of(blocks), tensors, representation))
     count = 0
     for i, up in enumerate(blocks):
         for k, low in enumerate(blocks):
@@ -143,7 +143,7 @@ def test_tensors_of_axial_tops_are_those_of_pairs(body):
     blocks, representation = solved_rotor(Top(Constants(A=9400.0, B=3100.0)), SEMI_RIGID, [], 0, 6, None)
     rank = np.ndim(body)
     tensors = {(0, 0): body_tensor(body, rank, representation)}
-    computed = by_numbers(tensors_of_stacks(stacks_of(blocks), tensors))
+    computed = by_numbers(tensors_of_stacks(stacks_of(blocks), tensors, representation))
     count = 0
     for i, up in enumerate(blocks):
         for k, low in enumerate(blocks):
