@@ -29,9 +29,14 @@ class Mutation:
 
 
 WHOLE_MATRIX = """
+    blocks_of_j = [[block for block in blocks if block.j == j] for j in dict.fromkeys(block.j for block in blocks)]
+    return [piece for whole in blocks_of_j for piece in _whole(whole[0].j, scalar_energy(operators, whole[0].j), operators, whole)]
+
+
+def _whole(j, scalar, operators, whole):
     from scipy.linalg import block_diag, eigh
 
-    of_k, parts = np.zeros((2 * j + 1, 2 * j + 1)), [block_bands(matrix, block) for block in whole]
+    out, of_k, parts = [], np.zeros((2 * j + 1, 2 * j + 1)), list(block_bands(operators, whole))
     for block, start in zip(whole, np.cumsum([0] + [b.size for b in whole]), strict=False):
         for row, k in enumerate(block.k):
             of_k[start + row, j + k] += np.sqrt(0.5) if k else 1.0
@@ -71,8 +76,8 @@ MUTATIONS = (
     ),
     Mutation(
         3, "rotor/quantum/wang/rotation.py",
-        "    return [(block, scalar, block_bands(matrix, block)) for block in blocks]\n",
-        "    whole, out = blocks, []\n" + WHOLE_MATRIX,
+        "    return [(block, scalar_energy(operators, block.j), each) for block, each in zip(blocks, bands, strict=True)]\n",
+        WHOLE_MATRIX,
         "tests/hard/test_safeguards.py::test_vectors_of_near_degenerate_partners_lie_in_one_block",
     ),
     Mutation(
@@ -101,9 +106,9 @@ MUTATIONS = (
     ),
     Mutation(
         7, "rotor/quantum/wang/rotation.py",
-        "    return [(block, scalar, block_bands(matrix, block)) for block in blocks]\n",
-        "    pieces = [(block, block_bands(matrix, block)) for block in blocks]\n    for _, bands in pieces:\n        bands[0] += scalar\n"
-        "    return [(block, 0.0, bands) for block, bands in pieces]\n",
+        "    return [(block, scalar_energy(operators, block.j), each) for block, each in zip(blocks, bands, strict=True)]\n",
+        "    pieces = list(zip(blocks, bands, strict=True))\n    for block, each in pieces:\n"
+        "        each[0] += scalar_energy(operators, block.j)\n    return [(block, 0.0, each) for block, each in pieces]\n",
         "tests/quantum/test_safeguards.py::test_the_scalar_part_stays_out_of_the_matrix",
     ),
     Mutation(

@@ -19,7 +19,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
 from rotor.quantum.estimates.derivatives import term_expectations
 from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
-from rotor.quantum.wang.wang_matrix import JMatrix, scalar_energy
+from rotor.quantum.wang.wang_matrix import elements_by_order, order_of, scalar_energy
 from rotor.table import counted
 from rotor.tops.operators import Operators
 
@@ -52,11 +52,10 @@ def order_sizes_mhz(
 
 def _row_bound(operators: Operators, j: int, kmax: int) -> float:
     """The largest Σ_K' |⟨K'|H|K⟩| over |K| ≤ kmax."""
-    multiplet = JMatrix(operators, j)
-    k = np.arange(kmax + 1)
-    rows = np.abs(multiplet.element(k, 0) + scalar_energy(operators, j))
-    for n in range(1, multiplet.order + 1):
-        rows += np.abs(multiplet.element(k, n)) + np.abs(multiplet.element(k - 2 * n, n))
+    k, multiplet = 2 * order_of(operators) + np.arange(kmax + 1), [row for (row,) in elements_by_order(operators, [j])]
+    rows = np.abs(multiplet[0][k] + scalar_energy(operators, j))
+    for n, elements in enumerate(multiplet[1:], 1):
+        rows += np.abs(elements[k]) + np.abs(elements[k - 2 * n])
     return float(rows.max())
 
 

@@ -16,11 +16,9 @@ from rotor.quantum.levels import Levels, SolvedBlock, levels_table, single_block
 from rotor.quantum.wang.basis import WangBlock, blocks_within, names_of_blocks
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
 from rotor.quantum.wang.wang_matrix import (
-    JMatrix,
     block_bands,
     diagonalise_all,
     lowest_energies,
-    matrices_of,
     scalar_energy,
 )
 from rotor.tops.operators import AXIAL_REPRESENTATION, Operators, added
@@ -190,11 +188,7 @@ def _solve(
     limits: tuple[int, int] | None = None, below_mhz: float = math.inf,
 ) -> list[tuple[WangBlock, Floats, Floats]]:  # fmt: skip
     """Solve the Wang blocks of several J: (block, energies in MHz, eigenvectors) by J in the order ee, eo, oe, oo; K within `limits`."""
-    all_j = list(js)
-    j_and_matrix = zip(all_j, matrices_of(operators, all_j), strict=True)
-    pieces = [
-        piece for j, matrix in j_and_matrix for piece in _blocks_of_j(operators, j, matrix, representation, limits)
-    ]
+    pieces = _with_bands(operators, [block for j in js for block in blocks_within(j, representation, limits)])
     if below_mhz < math.inf and not vectors:
         return [(block, lowest_energies(bands, below_mhz - scalar) + scalar, _NONE) for block, scalar, bands in pieces]
     solved = diagonalise_all([bands for _, _, bands in pieces], vectors)
@@ -204,9 +198,7 @@ def _solve(
     ]
 
 
-def _blocks_of_j(
-    operators: Operators, j: int, matrix: JMatrix, representation: str, limits: tuple[int, int] | None
-) -> list[tuple[WangBlock, float, list[Floats]]]:
-    """The Wang blocks of one J: (block, scalar part of the energy, diagonals of the rest)."""
-    scalar, blocks = scalar_energy(operators, j), blocks_within(j, representation, limits)
-    return [(block, scalar, block_bands(matrix, block)) for block in blocks]
+def _with_bands(operators: Operators, blocks: Sequence[WangBlock]) -> list[tuple[WangBlock, float, list[Floats]]]:
+    """Wang blocks, each with the scalar part of its energies and the diagonals of the rest."""
+    bands = block_bands(operators, blocks)
+    return [(block, scalar_energy(operators, block.j), each) for block, each in zip(blocks, bands, strict=True)]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.wang.basis import WangBlock
-from rotor.quantum.wang.wang_matrix import JMatrix, block_bands, scalar_energy
+from rotor.quantum.wang.wang_matrix import block_bands, scalar_energy
 from rotor.tops.operators import CUBIC_TENSOR, Operators
 from rotor.tops.spins.spin_weights import CUBIC_IRREPS
 
@@ -87,7 +87,7 @@ def _block(j: int, name: str) -> Floats:
     block, chosen = _wang(j, name)
     if block.size == 0:
         return np.zeros((0, 0))
-    bands = block_bands(JMatrix(CUBIC_TENSOR, j), block)
+    (bands,) = block_bands(CUBIC_TENSOR, [block])
     matrix = np.diag(bands[0])
     for n, band in enumerate(bands[1:], 1):
         matrix += np.diag(band, n) + np.diag(band, -n)

@@ -1,6 +1,6 @@
 """Diagonals of the unit matrices ½[Jz^2q, J₊^2n + J₋^2n]₊ over Wang blocks side by side, and their expectation values.
 
-The formulas are those of `wang_matrix`, without a constant; levels of many J, labelled levels of fits and derivatives have them in common.
+Labelled levels of fits and derivatives have them in common; the elements are those of `wang_matrix`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Workspace
 from rotor.quantum.wang.basis import WangBlock
+from rotor.quantum.wang.wang_matrix import BlockRows
 
 
 def unit_diagonals(
@@ -18,26 +19,15 @@ def unit_diagonals(
 ) -> tuple[Floats, ...]:
     """Diagonal d of ½[Jz^2q, J₊^2n + J₋^2n]₊ at (block, state, (q, n)), state i with i + d; zero beyond a block.
 
-    As in `rotor.quantum.effects.watson`: ⟨K+2n|..|K⟩ on diagonal n, √2 more where K = 0, and ⟨2n-K|..|-K⟩ with the sign of the
-    block on diagonal n - K. taken: how many of the states of each block.
+    taken: how many of the states of each block.
     """
+    js, rows = BlockRows.from_blocks(blocks, taken)
+    j = np.array(js, dtype=float)[:, None]
     order = max((n for _, n in units), default=0)
-    j = np.array([basis.j for basis in blocks], dtype=float)[:, None]
-    first = np.array([basis.first_k for basis in blocks])[:, None]
-    sign = np.array([basis.sign for basis in blocks], dtype=float)[:, None]
-    size, sizes = max(taken), np.array(taken)[:, None]
-    index = np.arange(size)[None, :]
-    k = (first + 2 * index).astype(float)
-
-    out = tuple(np.zeros((len(blocks), size, len(units))) for _ in range(order + 1))
+    out = tuple(np.zeros((*rows.k.shape, len(units))) for _ in range(order + 1))
     for place, (q, n) in enumerate(units):
-        inside = index + n < sizes
-        element = _element(j, k, q, n) * np.where((k == 0) & (n > 0), np.sqrt(2.0), 1.0)
-        out[n][:, :, place] += np.where(inside, element, 0.0)
-        for low in range(1, n + 1):
-            here = (k == low) & (index + n - low < sizes) & (index < sizes)
-            folded = sign * _element(j, np.full_like(k, -low), q, n)
-            out[n - low][:, :, place] += np.where(here, folded, 0.0)
+        elements = _elements(j, np.arange(-2.0 * n, js[-1] + 1), q, n)
+        rows.add(elements, n, n, [diagonal[:, :, place] for diagonal in out])
     return out
 
 
@@ -53,8 +43,8 @@ def expectations(diagonals: Sequence[Floats], vectors: Floats, space: Workspace)
     return np.asarray(total)
 
 
-def _element(j: Floats, k: Floats, q: int, n: int) -> Floats:
-    """⟨K+2n|½[Jz^2q, J₊^2n + J₋^2n]₊|K⟩, K^2q for n = 0."""
+def _elements(j: Floats, k: Floats, q: int, n: int) -> Floats:
+    """⟨K+2n|½[Jz^2q, J₊^2n + J₋^2n]₊|K⟩ (J, K), K^2q for n = 0."""
     if n == 0:
         return np.asarray(k ** (2 * q) + 0.0 * j)
     squared = np.ones_like(j * k)

@@ -11,18 +11,18 @@ with the phases of J∓ (body-fixed) real and positive.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.wang.basis import WangBlock
-from rotor.tops.operators import Operators
+from rotor.tops.operators import Operators, Powers
 
 FEW = 20  # bisection pays for at most one in so many eigenvalues
 AT_ONCE = 32  # matrices of one size with at most so many rows are solved together
-J_AT_ONCE = 32  # number of J whose matrix elements are computed together
+AT_ONCE_BLOCKS = 128  # blocks whose matrix elements are computed together: those of 32 J
 _NONE: Floats = np.zeros((0, 0))
 _ROOT_2 = float(np.sqrt(2))
 _OVERFLOW = "a block of the Hamiltonian overflows: J max is too high for these distortion constants"
@@ -35,52 +35,18 @@ def scalar_energy(operators: Operators, j: int) -> float:
     return float(sum(c * x**p for (p, q, n), c in operators.items() if q == n == 0))
 
 
-class JMatrix:
-    """Matrix elements over |J K⟩ of one J without the scalar part, for its four Wang blocks.
-
-    elements: elements that `matrices_of` computed for many J; by default they are computed here.
-    """
-
-    def __init__(self, operators: Operators, j: int, elements: list[Floats] | None = None) -> None:
-        self.order = _order(operators)
-        self._margin = 2 * self.order  # K starts at -margin, to include folded elements
-        self._elements = _elements(operators, [j])[0] if elements is None else elements
-
-    def element(self, k: NDArray[np.int64], n: int) -> NDArray[np.float64]:
-        """⟨K+2n|H|K⟩ for K from -2 `order` to J; zero where K + 2n is beyond J."""
-        return self._elements[n][self._margin + k]
-
-    def folded(self, low: int, n: int) -> float:
-        """⟨2n - low|H|-low⟩, which connects K = low and K = 2n - low of a Wang block."""
-        return float(self._elements[n][self._margin - low])
-
-    def band(self, block: WangBlock, n: int) -> NDArray[np.float64]:
-        """⟨K+2n|H|K⟩ over the K of a block, (size - n,)."""
-        first = self._margin + block.first_k
-        return self._elements[n][first : first + 2 * (block.size - n) : 2].copy()
-
-
-def matrices_of(operators: Operators, js: Sequence[int]) -> Iterator[JMatrix]:
-    """Matrix elements of each J, computed for several J together."""
-    for first in range(0, len(js), J_AT_ONCE):
-        chunk = js[first : first + J_AT_ONCE]
-        for j, elements in zip(chunk, _elements(operators, chunk), strict=True):
-            yield JMatrix(operators, j, elements)
-
-
-def _order(operators: Operators) -> int:
+def order_of(operators: Iterable[Powers]) -> int:
     """The highest power n of the ladder operators."""
     return max((n for _, _, n in operators), default=0)
 
 
-def _elements(operators: Operators, js: Sequence[int]) -> list[list[Floats]]:
-    """⟨K+2n|H|K⟩ of each J by n, for K from -2 `order` to J."""
-    order, highest = _order(operators), max(js)
+def elements_by_order(operators: Operators, js: Sequence[int]) -> list[Floats]:
+    """⟨K+2n|H|K⟩ by n, without the scalar part, (J, K) for K from -2 `order_of` to the highest J; zero for n > 0 and K + 2n beyond J."""
+    order, highest = order_of(operators), max(js)
     k, j = np.arange(-2 * order, highest + 2 * order + 1), np.array(js)[:, None]
     steps = np.sqrt(np.maximum((j - k) * (j + k + 1), 0))  # elements of J₊ over |J K⟩; zero beyond K = J
     with np.errstate(over="ignore", invalid="ignore"):  # reported where the block is diagonalised
-        by_n = [_elements_of_order(operators, js, k[: len(k) - 2 * order], n, steps) for n in range(order + 1)]
-    return [[elements_of_n[row, : 2 * order + number + 1] for elements_of_n in by_n] for row, number in enumerate(js)]
+        return [_elements_of_order(operators, js, k[: len(k) - 2 * order], n, steps) for n in range(order + 1)]
 
 
 def _elements_of_order(operators: Operators, js: Sequence[int], k: Ints, n: int, steps: Floats) -> Floats:
@@ -105,24 +71,53 @@ def _elements_of_order(operators: Operators, js: Sequence[int], k: Ints, n: int,
     return np.asarray(total)
 
 
-def block_bands(matrix: JMatrix, block: WangBlock) -> list[NDArray[np.float64]]:
-    """Diagonals of the block's matrix without the scalar part; the n-th has the elements (i+n, i), (size - n,).
+class BlockRows(NamedTuple):
+    """Functions of Wang blocks side by side: row of J in tables of elements, K (blocks, size), sign and size of each block as columns."""
 
-    ⟨K' s|H|K s⟩ = ⟨K'|H|K⟩ + s ⟨K'|H|-K⟩, times √2 if one of K, K' is 0. The second term exists for K + K' = 2n; it folds an operator of
-    high n back to lower diagonals.
-    """
-    bands = [matrix.band(block, n) for n in range(min(matrix.order, block.size - 1) + 1)]
-    if block.first_k == 0:
-        for band in bands[1:]:
-            band[0] *= _ROOT_2
+    rows: Ints
+    k: Ints
+    sign: Ints
+    sizes: Ints
 
-    last = block.first_k + 2 * (block.size - 1)
-    for n in range(1, matrix.order + 1):
-        for low in range(max(block.first_k, 2 - block.first_k % 2), n + 1, 2):
-            high = 2 * n - low
-            if high <= last:
-                bands[(high - low) // 2][(low - block.first_k) // 2] += block.sign * matrix.folded(low, n)
-    return bands
+    @classmethod
+    def from_blocks(cls, blocks: Sequence[WangBlock], taken: Sequence[int]) -> tuple[list[int], BlockRows]:
+        """The J of the blocks, rising, and the rows. taken: how many of the functions of each block."""
+        js, rows = np.unique([block.j for block in blocks], return_inverse=True)
+        first, sign, sizes = (
+            np.array(column)[:, None]
+            for column in zip(*((b.first_k, b.sign, n) for b, n in zip(blocks, taken, strict=True)), strict=True)
+        )
+        return js.tolist(), cls(rows, first + 2 * np.arange(max(taken)), sign, sizes)
+
+    def add(self, elements: Floats, n: int, order: int, diagonals: Sequence[Floats]) -> None:
+        """Add ⟨K+2n|H|K⟩ (J, K), K from -2 `order` on, to the diagonals (blocks, size) of the blocks; the d-th has the elements (i + d, i).
+
+        ⟨K' s|H|K s⟩ = ⟨K'|H|K⟩ + s ⟨K'|H|-K⟩, times √2 if one of K, K' is 0. The second term exists for K + K' = 2n; it folds an
+        operator of high n back to lower diagonals.
+        """
+        index, last = np.arange(self.k.shape[1]), elements.shape[1] - 1
+        direct = elements[self.rows[:, None], np.minimum(2 * order + self.k, last)]
+        if n:
+            direct[self.k == 0] *= _ROOT_2
+        diagonals[n][...] += np.where(index + n < self.sizes, direct, 0.0)
+        for low in range(1, n + 1):
+            here = (self.k == low) & (index + n - low < self.sizes)
+            folded = self.sign * elements[self.rows, 2 * order - low][:, None]
+            diagonals[n - low][...] += np.where(here, folded, 0.0)
+
+
+def block_bands(operators: Operators, blocks: Sequence[WangBlock]) -> Iterator[list[Floats]]:
+    """Diagonals of the matrix of each block without the scalar part; the n-th has the elements (i+n, i), (size - n,)."""
+    order = order_of(operators)
+    for first in range(0, len(blocks), AT_ONCE_BLOCKS):
+        chunk = blocks[first : first + AT_ONCE_BLOCKS]
+        js, rows = BlockRows.from_blocks(chunk, [block.size for block in chunk])
+        diagonals = [np.zeros(rows.k.shape) for _ in range(order + 1)]
+        with np.errstate(over="ignore", invalid="ignore"):  # reported where the block is diagonalised
+            for n, elements in enumerate(elements_by_order(operators, js)):
+                rows.add(elements, n, order, diagonals)
+        for number, block in enumerate(chunk):
+            yield [diagonal[number, : block.size - n] for n, diagonal in enumerate(diagonals[: block.size])]
 
 
 def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floats]:
