@@ -139,17 +139,6 @@ class SolvedBlock:
         """Whether it is a Wang block that nothing couples with others."""
         return self.labels is None and self.moments is None
 
-    def elements(self, low: SolvedBlock, between: Callable[[Any, Any], Floats | None]) -> Floats | None:
-        """⟨r'|X|r⟩ (n_up, n_low) between the states of two blocks from the elements of X between their parts; None where it is zero."""
-        total: Floats | None = None
-        for left in self.parts:
-            for right in low.parts:
-                element = between(left, right)
-                if element is not None and element.any():
-                    moved = self.vectors[left.place].T @ element @ low.vectors[right.place]
-                    total = moved if total is None else total + moved
-        return total
-
 
 Mixtures = Sequence[tuple[SolvedBlock, NDArray[Any]]]
 """Blocks of one J, and coefficients (states, p, n) of their states in n mixtures, sums over p of squares of functions."""

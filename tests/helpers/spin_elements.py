@@ -27,9 +27,21 @@ def elements_of_parts(up, low, tensors):
 
     for a in up.spins.parts:
         for b in low.spins.parts:
-            element = a.rotor.elements(b.rotor, between)
+            element = _between_states(a.rotor, b.rotor, between)
             if element is not None:
                 bases = a.rotor.parts[0].basis, b.rotor.parts[0].basis
                 both = isinstance(bases[0], AxialState) and any(basis.axial_k for basis in bases)
                 total[a.place, b.place] = (np.sqrt(2.0) if both else 1.0) * np.kron(t[a.patterns, b.patterns], element)
     return up.vectors.T @ total @ low.vectors
+
+
+def _between_states(up, low, between):
+    """⟨r'|X|r⟩ (n_up, n_low) between the states of two blocks from the elements of X between their parts; None where it is zero."""
+    total = None
+    for left in up.parts:
+        for right in low.parts:
+            element = between(left, right)
+            if element is not None and element.any():
+                moved = up.vectors[left.place].T @ element @ low.vectors[right.place]
+                total = moved if total is None else total + moved
+    return total

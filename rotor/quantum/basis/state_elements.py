@@ -110,11 +110,6 @@ class StateTerms(NamedTuple):
         factors = np.array([row[3] for row in rows], dtype=float)
         return cls(powers, first, unit, column, p, factors, tuple(link for _, link in links))
 
-    @property
-    def linked(self) -> list[int]:
-        """The parameters that multiply other operators than powers."""
-        return sorted({int(column) for column in self.columns[self.rows >= len(self.first) * len(self.powers)]})
-
     def by_power(self) -> Iterator[tuple[int, Powers, int, float]]:
         """State, powers (p, q, n), parameter and factor of every term that is a power."""
         states = list(self.first)

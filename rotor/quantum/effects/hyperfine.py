@@ -27,9 +27,10 @@ if TYPE_CHECKING:
 class NuclearQuadrupole(SpinEffect):
     """Quadrupole coupling of any number of nuclei.
 
+    >>> from rotor.tops.top import Top
     >>> effect = NuclearQuadrupole({"chi_aa(14N)": -4.7, "chi_bb-cc(14N)": 0.2}, (Spin("14N", 2),))
-    >>> effect.with_values({"chi_aa(14N)": -4.8}).values["chi_aa(14N)"]
-    -4.8
+    >>> effect.parameters(Top.from_constants("A=9 B=5 C=4 MHz"))["chi_aa(14N)"]
+    -4.7
     """
 
     name: ClassVar[str] = "nuclear quadrupole"

@@ -84,10 +84,6 @@ class InteractingStates(QuantumEffect):
         """The dipoles by pairs of states."""
         return dict(self.moments)
 
-    def with_values(self, values: Mapping[str, float]) -> Self:
-        """This effect with new values of some parameters."""
-        return type(self)({**self.values, **values}, self.weights, self.moments)
-
     def size_mhz(self, top: Top, j: int) -> float:
         """The largest coupling at K = J."""
         sizes = [0.0]

@@ -10,9 +10,9 @@ n_v functions are the basis of the rotation (`rotor.quantum.internal_rotation.co
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar, Self
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.tops.internal_rotation import InternalRotationConstants
@@ -37,10 +37,6 @@ class InternalRotation(QuantumEffect):
     def parameters(self, top: Top) -> dict[str, float]:
         """Constants of the internal rotor in MHz; rho has no unit."""
         return dict(self.constants.values)
-
-    def with_values(self, values: Mapping[str, float]) -> Self:
-        """This effect with new values of some constants."""
-        return type(self)(replace(self.constants, values={**self.constants.values, **values}))
 
     def size_mhz(self, top: Top, j: int) -> float:
         """The largest E-A splitting of the torsional ground state for |K| ≤ J, relative to that of K = 0."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, Self
@@ -120,10 +119,6 @@ class SpinEffect(QuantumEffect):
     def scale(self, name: str, parts: ParameterName) -> float:
         """A further factor of a term, which depends on its spins."""
         return 1.0
-
-    def with_values(self, values: Mapping[str, float]) -> Self:
-        """This effect with new values of some parameters."""
-        return replace(self, values={**self.values, **values})
 
     def parameters(self, top: Top) -> dict[str, float]:
         """The values in MHz."""

@@ -47,8 +47,8 @@ class FieldMap(Table):
 
     field: in the unit of `request.kind`. m: M. rank: order in energy among the states of the basis in the exact block. block: its label.
     energy_mhz: E/h. label: the free level of this rank. slope: -dE/dfield, named by `slope_name`. cosines: expectation values by name.
-    edge_population: of the two highest J. copies: number of coinciding states (M and -M). diabatic_label: or None. free_row, free_mhz,
-    weight: row, energy and spin weight (of one state) of the free level. jmax: of the basis. truncation_mhz: bound of the truncation error
+    edge_population: of the two highest J. copies: number of coinciding states (M and -M). diabatic_label: or None. free_mhz, weight:
+    energy and spin weight (of one state) of the free level. jmax: of the basis. truncation_mhz: bound of the truncation error
     of each energy; NaN for states listed only for their diabatic label. round_off_mhz: round-off of each energy. block_number: place of the
     block in `blocks_of_map`. request: the request of the map.
     """
@@ -63,7 +63,6 @@ class FieldMap(Table):
     cosines: dict[str, Floats]
     edge_population: Floats
     copies: Ints
-    free_row: Ints
     free_mhz: Floats
     weight: Floats
     jmax: int
@@ -334,7 +333,6 @@ def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockState
     by_state = {
         "rank": np.arange(len(labels)),
         "label": labels,
-        "free_row": states.rows,
         "free_mhz": levels.energy_mhz[states.rows],
         "weight": levels.weight[states.rows],
     }

@@ -11,7 +11,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Workspace
 from rotor.quantum.wang.basis import WangBlock
-from rotor.quantum.wang.wang_matrix import BlockRows
+from rotor.quantum.wang.wang_matrix import WangRows
 
 
 def unit_diagonals(
@@ -21,7 +21,7 @@ def unit_diagonals(
 
     taken: how many of the states of each block.
     """
-    js, rows = BlockRows.from_blocks(blocks, taken)
+    js, rows = WangRows.from_blocks(blocks, taken)
     j = np.array(js, dtype=float)[:, None]
     order = max((n for _, n in units), default=0)
     out = tuple(np.zeros((*rows.k.shape, len(units))) for _ in range(order + 1))

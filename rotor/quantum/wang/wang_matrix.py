@@ -71,7 +71,7 @@ def _elements_of_order(operators: Operators, js: Sequence[int], k: Ints, n: int,
     return np.asarray(total)
 
 
-class BlockRows(NamedTuple):
+class WangRows(NamedTuple):
     """Functions of Wang blocks side by side: row of J in tables of elements, K (blocks, size), sign and size of each block as columns."""
 
     rows: Ints
@@ -80,7 +80,7 @@ class BlockRows(NamedTuple):
     sizes: Ints
 
     @classmethod
-    def from_blocks(cls, blocks: Sequence[WangBlock], taken: Sequence[int]) -> tuple[list[int], BlockRows]:
+    def from_blocks(cls, blocks: Sequence[WangBlock], taken: Sequence[int]) -> tuple[list[int], WangRows]:
         """The J of the blocks, rising, and the rows. taken: how many of the functions of each block."""
         js, rows = np.unique([block.j for block in blocks], return_inverse=True)
         first, sign, sizes = (
@@ -111,7 +111,7 @@ def block_bands(operators: Operators, blocks: Sequence[WangBlock]) -> Iterator[l
     order = order_of(operators)
     for first in range(0, len(blocks), AT_ONCE_BLOCKS):
         chunk = blocks[first : first + AT_ONCE_BLOCKS]
-        js, rows = BlockRows.from_blocks(chunk, [block.size for block in chunk])
+        js, rows = WangRows.from_blocks(chunk, [block.size for block in chunk])
         diagonals = [np.zeros(rows.k.shape) for _ in range(order + 1)]
         with np.errstate(over="ignore", invalid="ignore"):  # reported where the block is diagonalised
             for n, elements in enumerate(elements_by_order(operators, js)):

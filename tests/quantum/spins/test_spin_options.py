@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -107,7 +107,8 @@ def test_derivatives_with_a_total_spin():
         moved = []
         for sign in (1, -1):
             changed = [
-                e.with_values({name: e.values[name] + sign * step}) if name in e.values else e for e in _pair("I")
+                replace(e, values={**e.values, name: e.values[name] + sign * step}) if name in e.values else e
+                for e in _pair("I")
             ]
             # one of a pair alone breaks the exchange, which a second order of 1e-7 MHz shows
             moved.append(solve_levels(TOP, 2, effects=(*SEMI_RIGID, *changed)))

@@ -158,7 +158,9 @@ def test_derivatives_of_split_levels_are_differences(name):
                 top = replace(top, constants=Constants(**values))
             else:
                 changed = tuple(
-                    e.with_values({key: e.values[key] + sign * step}) if key in getattr(e, "values", {}) else e
+                    replace(e, values={**e.values, key: e.values[key] + sign * step})
+                    if key in getattr(e, "values", {})
+                    else e
                     for e in all_effects
                 )
             sides.append(solve_levels(top, top_n, effects=changed).energy_mhz)

@@ -283,7 +283,10 @@ def test_derivatives_with_three_equivalent_spins_are_differences():
     for name in ("chi_ac(X1)", "C_bb(X1)"):
         moved = []
         for sign in (1, -1):
-            changed = [e.with_values({name: e.values[name] + sign * step}) if name in e.values else e for e in effects]
+            changed = [
+                replace(e, values={**e.values, name: e.values[name] + sign * step}) if name in e.values else e
+                for e in effects
+            ]
             moved.append(solve_levels(PROLATE, 1, effects=(*SEMI_RIGID, *changed)).energy_mhz)
         slope = (moved[0] - moved[1]) / (2 * step)
         derivative = level_derivatives(PROLATE, levels, [name])[:, 0]
