@@ -138,7 +138,7 @@ class BySpecies:
     Hermitian within one state.
     """
 
-    operator: Cosines | CosinesWithN | ByElements | BySpecies
+    operator: Cosines | CosinesWithN | ByElements | BySpecies | Fixed
     factors: SpeciesFactors
     odd: bool
 
