@@ -36,7 +36,7 @@ def main() -> None:
     matrices = [_matrix(block, factors[:, shown.index(name)]) for name in terms]
     whole = _matrix(block, factors @ np.array([values[name] for name in shown]))
     figure, axes = plt.subplots(2, 3, figsize=(6.6, 4.6), constrained_layout=True)
-    labels = [f"$O$ of {name}" for name in terms] + ["$H = \\sum_i c_i O_i$"]
+    labels = [f"$O$ of {name}" for name in terms] + ["$H$, the sum of all $c_i O_i$"]
     for axis, matrix, label in zip(
         axes.flat, [*matrices, whole - whole[0, 0] * np.eye(len(whole))], labels, strict=True
     ):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Collection, Iterable
+from pathlib import Path
 from typing import Any
 
 
@@ -44,6 +46,17 @@ def require_between(name: str, value: float, low: float, high: float) -> float:
     if not low < value < high:
         raise ValueError(f"{name}: {value:g}: expected a number between {low:g} and {high:g}")
     return value
+
+
+def require_file(path: str | os.PathLike[str], rule: str = "") -> None:
+    """Raise ValueError for a folder, and for a path that does not exist.
+
+    path: path that was given. rule: what would do, such as "expected a spectrum"; of a folder by default, a file in it.
+    """
+    if Path(path).is_dir():
+        raise ValueError(f"{path}: is a folder; {rule or 'give a file in it'}")
+    if not Path(path).exists():
+        raise ValueError(f"{path}: no such file{rule and '; '}{rule}")
 
 
 def require_choice(name: str, value: str, allowed: Collection[str]) -> str:

@@ -16,6 +16,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.fitting.top_constants import DIPOLES, ConstantSet
 from rotor.tops.constants import UnknownConstantError
+from rotor.tops.kind_of_constants import RIGID
 from rotor.units import parse_quantity
 
 _NAME = r"(\w+(?:-[abc]{2}(?:_\w+)?(?=\())?(?:\([^()]*\))?(?:\[[^\[\]]*\])?)"  # DeltaJ, A[1], G_c[0,1], chi_bb-cc(14N)
@@ -194,6 +195,8 @@ def with_names(constants: ConstantSet, names: Sequence[str]) -> ConstantSet:
     0.0
     """
     missing = [name for name in names if name not in constants]
+    if rigid := [name for name in missing if name in RIGID]:
+        raise ValueError(f"{rigid[0]} is not a constant of the start, and a rotational constant cannot begin at 0")
     try:
         return constants.replace(**dict.fromkeys(missing, 0.0)) if missing else constants
     except UnknownConstantError as error:

@@ -240,7 +240,7 @@ def answer_fluid(
             from rotor.fluids.engines.follow import check_engine
 
             check_engine(request.engine, atoms, settings, outputs, request.threads)
-        with progress_bar(0, progress) as shown:
+        with progress_bar(progress) as shown:
             equilibration = equilibrate(atoms, settings, request.equilibration_ps, shown)
         start += f"; {equilibration.text}"
     if not built_in:

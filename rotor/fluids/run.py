@@ -127,7 +127,7 @@ def run_fluid(
         assert outputs.checkpoint is not None
         run.restore_from(outputs.checkpoint)
     dynamics.wrench()  # an invalid initial state is refused before any file is opened
-    with run.files(), progress_bar(settings.steps, progress) as shown:
+    with run.files(), progress_bar(progress) as shown:
         on_start()
         run.go(shown)
     return run.record()
@@ -380,7 +380,7 @@ def ns_per_day(settings: Settings, steps: int, seconds: float) -> float:
 
 
 @contextmanager
-def progress_bar(steps: int, progress: Progress | None) -> Iterator[Progress]:
+def progress_bar(progress: Progress | None = None) -> Iterator[Progress]:
     """The receiver of progress: the caller's function, a bar on a terminal, or none."""
     if progress is not None or not sys.stderr.isatty():
         yield progress or (lambda step, steps, speed: None)
@@ -390,5 +390,5 @@ def progress_bar(steps: int, progress: Progress | None) -> Iterator[Progress]:
 
     text = TextColumn("{task.completed} of {task.total} steps, {task.fields[speed]:.3g} ns/day")
     with Progress(BarColumn(), text, TimeRemainingColumn(), console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=steps, speed=0.0)
-        yield lambda step, steps, speed: bar.update(task, completed=step, speed=speed)
+        task = bar.add_task("", visible=False, speed=0.0)
+        yield lambda step, steps, speed: bar.update(task, completed=step, total=steps, speed=speed, visible=True)

@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from rotor.checks import require_file
+
 if TYPE_CHECKING:
     from ase import Atoms
 
@@ -14,8 +16,7 @@ def read_box(path: str | os.PathLike[str]) -> Atoms:
     """The last frame of a file, without its calculator; ValueError for an unreadable file and for a box without a cell."""
     from rotor.molecules.readers.ase_files import structures
 
-    if not Path(path).is_file():
-        raise ValueError(f"{path}: no such file")
+    require_file(path)
     frames = structures(Path(path), "-1", "give a box of atoms in extended xyz, with Lattice and pbc")
     if not frames:
         raise ValueError(f"{path}: no structure in it; give a file with a box of atoms")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Floats
 from rotor.assignment.peak_finding import LEAST_POINTS, pick_peaks, pick_peaks_in_pieces
 from rotor.assignment.peaks import PeakList, peak_list
+from rotor.checks import require_file
 from rotor.formats.packed import first_bytes, load
 from rotor.formats.spectra.axis import AXIS_UNITS
 
@@ -41,8 +42,7 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
     Raises ValueError with file and rule, for unreadable input.
     """
     name = os.fspath(path)
-    if not Path(path).is_file():
-        raise ValueError(f"{name}: no such file; expected a list of peaks or a spectrum (.csv, .npy, .fits)")
+    require_file(name, "expected a list of peaks or a spectrum (.csv, .npy, .fits)")
     if first_bytes(Path(path), 80).startswith(_FITS):
         from rotor.formats.spectra.read import read_spectrum
 

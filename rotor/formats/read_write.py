@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.checks import require_file
 from rotor.formats.packed import HARMLESS_BYTES, refuse_bomb
 from rotor.formats.registry import find_reader, find_writer
 from rotor.molecules.readers.sdf_entries import BUILT, parse_entry
@@ -149,10 +150,7 @@ def _looks_like_a_path(word: str) -> bool:
 def _read_path(path: Path, isotopes: Isotopes | None) -> Any:
     if parse_entry(str(path)) is not None:
         return _with_isotopes(_geometry_top(path), isotopes)
-    if not path.exists():
-        raise ValueError(f"{path}: no such file")
-    if path.is_dir():
-        raise ValueError(f"{path}: is a folder; give a file in it")
+    require_file(path)
     if path.stat().st_size == 0:
         raise ValueError(f"{path}: the file is empty")
     reader = find_reader(path)

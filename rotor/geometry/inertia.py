@@ -176,6 +176,8 @@ def principal_frame(
     >>> [round(float(m), 12) for m in frame.moments], np.round(frame.axes[0] * 5**0.5, 12).tolist()
     ([4.0, 9.0, 13.0], [2.0, 1.0, 0.0])
     """
+    if not isinstance(body, Body):
+        raise ValueError(f"body: {type(body).__name__}: expected a Body; of a tensor alone, Body(mass, centre, tensor)")
     tensor = np.asarray(body.tensor, dtype=float)
     if (
         tensor.shape != (3, 3)

@@ -22,6 +22,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats, Ints, numbers_in_runs
+from rotor.checks import require_positive
 from rotor.observed.species import SpeciesLines
 from rotor.spectra.emission import BACKGROUND_K, planck_k
 from rotor.spectra.opacity import NM2_IN_CM2
@@ -53,11 +54,10 @@ class Component:
 
     def __post_init__(self) -> None:
         for name in ("column_per_cm2", "excitation_k", "fwhm_km_s", "size_arcsec"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{self.species.name}: {name} = {value}: expected a finite number above 0")
+            if getattr(self, name) is not None:
+                require_positive(f"{self.species.name}: {name}", getattr(self, name))
         if not abs(self.velocity_km_s) < KM_PER_S:
-            raise ValueError(f"{self.species.name}: velocity_km_s = {self.velocity_km_s}: beyond the speed of light")
+            raise ValueError(f"{self.species.name}: velocity_km_s: {self.velocity_km_s:g}: beyond the speed of light")
 
     @property
     def shift(self) -> float:

@@ -21,6 +21,7 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.checks import require_positive
 from rotor.observed.model import KM_PER_S, Sight, beam_filling, escape
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.spectra.emission import planck_k
@@ -56,8 +57,7 @@ class NonLteComponent:
 
     def __post_init__(self) -> None:
         for name in ("column_per_cm2", "kinetic_k", "density_per_cm3", "fwhm_km_s"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ValueError(f"{name} = {getattr(self, name)}: expected a finite number above 0")
+            require_positive(name, getattr(self, name))
         if self.geometry not in GEOMETRIES:
             raise ValueError(f"geometry {self.geometry!r}: expected one of {', '.join(GEOMETRIES)}")
 

@@ -184,7 +184,7 @@ def line_free(intensity: Floats, widen: int = 2) -> NDArray[np.bool_]:
         beyond = np.abs(intensity - middle) > _CLIP * deviation
         # a single channel beyond three deviations is noise as often as a line: only pairs take their neighbours along
         pairs = beyond & (np.roll(beyond, 1) | np.roll(beyond, -1))
-        wide = np.convolve(pairs, np.ones(2 * widen + 1), mode="same") > 0
+        wide = np.convolve(pairs, np.ones(2 * widen + 1))[widen : len(pairs) + widen] > 0
         now = ~(wide | beyond)
         if now.sum() < max(_LEAST_CHANNELS, len(intensity) // 50) or (now == selected).all():
             break

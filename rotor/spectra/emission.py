@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor import units
 from rotor.arrays import Floats
+from rotor.checks import require_positive
 from rotor.spectra.opacity import NM2_IN_CM2
 from rotor.spectra.profiles import gaussian
 from rotor.table import Table
@@ -77,18 +78,17 @@ class Source:
 
     def __post_init__(self) -> None:
         for name in ("column_per_cm2", "excitation_k", "fwhm_km_s"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0):
-                raise ValueError(f"{name} = {getattr(self, name)}: expected a finite number above 0")
+            require_positive(name, getattr(self, name))
         if not (math.isfinite(self.background_k) and self.background_k >= 0):
-            raise ValueError(f"background_k = {self.background_k}: expected a finite temperature of 0 K or more")
+            raise ValueError(f"background_k: {self.background_k:g}: expected a finite temperature of 0 K or more")
         if not 0 < self.filling <= 1:
-            raise ValueError(f"filling = {self.filling}: expected a fraction above 0 and up to 1")
+            raise ValueError(f"filling: {self.filling:g}: expected a fraction above 0 and up to 1")
         if not abs(self.velocity_km_s) < KM_PER_S:
             raise ValueError(
-                f"velocity_km_s = {self.velocity_km_s}: expected less than the speed of light, {KM_PER_S:.3f}; give a redshift"
+                f"velocity_km_s: {self.velocity_km_s:g}: expected less than the speed of light, {KM_PER_S:.3f}; give a redshift"
             )
         if not (math.isfinite(self.redshift) and self.redshift > -1):
-            raise ValueError(f"redshift = {self.redshift}: expected a finite number above -1")
+            raise ValueError(f"redshift: {self.redshift:g}: expected a finite number above -1")
 
     @property
     def frequency_ratio(self) -> float:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from rotor.checks import require_file
 from rotor.frozen import dataclass
 from rotor.quantum.quanta import headings
 from rotor.reports.line_tables import first_rows_title
@@ -169,8 +170,7 @@ def _molecule(reading: Reading, partition: str | None) -> Top | CatalogueLines:
     from rotor.formats.catalogue.cat_species import read_cat_with
 
     path = Path(reading.path(source))
-    if not path.is_file():
-        raise ValueError(f"{path}: no such file")
+    require_file(path)
     species = read_cat_with(path, partition if partition is None or "=" in partition else reading.path(partition))
     if "note" in species.identity:
         reading.note(f"{path}: {species.identity['note']}; --partition states another")

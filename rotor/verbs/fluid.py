@@ -151,8 +151,6 @@ def _equilibration(inputs: BoxInput, entries: Entries) -> dict[str, Any]:
 def _read(path: str) -> Atoms:
     from rotor.formats.boxes import read_box
 
-    if not Path(path).is_file():
-        raise ValueError(f"{path}: no such file")
     return read_box(path)
 
 
@@ -358,6 +356,7 @@ VERB = Verb(
     drawn="ps",
     scaled=False,
     sound=False,
+    stepwise=True,
     invariants="conserved",
     numerics="rotor.fluids.numerics:FLUID",
     accuracy="of the conserved energy (K) or of Ewald's forces (%)",

@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from rotor.checks import require_file
 from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
 from rotor.requests.fill import Entries, NamedError, read_instance, renaming, written_fields
@@ -178,8 +179,10 @@ def _path(name: Any, called: str, place: Place) -> Any:
     if not isinstance(name, str):
         return name
     path = Path(place.folder) / name
-    if not path.is_file():
-        raise ValueError(f"{called}: {path}: no such file" if called != "SOURCE" else f"{path}: no such file")
+    try:
+        require_file(path)
+    except ValueError as error:
+        raise ValueError(f"{called}: {error}" if called != "SOURCE" else str(error)) from None
     return str(path)
 
 

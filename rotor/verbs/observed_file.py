@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from rotor.checks import require_file
 from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, Rule, changed_fields, declared, declared_fields, identical, part
 from rotor.requests.readers import INFINITE, NameList, Names, Numbers, Quantity, Text, Whole
@@ -144,8 +145,7 @@ def _species_of_word(word: str, range_mhz: tuple[float, float], partition: str |
     if is_catalogue(word):
         from rotor.formats.catalogue.cat_species import read_cat_with
 
-        if not Path(word).is_file():
-            raise ValueError(f"{word}: no such file")
+        require_file(word)
         return read_cat_with(Path(word), partition)
     from rotor.observed.species import species_from_lines
     from rotor.spectra.lines import line_list

@@ -11,6 +11,7 @@ import msgspec
 import numpy as np
 
 from rotor.assignment.peaks import PeakList
+from rotor.checks import require_file
 from rotor.formats.packed import first_bytes
 from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
 from rotor.viewer.messages import Context
@@ -20,6 +21,7 @@ from rotor.viewer.session import SUFFIX, Session, check_spectrum, is_session, re
 from rotor.viewer.species_actions import add_species
 
 Note = Callable[[str], None]
+_READABLE = f"expected a spectrum (text, FITS or .npy) or a session ({SUFFIX})"
 ALIKE = 0.1  # relative difference of neighbouring steps of a spectrum; those of a list of peaks are random
 
 
@@ -28,8 +30,7 @@ def open_spectrum(path: Path, reading: SpectrumFile | None = None) -> ObservedSp
     from rotor.formats.spectra.axis import ReadChoices
     from rotor.formats.spectra.read import read_spectrum
 
-    if not path.is_file():
-        raise ValueError(f"{path}: no such file; expected a spectrum (text, FITS or .npy) or a session ({SUFFIX})")
+    require_file(path, _READABLE)
     if first_bytes(path, 6) == b"\x93NUMPY":
         values = np.load(path, allow_pickle=False)
         if values.ndim != 2 or not {2, 3} & set(values.shape) or values.dtype.kind not in "fiu":
@@ -78,6 +79,8 @@ def open_session(
     Raises ValueError with file and rule for what cannot be read, and where another program has the session.
     """
     path = Path(source)
+    if not is_session(path):
+        require_file(path, _READABLE)
     file = path if is_session(path) else Path(session) if session is not None else _session_beside(path)
     if session is not None and not is_session(file):
         raise ValueError(f"{file}: the name of a session ends in {SUFFIX}")

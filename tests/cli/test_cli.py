@@ -352,6 +352,8 @@ MISTAKES = {
     "file cut in the middle": ("spectrum cut.xyz", "cut.xyz"),
     "no geometry": ("spectrum text.xyz", "text.xyz"),
     "folder": ("info ./sub", "folder"),
+    "folder for lines": ("fit ./sub --start water", "sub: is a folder"),
+    "folder for peaks": ("assign ./sub", "sub: is a folder"),
     "unknown unit": ("spectrum water --temperature 5furlong", "--temperature: '5furlong': unit 'furlong' is not a known unit"),
     "unit of another kind": ("spectrum water --range 0:5K/cm", "--range"),
     "negative temperature": ("spectrum water --temperature -5", "--temperature: -5: expected a finite number above 0 K"),

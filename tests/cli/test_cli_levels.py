@@ -259,3 +259,14 @@ def test_a_table_goes_to_standard_output(call, folder):
     assert (code, err.rstrip()) == (2, "error: --csv - and --json -: one of them can go to standard output")
     assert "--parquet -: the name must end in .parquet" in call("levels", "OCS", "--parquet", "-")[2]
     assert "--csv -: the name must end in .csv" in call("fluid", "water", "--csv", "-")[2]  # written during the run
+
+
+def test_labels_of_a_term_diagram_end_before_the_next_column():
+    """5 0 5 of water was written over the step of 5 1 5."""
+    top = rotor.read("water")
+    (axes,) = levels_figure(answer_levels(LevelsRequest(top, jmax=5)).table, top).axes
+    steps = [axes.transData.transform(step) for lines in axes.collections for step in lines.get_segments()]
+    for label in axes.texts:
+        box = label.get_window_extent()
+        crossed = [s for s in steps if box.y0 < s[0, 1] < box.y1 and s[0, 0] < box.x1 and s[1, 0] > box.x0]
+        assert not crossed, label.get_text()

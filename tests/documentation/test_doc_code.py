@@ -1,4 +1,4 @@
-"""The Python blocks of the pages on classical motion, the Hamiltonian, scenes, spins and states run, and their assertions hold."""
+"""The Python blocks of some pages run, and their assertions hold."""
 
 import re
 
@@ -8,7 +8,9 @@ from places import PROJECT
 DOCS = PROJECT / "docs"
 
 
-@pytest.mark.parametrize("page", ["classical", "gas", "hamiltonian", "potential", "scenes", "spins_and_states"])
+@pytest.mark.parametrize(
+    "page", ["classical", "gas", "geometry", "hamiltonian", "potential", "scenes", "spins_and_states"]
+)
 def test_blocks_of_code_in_pages_run(page):
     blocks = re.findall(r"```python\n(.*?)```", (DOCS / f"{page}.md").read_text(encoding="utf-8"), re.DOTALL)
     assert blocks

@@ -387,6 +387,11 @@ def test_more_constants_than_lines_no_lines_and_unknown_levels_are_refused():
         fit_lines(strange, TRUE, parameters(TRUE, ["A"]))
 
 
+def test_a_rotational_constant_that_the_start_lacks_is_refused_by_its_name():
+    with pytest.raises(ValueError, match="A is not a constant of the start"):
+        with_names(Constants(B=6081.5), ["A", "B"])
+
+
 # Model building
 
 

@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from rotor.fluids.checkpoint import AseTrajectory, TextFile, read_checkpoint
 from rotor.fluids.forces.models import find_model
 from rotor.fluids.initial_box import lattice_box
 from rotor.fluids.record import FluidRecord
+from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
 from rotor.fluids.run import Outputs, make_calculator, make_dynamics, pressure_bar, run_fluid
 
 ENSEMBLES = ("nve", "langevin", "nose-hoover")
@@ -347,6 +349,16 @@ def test_a_terminal_sees_speed_and_progress_and_a_pipe_nothing(capsys, monkeypat
     run_fluid(box(8), SETTINGS)
     assert "ns/day" in terminal.getvalue()
     assert "60 of 60 steps" in terminal.getvalue()
+
+
+def test_a_terminal_sees_the_steps_of_the_equilibration_and_of_the_run(monkeypatch):
+    """The bar counted the steps of an equilibration as 5000 of 0."""
+    monkeypatch.setattr("sys.stderr", terminal := Terminal())
+    answer_fluid(FluidRequest(NewBox(64, equilibration_ps=0.4), replace(SETTINGS, cutoff_angstrom=6.0, steps=20)))
+    totals = set(re.findall(r"of (\w+) steps", terminal.getvalue()))
+    assert "20" in totals
+    assert len(totals) == 2
+    assert not totals & {"0", "None"}
 
 
 @pytest.mark.parametrize("harm", [Path.unlink, lambda path: path.write_bytes(path.read_bytes()[:3000])])

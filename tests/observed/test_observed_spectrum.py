@@ -38,6 +38,14 @@ def test_noise_of_a_spectrum_with_lines() -> None:
     assert free.mean() > 0.7
 
 
+@pytest.mark.parametrize("channels", [2, 3, 4, 5])
+def test_a_spectrum_of_a_few_channels_has_a_noise_level(channels: int) -> None:
+    """Fewer channels than a clipped channel and its neighbours take could not be read."""
+    intensity = np.arange(channels) % 2 + 1.0
+    assert line_free(intensity).all()
+    assert observed_spectrum(np.arange(1.0, channels + 1), intensity).noise[0] > 0
+
+
 def test_baseline_of_second_order() -> None:
     rng = np.random.default_rng(6)
     spectrum = injected([Component(rigid(), 1e15, 30.0, 0.0, 5.0)], GRID, 0.03, rng)

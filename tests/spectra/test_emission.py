@@ -189,5 +189,5 @@ def test_a_line_beyond_the_edge_shows_its_wing():
 def test_a_source_is_finite_and_above_zero(name, value):
     fine = {"column_per_cm2": 1e15, "excitation_k": 20.0, "fwhm_km_s": 1.0}
     assert Source(**fine).fwhm_km_s == 1.0
-    with pytest.raises(ValueError, match=f"{name} = .*: expected a finite number above 0"):
+    with pytest.raises(ValueError, match=f"{name}: .*: expected a finite number above 0"):
         Source(**{**fine, name: value})

@@ -106,3 +106,8 @@ def test_impossible_masses():
 def test_a_top_from_a_body():
     top = Top.from_body(point_masses([12.0, 16.0], [[0, 0, 0], [0, 0, 1.128]]))
     assert top.kind == "linear"
+
+
+def test_a_tensor_alone_is_refused_with_what_would_do():
+    with pytest.raises(ValueError, match=r"body: ndarray: expected a Body"):
+        principal_frame(np.diag([1.0, 2.0, 3.0]))

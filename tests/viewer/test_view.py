@@ -129,6 +129,11 @@ def test_a_session_killed_fifty_times_loses_no_assignment(tmp_path):
     assert known > 50
 
 
+def test_a_folder_is_no_spectrum():
+    with pytest.raises(ValueError, match=r"^\.: is a folder; expected a spectrum"):
+        open_session(".")
+
+
 def test_a_changed_spectrum_is_said_and_a_second_program_is_refused(service, tmp_path):
     assign_line(service, *SERIES[0])
     with pytest.raises(ValueError, match="another run"):

@@ -110,7 +110,7 @@ def _follow(
     """Write the frames and make the table; files are opened after the first frame."""
     first = next(frames)
     rows, started = [], time.perf_counter()
-    with ExitStack() as stack, progress_bar(settings.steps, None) as shown:
+    with ExitStack() as stack, progress_bar() as shown:
         on_start()
         csv, trajectories = _opened(stack, outputs)
         for frame in itertools.chain([first], frames):

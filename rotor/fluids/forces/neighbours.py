@@ -59,7 +59,7 @@ class Neighbours:
         if self.cutoff_angstrom > 0.5 * shortest * (1 + 1e-12):
             raise ValueError(
                 f"cutoff {self.cutoff_angstrom:g} Å is more than half of the smallest edge of the cell, {shortest:g} Å: "
-                f"at most {0.5 * shortest:g} Å, or a larger box"
+                f"give a cutoff of at most {0.5 * shortest:g} Å, or a larger box with more molecules"
             )
         if self.cutoff_angstrom + widest >= shortest or self.within_angstrom.max() + self.skin_angstrom > 2 * shortest:
             raise ValueError(

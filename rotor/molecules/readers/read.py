@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor.checks import require_file
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import element_symbol, isotope, isotope_by_mass
 from rotor.molecules.readers.quantum_chemistry import WITHOUT_CCLIB, has_cclib, is_output, needs_no_cclib, read_output
@@ -86,8 +87,7 @@ def _read_file(path: Path) -> Molecule:
     if entry is not None:
         molecule = parse_sdf(decode(entry_bytes(*entry), str(path)), str(path))
         return molecule if molecule.name else replace(molecule, name=f"{entry[0].stem}_{entry[1]}")
-    if not path.is_file():
-        raise ValueError(f"{path}: no such file; give one in xyz, mol or sdf, or in another format that ASE reads")
+    require_file(path, "give one in xyz, mol or sdf, or in another format that ASE reads")
     suffix = path.suffix.lower()
     if suffix in (".xyz", ".extxyz"):
         molecule = parse_xyz(decode(path.read_bytes(), str(path)), str(path))

@@ -7,6 +7,8 @@ import re
 from functools import lru_cache
 from pathlib import Path
 
+from rotor.checks import require_file
+
 SDF_SUFFIXES = (".sdf", ".sd")
 BUILT = ("SMILES:", "InChI=")  # beginnings of texts from which RDKit builds a molecule
 LIST_SUFFIXES = (".csv", ".smi", ".smiles")  # of lists of molecules by names and SMILES
@@ -33,8 +35,7 @@ def entry_bytes(path: Path, number: int) -> bytes:
 
     Raises ValueError for a number beyond the entries of the file.
     """
-    if not path.is_file():
-        raise ValueError(f"{path}: no such file")
+    require_file(path)
     entries = _entries(*_stamp(path))
     if not 1 <= number <= len(entries):
         raise ValueError(f"{path}#{number}: the file has {len(entries)} molecules, numbered from 1")
