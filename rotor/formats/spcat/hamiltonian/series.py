@@ -93,7 +93,7 @@ def coded_operator(d: Digits, axes: str, series: Series, states: tuple[int, int]
     """The operator of a code, with a series by its elements over |J k⟩.
 
     d: fields of the code. axes: the axes x, y, z: bca or bac. series: the constants of the file. states: states whose constants apply,
-    lower first; None for all.
+    lower first; None for all, which a series cannot have.
     Raises ValueError as `code_operator`, and for two series at once.
     """
     euler = d.kind is Kind.EULER
@@ -103,8 +103,10 @@ def coded_operator(d: Digits, axes: str, series: Series, states: tuple[int, int]
         raise ValueError("a code has one series alone, and no energy of one K (TYP 80 to 89) with it")
     if d.kind is Kind.LEVEL:
         return level_term(d, axes)
-    if states is None or not d.is_series:
+    if not d.is_series:
         return code_operator(d, axes)
+    if states is None:
+        raise ValueError("a term of a series without the constants of its states is read but not computed yet")
     if not d.ff:
         return _euler(d, axes, series, states)
     return _multiplied(code_operator(d.base, axes), k_factor(d.harmonic, d.sine, series, states), d.sine, axes)
