@@ -17,16 +17,20 @@ SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--sample", default="1/1", metavar="K/N", help="Of the chosen tests the K-th of N parts.")
+    parser.addoption("--sample", default="1/1", metavar="K/N", help="Of the slow tests the K-th of N parts.")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out what is not in the sample; which part a test is in follows from its name alone."""
+    """Leave out slow tests that are not in the sample; which part a test is in follows from its name alone."""
     part, parts = (int(number) for number in config.getoption("--sample").split("/"))
     if not 1 <= part <= parts:
         raise pytest.UsageError(f"--sample {part}/{parts}: expected K/N with K from 1 to N")
-    inside = [item for item in items if zlib.crc32(item.nodeid.encode()) % parts == part - 1]
-    config.hook.pytest_deselected(items=[item for item in items if item not in set(inside)])
+    outside: list[pytest.Item] = []
+    inside: list[pytest.Item] = []
+    for item in items:
+        other_part = item.get_closest_marker("slow") and zlib.crc32(item.nodeid.encode()) % parts != part - 1
+        (outside if other_part else inside).append(item)
+    config.hook.pytest_deselected(items=outside)
     items[:] = inside
 
 

@@ -13,14 +13,13 @@ from rotor.assignment.evidence import differs
 from rotor.assignment.families import Bounds, Family
 from rotor.assignment.growth import Grown, grow, line_slopes, predict, prior_weight, quartic_sizes
 from rotor.assignment.peaks import PeakList, peak_list
-from rotor.assignment.rigid_table import JMAX, PARAMETERS, rigid_table
+from rotor.assignment.rigid_table import PARAMETERS, rigid_table
 from rotor.assignment.search import Candidate, Field
 from rotor.assignment.species import multiples
 
 PROLATE = {"A": 8636.7, "B": 703.9, "C": 650.8, "DJ": 3e-5, "DJK": 3e-4, "DK": 8e-3, "d1": -2e-6, "d2": -3e-7}
 
 VALUES = np.array([SECOND[name] for name in PARAMETERS])
-TABLE = rigid_table(JMAX)
 
 
 def peaks_of(
@@ -36,12 +35,15 @@ def peaks_of(
 
 def field_of(peaks: PeakList) -> Field:
     """The peaks with wide bounds and the temperature of the lines."""
-    return Field(peaks, TABLE, Bounds(np.array([500.0, 200, 150]), np.array([2e4, 1.2e4, 9e3])), np.array([2.0]))
+    return Field(
+        peaks, rigid_table(), Bounds(np.array([500.0, 200, 150]), np.array([2e4, 1.2e4, 9e3])), np.array([2.0])
+    )
 
 
 def grown_near(seen: Field, constants: np.ndarray) -> Grown:
     """A species grown from rigid constants and three lines of J = 6 - 5."""
-    labels = [TABLE.label(row) for row in range(len(TABLE.upper))]
+    table = rigid_table()
+    labels = [table.label(row) for row in range(len(table.upper))]
     lines = np.array([labels.index(text) for text in ("6 0 6 - 5 0 5", "6 1 6 - 5 1 5", "6 1 5 - 5 1 4")])
     grown = grow(seen, Candidate(constants, Family(0, lines, lines[:0], 0.0), 100.0, 2.0))
     assert grown is not None
@@ -50,7 +52,8 @@ def grown_near(seen: Field, constants: np.ndarray) -> Grown:
 
 def largest_ka(rows: np.ndarray) -> np.ndarray:
     """The larger Ka of each line."""
-    return np.maximum(TABLE.quanta[TABLE.upper[rows], 1], TABLE.quanta[TABLE.lower[rows], 1])
+    table = rigid_table()
+    return np.maximum(table.quanta[table.upper[rows], 1], table.quanta[table.lower[rows], 1])
 
 
 def refitted(seen: Field, grown: Grown) -> Grown:
@@ -142,7 +145,7 @@ def test_lines_of_a_type_without_evidence_determine_nothing(right: tuple[Field, 
     assert scales[2] == pytest.approx(grown.scales[2], abs=0.3)
     assert np.isneginf(scales[:2]).all()
     checked = confirmed(seen, hidden, all_types=True)
-    assert (TABLE.kind[hidden.rows] == 2).sum() > 5
-    assert not (TABLE.kind[checked.rows] == 2).any()
+    assert (rigid_table().kind[hidden.rows] == 2).sum() > 5
+    assert not (rigid_table().kind[checked.rows] == 2).any()
     assert (np.abs(checked.constants - VALUES) < 5 * np.sqrt(np.diag(checked.covariance)))[:3].all()
     assert checked.covariance[0, 0] > 4 * grown.covariance[0, 0]
