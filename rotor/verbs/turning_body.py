@@ -211,7 +211,8 @@ def _start(
     units: of the angular velocity and of the angular momentum.
     """
     by_velocity = start.angular_velocity is not None
-    field = BODY["angular_velocity"] if by_velocity else MOTION["angular_momentum"]
+    in_body = BODY if start.angular_momentum is not None else MOTION  # the key of a scene's body
+    field = BODY["angular_velocity"] if by_velocity else in_body["angular_momentum"]
     value = start.angular_velocity if by_velocity else motion.angular_momentum
     if value is None:
         return None

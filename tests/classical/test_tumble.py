@@ -361,6 +361,13 @@ def test_moments_of_a_molecule_in_its_unit(call):
     assert json.loads(text)["energy"] == pytest.approx(json.loads(si)["energy"], rel=1e-14)  # round-off
 
 
+def test_the_scene_of_a_body_names_the_key_of_its_momentum(call):
+    """It was said to be given as conditions.angular_momentum, which is for molecules."""
+    start = ("--moments", "0.6,0.8,1.0", "--angular-momentum", "1.8,0.4,-0.9", "--times", "0:10:3")
+    assert call("tumble", *start, "--save-scene", "s.toml")[0] == 0
+    assert "in the body: given (body.angular_momentum)" in call("run", "s.toml")[1]
+
+
 def test_the_scene_of_an_everyday_body_keeps_its_name(call, tmp_path):
     """Its sizes and the names of its axes: saved as moments, a book was a body with axes 1, 2, 3."""
     code, out, _ = call("tumble", "wing-nut", "--omega", "0.01,0,20", "--save-scene", "s.toml")

@@ -8,6 +8,7 @@ E. W. Greisen, M. R. Calabretta, F. G. Valdes, S. L. Allen, Astron. Astrophys. 4
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -109,3 +110,14 @@ def intensity_unit(text: str | None, where: str) -> tuple[str, float]:
     if key not in INTENSITIES:
         raise ValueError(f"{where}: intensity in {text!r}; known units are K, mK, Jy/beam, mJy/beam, absorbance, V, mV")
     return INTENSITIES[key]
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit of a spectral axis or of an intensity.
+
+    >>> is_unit("km/s"), is_unit("K (Tmb)"), is_unit("30 arcsec")
+    (True, True, False)
+    """
+    with suppress(ValueError):
+        return bool(intensity_unit(text, ""))
+    return " ".join(text.lower().split()) in {*AXIS_UNITS, *_VELOCITY_UNITS, *_LENGTH_UNITS}

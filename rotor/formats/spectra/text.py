@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.formats.packed import load
-from rotor.formats.spectra.axis import AXIS_UNITS, INTENSITIES, ReadChoices, axis_mhz, intensity_unit
+from rotor.formats.spectra.axis import AXIS_UNITS, INTENSITIES, ReadChoices, axis_mhz, intensity_unit, is_unit
 from rotor.observed.spectrum import ObservedSpectrum, observed_spectrum
 
+LOW_MHZ = 1000.0  # of spectra below it the unit may be wrong: numbers of bands in GHz are between 1 and 1000
 COMMENTS = ("#", "!", "//", ";", "%")
 _SEPARATOR = re.compile(r"[,;\s]+")
 _NAME_AND_BRACKET = re.compile(r"[^\[\]()]+[\[(][^\])]+[\])]")
@@ -46,12 +47,16 @@ def read_text_spectrum(path: Path, choices: ReadChoices | None = None) -> Observ
     ]
     chosen, factor = intensity_unit(unit or "K", name)
     notes = (f"no units in the file: {' and '.join(assumed)} assumed",) if assumed else ()
+    frequency = axis_mhz(numbers[:, 0], axis_unit or "MHz", name, choices)
+    if (axis_unit or "MHz").lower() == "mhz" and frequency.max() < LOW_MHZ:
+        low = f"frequencies of {frequency.min():g} to {frequency.max():g} MHz are lower than those of most spectra"
+        notes = (*notes, f"{low}; if the numbers are GHz, --axis-unit GHz says so")
     third = numbers.shape[1] > 2 and len(names) > 2 and _NOISE.search(names[2])
     noise = numbers[:, 2] * factor if third else None
     if choices.noise is not None:
         noise = np.full(len(numbers), choices.noise * factor)
     return observed_spectrum(
-        axis_mhz(numbers[:, 0], axis_unit or "MHz", name, choices),
+        frequency,
         numbers[:, 1] * factor,
         noise=noise,
         source=name,
@@ -141,7 +146,9 @@ def _names_and_labels(heading: list[str]) -> tuple[list[str], dict[str, str]]:
             if bracket := _IN_BRACKETS.findall(match.group(2)):
                 labels[match.group(1).lower()] = bracket[-1] if match.group(1).lower() == "x" else bracket[0]
         elif ("," in line or ";" in line) and ":" not in line:
-            names = [item.strip() for item in re.split("[,;]", line)]
+            listed = [item.strip() for item in re.split("[,;]", line)]
+            stated = [unit for unit in map(_unit_in, listed[:2]) if unit]
+            names = listed if not stated or any(map(is_unit, stated)) else names  # else a remark with brackets
         elif len(named := _NAME_AND_BRACKET.findall(line)) > 1 and str(_unit_in(named[0])).lower() in AXIS_UNITS:
             names = named
         elif line.strip() and _unit_in(line.split()[0]):

@@ -158,6 +158,7 @@ def test_table_of_channels_as_specutils_writes_it(tmp_path: Path) -> None:
         ("Frequency / GHz, T / mK\n0.100,1000\n0.101,2000\n0.102,3000\n", [100, 101, 102], "K"),
         ("f/GHz T/K\n0.100 1\n0.101 2\n0.102 3\n", [100, 101, 102], "K"),
         ("# Orion (KL) taken in May (2020)\n100 1\n101 2\n102 3\n", [100, 101, 102], "K"),
+        ("# Sgr B2 in May 2020, beam (30 arcsec)\n100 1\n101 2\n102 3\n", [100, 101, 102], "K"),
         ("! MHz K\n100.0D0  1.0E0 \n101.0   2\n102 3\n", [100, 101, 102], "K"),
     ],
 )
@@ -169,6 +170,16 @@ def test_text_spectra_are_read_with_units_of_their_headings(
     assert spectrum.frequency_mhz.tolist() == pytest.approx(frequency)
     assert spectrum.intensity.tolist() == pytest.approx([1.0, 2.0, 3.0])
     assert spectrum.unit == unit
+
+
+def test_numbers_of_ghz_below_a_heading_of_mhz_have_a_hint(tmp_path: Path) -> None:
+    """A band of ALMA in GHz, called MHz, was a poor fit without a word."""
+    (tmp_path / "a.txt").write_text("frequency_mhz,t_k\n84.1,1\n84.2,2\n84.3,3\n")
+    (note,) = read_spectrum(tmp_path / "a.txt", ReadChoices(noise=1.0)).notes
+    assert note == (
+        "frequencies of 84.1 to 84.3 MHz are lower than those of most spectra; if the numbers are GHz, --axis-unit GHz says so"
+    )
+    assert read_spectrum(tmp_path / "a.txt", ReadChoices(axis_unit="GHz", noise=1.0)).notes == ()
 
 
 def test_text_in_velocities_with_noise_and_packed(tmp_path: Path) -> None:
