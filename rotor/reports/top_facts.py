@@ -127,20 +127,20 @@ def top_parts(
 
 def report_on_top(
     facts: Callable[[Any, Mapping[str, Any]], Facts],
-    *parts: Callable[[Any, Mapping[str, Any]], Part | None],
+    *parts: Callable[[Any, Any], Part | None],
     sources: Sequence[str] = ("constants",),
-    title: Callable[[Top], str] = lambda top: heading(top),
+    title: Callable[[Any], str] = lambda answer: heading(answer.request.top),
 ) -> Callable[[Any, Any], Iterable[Part | None]]:
-    """The function `show` of a verb on the top of its request, from functions of the answer and the content of its JSON.
+    """The function `show` of a verb on the top of its request.
 
-    sources: tables of the top that are cited.
+    facts: of an answer and the content of its JSON. parts: of an answer and its report. sources: tables of the top that are cited.
+    title: of an answer.
     """
 
     def show(answer: Any, report: Any) -> Iterable[Part | None]:
         """The parts of the report."""
-        top, content = answer.request.top, report.content
-        tables = [part(answer, content) for part in parts]
-        return top_parts(top, facts(answer, content), tables, sources, report, title(top))
+        tables = [part(answer, report) for part in parts]
+        return top_parts(answer.request.top, facts(answer, report.content), tables, sources, report, title(answer))
 
     return show
 

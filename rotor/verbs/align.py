@@ -19,7 +19,7 @@ from rotor.requests.readers import Quantity
 from rotor.table import counted
 from rotor.tops.top import Top
 from rotor.verbs.molecule import NUCLEI, REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
-from rotor.verbs.outputs import picture, tables
+from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Subject, Verb
 
@@ -143,7 +143,7 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> AlignRequest:
     return AlignRequest(**subject.values, **values)
 
 
-def _table(answer: AlignAnswer, content: Mapping[str, Any]) -> Table:
+def _table(answer: AlignAnswer, report: Report) -> Table:
     """Extremes of the cosines."""
     trace = answer.trace
     columns = {
@@ -154,7 +154,7 @@ def _table(answer: AlignAnswer, content: Mapping[str, Any]) -> Table:
         "min at (ps)": "{min_at_ps:.3f}",
         "mean after": lambda row: f"{trace.permanent[row['name']]:.6f}" if row["name"] in trace.permanent else "",
     }
-    return record_table("", columns, content["extremes"], {"cosine"})
+    return record_table("", columns, report.content["extremes"], {"cosine"})
 
 
 def _facts(answer: AlignAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -18,10 +18,6 @@ _UNIT_AT_END = re.compile(r"[A-Za-z][\w ²*^/]*$")
 MOST_TIMES = 10_000_000
 
 
-def _body(name: Any) -> NamedBody:
-    return named_body(name)
-
-
 def three(raw: Any, unit: str = "") -> Three:
     """Three finite numbers; a text may carry a unit, else `unit` holds."""
     x, y, z = _numbers(raw, 3, "three numbers, such as 0.6,0.8,1.0", unit)
@@ -80,7 +76,7 @@ class BodyInput:
     """A rigid body instead of a molecule, in any coherent units."""
 
     body: NamedBody | None = declared(
-        None, Custom(_body, lambda body: body.name, "NAME"), "Everyday body instead of a molecule: book, phone, racket or wing-nut",
+        None, Custom(named_body, lambda body: body.name, "NAME"), "Everyday body instead of a molecule: book, phone, racket or wing-nut",
         "body.name", option="--body", panel=MOLECULE, common=True, example="book",
     )  # fmt: skip
     moments: Three | None = declared(

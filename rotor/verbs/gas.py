@@ -15,7 +15,7 @@ from rotor.reports.screen import Table, record_table, sampled
 from rotor.requests.fill import Entries
 from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
 from rotor.verbs.molecule import NUCLEI, POLARIZABILITY, REFINEMENT, STATES
-from rotor.verbs.outputs import picture, tables
+from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Verb, Work
 
@@ -61,7 +61,7 @@ def _facts(answer: GasAnswer, content: Mapping[str, Any]) -> list[tuple[str, str
     return facts
 
 
-def _degrees_table(answer: GasAnswer, content: Mapping[str, Any]) -> Table:
+def _degrees_table(answer: GasAnswer, report: Report) -> Table:
     columns = {
         "degree": "{name}",
         "E (cm-1)": "{energy_cm:.4f}",
@@ -74,10 +74,10 @@ def _degrees_table(answer: GasAnswer, content: Mapping[str, Any]) -> Table:
         "p (KS)": "{ks_p_value:.3g}",
     }
     title = "mean kinetic energy by degree; spread √2 = 1.4142 expected"
-    return record_table(title, columns, content["degrees"], {"degree"})
+    return record_table(title, columns, report.content["degrees"], {"degree"})
 
 
-def _curves_table(answer: GasAnswer, content: Mapping[str, Any]) -> Table | None:
+def _curves_table(answer: GasAnswer, report: Report) -> Table | None:
     curves = answer.correlations
     if curves is None:
         return None
@@ -98,7 +98,10 @@ VERB = Verb(
     results=lambda answer: {"p_value": answer.test.p_value, "chi2": answer.test.chi2},
     rows="correlation",
     show=top_facts.report_on_top(
-        _facts, _degrees_table, _curves_table, title=lambda top: f"{top_facts.heading(top)}, a classical gas"
+        _facts,
+        _degrees_table,
+        _curves_table,
+        title=lambda answer: f"{top_facts.heading(answer.request.top)}, a classical gas",
     ),
     outputs=(
         *tables("the correlation functions", "out"),

@@ -14,7 +14,7 @@ from rotor.thermodynamics.info_request import InfoAnswer, InfoRequest, answer_in
 from rotor.tops.uncertain_numbers import known_digits
 from rotor.units import MHZ_PER_CM
 from rotor.verbs.molecule import POLARIZABILITY
-from rotor.verbs.outputs import tables
+from rotor.verbs.outputs import Report, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Verb, facts_named
 
@@ -69,7 +69,7 @@ def _kind_text(kind: str, decision: Mapping[str, Any]) -> str:
     return f"the geometry is {decision['kind']} by {numbers}; margin: a factor of {margin}{differs}"
 
 
-def _constants_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
+def _constants_table(answer: InfoAnswer, report: Report) -> Table:
     top = answer.request.top
     stated, estimated = top.constants.uncertainties, top.estimated_errors_mhz
     rows = []
@@ -91,7 +91,7 @@ def wavenumber_digits(mhz: float) -> int:
     return min(10, 1 + len(digits.replace(".", "").lstrip("0")))
 
 
-def _states_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table | None:
+def _states_table(answer: InfoAnswer, report: Report) -> Table | None:
     """Constants of further vibrational states and their couplings."""
     states = answer.request.top.states
     if states is None:
@@ -101,9 +101,9 @@ def _states_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table | Non
     return Table("", ("of states", "MHz", "cm-1"), rows, frozenset({"of states"}))
 
 
-def _axes_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
+def _axes_table(answer: InfoAnswer, report: Report) -> Table:
     """Moments and planar moments; axes and centre of mass in the frame of the input."""
-    moments, planar, frame = (content[k] for k in ("moments_u_angstrom2", "planar_moments_u_angstrom2", "frame"))
+    moments, planar, frame = (report.content[k] for k in ("moments_u_angstrom2", "planar_moments_u_angstrom2", "frame"))
     columns = ["axis", "I (u Å²)", "P (u Å²)"] + (["x", "y", "z"] if frame else [])
     rows = []
     for i, axis in enumerate("abc"):
@@ -114,10 +114,10 @@ def _axes_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
     return Table("", columns, rows, frozenset({"axis"}))
 
 
-def _nuclei_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table | None:
+def _nuclei_table(answer: InfoAnswer, report: Report) -> Table | None:
     """Nuclei that split lines, the size of the splitting, and their constants if known."""
     top, rows = answer.request.top, []
-    for nucleus in content["splitting_nuclei"]:
+    for nucleus in report.content["splitting_nuclei"]:
         constants_of_spin = top.spin_constants.of(nucleus["nucleus"]) if nucleus["known"] and top.spin_constants else {}
         constants = ", ".join(f"{name} {value:.6g}" for name, value in constants_of_spin.items())
         text = constants or "not known; the size is that of covalent bonds of this element"
@@ -145,8 +145,8 @@ def _reason(source: str) -> str:
     return re.sub(r"^Q\([^)]*\):? *", "", source).partition(";")[0]
 
 
-def _q_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
-    rows = content["partition_function"]
+def _q_table(answer: InfoAnswer, report: Report) -> Table:
+    rows = report.content["partition_function"]
     columns: dict[str, Any] = {
         "T (K)": "{temperature_k:g}",
         "Q": lambda row: "-" if row["q"] is None else f"{row['q']:.6g}",
@@ -160,12 +160,12 @@ def _q_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
     return record_table("", columns, rows, {"remark"})
 
 
-def _conformers_table(answer: InfoAnswer, content: Mapping[str, Any]) -> Table:
+def _conformers_table(answer: InfoAnswer, report: Report) -> Table:
     """Energies, constants (to the digits that the error of the geometry leaves) and dipoles of the conformers, if requested."""
     columns = ("conformer", "E (kJ/mol)", "A (MHz)", "B (MHz)", "C (MHz)", "μa (D)", "μb (D)", "μc (D)")
     rows, molecule = [], answer.request.top.molecule
     relative = (molecule.uncertainty or 0.0) if molecule is not None else 0.0
-    for number, conformer in enumerate(content.get("conformers", ()), start=1):
+    for number, conformer in enumerate(report.content.get("conformers", ()), start=1):
         constants = [
             known_digits(x, relative * x) if x < float("inf") else "-" for x in conformer["rotational_constants_mhz"]
         ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from rotor.quantum.quanta import headings
 from rotor.quantum.request import LevelsAnswer, LevelsRequest, answer_levels
 from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title
-from rotor.reports.screen import Part, Table, record_table, table_records
+from rotor.reports.screen import Table, record_table, table_records
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
 from rotor.requests.readers import Text, Whole, whole_range
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY
@@ -55,12 +55,6 @@ def _span(name: str) -> Any:
     return read
 
 
-def show(answer: LevelsAnswer, report: Report) -> Iterable[Part | None]:
-    """Constants and the lowest levels."""
-    facts, table = _facts(answer, report.content), _table(answer, report.shown)
-    return top_facts.top_parts(answer.request.top, facts, (table,), ("constants", "spin weights"), report)
-
-
 def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
     top, request = answer.request.top, answer.request
     between = f"= {request.jmin}" if request.jmin == request.jmax else f"from {request.jmin} to {request.jmax}"
@@ -86,9 +80,9 @@ def _facts(answer: LevelsAnswer, content: Mapping[str, Any]) -> list[tuple[str, 
     ]
 
 
-def _table(answer: LevelsAnswer, shown: LevelsShown) -> Table:
+def _table(answer: LevelsAnswer, report: Report) -> Table:
     """The lowest existing levels in order of energy."""
-    table = answer.table
+    table, shown = answer.table, report.shown
     order = np.argsort(table.energy_mhz, kind="stable")
     existing = order[table.levels.weight[table.rows[order]] > 0]
     rows = existing[: shown.top_levels]
@@ -122,7 +116,7 @@ VERB = Verb(
         "highest_cm": answer.table.energy_cm.max(),
     },
     rows="levels",
-    show=show,
+    show=top_facts.report_on_top(_facts, _table, sources=("constants", "spin weights")),
     outputs=(
         *tables("all levels", "levels"),
         Output("egy", (".egy",), "Write all levels as SPCAT's list (.egy)", example="levels.egy"),

@@ -13,7 +13,7 @@ from rotor.requests.field import OUTPUT, declared
 from rotor.requests.readers import Whole
 from rotor.spectra.raman_request import RamanAnswer, RamanRequest, answer_raman
 from rotor.verbs.molecule import DIPOLE, REFINEMENT, with_known_polarizability
-from rotor.verbs.outputs import picture, tables
+from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Shown, Verb
 
@@ -50,12 +50,12 @@ def _facts(answer: RamanAnswer, record: Mapping[str, Any]) -> list[tuple[str, st
     ]
 
 
-def _table(answer: RamanAnswer, record: Mapping[str, Any]) -> Part:
+def _table(answer: RamanAnswer, report: Report) -> Part:
     """The strongest lines in order of shift, or why there are none."""
     lines = answer.lines
     if not len(lines):
         return f"no lines: {answer.why_no_lines}\n"
-    selected = lines.where(record["strongest"])
+    selected = lines.where(report.content["strongest"])
     digits = 6 if "f" in lines.quanta_names else 4  # hyperfine shifts are about 1e-5 cm⁻¹
     columns = {
         "shift (cm-1)": f"{{shift_cm:.{digits}f}}",

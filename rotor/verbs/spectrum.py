@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -181,20 +181,24 @@ def draw(answer: SpectrumAnswer, path: Path, report: Report) -> None:
         draw_answer(answer, path, report)
 
 
-def show(answer: SpectrumAnswer, report: Report) -> Iterable[Part | None]:
-    """Constants, conditions and the strongest lines."""
+def _lines_part(answer: SpectrumAnswer, report: Report) -> Part:
+    """The strongest lines or patterns, or why there are none."""
     lines, record = answer.lines, report.content
-    part: Part
     if not len(lines):
         reason = answer.why_no_lines.replace("the range or lower the cut", "--range or lower --min-lgint")
-        part = f"no lines: {reason}{range_without_unit(report.entries)}\n"
-    elif record["patterns"] is not None:
-        part = patterns_table(record["patterns"], headings(rotational_quanta(lines.levels.quanta)))
-    else:
-        part = lines_table(lines, record["strongest"], record["optical_depth"])
-    title = "" if lines.levels.has_named_constants else f"{lines.top.name}: levels of the file's own parameters"
-    sources = ("constants", "dipole", "spin weights")
-    return top_facts.top_parts(lines.top, _facts(answer, record), (part,), sources, report, title)
+        return f"no lines: {reason}{range_without_unit(report.entries)}\n"
+    if record["patterns"] is not None:
+        return patterns_table(record["patterns"], headings(rotational_quanta(lines.levels.quanta)))
+    return lines_table(lines, record["strongest"], record["optical_depth"])
+
+
+def _title(answer: SpectrumAnswer) -> str:
+    top = answer.lines.top
+    return (
+        top_facts.heading(top)
+        if answer.lines.levels.has_named_constants
+        else f"{top.name}: levels of the file's own parameters"
+    )
 
 
 def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -290,7 +294,7 @@ VERB = Verb(
     table=lambda answer: answer.lines,
     results=results,
     rows="lines",
-    show=show,
+    show=top_facts.report_on_top(_facts, _lines_part, sources=("constants", "dipole", "spin weights"), title=_title),
     outputs=(
         Output(
             "cat", (".cat", ".cat.gz"), "Write a catalogue of 80 columns (.cat, .cat.gz)", write_catalogue, "lines.cat"

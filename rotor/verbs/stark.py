@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ from rotor.reports.field_maps import (
     results_of_map,
     table_of_states,
 )
-from rotor.reports.screen import Part, Table, record_table
+from rotor.reports.screen import Table, record_table
 from rotor.requests.fill import Entries
 from rotor.spectra.fields.request import MAKERS, FieldRequest, FieldSample
 from rotor.verbs.molecule import REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
@@ -28,7 +28,6 @@ from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Shown, Verb
 
 if TYPE_CHECKING:
-    from rotor.quantum.fields.field_map import FieldMap
     from rotor.spectra.fields.stark_coefficients import StarkCoefficients
     from rotor.tops.top import Top
 
@@ -81,16 +80,11 @@ def draw_lines(answer: StarkAnswer, path: Path, report: Report) -> None:
     write_picture(_derived_table("lines", answer, report), path, report.command, title=report.content["name"])
 
 
-def show(answer: StarkAnswer, report: Report) -> Iterable[Part | None]:
-    """The conditions and the first states."""
-    top, content = answer.request.top, report.content
-    table = _table(answer.states, mixed=bool(content["field_direction"][0] or content["field_direction"][1]))
-    further = [_coefficient_table(report.cache["coefficients"])] if "coefficients" in report.cache else []
-    return top_facts.top_parts(top, _facts(answer, content), (table, *further), ("constants", "dipole"), report)
-
-
-def _coefficient_table(coefficients: StarkCoefficients) -> Table:
-    """The first rows of the file of --coefficients."""
+def _coefficient_table(_: StarkAnswer, report: Report) -> Table | None:
+    """The first rows of the file of --coefficients, if it is written."""
+    coefficients: StarkCoefficients | None = report.cache.get("coefficients")
+    if coefficients is None:
+        return None
     columns = {name.replace("_m", " M").replace("label", "state"): f"{{{name}}}" for name in coefficients.names}
     columns = {name.upper() if name == "m" else name: form for name, form in columns.items()}
     units = ("kV/cm", *(f"(kV/cm){power}" for power in "²³⁴"))
@@ -104,9 +98,10 @@ def _coefficient_table(coefficients: StarkCoefficients) -> Table:
     return record_table(title, columns, rows, set(columns) & {"state", "upper", "lower"})
 
 
-def _table(states: FieldMap, mixed: bool) -> Table:
-    """The first states, by M and block; M is signed if all three components of the dipole act."""
-    columns: dict[str, Any] = {"M": lambda ends: "mixed"} if mixed else {}
+def _table(answer: StarkAnswer, report: Report) -> Table:
+    """The first states, by M and block; M is mixed in a field at an angle with Z."""
+    states, (x, y, _) = answer.states, report.content["field_direction"]
+    columns: dict[str, Any] = {"M": lambda ends: "mixed"} if x or y else {}
     columns["μ_eff there (D)"] = lambda ends: f"{states.slope[ends[1]]:.6f}"
     columns["⟨cosθ⟩ there"] = lambda ends: f"{states.cosines['costheta'][ends[1]]:.6f}"
     return table_of_states(states, "kV/cm", columns)
@@ -140,7 +135,7 @@ VERB = Verb(
     table=lambda answer: answer.states,
     results=results_of_map,
     rows="states",
-    show=show,
+    show=top_facts.report_on_top(_facts, _table, _coefficient_table, sources=("constants", "dipole")),
     outputs=(
         *tables("the map", "out"),
         picture("Draw the map", "out.png"),

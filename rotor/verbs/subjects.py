@@ -28,11 +28,6 @@ MOLECULE = Field(
 )  # fmt: skip
 
 
-def unprepared(top: Top, reading: Reading, entries: Entries) -> Top:
-    """The top unchanged."""
-    return top
-
-
 @dataclass(frozen=True)
 class OneMolecule(SubjectKind):
     """A molecule.
@@ -42,7 +37,7 @@ class OneMolecule(SubjectKind):
     """
 
     without: tuple[str, ...] = ()
-    prepare: Callable[[Top, Reading, Entries], Top] = unprepared
+    prepare: Callable[[Top, Reading, Entries], Top] = lambda top, reading, entries: top
     further: type | None = None
     scene_fields: ClassVar[tuple[Field, ...]] = (MOLECULE,)
 

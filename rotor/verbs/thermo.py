@@ -13,7 +13,7 @@ from rotor.requests.field import CONDITIONS
 from rotor.thermodynamics import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT
-from rotor.verbs.outputs import picture, tables
+from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Verb
 
@@ -78,7 +78,7 @@ def _theta_text(theta: Sequence[float]) -> str:
     return ", ".join(finite) + " K"
 
 
-def _rotation_table(answer: ThermoAnswer, content: Mapping[str, Any]) -> Table:
+def _rotation_table(answer: ThermoAnswer, report: Report) -> Table:
     """The functions of rotation at evenly spaced temperatures."""
     records, few = sampled(answer.functions, SHOWN, "temperatures")
     columns = {
@@ -96,7 +96,7 @@ def _rotation_table(answer: ThermoAnswer, content: Mapping[str, Any]) -> Table:
     return record_table(title, columns, records)
 
 
-def _gas_table(answer: ThermoAnswer, content: Mapping[str, Any]) -> Table | None:
+def _gas_table(answer: ThermoAnswer, report: Report) -> Table | None:
     """The functions of the ideal gas, if they are requested."""
     functions, gas = answer.functions, answer.functions.gas
     if gas is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rotor import units
 from rotor.reports import top_facts
@@ -13,12 +13,9 @@ from rotor.reports.screen import Table, record_table, table_records
 from rotor.requests.field import Rule
 from rotor.thermodynamics.torsion_request import TorsionAnswer, TorsionRequest, answer_torsion
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
-from rotor.verbs.outputs import picture, table_file
+from rotor.verbs.outputs import Report, picture, table_file
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Verb, Work, facts_named
-
-if TYPE_CHECKING:
-    pass
 
 EXAMPLES = """\
   rotor torsion C2H6 --bond 1-2
@@ -71,7 +68,7 @@ def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, 
     return facts
 
 
-def _classical_facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, str]]:
+def _classical_facts(answer: TorsionAnswer, report: Report) -> list[tuple[str, str]]:
     gas = answer.classical
     if gas is None:
         return []
@@ -96,7 +93,7 @@ def _terms_text(record: Mapping[str, Any]) -> str:
     return (", ".join(selected) + " cm⁻¹") if selected else "none"
 
 
-def _level_table(answer: TorsionAnswer, record: Mapping[str, Any]) -> Table:
+def _level_table(answer: TorsionAnswer, report: Report) -> Table:
     def splitting(row: Mapping[str, Any]) -> str:
         hidden = math.isnan(row["splitting_mhz"]) or (row["splitting_mhz"] == 0.0 and row["species"] == 0)
         return "" if hidden else f"{row['splitting_mhz']:.4f}"
@@ -113,7 +110,7 @@ def _level_table(answer: TorsionAnswer, record: Mapping[str, Any]) -> Table:
     return record_table(title, columns, table_records(answer.levels, slice(SHOWN)))
 
 
-def _thermo_table(answer: TorsionAnswer, record: Mapping[str, Any]) -> Table:
+def _thermo_table(answer: TorsionAnswer, report: Report) -> Table:
     functions = answer.functions
     exact = functions.for_method("levels")
     columns: dict[str, Any] = {

@@ -22,7 +22,7 @@ from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Numbers
 from rotor.tops.magnetic import MagneticTensors, tensor_for
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
-from rotor.verbs.outputs import picture, tables
+from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Verb
 
@@ -75,7 +75,7 @@ def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
     return top if chi is None else replace(top, magnetic=replace(top.magnetic, magnetisability=chi))
 
 
-def _table(answer: ZeemanAnswer, content: Mapping[str, Any]) -> Table:
+def _table(answer: ZeemanAnswer, report: Report) -> Table:
     states = answer.states
     return table_of_states(states, "T", {"moment there (μ_N)": lambda ends: f"{states.slope[ends[1]]:z.6f}"})
 
