@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Facts, Part
@@ -112,35 +112,25 @@ def model_facts(report: Any) -> list[tuple[str, str]]:
     return facts + left_out_facts(limits or [NOTHING_SEEN if content["mass_u"] is not None else unknown])
 
 
-def top_parts(
-    top: Top, facts: Facts, parts: Iterable[Part | None], tables: Sequence[str], report: Any, title: str = ""
-) -> Iterator[Part | None]:
-    """Parts of a report on a top: heading, facts, further parts; then sources of the named tables, errors and what is left out.
-
-    report: a `rotor.verbs.outputs.Report`. title: heading, by default that of the top.
-    """
-    yield title or heading(top)
-    yield facts
-    yield from parts
-    yield [*source_facts(top, tables, report.sources), *model_facts(report)]
-
-
 def report_on_top(
     facts: Callable[[Any, Mapping[str, Any]], Facts],
     *parts: Callable[[Any, Any], Part | None],
     sources: Sequence[str] = ("constants",),
     title: Callable[[Any], str] = lambda answer: heading(answer.request.top),
 ) -> Callable[[Any, Any], Iterable[Part | None]]:
-    """The function `show` of a verb on the top of its request.
+    """The function `show` of a verb on the top of its request: heading, facts, further parts; then sources, errors and what is left out.
 
-    facts: of an answer and the content of its JSON. parts: of an answer and its report. sources: tables of the top that are cited.
-    title: of an answer.
+    facts: of an answer and the content of its JSON. parts: of an answer and its report (`rotor.verbs.outputs.Report`).
+    sources: tables of the top that are cited. title: of an answer.
     """
 
     def show(answer: Any, report: Any) -> Iterable[Part | None]:
         """The parts of the report."""
-        tables = [part(answer, report) for part in parts]
-        return top_parts(answer.request.top, facts(answer, report.content), tables, sources, report, title(answer))
+        yield title(answer)
+        yield facts(answer, report.content)
+        for part in parts:
+            yield part(answer, report)
+        yield [*source_facts(answer.request.top, sources, report.sources), *model_facts(report)]
 
     return show
 

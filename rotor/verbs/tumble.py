@@ -100,13 +100,14 @@ def show(answer: TumbleAnswer | DrivenAnswer, report: Report) -> Iterable[Part |
     content = report.content
     if isinstance(answer, DrivenAnswer):
         return _driven_parts(answer, content)
-    request = answer.request
-    title, facts = f"{_heading(request)}, turning freely", _facts(request, content)
-    tables = _axes_table(request, content), _motion_table(answer)
-    top = getattr(request, "top", None)
-    if top is None:
-        return [title, facts, *tables, top_facts.error_facts(content.get("errors"))]
-    return top_facts.top_parts(top, facts, tables, ("constants",), report, title)
+    if getattr(answer.request, "top", None) is not None:
+        return _show_top(answer, report)
+    tables = _axes_table(answer, report), _motion_table(answer, report)
+    return [_title(answer), _facts(answer, content), *tables, top_facts.error_facts(content.get("errors"))]
+
+
+def _title(answer: TumbleAnswer) -> str:
+    return f"{_heading(answer.request)}, turning freely"
 
 
 def _driven_parts(answer: DrivenAnswer, content: Mapping[str, Any]) -> list[Part | None]:
@@ -124,8 +125,9 @@ def _driven_parts(answer: DrivenAnswer, content: Mapping[str, Any]) -> list[Part
     return [f"{_heading(answer.request)}, under {', '.join(names)}", facts, _driven_table(answer)]
 
 
-def _facts(request: TumbleRequest, content: Mapping[str, Any]) -> list[tuple[str, str]]:
-    units, facts = request.units, []
+def _facts(answer: TumbleAnswer, content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    request, facts = answer.request, list[tuple[str, str]]()
+    units = request.units
     top = getattr(request, "top", None)
     if top is not None:
         facts.append(top_facts.rigid_fact(top))
@@ -168,7 +170,7 @@ def _motion_text(request: TumbleRequest, content: Mapping[str, Any]) -> str:
     return f"{period}; its component along axis {middle} changes sign every half of it"
 
 
-def _axes_table(request: TumbleRequest, content: Mapping[str, Any]) -> Table:
+def _axes_table(answer: TumbleAnswer, report: Report) -> Table:
     """Stability of a rotation about each axis."""
     fates = {
         "stable": "a push oscillates",
@@ -176,7 +178,7 @@ def _axes_table(request: TumbleRequest, content: Mapping[str, Any]) -> Table:
         "neutral": "a push drifts",
         "none": "no rotation about it",
     }
-    units = request.units
+    units = answer.request.units
     columns = {
         "axis": "{axis}",
         "moment" + _bracket(units.moment): "{moment:.8g}",
@@ -184,16 +186,21 @@ def _axes_table(request: TumbleRequest, content: Mapping[str, Any]) -> Table:
         f"rate (rad{_per(units.time)})": "{rate:.8g}",
         "": lambda row: fates[row["kind"]],
     }
-    return record_table("spin about each axis, at this |L|", columns, content["fixed_axes"], {"axis", "kind", ""})
+    return record_table(
+        "spin about each axis, at this |L|", columns, report.content["fixed_axes"], {"axis", "kind", ""}
+    )
 
 
-def _motion_table(answer: TumbleAnswer) -> Table:
+def _motion_table(answer: TumbleAnswer, _: Report) -> Table:
     units, columns = answer.request.units, answer.table.columns
     names = {
         f"m{number}": f"L{axis}{_bracket(units.angular_momentum)}" for number, axis in enumerate(answer.request.axes, 1)
     }
     forms = {name: f"{{{name}:{_form(columns[name])}}}" for name in (*names, *_ATTITUDE)}
     return _rows(answer.table, units.time, {names.get(name, name): form for name, form in forms.items()})
+
+
+_show_top = top_facts.report_on_top(_facts, _axes_table, _motion_table, title=_title)
 
 
 def _driven_table(answer: DrivenAnswer) -> Table:
