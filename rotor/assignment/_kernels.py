@@ -4,12 +4,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rotor.assignment.rigid_table import MIXED
 from rotor.units import MHZ_PER_K
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-MIXED = 3  # the type of a family of lines of several types
 
 
 @njit(cache=True, nogil=True)

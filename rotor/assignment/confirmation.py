@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment import _kernels
 from rotor.assignment.growth import (
     LEAST_RATIO,
     ROUNDS,
@@ -139,6 +138,8 @@ def _places(
     seen: Field, species: Grown, taken: Mask, column: int, least: int, sigma0: float, all_types: bool
 ) -> Places | None:
     """Likelihood of the group at all its places; None where the other lines place it, or do not predict it."""
+    from rotor.assignment import _kernels
+
     constants, covariance = _others(seen, species, taken)
     predicted = predict(seen, species.constants, species.temperature_k)
     scales = np.where(species.ratios > LEAST_RATIO, species.scales, -np.inf)

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment._kernels import MIXED, strongest_lines
-from rotor.assignment.rigid_table import RigidTable
+from rotor.assignment.rigid_table import MIXED, RigidTable
 
 STRONGEST = 7  # strongest lines of a type from which families are formed
 COMPANIONS = 16  # lines that a family predicts
@@ -114,6 +113,8 @@ def families(
     list of Family
         Ordered by greedy cover: families that cover most tops first.
     """
+    from rotor.assignment._kernels import strongest_lines
+
     tops = sample_tops(bounds, samples, rng)
     temperatures = np.exp(rng.uniform(np.log(temperature_k[0]), np.log(temperature_k[1]), len(tops)))
     j = table.quanta[:, 0].astype(np.float64)

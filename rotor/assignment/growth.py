@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment import _kernels
 from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field
 from rotor.units import MHZ_PER_K
 
@@ -113,6 +112,8 @@ def prior_weight(field: Field, constants: Floats, sizes: Floats) -> Floats:
 
 def predict(field: Field, constants: Floats, temperature_k: float, most: int = MOST_LINES) -> Predicted:
     """The strongest lines of each type in the band."""
+    from rotor.assignment import _kernels
+
     table = field.table
     size = len(table.upper)
     energy, row, f, s_nu = np.empty(len(field.jj)), np.empty(size, np.int64), np.empty(size), np.empty(size)
@@ -136,6 +137,8 @@ def predict(field: Field, constants: Floats, temperature_k: float, most: int = M
 
 def line_slopes(field: Field, rows: Ints, constants: Floats) -> Floats:
     """∂ν/∂c of lines (rows, 8)."""
+    from rotor.assignment import _kernels
+
     table = field.table
     slopes: Floats = _kernels.derivatives(table.levels, table.theta, table.upper, table.lower, rows, constants)
     return slopes
@@ -213,6 +216,8 @@ class _Matched:
 
 def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0: float) -> float:
     """The temperature with the largest likelihood ratio, among the given ones or on a grid."""
+    from rotor.assignment import _kernels
+
     if len(field.temperatures) == 1:
         return float(field.temperatures[0])
     lines = predict(field, constants, TEMPERATURES[-1], 4000)  # the highest temperature shows the most lines
@@ -245,6 +250,8 @@ def _errors(slopes: Floats, covariance: Floats, sigma0: float) -> Floats:
 
 def _ratios(field: Field, lines: Predicted, errors: Floats, most: int) -> tuple[Floats, Floats]:
     """Likelihood ratios and scales by type, from the strongest lines of each; errors of lines (lines,)."""
+    from rotor.assignment import _kernels
+
     peaks = field.peaks
     ratios: tuple[Floats, Floats] = _kernels.best_scales(
         lines.frequency, lines.expected, lines.kind, errors, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
@@ -337,6 +344,8 @@ def _predicted_by_others(
 
 def _nearest(field: Field, centre: Floats, height: Floats, errors: Floats, most_chance: float) -> Ints:
     """The peak matched to each line (lines,), or -1."""
+    from rotor.assignment import _kernels
+
     peaks = field.peaks
     chosen: Ints = _kernels.nearest_peaks(
         centre, height, errors, WINDOW, most_chance, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density, SPREAD,
@@ -365,6 +374,8 @@ def _refitted(
     start: Candidate,
 ) -> tuple[Floats, Floats, float, Grown]:
     """A step of weighted least squares; distant lines have lower weights."""
+    from rotor.assignment import _kernels
+
     peaks = field.peaks
     energy = np.empty(len(field.jj))
     _kernels.level_energies(field.table.levels, field.table.theta, field.jj, constants, energy)
@@ -437,6 +448,8 @@ def with_evidence(field: Field, grown: Grown) -> Grown:
 
 def _joint_ratio(field: Field, constants: Floats, lines: Predicted, scales: Floats, sigma0: float) -> float:
     """ln of the likelihood ratio of the lines of all types; lines of a peak are merged, and each peak is matched once."""
+    from rotor.assignment import _kernels
+
     merged = merged_lines(field, constants, lines, scales)
     order = np.argsort(-merged.height, kind="stable")
     peaks = field.peaks

@@ -14,7 +14,6 @@ from itertools import combinations
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment import _kernels
 from rotor.assignment.families import Bounds, Family
 from rotor.assignment.growth import Grown, Merged, grow, merged_lines, predict
 from rotor.assignment.peaks import PeakList
@@ -180,6 +179,8 @@ def _shifts(peaks: PeakList, lines: Merged, three: Ints, expected: Expected) -> 
 
 def _ratio(peaks: PeakList, lines: Merged, visible: Ints, shift: Floats) -> float:
     """ln of the likelihood ratio of the visible lines at shifted constants."""
+    from rotor.assignment import _kernels
+
     centre = lines.centre[visible] + lines.slope[visible, :3] @ shift
     value = _kernels.joint_ratio(
         centre, lines.height[visible], np.full(len(visible), ROUGH_MHZ), peaks.frequency_mhz, peaks.log_intensity,

@@ -26,6 +26,7 @@ from rotor.tops.top import Top
 
 PARAMETERS = ("A", "B", "C", "DJ", "DJK", "DK", "d1", "d2")
 TYPES = "abc"
+MIXED = len(TYPES)  # the type of a family of lines of several types
 JMAX = 30
 KA_MAX = 10  # highest J of lines; higher ones are weak at the temperatures of jets
 NODES, STRENGTH_NODES = 96, 24

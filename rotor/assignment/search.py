@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment import _kernels, _sweep
 from rotor.assignment.families import SAME_PEAK_MHZ, Bounds, Family
 from rotor.assignment.peaks import PeakList
-from rotor.assignment.rigid_table import RigidTable
+from rotor.assignment.rigid_table import MIXED, RigidTable
 
 BIN_MHZ = 0.1
 NEAR_MHZ = 0.5  # distance of a peak from a predicted line that counts as a hit: shifts by distortion and errors of the family's lines
@@ -104,6 +103,8 @@ class Field:
 
 def search_roots(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
     """Roots of a family (n, 5): hits, misses, A, B, C."""
+    from rotor.assignment._sweep import sweep
+
     table = field.table
     # the line with the largest change of J first: two Q branches alone do not give ½(A+C)
     lines = family.lines[np.argsort(-np.abs(_jj_change(field, family.lines)), kind="stable")]
@@ -112,7 +113,7 @@ def search_roots(field: Field, family: Family, seeds: Ints, need: int) -> Floats
     energies, kappa = field.energies, table.kappa[field.points]
     out = np.empty((4000, 5))
     low, high = field.peaks.band_mhz
-    count = _sweep.sweep(
+    count = sweep(
         energies[upper] - energies[lower], field.jj[upper] - field.jj[lower], kappa,
         np.ascontiguousarray((energies[further] - energies[below]).T), field.jj[further] - field.jj[below],
         field.peaks.frequency_mhz[seeds], field.peaks.log_intensity[seeds], field.near, low, high, BIN_MHZ, NEAR_MHZ, 2 * SOFTNESS, RATIO,
@@ -151,10 +152,12 @@ def quick_ratios(field: Field, tops: Floats, kind: int, least: float = 0.0) -> t
 
     least : of a ratio of one type that matters; lower ones count as 0.
     """
+    from rotor.assignment import _kernels
+
     table, peaks = field.table, field.peaks
     lines = table.with_type(kind)
     ratios: tuple[Floats, Floats] = _kernels.quick_ratios(
-        table.reduced, table.theta, field.jj, lines.upper, lines.lower, lines.kind, lines.strength, kind == _kernels.MIXED, tops,
+        table.reduced, table.theta, field.jj, lines.upper, lines.lower, lines.kind, lines.strength, kind == MIXED, tops,
         field.temperatures, peaks.windows, ROUGH_MHZ, SOFTNESS, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
         peaks.log_threshold, SPREAD, DETECTED, 40, SAME_PEAK_MHZ, least,
     )  # fmt: skip

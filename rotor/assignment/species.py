@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment import _kernels
 from rotor.assignment.families import Bounds, Family
 from rotor.assignment.growth import LEAST_RATIO, Grown, grow, line_slopes, predict, regrown
-from rotor.assignment.rigid_table import RigidTable
+from rotor.assignment.rigid_table import MIXED, RigidTable
 from rotor.assignment.search import Candidate, Field, alike, quick_ratios, ranked, search_roots
 
 CLEAR = 300.0  # evidence at which a search ends at once
@@ -218,6 +217,8 @@ def _multiple_row(low: Ints, upper: Ints, row: int, ratio: float) -> int:
 
 def _fitted_top(seen: Field, top: Floats, lines: Ints, frequency: Floats) -> Floats:
     """A, B, C near `top` from lines with their frequencies, by least squares."""
+    from rotor.assignment import _kernels
+
     constants, energy = np.concatenate([top, np.zeros(5)]), np.empty(len(seen.jj))
     for _ in range(3):
         if not constants[0] > constants[1] > constants[2] > 0:
@@ -256,6 +257,8 @@ def _mirrored_row(table: RigidTable, row: int) -> int | None:
 
 def _shifted(seen: Field, start: Floats, present: NDArray[np.bool_], slow: Ints) -> list[Candidate]:
     """Candidates A + x, B + x, C + x; present : types of lines (3,). slow : lines of Q branches that the candidates begin with."""
+    from rotor.assignment import _kernels
+
     table, constants = seen.table, start.copy()
     energy = np.empty(len(seen.jj))
     _kernels.level_energies(table.levels, table.theta, seen.jj, constants, energy)
@@ -281,7 +284,7 @@ def _shifted(seen: Field, start: Floats, present: NDArray[np.bool_], slow: Ints)
     out = list[Candidate]()
     for n in np.argsort(-ratios)[: 5 * MOST_ALIASES].tolist():
         if ratios[n] > FAINT and not any(alike(tops[n], candidate.constants, NEAR) for candidate in out):
-            family = Family(_kernels.MIXED, np.concatenate([which[n : n + 1], slow]), slow[:0], 0.0)
+            family = Family(MIXED, np.concatenate([which[n : n + 1], slow]), slow[:0], 0.0)
             out.append(Candidate(tops[n], family, float(ratios[n]), float(temperatures[n])))
     return out[:MOST_ALIASES]
 
