@@ -19,6 +19,7 @@ from rotor.reports.error_table import error_parts
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.reports.screen import Part, Table, evenly, json_with_rows
 from rotor.requests.field import NUMERICS, OUTPUT, Rule, declared
+from rotor.requests.fill import within
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
 from rotor.verbs.outputs import Report
@@ -196,10 +197,8 @@ def _dask_pool(address: str, certificates: str | None) -> Iterator[Executor]:
     if files and len(files) != 3:
         raise ValueError(f"--dask-tls {certificates}: expected three files: authority, certificate, key")
     with ExitStack() as stack:
-        try:
+        with within("--dask"):
             pool = stack.enter_context(dask_executor(address, tls_security(*files) if files else None))
-        except ValueError as error:
-            raise ValueError(f"--dask: {error}") from None
         yield pool
 
 

@@ -27,7 +27,7 @@ from typing import Any
 from rotor.frozen import dataclass
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import REQUIRED, declared
-from rotor.requests.fill import Entries
+from rotor.requests.fill import Entries, within
 from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Sought
 from rotor.requests.numerics import Numerics
 from rotor.requests.readers import Custom, Quantity
@@ -142,10 +142,8 @@ def read_accuracy(stated: Stated, numerics: Numerics, entries: Entries = Entries
         raise ValueError(f"accuracy: {plain!r}: expected a unit: {units}")
     if percent and unit not in ("", "%"):
         raise ValueError(f"accuracy: {plain!r}: expected {unit}, not a percentage")
-    try:
+    with within("accuracy"):
         number = Quantity(unit if unit in CONVERTED else "").read(text.removesuffix("%").removesuffix("rad").strip())
-    except ValueError as error:
-        raise ValueError(f"accuracy: {error}") from None
     if not number > 0.0:
         raise ValueError(f"accuracy: {plain!r}: expected more than 0")
     return Accuracy(0.01 * number if percent and not unit else number, unit, total, numerics)

@@ -96,6 +96,16 @@ class NamedError(ValueError):
 
 
 @contextmanager
+def within(place: str) -> Iterator[None]:
+    """Context in which the text of a ValueError begins with its place: an option, a key, or a field in braces (`NamedError`)."""
+    try:
+        yield
+    except ValueError as error:
+        kind = NamedError if place.startswith("{") else ValueError
+        raise kind(f"{place}: {error}") from None
+
+
+@contextmanager
 def naming(fields: Iterable[Field], style: str) -> Iterator[None]:
     """Context in which a NamedError names these fields in the user's style."""
     try:

@@ -14,7 +14,7 @@ from rotor.arrays import Floats
 from rotor.reports import top_facts
 from rotor.reports.screen import Table, record_table
 from rotor.requests.field import CONDITIONS, REQUIRED, all_fields, declared_fields
-from rotor.requests.fill import Entries, NamedError, read_fields
+from rotor.requests.fill import Entries, NamedError, read_fields, within
 from rotor.requests.readers import Quantity
 from rotor.table import counted
 from rotor.tops.top import Top
@@ -64,24 +64,18 @@ def read_pulses(typed: Mapping[str, Any]) -> Mapping[str, Any]:
 
     Raises ValueError, with the option, for an unreadable text, and if no pulse is given.
     """
-    axis = _named("--polarization", lambda: read_axis(typed.get("--polarization", "z")))
-    pulses = [
-        _named(option, lambda t=text, o=option: _pulse_of_text(t, o, axis))
-        for option in _TEXTS
-        for text in typed.get(option, ())
-    ]
+    with within("--polarization"):
+        axis = read_axis(typed.get("--polarization", "z"))
+    pulses: list[Pulse] = []
+    for option in _TEXTS:
+        with within(option):
+            pulses += [_pulse_of_text(text, option, axis) for text in typed.get(option, ())]
     if "--pulse-table" in typed:
-        pulses.append(_named("--pulse-table", lambda: _pulse_of_table(typed["--pulse-table"], axis)))
+        with within("--pulse-table"):
+            pulses.append(_pulse_of_table(typed["--pulse-table"], axis))
     if not pulses:
         raise ValueError('no pulse: give --pulse "1e13 W/cm2, 1 ps", --switched, --kick, --pulse-table or --thz')
     return {"pulses": tuple(pulses)}
-
-
-def _named(option: str, make: Any) -> Any:
-    try:
-        return make()
-    except ValueError as error:
-        raise ValueError(f"{option}: {error}") from None
 
 
 def _pulse_of_text(text: str, option: str, axis: Axis) -> Pulse:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rotor.checks import require_file
 from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
-from rotor.requests.fill import Entries, NamedError, read_instance, renaming, written_fields
+from rotor.requests.fill import Entries, NamedError, read_instance, renaming, within, written_fields
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
@@ -232,10 +232,8 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> FitRequest:
                 start=subject.values["start"],
             )
     if paths["merge"] is not None:
-        try:
+        with within("{merge}"):
             request = with_more_lines(request, paths["merge"])
-        except ValueError as error:
-            raise NamedError(f"{{merge}}: {error}") from None
     settings = {item.name for item in fields(request.options)}
     changes = {name: value for name, value in vars(inputs).items() if name in settings and value is not None}
     return replace(request, options=replace(request.options, **changes))

@@ -5,23 +5,22 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
-from rotor.requests.fill import Entries, read_instance, renamed
+from rotor.requests.fill import Entries, read_instance, renamed, within
 from rotor.requests.readers import Names, Numbers, Pairs, Quantity, Text
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
     from rotor.tops.top import Top
 
-T = TypeVar("T")
 USUAL_LEAST_MHZ = 100.0  # largest constant below which a missing unit gives a note
 STATES = ("state_constants", "state_dipoles", "state_weights", "state_symmetry", "state_names")
 DIPOLE, POLARIZABILITY = ("dipole", "dipole_abc"), ("polarizability", "anisotropy")
@@ -161,13 +160,6 @@ class Reading:
         """The source of a number that the user gave, for provenance."""
         return f"given{how} ({self.named(name)})" if self.style != "name" else f"given{how}"
 
-    def within(self, name: str, make: Callable[[], T]) -> T:
-        """The result of `make`; a ValueError names the input."""
-        try:
-            return make()
-        except ValueError as error:
-            raise ValueError(f"{self.named(name)}: {error}") from None
-
     def path(self, name: str) -> str:
         """Path of a file relative to the scene; other words unchanged."""
         beside = str(Path(self.folder) / name)
@@ -201,7 +193,8 @@ def top_of(reading: Reading) -> Top:
     for name, step in _STEPS.items():
         value = getattr(reading.inputs, name)
         if value is not None:
-            top = reading.within(name, partial(step, top, value, reading))
+            with within(reading.named(name)):
+                top = step(top, value, reading)
     top = _with_states(top, reading)
     from rotor.tops.plausible import implausible
 
@@ -240,7 +233,8 @@ def _from_constants(reading: Reading) -> Top:
     from rotor.tops.top import Top
 
     text = reading.inputs.constants or ""
-    top = reading.within("constants", lambda: Top.from_constants(text, source=reading.source("constants")))
+    with within(reading.named("constants")):
+        top = Top.from_constants(text, source=reading.source("constants"))
     if reading.style == "option" and not has_unit(text) and max(top.constants.values.values()) < USUAL_LEAST_MHZ:
         reading.note(
             f"{reading.named('constants')}: no unit is given: the numbers are taken as MHz; for GHz write '{text} GHz'"
@@ -282,8 +276,8 @@ def _from_source(reading: Reading) -> Top:
             f"{source}: {kind} is a list of molecules, not a single one: write it into a scene, "
             f"molecule = \"{Path(source).name}\", and start that with 'rotor run'; 'rotor new info' prints a scene"
         )
-    read_top = partial(read, source, isotopes=",".join(inputs.isotopes) or None)
-    top: object = reading.within("source", read_top) if reading.style == "key" else read_top()
+    with within(reading.named("source")) if reading.style == "key" else nullcontext():
+        top: object = read(source, isotopes=",".join(inputs.isotopes) or None)
     if not isinstance(top, Top):
         raise ValueError(f"{source}: holds a {type(top).__name__.lower()}, not a molecule or constants")
     return top

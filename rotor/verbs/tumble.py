@@ -12,7 +12,7 @@ from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import Rule
-from rotor.requests.fill import NamedError
+from rotor.requests.fill import NamedError, within
 from rotor.table import Table as Columns
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
@@ -47,10 +47,8 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
     from rotor.plots.animation import check_film
 
     path, times = str(outputs["gif"][0]), request.times
-    try:
+    with within("{outputs.gif}"):
         check_film(path)
-    except ValueError as error:
-        raise NamedError(f"{{outputs.gif}}: {error}") from None
     if times is not None and min(times) == max(times):
         raise NamedError(
             f"{{outputs.gif}} {path}: a film needs at least two different times; give more {{conditions.times}}"

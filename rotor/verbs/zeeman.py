@@ -18,7 +18,7 @@ from rotor.reports.field_maps import (
 )
 from rotor.reports.screen import Table
 from rotor.requests.field import CONDITIONS, declared, names_of
-from rotor.requests.fill import Entries, read_instance
+from rotor.requests.fill import Entries, read_instance, within
 from rotor.requests.readers import Numbers
 from rotor.tops.magnetic import MagneticTensors, tensor_for
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
@@ -58,10 +58,8 @@ def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
 
     def tensor(name: str) -> Tensor | None:
         numbers = getattr(magnetic, name)
-        try:
+        with within(called[name]):
             return None if numbers is None else tensor_for(top.kind, list(numbers))
-        except ValueError as error:
-            raise ValueError(f"{called[name]}: {error}") from None
 
     g, chi = tensor("g"), tensor("magnetisability")
     if g is not None:

@@ -24,7 +24,7 @@ from rotor.cli.shared.output import HELD, at_end, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_fields, picture_settings, picture_style
 from rotor.reports.screen import show_parts
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, Field
-from rotor.requests.fill import Entries
+from rotor.requests.fill import Entries, within
 from rotor.requests.readers import Flag, Text
 from rotor.verbs.calculation import Calculation, Outcome, answering
 from rotor.verbs.molecule import is_file
@@ -285,10 +285,8 @@ def fields_of_extras(verb: Verb, typed: Mapping[str, Any], others: Collection[st
             continue
         if double := next((other for other in extra.instead_of if other in others), None):
             raise ValueError(f"{extra.option} and {verb.fields[double].flag}: give one of them")
-        try:
+        with within(extra.option):
             values |= extra.read(typed[extra.option])
-        except ValueError as error:
-            raise ValueError(f"{extra.option}: {error}") from None
     return values if verb.read_extras is None else {**values, **verb.read_extras(typed)}
 
 
@@ -340,10 +338,8 @@ def working(verb: Verb, workers: Any) -> Any:
     from rotor.cli.shared.workers import working as pool
     from rotor.requests.readers import Whole
 
-    try:
+    with within("--workers"):
         count = Whole().read(workers)
-    except ValueError as error:
-        raise ValueError(f"--workers: {error}") from None
     executor: Executor | Any = pool(count, verb.workers.split()[0])
     return executor
 
