@@ -268,7 +268,13 @@ def test_derivatives_of_states_and_spins():
     for column, key in enumerate(names[1:6], 1):
         sides = [
             solve_levels(
-                ASYMMETRIC, 3, effects=(*SEMI_RIGID, STATES.with_values({key: STATES.values[key] + d}), effects[-1])
+                ASYMMETRIC,
+                3,
+                effects=(
+                    *SEMI_RIGID,
+                    replace(STATES, values={**STATES.values, key: STATES.values[key] + d}),
+                    effects[-1],
+                ),
             ).energy_mhz
             for d in (1e-3, -1e-3)
         ]
