@@ -99,7 +99,7 @@ def _exact(energies: Floats, vectors: Matrix) -> tuple[Floats, Matrix, Floats]:
 
 def _each(terms: Terms, fields: Floats, count: int) -> tuple[Floats, Matrix, Floats]:
     """Full solutions field by field."""
-    solved = [_lowest(at_fields(terms, fields[place : place + 1])[0], count) for place in range(len(fields))]
+    solved = [_lowest(_at(terms, fields, place), count) for place in range(len(fields))]
     return _exact(np.array([energies for energies, _ in solved]), np.array([vectors for _, vectors in solved]))
 
 
@@ -131,7 +131,7 @@ def spanned_states(
     more than half the size of the matrix.
     """
     anchors = np.unique(np.linspace(0, len(fields) - 1, FIRST_ANCHORS).astype(int)).tolist()
-    full = [_lowest(at_fields(terms, fields[place : place + 1])[0], count + BUFFER)[1] for place in anchors]
+    full = [_lowest(_at(terms, fields, place), count + BUFFER)[1] for place in anchors]
     while True:
         basis = _orthonormal(np.concatenate(full, axis=1))
         if basis.shape[1] > len(terms[0]) // 2:
@@ -147,7 +147,7 @@ def spanned_states(
             return basis, states
         worst = int(places[np.argmax(error)])
         anchors.append(worst)
-        full.append(_lowest(at_fields(terms, fields[worst : worst + 1])[0], count + BUFFER)[1])
+        full.append(_lowest(_at(terms, fields, worst), count + BUFFER)[1])
 
 
 def _orthonormal(vectors: Matrix) -> Matrix:

@@ -18,7 +18,6 @@ from rotor.quantum.hyperfine_method import EXACT, FIRST_ORDER, N_DIAGONAL, Hyper
 from rotor.quantum.levels import Used
 from rotor.quantum.spins.blocks import Plan
 from rotor.quantum.spins.contraction import Contracted
-from rotor.quantum.spins.neglected import largest_shifts
 
 
 def simplified(plan: Plan, effects: Sequence[QuantumEffect], all_f: Sequence[int]) -> Plan:
@@ -32,6 +31,8 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], all_f: Sequence[int
         )
     if requested.method == EXACT or plan.shared.scheme.equivalent == 3:
         return plan.with_method(Used(EXACT, 0.0, requested.tolerance_mhz))
+    from rotor.quantum.spins.neglected import largest_shifts
+
     other_n, same_n = largest_shifts(plan)
     estimates = {FIRST_ORDER: 2 * (other_n + same_n), N_DIAGONAL: 2 * other_n, EXACT: 0.0}
     chosen = requested.method
