@@ -103,7 +103,7 @@ def _named_constants(file: ParameterFile) -> tuple[Constants, Floats] | None:
     Codes are fitted for spins, states and further operators, for axes not in the order A >= B >= C, if the sign of SPIND requests the
     quantum numbers of the other kind of top, and for the diagonal elements of DIAG below 0.
     """
-    if not is_plain(file, None):
+    if not is_plain(file):
         return None
     try:
         constants, matrix = constants_and_matrix(file)

@@ -13,23 +13,22 @@ from rotor.formats.spcat.hamiltonian.codes import (
     S_REDUCTION,
     SQUARES,
     SYMMETRIC,
-    Named,
+    Factors,
     is_linear,
 )
 from rotor.formats.spcat.text.par import ParameterFile
 
-_RIGID = tuple(Named(name, code, 1) for code, name in SQUARES.items())
-_B = Named("B", MEAN, 1)
+_RIGID: Factors = {code: {name: 1.0} for code, name in SQUARES.items()}
+_B: Factors = {MEAN: {"B": 1.0}}
 
 
 def publication_rows(fit_input: SpfitInput, fit: Fit) -> list[Row]:
     """Rows of all parameters: published constants with their names and signs, others with their labels."""
     file, rows = fit_input.file, list[Row]()
-    published = {item.code: item for item in _names(file)}
+    published = _names(file)
     for place, (parameter, digits) in enumerate(zip(file.parameters, file_codes(file), strict=True)):
-        named = published.get(_rotational(digits))
-        name = named.name if named else parameter.label or str(parameter.code)
-        sign = named.sign if named else 1
+        unnamed = {parameter.label or str(parameter.code): 1.0}
+        ((name, sign),) = published.get(_rotational(digits), unnamed).items()
         value, error, follows = _numbers(fit_input, fit, place)
         rows.append(Row(name, sign * value, error, follows, _states(digits)))
     return rows
@@ -65,18 +64,18 @@ def _rotational(digits: Digits) -> int:
     return digits.in_lowest_state
 
 
-def _names(file: ParameterFile) -> tuple[Named, ...]:
+def _names(file: ParameterFile) -> Factors:
     """The published names of the codes of a file; empty if its terms fit no single reduction."""
     rotational = [d for d in file_codes(file) if _rotational(d) >= 0]
     if all(is_linear(options) for options in file.options):
-        return (_B, *LINEAR)
+        return _B | LINEAR
     if all(d.kind is Kind.SCALAR for d in rotational):
-        return (_B, *SYMMETRIC)
-    rigid = _RIGID if set(SQUARES) <= {_rotational(d) for d in rotational} else ()
+        return _B | SYMMETRIC
+    rigid = _RIGID if set(SQUARES) <= {_rotational(d) for d in rotational} else {}
     letters = frozenset().union(*(d.reductions for d in rotational))
     if len(letters) != 1:
         return rigid
-    return (*rigid, *(A_REDUCTION if "A" in letters else S_REDUCTION))
+    return rigid | (A_REDUCTION if "A" in letters else S_REDUCTION)
 
 
 def _states(digits: Digits) -> str:

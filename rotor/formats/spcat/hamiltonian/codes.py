@@ -9,7 +9,7 @@ for that representation.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,12 +45,7 @@ def is_oblate(constants: Constants) -> bool:
     return constants.kind == "oblate" or constants.representation == "IIIl"
 
 
-class Named(NamedTuple):
-    """A constant's name in one vocabulary, its code, and the sign with which it enters the file."""
-
-    name: str
-    code: int
-    sign: int
+Factors = dict[int, dict[str, float]]  # by code, factors by name of a constant
 
 
 def term_code(p: int, q: int, n: int) -> int:
@@ -62,10 +57,9 @@ def term_code(p: int, q: int, n: int) -> int:
     return join_code(Digits(typ=ladder_typ(n), ksq=q, nsq=p))
 
 
-def _named(terms: Iterable[tuple[str, Operators]]) -> tuple[Named, ...]:
-    """Names, codes and signs of constants that multiply one term each."""
-    signed_terms = ((name, *next(iter(operators.items()))) for name, operators in terms)
-    return tuple(Named(name, term_code(*powers), int(sign)) for name, powers, sign in signed_terms)
+def _named(terms: Iterable[tuple[str, Operators]]) -> Factors:
+    """The codes of published constants that multiply one term each, with their signs."""
+    return {term_code(*powers): {name: sign} for name, operators in terms for powers, sign in operators.items()}
 
 
 LINEAR, SYMMETRIC, S_REDUCTION = (
@@ -138,7 +132,7 @@ def constants_and_matrix(file: ParameterFile, *, errors: bool = False) -> tuple[
 
 def _distortion_factors(codes: Iterable[int], kind: str, reduction: str | None) -> Factors:
     """The constants of distortion codes: published ones with their signs, else spelled operators such as J8Jpm2 for 40400."""
-    factors: Factors = {item.code: {item.name: float(item.sign)} for item in _vocabulary(kind, reduction)}
+    factors = dict(_vocabulary(kind, reduction))
     for code in [code for code in codes if code not in factors]:
         d = split_code(code)
         if d.kind is Kind.SQUARE or (d.ladder and kind != "asymmetric") or (d.ksq and kind in ("linear", "spherical")):
@@ -151,9 +145,6 @@ def _distortion_factors(codes: Iterable[int], kind: str, reduction: str | None) 
 SQUARES = {join_code(Digits(typ=square_typ(x))): x.upper() for x in "abc"}
 MEAN, ALONG, ACROSS = term_code(1, 0, 0), term_code(0, 1, 0), term_code(0, 0, 1)  # N², Nz², N₊² + N₋²
 _RIGID = (*SQUARES, MEAN, ALONG, ACROSS)
-
-
-Factors = dict[int, dict[str, float]]  # by code, factors by name of a constant
 
 
 def _rigid_factors(kind: str, axes: str) -> Factors:
@@ -197,10 +188,10 @@ def _reduction(options: Options, distortion: Sequence[int]) -> str | None:
     return "A" if in_a else "S" if in_s or options.chr.lower() == "s" else "A"
 
 
-def _vocabulary(kind: str, reduction: str | None) -> tuple[Named, ...]:
-    """Constants of a kind of top and a reduction, with codes and signs."""
+def _vocabulary(kind: str, reduction: str | None) -> Factors:
+    """Codes of the published constants of a kind of top and a reduction."""
     if kind == "asymmetric":
-        return {"A": A_REDUCTION, "S": S_REDUCTION, None: ()}[reduction]
+        return {"A": A_REDUCTION, "S": S_REDUCTION, None: {}}[reduction]
     return SYMMETRIC if kind in ("prolate", "oblate") else LINEAR
 
 
@@ -217,9 +208,9 @@ def code_factors(constants: Constants) -> Factors:
     elif axis:
         rigid = {ALONG: {axis: 1.0, "B": -1.0}} | rigid
     vocabulary = _vocabulary(constants.kind, constants.reduction)
-    named = {item.code: {item.name: float(item.sign)} for item in vocabulary if item.name in constants}
+    named = {code: factors for code, factors in vocabulary.items() if all(name in constants for name in factors)}
     spelled: Factors = {}
-    for name in [name for name in constants.values if name not in (*RIGID, *(item.name for item in vocabulary))]:
+    for name in [name for name in constants.values if name not in {*RIGID, *(n for f in named.values() for n in f)}]:
         if (powers := spelled_powers(name)) is None:
             raise ValueError(f"{name}: SPFIT's files have no code for it; leave it out")
         spelled[term_code(*powers)] = {name: 1.0}

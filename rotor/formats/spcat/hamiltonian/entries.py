@@ -122,50 +122,45 @@ class Connected:
 
     def _between(self, line: CodedLine, operator: CodedOperator, part: RealPart) -> Iterator[Entry]:
         """The entry of a part of a line, if it has elements."""
-        has_turn = bool(self.turned) and line.symmetry.axis not in ("", self.turned)
-        half_turn = half_turned(self.turned, operator.odd) if has_turn else None
+        factors = None
+        if self.turned and line.symmetry.axis not in ("", self.turned):
+            factors = half_turned(self.turned, operator.odd)
         if operator.rotor is not None:
             rotor = turned_rotor(operator.rotor, self.axes) if part.turned else operator.rotor
-            if rotor is not None:
-                placed = replace(operator, rotor=self._allowed_rotor(_by_species(rotor, half_turn), part))
-                yield Entry(line.name, placed, part.bra, part.ket, part.factor)
+            if rotor is None:
+                return
+            is_odd, pairs = rotor.odd and factors is None, self.apart.get((part.bra, part.ket))
+            if pairs and self._has_elements_beyond(rotor, pairs):
+                factors = _times(factors, pairs)
+            if factors:
+                assert isinstance(rotor, ByElements | Cosines | CosinesWithN)
+                rotor = BySpecies(rotor, factors, is_odd)
+            yield Entry(line.name, replace(operator, rotor=rotor), part.bra, part.ket, part.factor)
         elif operator.plain is not None and not line.is_between:
             yield Entry(line.name, operator, part.bra, part.ket)
         else:
             alone = turned_operator(operator.alone) if part.turned else operator.alone
-            placed = replace(operator, plain=None, of_n=part.factor * alone)
-            yield Entry(line.name, placed, part.bra, part.ket, factors=self._allowed(half_turn, part))
+            placed, pairs = (
+                replace(operator, plain=None, of_n=part.factor * alone),
+                self.apart.get((part.bra, part.ket)),
+            )
+            yield Entry(line.name, placed, part.bra, part.ket, factors=_times(factors, pairs) if pairs else factors)
 
-    def _allowed(self, factors: SpeciesFactors | None, part: RealPart) -> SpeciesFactors | None:
-        """The factors of an operator, 0 between levels of unequal weights."""
-        pairs = self.apart.get((part.bra, part.ket))
-        if pairs is None:
-            return factors
-        between = np.array(factors_of_pairs(pairs)) * (1.0 if factors is None else np.array(factors))
-        return tuple(map(tuple, between.tolist()))
-
-    def _allowed_rotor(self, rotor: Rotor, part: RealPart) -> Rotor:
-        """The operator of a spin term without elements between levels of unequal weights."""
-        pairs, basis = self.apart.get((part.bra, part.ket)), basis_of(self.axes)
-        if pairs is None or isinstance(rotor, Scalar):
-            return rotor
+    def _has_elements_beyond(self, rotor: Rotor, pairs: SpeciesPairs) -> bool:
+        """Whether the operator of a spin term connects other species than these pairs."""
+        if isinstance(rotor, Scalar):
+            return False
+        basis = basis_of(self.axes)
         blocks = wang_blocks(_LOOKED_AT, basis)
-        beyond = (
-            elements_of_pair(rotor, up, low, basis)
-            for up in blocks
-            for low in blocks
-            if (up.species, low.species) not in pairs
-        )
-        forbidden = any(elements is not None and elements.any() for elements in beyond)
-        return BySpecies(rotor, factors_of_pairs(pairs), rotor.odd) if forbidden else rotor
+        beyond = [(up, low) for up in blocks for low in blocks if (up.species, low.species) not in pairs]
+        all_elements = (elements_of_pair(rotor, up, low, basis) for up, low in beyond)
+        return any(elements is not None and elements.any() for elements in all_elements)
 
 
-def _by_species(rotor: Rotor, factors: SpeciesFactors | None) -> Rotor:
-    """The operator of a spin term times the half turn of the phases."""
-    if factors is None:
-        return rotor
-    assert isinstance(rotor, ByElements | Cosines | CosinesWithN)
-    return BySpecies(rotor, factors, False)
+def _times(factors: SpeciesFactors | None, pairs: SpeciesPairs) -> SpeciesFactors:
+    """Factors of an operator, 0 beyond these pairs of species."""
+    between = np.array(factors_of_pairs(pairs)) * (1.0 if factors is None else np.array(factors))
+    return tuple(map(tuple, between.tolist()))
 
 
 def _exchanged(operator: CodedOperator, exchange: int, count: int) -> list[tuple[CodedOperator, float]]:

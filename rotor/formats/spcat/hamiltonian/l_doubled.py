@@ -133,12 +133,11 @@ def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
     """
     if not isinstance(rotor, Cosines | CosinesWithN) or (rotor.rank == 1 and isinstance(rotor, Cosines)):
         return None
-    x, y, z = ("abc".index(axis) for axis in axes)
-    c, turned = np.array(rotor.components, dtype=float), np.zeros((3, 3))
-    stretched = (c[x, x] - c[y, y]) / 2
-    turned[x, y] = turned[y, x] = stretched
-    turned[x, x], turned[y, y] = -(c[x, y] + c[y, x]) / 2, (c[x, y] + c[y, x]) / 2
-    turned[y, z], turned[z, y], turned[x, z], turned[z, x] = c[x, z], c[z, x], -c[y, z], -c[z, y]
+    x, y = ("abc".index(axis) for axis in axes[:2])
+    c, turn = np.array(rotor.components, dtype=float), np.zeros((3, 3))
+    turn[x, y], turn[y, x] = -1.0, 1.0  # by a small angle about z
+    turned = turn @ c - c @ turn
+    turned[np.ix_((x, y), (x, y))] /= 2  # components that change K by two turn by twice the angle
     if not turned.any():
         return None
     turned += 0.0  # no minus zeros

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.formats.spcat.hamiltonian.code_table import file_codes
 from rotor.formats.spcat.hamiltonian.codes import NOT_YET
-from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.frozen import dataclass
 
@@ -253,7 +252,7 @@ def is_single_state(parameters: ParameterFile) -> bool:
     return abs(first.nvib) == 1 and len(parameters.options) == 1 and not doubled_spins(first.spind)
 
 
-def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bool:
+def is_plain(parameters: ParameterFile) -> bool:
     """Whether a file has one state, no spin and operators of orthorhombic symmetry, so that its constants have names."""
     first = parameters.options[0]
     if not is_single_state(parameters) or first.knmin != 0 or first.iax not in (0, 1, 2, 3, 6, 9) or first.ixx:
@@ -264,5 +263,4 @@ def is_plain(parameters: ParameterFile, intensities: IntensityFile | None) -> bo
         return False
     digits = file_codes(parameters)
     mixed = len(frozenset().union(*(d.reductions for d in digits))) > 1  # terms of both reductions
-    plain_dipoles = intensities is None or all(dipole.code in (1, 2, 3) for dipole in intensities.dipoles)
-    return all(d.has_name for d in digits) and plain_dipoles and not mixed
+    return all(d.has_name for d in digits) and not mixed
