@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import tomllib
 from collections.abc import Mapping
@@ -15,35 +14,30 @@ MOST_DEPTH = 50  # deepest nesting of lists and tables; the files here have four
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
     """The tables of a TOML text; ValueError for invalid text, too deep nesting, or numbers too large for a double."""
+    too_deep = f"{where}: lists or tables more than {MOST_DEPTH} deep; four are enough"
     try:
         content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ValueError(f"{where}: not a TOML file: {error}") from None
     except RecursionError:
-        raise ValueError(_too_deep(where)) from None
+        raise ValueError(too_deep) from None
     except ValueError:  # Python's bound for the digits of a whole number
         raise ValueError(f"{where}: not a TOML file: a whole number of thousands of digits") from None
-    _refuse_extremes(content, where, 0)
+    inner: list[tuple[Any, int]] = [(content, 0)]
+    while inner:
+        thing, depth = inner.pop()
+        if depth > MOST_DEPTH:
+            raise ValueError(too_deep)
+        if isinstance(thing, dict | list):
+            inner += [(item, depth + 1) for item in (thing.values() if isinstance(thing, dict) else thing)]
+        elif isinstance(thing, int):
+            try:
+                float(thing)
+            except OverflowError:
+                raise ValueError(
+                    f"{where}: a whole number of {len(str(thing))} digits is too large; write it as 1e99"
+                ) from None
     return content
-
-
-def _too_deep(where: str) -> str:
-    return f"{where}: lists or tables more than {MOST_DEPTH} deep; a molecule file needs four"
-
-
-def _refuse_extremes(thing: Any, where: str, depth: int) -> None:
-    if depth > MOST_DEPTH:
-        raise ValueError(_too_deep(where))
-    if isinstance(thing, dict | list):
-        for item in thing.values() if isinstance(thing, dict) else thing:
-            _refuse_extremes(item, where, depth + 1)
-    elif isinstance(thing, int):
-        try:
-            math.isfinite(float(thing))
-        except OverflowError:
-            raise ValueError(
-                f"{where}: a whole number of {len(str(thing))} digits is too large; write it as 1e99"
-            ) from None
 
 
 def toml_key(key: str) -> str:

@@ -7,7 +7,6 @@ computes a scene is imported by name when it runs.
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import is_dataclass
@@ -17,7 +16,7 @@ from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any, get_args, get_origin
 
-from rotor.formats.toml import toml_key, toml_value
+from rotor.formats.toml import parse_toml, toml_key, toml_value
 from rotor.frozen import dataclass
 from rotor.requests.accuracy import Stated, TotalAccuracy
 from rotor.requests.choices import Choices, nearest
@@ -212,11 +211,7 @@ def parse_scene(text: str, where: str = "scene") -> Scene:
         ...
     ValueError: scene: [observables] has no key 'j_max'; the nearest is 'jmax'
     """
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ValueError(f"{where}: not a TOML file: {error}") from None
-    return scene_of(content, where)
+    return scene_of(parse_toml(text, where), where)
 
 
 def scene_text(scene: Scene) -> str:

@@ -91,6 +91,20 @@ BAD = [
 ]
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("sweep = " + "[" * 3000 + "]" * 3000, "lists or tables more than 50 deep"),
+        ("[observables]\njmax = " + "9" * 6000, "a whole number of thousands of digits"),
+        ("[observables]\nmax_energy = " + "9" * 400, "a whole number of 400 digits is too large"),
+    ],
+)
+def test_extremes_are_no_defects(text, said):
+    """They ended in an error of recursion, of Python's bound for digits, or of an overflow."""
+    with pytest.raises(ValueError, match=f"^s.toml: .*{said}"):
+        parse_scene(f'schema = 1\nkind = "levels"\nmolecule = "CO"\n{text}\n', "s.toml")
+
+
 @pytest.mark.parametrize(("text", "said"), BAD, ids=[said for _, said in BAD])
 def test_a_mistake_is_named(text, said):
     with pytest.raises(ValueError, match=r".") as caught:
