@@ -44,6 +44,15 @@ def service(made, tmp_path, monkeypatch):
     opened.session.release()
 
 
+@pytest.fixture(scope="module")
+def unchanged(made, tmp_path_factory):
+    """A session for messages that leave it as it is."""
+    folder = shutil.copytree(made, tmp_path_factory.mktemp("unchanged"), dirs_exist_ok=True)
+    opened = open_session(str(folder / "spectrum.csv"), [str(folder / NAME)], temperature_k=KELVIN)
+    yield opened
+    opened.session.release()
+
+
 def done(service, name, **message):
     """The content of an answer that is no error."""
     answer = service.answer({"do": name, **message})
@@ -430,19 +439,21 @@ def test_an_exported_page_has_everything_inside(service, tmp_path):
         ({"do": "export", "what": "exe", "species": 1}, "expected one of lin, csv"),
         ({"do": "export", "what": "lin", "species": 1}, "no line is assigned"),
         ({"do": "pick", "species": 1, "level": [50, 60, 1]}, "there is no such level"),
-        ({"do": "undo", "x": 1}, None),
-        ({"do": "redo"}, "no action was taken back"),
     ],
 )  # fmt: skip
-def test_a_message_that_cannot_be_is_answered_with_one_line(service, message, said):
-    state = service.session.state
-    answer = service.answer(message)
-    if said is None:
-        assert "ok" in answer
-        return
+def test_a_message_that_cannot_be_is_answered_with_one_line(unchanged, message, said):
+    state = unchanged.session.state
+    answer = unchanged.answer(message)
     assert said in answer["error"]
     assert "\n" not in answer["error"]
+    assert unchanged.session.state == state
+
+
+def test_a_session_without_an_undo_has_nothing_to_redo(service):
+    state = service.session.state
+    assert service.answer({"do": "redo"})["error"].endswith("no action was taken back")
     assert service.session.state == state
+    assert "ok" in service.answer({"do": "undo", "x": 1})
 
 
 def test_species_of_many_kinds_are_predicted_and_labelled(service):

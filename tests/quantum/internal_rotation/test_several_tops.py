@@ -83,14 +83,14 @@ SPECIES_OF_THREE = [s for s in product((0, 1, -1), repeat=3) if s >= tuple(-x fo
 
 
 @pytest.mark.parametrize("plane", [True, False])
-@pytest.mark.parametrize("species", SPECIES_OF_THREE)
-def test_all_products_of_three_tops_give_the_levels_of_the_direct_product(species, plane):
+@pytest.mark.parametrize(("species", "waves"), [*((species, 1) for species in SPECIES_OF_THREE), ((1, 1, -1), 2)])
+def test_all_products_of_three_tops_give_the_levels_of_the_direct_product(species, waves, plane):
     third = THIRD if plane else InternalTop(THIRD.f_mhz, THIRD.v3_mhz, (0.01, 0.055, 0.02), THIRD.v6_mhz)
     model = SeveralTops(ABC, (FIRST, SECOND, third), COUPLED_THREE)
-    blocks = model.blocks(species, 2, count=125, each=5, waves=2)
+    blocks = model.blocks(species, 2, count=(2 * waves + 1) ** 3, each=2 * waves + 1, waves=waves)
     energies = blocks.summed(model.coefficients).energies([1.0])
     for j in range(3):
-        expected = np.linalg.eigvalsh(direct_product(model, j, species, 2))
+        expected = np.linalg.eigvalsh(direct_product(model, j, species, waves))
         found = np.sort(energies[blocks.functions.labels["J"] == j])
         assert len(found) == len(expected)
         assert np.abs(found - expected).max() < 1e-6  # MHz, of energies up to 4e7: rounding of both matrices

@@ -251,11 +251,11 @@ def test_planes_of_both_parts_make_the_potential_even(smiles, bond, even):
         assert np.abs(lengths[0] - lengths[1]).max() < 0.1  # the geometry is symmetric to some 0.03 Å
 
 
-def test_both_gauche_wells_of_butane_are_alike():
-    answer = answer_torsion(TorsionRequest(top_of("SMILES:CCCC"), "2-3"))
+def test_both_gauche_wells_of_difluoroethane_are_alike():
+    answer = answer_torsion(TorsionRequest(top_of("SMILES:FCCF"), "2-3"))
     wells = sorted(well.energy_mhz for well in answer.torsion.wells())
     assert len(wells) == 3
-    assert wells[1] == pytest.approx(wells[2], rel=1e-9)  # of a series without odd terms
+    assert wells[1] - wells[0] < 1e-9 * wells[2]  # gauche is below anti here; of a series without odd terms
 
 
 @pytest.mark.slow
