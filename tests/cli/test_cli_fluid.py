@@ -221,7 +221,9 @@ def test_ctrl_c_tells_where_to_go_on(call, folder, monkeypatch):
 
 
 def test_what_there_is_not_has_no_row(call, folder):
-    argon = ("fluid", "argon", "--model", "argon", "--molecules", "27", "--density", "0.5", "--cutoff", "6")
+    argon = (
+        "fluid", "argon", "--model", "argon", "--molecules", "27", "--density", "0.5", "--cutoff", "6", "--equilibration", "0",
+    )  # fmt: skip
     code, out, _ = call(*argon, "--temperature", "90", "--steps", "20")
     assert code == 0
     assert "of translation" in out

@@ -130,10 +130,10 @@ def test_a_gas_from_python_is_that_of_the_command(call):
 def test_a_fluid_from_python_is_that_of_the_command(call):
     command = answer_of(
         call, "fluid", "water", "--molecules", "27", "--density", "0.5", "--ensemble", "langevin", "--steps", "20",
-        "--cutoff", "5", "--seed", "3", "--temperature", "320",
+        "--cutoff", "5", "--seed", "3", "--temperature", "320", "--equilibration", "1 ps",
     )  # fmt: skip
     settings = Settings(ensemble="langevin", steps=20, cutoff_angstrom=5.0, seed=3, temperature_k=320.0)
-    answer = answer_fluid(FluidRequest(NewBox(27, 0.5), settings))
+    answer = answer_fluid(FluidRequest(NewBox(27, 0.5, 1.0), settings))
     assert_same(command, {**answer.facts(), "record": table_records(answer.record)})
 
 
