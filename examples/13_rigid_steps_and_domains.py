@@ -2,7 +2,7 @@
 # # Rigid parts: base pairs of DNA, domains of a protein, and the bracket that parks a car
 #
 # A base pair of DNA, a domain of a protein and a car on a street are rigid bodies; what differs is what joins them. This notebook uses
-# the modules `base_pair_steps`, `rigid_parts` and `rigid_motions` of `rotor.geometry` ([their page](../docs/geometry.md)).
+# the modules `base_pair_steps`, `rigid_parts` and `rigid_motions` of `rotor.geometry`.
 
 # %%
 import matplotlib.pyplot as plt

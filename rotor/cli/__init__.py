@@ -83,7 +83,7 @@ EXAMPLES = """\
   rotor gas water --molecules 20000 --seed 7
   rotor fluid water --molecules 216 --csv run.csv
   rotor fit case.par --out fitted
-  rotor assign peaks.csv --plot found.png
+  rotor assign peaks.csv --plot assigned.png
   rotor view spectrum.csv water
   rotor structure family.toml --plot molecule.png
   rotor new spectrum > s.toml && rotor run s.toml"""

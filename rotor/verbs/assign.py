@@ -25,9 +25,9 @@ from rotor.verbs.verb import Place, Subject, SubjectKind, Verb
 
 EXAMPLES = """\
   rotor assign peaks.csv
-  rotor assign spectrum.csv --species 3 --plot found.png --csv peaks_assigned.csv --lin found.lin
+  rotor assign spectrum.csv --species 3 --plot assigned.png --csv peaks_assigned.csv --lin assigned.lin
   rotor assign peaks.csv --guess 2458,490,409 --temperature 2
-  rotor assign peaks.csv --isotopologues --molecule parent.xyz --json found.json"""
+  rotor assign peaks.csv --isotopologues --molecule parent.xyz --json assigned.json"""
 
 
 def spectrum_source(raw: Any) -> Any:
@@ -193,9 +193,9 @@ VERB = Verb(
             (".lin", ".csv"),
             "Write the lines of the first species, ready for rotor fit",
             write_lines,
-            "found.lin",
+            "assigned.lin",
         ),
-        picture("Draw peaks, predictions and what is left", "found.png"),
+        picture("Draw peaks, predictions and what is left", "assigned.png"),
     ),
     subject=SpectrumFile(),
     drawn="MHz",

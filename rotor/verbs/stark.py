@@ -152,6 +152,7 @@ VERB = Verb(
     drawn="kV/cm",
     scaled=False,
     workers="blocks of states",
+    small_blocks=True,
     check=lambda request, outputs, shown: refuse_picture_of_one_field(request.fields_kv_per_cm, outputs),
     sound=False,
     numerics="rotor.quantum.fields.numerics:STARK",

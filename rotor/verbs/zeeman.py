@@ -120,6 +120,7 @@ VERB = Verb(
     drawn="T",
     scaled=False,
     workers="blocks of states",
+    small_blocks=True,
     check=lambda request, outputs, shown: refuse_picture_of_one_field(request.fields_tesla, outputs),
     sound=False,
     numerics="rotor.quantum.fields.numerics:ZEEMAN",
