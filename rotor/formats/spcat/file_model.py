@@ -306,8 +306,10 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
         if not line.states or line.is_between or line.states[0] not in seconds
     )
     values = {line.name: line.parameter.value for line in lines}
-    entries = Connected(tuple(states), pairs, axes, turned).entries(lines)
-    effect = FileEffect(values, entries, len(states), coupled, moments, limits, beside, first.ixx, pairs)
+    connected = Connected(tuple(states), pairs, axes, turned)
+    if pairs:  # raises for operators forbidden between l-doubled states, before levels are solved
+        connected.entries(lines)
+    effect = FileEffect(values, lines, connected, coupled, moments, limits, beside, first.ixx)
     top = Top(_STANDS_FOR[kind, oblate], dipole_abc_debye=moments.get((0, 0), (0.0, 0.0, 0.0)), name=coded.file.title)
     kmax = states[0].kmax if kind in ("prolate", "oblate") else ALL_K
     return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.by_k)

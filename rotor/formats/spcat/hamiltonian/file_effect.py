@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
-from rotor.formats.spcat.hamiltonian.entries import Entry
+from rotor.formats.spcat.hamiltonian.coded_file import CodedLine
+from rotor.formats.spcat.hamiltonian.entries import Connected, Entry
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
@@ -25,23 +27,32 @@ Vector = tuple[float, float, float]
 class FileEffect(QuantumEffect):
     """The parameter lines of a file for a group of its states, which are numbered here from 0.
 
-    values: in MHz by code and number of the line. entries: what the lines stand for. count: number of states. coupled: the spins by
-    place. moments: dipoles in debye by pairs of states. limits: smallest and largest K by state. others: moments of other kinds. ixx: bits
-    for conserved sums of angular momenta, from N on. pairs: l-doubled states.
+    values: in MHz by code and number of the line. lines: the parameter lines. connected: the states. coupled: the spins by place.
+    moments: dipoles in debye by pairs of states. limits: smallest and largest K by state. others: moments of other kinds. ixx: bits for
+    conserved sums of angular momenta, from N on.
     """
 
     name: ClassVar[str] = ""
     conserved: ClassVar[frozenset[str]] = frozenset()
 
     values: dict[str, float]
-    entries: tuple[Entry, ...]
-    count: int
+    lines: tuple[CodedLine, ...]
+    connected: Connected
     coupled: tuple[Spin, ...]
     moments: dict[tuple[int, int], Vector]
     limits: dict[int, tuple[int, int]]
     others: tuple[Moment, ...] = ()
     ixx: int = 0
-    pairs: tuple[Pair, ...] = ()
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """The l-doubled states."""
+        return self.connected.pairs
+
+    @cached_property
+    def entries(self) -> tuple[Entry, ...]:
+        """What the lines stand for, made when a Hamiltonian is asked for."""
+        return self.connected.entries(self.lines)
 
     def parameters(self, top: Top) -> dict[str, float]:
         """Values in MHz by code and number of the line."""
@@ -61,7 +72,7 @@ class FileEffect(QuantumEffect):
 
     def states(self, top: Top) -> tuple[State, ...]:
         """The states beyond the first."""
-        return tuple(State(v, self._plain(v)) for v in range(1, self.count))
+        return tuple(State(v, self._plain(v)) for v in range(1, len(self.connected.states)))
 
     def couplings(self, top: Top, representation: str) -> tuple[Coupling, ...]:
         """Interactions of states, and operators of one state that have no powers (p, q, n)."""
