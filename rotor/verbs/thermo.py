@@ -74,8 +74,9 @@ def _species_text(functions: ThermoFunctions, content: Mapping[str, Any]) -> str
 
 
 def _theta_text(theta: Sequence[float]) -> str:
-    finite = [f"{name} {value:.6g}" for name, value in zip("ABC", theta, strict=True) if math.isfinite(value)]
-    return ", ".join(finite) + " K"
+    """Temperatures of A, B, C; of B alone for a linear top."""
+    names = "ABC" if math.isfinite(theta[0]) else "B"
+    return ", ".join(f"{name} {theta['ABC'.index(name)]:.6g}" for name in names) + " K"
 
 
 def _rotation_table(answer: ThermoAnswer, report: Report) -> Table:

@@ -55,6 +55,7 @@ def test_the_grid_of_the_contract(call, folder):
     assert provenance["rows"] == 100
     assert "25 of 100 temperatures" in out
     assert "Θ_rot         A 40.1146, B 20.8894, C 13.3521 K" in out
+    assert "Θ_rot         B 85.3692 K" in call("thermo", "H2")[1].splitlines()
 
 
 def test_json_has_the_keys_of_the_contract(call):

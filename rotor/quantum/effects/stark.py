@@ -172,7 +172,9 @@ def acting(
     if dipole is None and not intensity_w_per_cm2:
         raise ValueError(f"the dipole of {name} is not known: give one, in principal axes (D)")
     if not np.any(dipole or (0.0,)) and not intensity_w_per_cm2:
-        raise ValueError(f"{name} has no dipole: a static field does not move its levels to first or second order")
+        raise ValueError(
+            f"{name} has no dipole, which a map in a static field needs; its polarizability is left out there"
+        )
     light = None
     if intensity_w_per_cm2:
         if top.polarizability_abc_angstrom3 is None:
