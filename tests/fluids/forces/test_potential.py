@@ -356,7 +356,9 @@ def test_atoms_on_top_of_each_other_are_named(shift: float) -> None:
 
 def test_cells_too_small_or_askew_or_flat_are_refused() -> None:
     atoms = plain.box_of({"spce": 8}, 17.0)
-    with pytest.raises(ValueError, match=r"more than half of the smallest edge of the cell, 17 Å: at most 8\.5 Å"):
+    with pytest.raises(
+        ValueError, match=r"more than half of the smallest edge of the cell, 17 Å: give a cutoff of at most 8\.5 Å"
+    ):
         RigidPotential("spce").evaluate(atoms)
     small = plain.box_of({"trappe-co2": 1}, 4.4)
     with pytest.raises(ValueError, match="a molecule would meet itself"):
