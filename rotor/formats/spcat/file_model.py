@@ -269,14 +269,6 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
             f"states {tuple(numbers)} are connected and have different spins: that is read but not computed yet"
         )
     here = {v: place for place, v in enumerate(numbers)}
-    moments = {(here[b], here[a]): mu for (a, b), mu in light.dipoles.items() if a in here and b in here}
-    acting = [(dipole, code) for dipole, code in light.others if set(code.states) <= set(here)]
-    beside = tuple(
-        line_moment(
-            dipole, code, (here[code.states[1]], here[code.states[0]]), len(spins), axes, as_spcat, coded.series
-        )
-        for dipole, code in acting
-    )
     usable = [
         line
         for line in coded.usable
@@ -284,7 +276,7 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     ]
     pairs = tuple(Pair(here[pair.first], here[pair.second]) for pair in doubled if pair.first in here)
     kind = _kind(states, usable, oblate, first.by_k)
-    if kind in ("prolate", "oblate") and beside:
+    if kind in ("prolate", "oblate") and any(set(code.states) <= set(here) for _, code in light.others):
         kind = "asymmetric"  # |N K⟩ does not distinguish K from -K, which such moments may exchange
     limits = {
         place: (state.kmin, state.kmax)
@@ -293,11 +285,7 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     }
     coupled = coupled_spins(states[0], first)
     turned = _turned(usable, light, doubled)
-    if light.phases.odd:
-        with_codes = [(moment, code) for moment, (_, code) in zip(beside, acting, strict=True)]
-        moments, beside = _moments_in_odd_phases(moments, with_codes, turned, light, oblate)
-    elif light.phases.between_i:
-        moments, beside = by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
+    moments, beside = _group_moments(coded, here, light, turned, as_spcat)
     seconds = {pair.second for pair in doubled}
     lines = tuple(
         line._replace(states=line.states and (here[line.states[0]], here[line.states[1]]))
@@ -315,13 +303,29 @@ def _group(coded: CodedFile, numbers: list[int], light: Light, as_spcat: bool) -
     return Group(tuple(states), top, effect, oblate, kmax, first.diag, first.by_k)
 
 
-def _moments_in_odd_phases(
-    moments: Dipoles, beside: Iterable[tuple[Moment, DipoleCode]], turned: str, light: Light, oblate: bool
+def _group_moments(
+    coded: CodedFile, here: dict[int, int], light: Light, turned: str, as_spcat: bool
 ) -> tuple[Dipoles, tuple[Moment, ...]]:
-    """Plain dipoles and other moments where operators within one state are odd under time reversal (`phases.turned_moments`)."""
-    fixed = light.phases._replace(odd=turned_odd_axes(turned)) if turned else light.phases
-    with_axes = [(moment, code.axis if is_vector(code) else 0) for moment, code in beside]
-    return turned_moments(moments, with_axes, turned, with_dipoles(fixed, light.axes_within_states, oblate, False))
+    """Plain dipoles and other moments of a group, in the phases of its functions; here: places of its states by their numbers."""
+    moments = {(here[b], here[a]): mu for (a, b), mu in light.dipoles.items() if a in here and b in here}
+    acting = [(dipole, code) for dipole, code in light.others if set(code.states) <= set(here)]
+    spins = len(coded.states[min(here)].spins)
+    beside = tuple(
+        line_moment(
+            dipole, code, (here[code.states[1]], here[code.states[0]]), spins, coded.axes, as_spcat, coded.series
+        )
+        for dipole, code in acting
+    )
+    if light.phases.odd:
+        fixed = light.phases._replace(odd=turned_odd_axes(turned)) if turned else light.phases
+        with_axes = [
+            (each, code.axis if is_vector(code) else 0) for each, (_, code) in zip(beside, acting, strict=True)
+        ]
+        phases = with_dipoles(fixed, light.axes_within_states, coded.oblate, False)
+        return turned_moments(moments, with_axes, turned, phases)
+    if light.phases.between_i:
+        return by_order(moments, beside, [as_spcat and code.typ in EVEN_ORDER for _, code in acting])
+    return moments, beside
 
 
 def _turned(lines: Iterable[CodedLine], light: Light, doubled: list[Pair]) -> str:
