@@ -152,7 +152,7 @@ BD = ("--constants", "B=57000 D=0.17 MHz", "--free", "B,D")
             ("co.csv", "--constants", "B=57000 mu_a=1 MHz", "--free", "B"),
             "'mu_a' is not a rotational constant known here: the dipole",
         ),
-        (("co.csv", "--constants", "B=57000 MHz", "--free", "B,A"), "--free: kind 'linear' needs B alone"),
+        (("co.csv", "--constants", "B=57000 MHz", "--free", "B,A"), "--free: A is not a constant of the start"),
         (("co.csv", *BD, "--prior", "B=1", "--prior", "B=2"), "--prior 'B=2': B has an a-priori error already"),
         (("co.csv", *BD, "--prior", "H=1"), "--prior: H is not in the set"),
         (("co.csv", *BD, "--tie", "Q=2*B"), "--tie 'Q=2*B': 'Q' is not a rotational constant known here"),
