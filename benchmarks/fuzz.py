@@ -396,10 +396,9 @@ def main() -> None:
         **{name: counts[name] for name in ("defect", "hang", "left behind")},
     }
     pieces = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else []
-    pieces = [piece for piece in pieces if piece["first"] != options.first] + [piece]
-    RESULTS.write_text(
-        json.dumps(sorted(pieces, key=lambda piece_: piece_["first"]), indent=1) + "\n", encoding="utf-8"
-    )
+    kept = [other for other in pieces if other.get("first") != options.first]
+    in_order = sorted([*kept, piece], key=lambda each: each.get("first", float("inf")))  # those of fuzz_values last
+    RESULTS.write_text(json.dumps(in_order, indent=1) + "\n", encoding="utf-8")
     print(piece)
 
 
