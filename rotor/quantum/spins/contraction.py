@@ -181,14 +181,16 @@ def pieces_in_both_orders(
     """Σ value ⟨r'‖X‖r⟩ of pieces of one rank between blocks for both orders of each pair, which are squared for both signs of K of |N K⟩.
 
     sign: the conjugates of pieces between different states are added, this times (-1)^(N'-N) times the transpose; None where the pieces
-    contain them. A block with itself occurs in both orders; the last entry counts.
+    contain them. Within a state an operator may be anti-Hermitian, as [N², φ]: each order has its own elements. A block with itself occurs
+    in both orders; the last entry counts.
     """
     axial, out = stacks[0].axial, list[Contracted]()
+    hermitian = all(piece.bra != piece.ket or isinstance(piece.rotor, Fixed) for piece in pieces)
     for up, low, pairs in _near(stacks, min(pieces[0].rotor.rank, _REACH), _RISES_OF_K if axial else range(1)):
         orders = _Pieces(up, low, pairs, representation), _Pieces(low, up, pairs.turned(), representation)
         phase = None if sign is None else sign * (-1.0) ** pairs.rise
         forward = _with_conjugates(*orders, pieces, phase)
-        if phase is None or axial:
+        if phase is None or axial or not hermitian:
             back = _with_conjugates(*orders[::-1], pieces, phase)
         else:
             back = None if forward is None else forward.turned(phase)

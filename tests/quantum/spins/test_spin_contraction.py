@@ -8,8 +8,8 @@ from plain_elements import rotor_elements, tensor_elements
 
 from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.operators.rotation import components, direction_cosine
-from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of, tensors_of_stacks
+from rotor.quantum.operators.rotation import components, direction_cosine, j_squared
+from rotor.quantum.spins.contraction import operators_of_stacks, pieces_in_both_orders, stacks_of, tensors_of_stacks
 from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Scalar
 from rotor.quantum.spins.rotor import Piece, acts, solved_rotor
 from rotor.quantum.tensors import body_tensor, tensor_between
@@ -135,6 +135,38 @@ def test_dipoles_are_those_of_pairs(sign):
                 count += 1
                 assert np.abs(computed[i, k] - item).max() < 1e-13  # elements of up to 30, two orders of summation
     assert count > 40
+
+
+COSINE = direction_cosine("c", "Ir")
+
+
+@pytest.mark.parametrize("states", [(0, 0), (1, 0)], ids=["within a state", "between states"])
+@pytest.mark.parametrize(
+    "operator",
+    [COSINE @ j_squared() + j_squared() @ COSINE, COSINE @ j_squared() - j_squared() @ COSINE],
+    ids=["Hermitian", "anti-Hermitian"],
+)
+def test_moments_are_those_of_pairs(operator, states):
+    """{φ, N²} and [φ, N²] in both orders; within a state the second has elements of its own in either order, not its adjoint."""
+    blocks, representation = _blocks((STATES,))
+    piece, sign = Piece(0.4, ByElements(1, 1j * operator), *states, 0, 0), -1.0
+    computed = by_numbers(pieces_in_both_orders(stacks_of(blocks), [piece], sign, representation))
+    count = 0
+    for i, up in enumerate(blocks):
+        for k, low in enumerate(blocks):
+            if not abs(up.j - low.j) <= 1 <= up.j + low.j:
+                continue
+            item = one_way(up, low, [piece], representation)
+            back = None if states == (0, 0) else one_way(low, up, [piece], representation)
+            if back is not None:
+                turned = sign * (-1.0) ** (up.j - low.j) * back.T
+                item = turned if item is None else item + turned
+            if item is None or np.abs(item).max() < 1e-12:
+                assert np.abs(computed.get((i, k), 0.0)).max() < 1e-12
+                continue
+            count += 1
+            assert np.abs(computed[i, k] - item).max() <= 1e-14 * np.abs(item).max() + 1e-13  # two orders of summation
+    assert count > 20
 
 
 @pytest.mark.parametrize("body", [(0.3, 0.5, 1.2), np.diag([2.0, -1.0, -1.0]) + 0.3], ids=["vector", "second rank"])
