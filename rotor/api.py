@@ -111,7 +111,12 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.geometry.base_pair_steps import persistence_steps as persistence_steps
     from rotor.geometry.base_pair_steps import step_parameters as step_parameters
     from rotor.geometry.base_pair_steps import step_pose as step_pose
+    from rotor.geometry.inertia import Body as Body
+    from rotor.geometry.inertia import cone as cone
+    from rotor.geometry.inertia import hemisphere as hemisphere
+    from rotor.geometry.inertia import principal_frame as principal_frame
     from rotor.geometry.inertia import rectangle as rectangle
+    from rotor.geometry.inertia import triangle as triangle
     from rotor.geometry.rigid_motions import adjoint as adjoint
     from rotor.geometry.rigid_motions import bracket as bracket
     from rotor.geometry.rigid_motions import chasles_screw as chasles_screw
@@ -125,8 +130,13 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.geometry.rotations import exp as exp
     from rotor.geometry.rotations import from_matrix as from_matrix
     from rotor.geometry.rotations import multiply as multiply
+    from rotor.geometry.rotations import nearest_rotation as nearest_rotation
     from rotor.geometry.rotations import rotate as rotate
+    from rotor.geometry.rotations import to_euler as to_euler
     from rotor.geometry.rotations import to_matrix as to_matrix
+    from rotor.geometry.superposition import flow_gradient as flow_gradient
+    from rotor.geometry.superposition import polar as polar
+    from rotor.geometry.superposition import superpose as superpose
     from rotor.molecules.optimise import refine as refine
     from rotor.observed.channels import fit_rejecting as fit_rejecting
     from rotor.observed.diagram import plot_rotational_diagram as plot_rotational_diagram

@@ -22,7 +22,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out slow tests that are not in the sample; which part a test is in follows from its name alone."""
+    """Leave out slow tests that are not in the sample; which part a test is in follows from its name alone.
+
+    The slow ones come first, so that at the end no worker waits for a long one of another.
+    """
     part, parts = (int(number) for number in config.getoption("--sample").split("/"))
     if not 1 <= part <= parts:
         raise pytest.UsageError(f"--sample {part}/{parts}: expected K/N with K from 1 to N")
@@ -32,7 +35,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         other_part = item.get_closest_marker("slow") and zlib.crc32(item.nodeid.encode()) % parts != part - 1
         (outside if other_part else inside).append(item)
     config.hook.pytest_deselected(items=outside)
-    items[:] = inside
+    items[:] = sorted(inside, key=lambda item: item.get_closest_marker("slow") is None)
 
 
 def pytest_collection_finish() -> None:

@@ -138,7 +138,7 @@ def test_a_plan_counts_the_equilibration_of_a_box_that_is_made(call, folder):
             "expected with --electrostatics ewald; reaction-field does",
         ),
         (("tip4p", "--molecules", "8"), "write --model tip4p too"),
-        (("water", "--molecules", "8", "--step", "0"), "--step: 0: expected a finite number above 0 fs"),
+        (("water", "--molecules", "8", "--step", "0"), "--step: 0: expected a number above 0 and up to 1e+30 fs"),
         (("water", "--molecules", "8", "--relaxation", "9x"), "the default is 'fs'"),
         (("water", "--molecules", "8", "--seed", "-1"), "--seed: -1: expected a whole number of 0 or more"),
         (("overlap.xyz", "--trajectory", "./overlap.xyz"), "--trajectory overlap.xyz: is an input of this command"),
