@@ -139,8 +139,8 @@ def _constant_limits(top: Top, j: int) -> list[Limit]:
         vibration_cm = VIBRATION_CM * (b / units.MHZ_PER_CM) ** VIBRATION_POWER
         d = 4 * b**3 / (vibration_cm * units.MHZ_PER_CM) ** 2
         text = (
-            f"the constants are rigid; as with a vibration of {_rounded(vibration_cm, 2)} cm-1 a line of J = {j}, K = 0 is "
-            "lower by so much"
+            f"the constants are rigid; with a vibration of {_rounded(vibration_cm, 2)} cm-1 a line of J = {j}, K = 0 is "
+            "lower by this amount"
         )
         limits.append(Limit("centrifugal distortion", 4 * d * (j + 1) ** 3, text))
     return limits
@@ -210,11 +210,11 @@ def _split_text(nuclei: Sequence[Splitting]) -> str:
         f"{nucleus.nucleus} splits J = 1 by {nucleus.splitting_mhz:.3g} MHz" for nucleus in nuclei if nucleus.known
     ]
     others = sorted({nucleus.nucleus for nucleus in nuclei if not nucleus.known})
-    texts = [f"levels shift by so much, {', '.join(known_splittings)}: {COMPUTE}"] if known_splittings else []
+    texts = [f"levels shift by this amount, {', '.join(known_splittings)}: {COMPUTE}"] if known_splittings else []
     if others:
         texts.append(
-            f"{', '.join(others)} split{'s' if len(others) == 1 else ''} lines of low J, by so much in covalent bonds; its spin "
-            f"constants, such as chi_aa({others[0]}), are not known"
+            f"{', '.join(others)} split{'s' if len(others) == 1 else ''} lines of low J, by about this amount in covalent bonds; its "
+            f"spin constants, such as chi_aa({others[0]}), are not known"
         )
     return "; ".join(texts)
 

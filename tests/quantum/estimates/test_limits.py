@@ -178,7 +178,7 @@ def test_reports_end_with_the_limits(call, verb):
     last = out.rstrip().splitlines()[-5:]
     assert last[0].startswith("effects   at J = ")
     assert " ".join([last[1], last.pop(2).lstrip()]).startswith(
-        "left out  nuclear quadrupole: about 2.4 MHz; levels shift by so much, 14N splits J = 1 by 3.53 MHz: rotor"
+        "left out  nuclear quadrupole: about 2.4 MHz; levels shift by this amount, 14N splits J = 1 by 3.53 MHz: rotor"
     )
     assert last[2].lstrip() == "magnetic coupling of nuclear spins: not estimated; 1H: small splittings"
     assert last[3].lstrip() == "and smaller or not estimated: spin-rotation"  # below a tenth of the largest
