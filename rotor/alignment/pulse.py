@@ -26,14 +26,15 @@ from numpy.typing import ArrayLike
 from rotor import units
 from rotor.arrays import Floats
 from rotor.checks import Renamed
+from rotor.quantum.fields.inputs import INTENSITY
 from rotor.requests.field import REQUIRED, check_fields, declared
+from rotor.requests.fill import within
 from rotor.requests.readers import Custom, Numbers, Quantity
 
 Complexes = np.typing.NDArray[np.complex128]
 Axis = tuple[complex, complex, complex]
 
 Z_AXIS: Axis = (0.0, 0.0, 1.0)
-INTENSITY = Quantity("W/cm2", least=0, most=1e17)  # the bound is far beyond the ionisation of any molecule
 HIGHEST_KV_PER_CM = 1e6  # 10 V/Å: molecules are ionised below 1 V/Å; models of kicks may go beyond that
 # 2π I/(cħ) in rad/ps for 1 Å³ and 1 W/cm²; Å³ → m³ 1e-30, W/cm² → W/m² 1e4, 1/s → 1/ps 1e-12
 RAD_PER_PS_ANGSTROM3_W_PER_CM2 = (
@@ -231,11 +232,9 @@ class TabulatedPulse(Pulse):
             )
         if not np.isfinite(times).all() or (np.diff(times) <= 0).any():
             raise ValueError("times_ps: expected finite times that rise")
-        try:
+        with within("intensities_w_per_cm2"):
             for value in (values.min(), values.max()):
                 INTENSITY.check(float(value))
-        except ValueError as error:
-            raise ValueError(f"intensities_w_per_cm2: {error}") from None
         object.__setattr__(self, "times_ps", times)
         object.__setattr__(self, "intensities_w_per_cm2", values)
         super().__post_init__()

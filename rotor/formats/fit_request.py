@@ -30,6 +30,7 @@ from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import LevelModel
 from rotor.requests.budget import ErrorBudget
+from rotor.requests.fill import within
 from rotor.statistics.least_squares import Progress
 from rotor.table import Table, counted, with_article
 from rotor.tops.top import Top
@@ -202,15 +203,11 @@ def lines_request(
     names = list(has.uncertainties) if free is None else list(free)
     if not names:
         raise ValueError(f"free: name the constants to fit, such as A,B,C,DeltaJ; {_without_errors(start)}")
-    try:
+    with within("free"):
         begin = with_names(has, names)
-    except ValueError as error:
-        raise ValueError(f"free: {error}") from None
     for tie in ties:  # a tied constant may be missing from the starting constants
-        try:
+        with within(f"tie {tie!r}"):
             begin = with_names(begin, [tie.partition("=")[0].strip()] if "=" in tie else [])
-        except ValueError as error:
-            raise ValueError(f"tie {tie!r}: {error}") from None
     fitted = parameters(begin, names, ties=ties, priors_mhz=priors)
     has_prior = np.isfinite(fitted.prior)  # constants with an a-priori value start there
     begin, moved = beside_zero(

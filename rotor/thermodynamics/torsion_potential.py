@@ -16,6 +16,7 @@ from rotor.molecules.bond_scan import BondScan, relaxed_scan
 from rotor.molecules.bonds import bonded_atoms
 from rotor.quantum.bond_torsion import FourierSeries
 from rotor.quantum.torsion import TorsionalPotential
+from rotor.requests.fill import within
 
 TABLE = "table"
 _TERM = re.compile(r"([VW])(\d+)\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zµ][^\s,=]*)?(?=[\s,]|$)")
@@ -42,10 +43,8 @@ def potential_and_kinetic(
     if not is_scan(stated):
         terms, source = _named_terms(stated, rotation)
         return _series(terms), _rigid_kinetic(rotation, points), source, None, 0.0
-    try:
+    with within("potential"):
         scan = relaxed_scan(rotation, stated, points=points, progress=progress)
-    except ValueError as error:
-        raise ValueError(f"potential: {error}") from None
     period = rotation.symmetry_number(isotopes=False)
     harmonics = _harmonics(scan.angles, period)
     potential = FourierSeries.fitted(

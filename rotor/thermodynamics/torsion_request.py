@@ -20,6 +20,7 @@ from rotor.molecules.bond_scan import MMFF, POINTS, BondScan
 from rotor.quantum.bond_torsion import BondTorsion
 from rotor.requests.budget import ErrorBudget, ErrorTerm
 from rotor.requests.field import check_fields, declared
+from rotor.requests.fill import within
 from rotor.requests.knob import Knob, Measure, with_whole
 from rotor.requests.readers import Custom, Grid, Quantity, Text, Whole
 from rotor.table import Table, TextOf
@@ -127,10 +128,8 @@ class TorsionRequest:
     def rotation(self) -> BondRotation:
         """The rotation about the bond; ValueError for a bond without internal rotation."""
         assert self.top.molecule is not None
-        try:
+        with within("bond"):
             return bond_rotation(self.top.molecule, self.bond)
-        except ValueError as error:
-            raise ValueError(f"bond: {error}") from None
 
 
 @dataclass(frozen=True, eq=False, repr=False)

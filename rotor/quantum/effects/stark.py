@@ -31,7 +31,7 @@ from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.beyond import Limit
 from rotor.quantum.fields.answer import MapAnswer
 from rotor.quantum.fields.field_map import FieldMap, field_map
-from rotor.quantum.fields.inputs import basis_field, read_direction, read_m, states_field, tolerance_field
+from rotor.quantum.fields.inputs import INTENSITY, basis_field, read_direction, read_m, states_field, tolerance_field
 from rotor.quantum.fields.map_request import MOST_AT_EDGE, FieldKind, FieldTerm, MapRequest
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.hamiltonian_input import spins_field
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 HIGHEST_KV_PER_CM = 1e5  # 1 V/Å is 1e5 kV/cm: molecules are ionised
-INTENSITY = Quantity("W/cm2", least=0, most=1e17, metavar="I")  # of light; no molecule survives more
 DEFAULT_TOLERANCE_MHZ = 1e-6
 ELECTRIC = FieldKind(
     "kV/cm", "fields_kv_per_cm", "field_kv_per_cm", "mu_eff_debye", units.MHZ_PER_DEBYE_KV_PER_CM, HIGHEST_KV_PER_CM

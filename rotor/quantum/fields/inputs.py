@@ -17,6 +17,7 @@ from rotor.units import parse_quantity
 MOST_J = 500  # highest J of a basis: about a minute for an asymmetric top
 TOLERANCES_MHZ = (1e3, 1e2, 1e1, 1.0, 1e-1, 1e-2, 1e-4, 1e-6)
 LEAST_MHZ = 1e-9
+INTENSITY = Quantity("W/cm2", least=0, most=1e17, metavar="I")  # of light, far beyond the ionisation of any molecule
 
 
 def largest_difference(first: Any, other: Any) -> float:

@@ -206,11 +206,9 @@ class Digits(NamedTuple):
         """The code of the operator whose elements a series, or the choice of one K, multiplies."""
         if self.kind is Kind.LEVEL:
             return self._replace(typ=0, ksq=0, ff=0)
-        if self.ex or self.kind is Kind.EULER:
-            return self._replace(
-                ex=0, ksq=0, nsq=0, typ=ladder_typ(self.ladder) if self.kind is Kind.EULER else self.typ
-            )
-        return self._replace(ff=0)
+        if self.kind is Kind.EULER:
+            return self._replace(ex=0, ksq=0, nsq=0, typ=ladder_typ(self.ladder))
+        return self._replace(ex=0, ksq=0, nsq=0) if self.ex else self._replace(ff=0)
 
     @property
     def _is_second_of_pair(self) -> bool:

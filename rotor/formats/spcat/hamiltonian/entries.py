@@ -78,13 +78,13 @@ class Connected:
         return tuple(entry for line in lines for entry in self._entries(line))
 
     def _entries(self, line: CodedLine) -> Iterator[Entry]:
-        operator = self._of_three_spins(line)
+        operator = self._with_threefold_factors(line)
         for states, exchange in self._exchanges(line):
             for swapped, factor in _exchanged(operator, exchange, len(self.states[0].spins)):
                 for part in self._parts(line, states):
                     yield from self._between(line, swapped, part._replace(factor=factor * part.factor))
 
-    def _of_three_spins(self, line: CodedLine) -> CodedOperator:
+    def _with_threefold_factors(self, line: CodedLine) -> CodedOperator:
         """The operator with SPCAT's factors for three equivalent spins."""
         if not self.states[0].is_threefold(line.operator.spins):
             return line.operator
