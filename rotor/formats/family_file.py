@@ -36,7 +36,7 @@ from rotor.fitting.fit import FitOptions, fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.fitting.result import Fit
 from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
-from rotor.formats.toml import parse_toml
+from rotor.formats.toml import read_toml
 from rotor.molecules.molecule import Molecule
 from rotor.structures.coordinates import Named, named
 from rotor.structures.family import Family, family
@@ -63,11 +63,7 @@ def read_family(path: str | os.PathLike[str], options: FitOptions | None = None)
     Raises ValueError, with file, table and key, for text that is no TOML, unknown keys, isotopologues that do not fit the
     geometry, constants that are missing, and lines whose fit does not converge.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: not a TOML file: {error}") from None
-    content = parse_toml(text, str(path))
+    content = read_toml(path)
     _refuse_unknown(content, _TABLES, str(path))
     molecule = _molecule(content, str(path))
     species = content.get("isotopologue")

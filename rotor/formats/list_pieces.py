@@ -80,9 +80,9 @@ class Plan:
 
 def list_plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[float, float], folder: Path) -> Plan:
     """The input of all pieces; `start` is the list of J = 0, with its settings."""
-    top, dipole, q = start.top, start.top.dipole_abc_debye, start.partition
+    top, dipole, partition = start.top, start.top.dipole_abc_debye, start.partition
     assert dipole is not None  # line_list has refused a top without one
-    jmax = highest_j(top, dipole, start.temperature_k, q.q, least, jmax, start.levels.effects)
+    jmax = highest_j(top, dipole, partition, least, jmax, start.levels.effects)
     if jmax < 1:
         raise ValueError(f"J max = {jmax}: expected 1 or more, J = 0 alone has no line")
     effects = start.levels.effects
@@ -100,7 +100,7 @@ def list_plan(start: Lines, jmax: int | None, least: float, range_mhz: tuple[flo
         dipole,
         jmax,
         start.temperature_k,
-        q,
+        partition,
         least,
         range_mhz,
         ground,
@@ -133,7 +133,7 @@ def make_piece(plan: Plan, first: int, last: int) -> None:
     trusted = are_trusted(plan.top, levels, plan.ground_mhz)
     if trusted.any():  # the others may lie far below the ground; without any there are no lines at all
         levels = replace(levels, weight=np.where(trusted, levels.weight, 0))
-    cut = intensity_cut(levels, plan.temperature_k, plan.partition.q, plan.min_lgint, plan.ground_mhz)
+    cut = intensity_cut(levels, plan.partition, plan.min_lgint, plan.ground_mhz)
     dipoles = dipoles_by_state(plan.top, plan.dipole_abc, levels.effects)
     transitions = all_transitions(levels, dipoles, plan.range_mhz, cut)
     in_piece = np.minimum(totals[transitions.upper], totals[transitions.lower]) <= last

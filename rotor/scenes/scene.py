@@ -16,7 +16,7 @@ from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any, get_args, get_origin
 
-from rotor.formats.toml import parse_toml, toml_key, toml_value
+from rotor.formats.toml import parse_toml, read_toml, toml_key, toml_value
 from rotor.frozen import dataclass
 from rotor.requests.accuracy import Stated, TotalAccuracy
 from rotor.requests.choices import Choices, nearest
@@ -188,11 +188,7 @@ def read_scene(path: str | os.PathLike[str]) -> Scene:
 
     Raises ValueError, with file and key, for invalid TOML, unknown keys and wrong types.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: a scene file is UTF-8 text: {error}") from None
-    return parse_scene(text, str(path))
+    return scene_of(read_toml(path), str(path))
 
 
 def checked_scene(scene: Any) -> None:

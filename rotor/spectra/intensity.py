@@ -24,6 +24,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels
 
 if TYPE_CHECKING:
+    from rotor.thermodynamics.partition import PartitionFunction
     from rotor.tops.top import Top
 
 LGINT_NM2_MHZ = 4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; for LGINT only
@@ -47,8 +48,7 @@ def require_cut(min_lgint: float | None) -> None:
 def highest_j(
     top: Top,
     dipole_abc: tuple[float, float, float],
-    temperature_k: float,
-    q: float,
+    partition: PartitionFunction,
     cut: float,
     jmax: int | None = None,
     effects: Sequence[QuantumEffect] = SEMI_RIGID,
@@ -65,10 +65,8 @@ def highest_j(
         Rotational constants and spin weights.
     dipole_abc : (float, float, float)
         Components of μ in debye.
-    temperature_k : float
-        Temperature of the gas.
-    q : float
-        Partition function.
+    partition : PartitionFunction
+        Temperature of the gas and Q there.
     cut : float
         log10 of nm² MHz; -inf (no cut) uses the usual cut of -12.
     jmax : int, optional
@@ -91,7 +89,7 @@ def highest_j(
         return jmax
     constants = top.rotational_constants_mhz
     a, c = max(x for x in constants if math.isfinite(x)), constants[2]  # a linear molecule has an infinite A
-    kt_mhz = temperature_k * units.MHZ_PER_K
+    kt_mhz = partition.temperature_k * units.MHZ_PER_K
     dipole2 = sum(mu * mu for mu in dipole_abc) or 1.0
     weight = max(top.spin_weights.values)
     least = 10.0 ** (USUAL_CUT if math.isinf(cut) else cut)
@@ -99,7 +97,7 @@ def highest_j(
     for j in range(1, 100_000):
         frequency = 2 * a * (j + 1)
         photon = -math.expm1(-frequency / kt_mhz)
-        population = weight * math.exp(-c * j * (j - 1) / kt_mhz) / q
+        population = weight * math.exp(-c * j * (j - 1) / kt_mhz) / partition.q
         if j > 1 and LGINT_NM2_MHZ * frequency * (j + 1) * dipole2 * photon * population < least and c * j * j > kt_mhz:
             break
     if jmax is not None and table is not None:
@@ -108,24 +106,22 @@ def highest_j(
         largest_mhz = f"a largest constant of {a:g} MHz is small for a molecule"
         unit = f"; {largest_mhz}: numbers without a unit are MHz; write GHz or cm-1 if that is meant"
         raise ValueError(
-            f"lines above 10^{math.log10(least):g} nm² MHz at {temperature_k:g} K reach to J = {j}, more than "
+            f"lines above 10^{math.log10(least):g} nm² MHz at {partition.temperature_k:g} K reach to J = {j}, more than "
             f"{JMAX_DEFAULT_LIMIT}; give J max, a lower temperature or a higher cut"
             + (unit if a < SUSPECT_BELOW_MHZ else "")
         )
     return j
 
 
-def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float | None = None) -> Floats:
+def population(levels: Levels, partition: PartitionFunction, ground_mhz: float | None = None) -> Floats:
     """The fraction of molecules in each level, per component and M, including its spin weight.
 
     Parameters
     ----------
     levels : Levels
         Energies and weights.
-    temperature_k : float
-        Temperature of the gas.
-    q : float
-        Partition function with the same spin weights.
+    partition : PartitionFunction
+        Temperature of the gas, and Q there with the same spin weights.
     ground_mhz : float, optional
         Zero of energy for Q; by default the lowest of these levels that exists.
 
@@ -135,8 +131,10 @@ def population(levels: Levels, temperature_k: float, q: float, ground_mhz: float
         Pure numbers.
     """
     above_k = (levels.energy_mhz - (levels.ground_mhz if ground_mhz is None else ground_mhz)) / units.MHZ_PER_K
-    exponent = np.minimum(-above_k / temperature_k, 600.0)  # unphysical levels may lie far below the ground state
-    return np.asarray(levels.weight_per_component / q * np.exp(exponent))
+    exponent = np.minimum(
+        -above_k / partition.temperature_k, 600.0
+    )  # unphysical levels may lie far below the ground state
+    return np.asarray(levels.weight_per_component / partition.q * np.exp(exponent))
 
 
 def largest(values: Floats, count: int) -> Ints:
@@ -183,8 +181,7 @@ class IntensityCut:
 
 def intensity_cut(
     levels: Levels,
-    temperature_k: float,
-    q: float,
+    partition: PartitionFunction,
     least_lgint: float,
     ground_mhz: float | None = None,
     most_lines: float = math.inf,
@@ -195,10 +192,8 @@ def intensity_cut(
     ----------
     levels : Levels
         Energies and weights.
-    temperature_k : float
-        Temperature of the gas.
-    q : float
-        Partition function.
+    partition : PartitionFunction
+        Temperature of the gas and Q there.
     least_lgint : float
         log10 of the weakest intensity in nm² MHz.
     ground_mhz : float, optional
@@ -213,5 +208,5 @@ def intensity_cut(
     """
     if math.isinf(least_lgint):
         return None  # no cut keeps every line
-    scaled = LGINT_NM2_MHZ * population(levels, temperature_k, q, ground_mhz)
-    return IntensityCut(scaled, temperature_k * units.MHZ_PER_K, 10.0**least_lgint, most_lines)
+    scaled = LGINT_NM2_MHZ * population(levels, partition, ground_mhz)
+    return IntensityCut(scaled, partition.temperature_k * units.MHZ_PER_K, 10.0**least_lgint, most_lines)

@@ -191,7 +191,7 @@ class Lines(TransitionTable):
     @property
     def intensity_nm2_mhz(self) -> Floats:
         """Integrated absorption I(T) in nm² MHz."""
-        lower_population = population(self.levels, self.temperature_k, self.q)[self.lower]
+        lower_population = population(self.levels, self.partition)[self.lower]
         photon = -np.expm1(-self.frequency_mhz / (self.temperature_k * units.MHZ_PER_K))
         return np.asarray(INTENSITY_NM2_MHZ * self.frequency_mhz * self.strength_debye2 * lower_population * photon)
 
@@ -356,13 +356,13 @@ def line_list(
     stated = line_partition(top, temperature_k, q, vibrational_factor, vibrations, effects)
     if stated is None and (jmax is None or math.isfinite(least)):
         stated = partition_function(top, temperature_k, effects=effects)
-    jmax = highest_j(top, dipole, temperature_k, stated.q if stated else 1.0, least, jmax, effects)
+    jmax = highest_j(top, dipole, stated or PartitionFunction.stated(temperature_k, 1.0), least, jmax, effects)
     levels = solve_levels(top, jmax, effects=effects, executor=executor)
     trusted = np.ones(len(levels), dtype=np.bool_) if untrusted else are_trusted(top, levels)
     ground = float(levels.energy_mhz[trusted & (levels.weight > 0)].min(initial=math.inf))  # inf without levels: no cut
     cut = None
     if stated and math.isfinite(ground):
-        cut = intensity_cut(levels, temperature_k, stated.q, least, ground, most_lines)
+        cut = intensity_cut(levels, stated, least, ground, most_lines)
     others = [moment for effect in levels.effects for moment in effect.other_moments(top)]
     transitions = all_transitions(levels, dipoles_by_state(top, dipole, levels.effects), range_mhz, cut, others)
     inside = None if trusted.all() else trusted[transitions.upper] & trusted[transitions.lower]
@@ -438,9 +438,8 @@ def line_partition(
         if value is not None and not (math.isfinite(value) and value > 0):
             raise ValueError(f"{name} = {value}: expected a finite number above 0")
     if q is not None:
-        # the error of a stated Q is unknown
-        source = "given" if vibrational_factor == 1.0 else f"given, times {named}"
-        return PartitionFunction(temperature_k, q * vibrational_factor, None, math.nan, source)
+        times = "" if vibrational_factor == 1.0 else f", times {named}"
+        return PartitionFunction.stated(temperature_k, q * vibrational_factor, f"given{times}")
     if vibrational_factor == 1.0:
         return None
     summed = partition_function(top, temperature_k, effects=effects)

@@ -89,15 +89,16 @@ def _line_numerics(
 def _spectrum_jmax(request: Any) -> tuple[int, str]:
     """J max of a line list, and the reason."""
     from rotor.spectra import intensity
+    from rotor.spectra.lines import line_partition
     from rotor.thermodynamics import partition_function
 
     if request.jmax is not None:
         return request.jmax, "given"
     top, kelvin = request.top, request.temperature_k
     cut = -math.inf if request.min_lgint is None else request.min_lgint
-    q = request.q or partition_function(top, kelvin).q
+    partition = line_partition(top, kelvin, request.q, request.vibrational_factor, None)
     dipole = top.dipole_abc_debye or (0.0, 0.0, 0.0)
-    return intensity.highest_j(top, dipole, kelvin, q * request.vibrational_factor, cut), "as the cut requires"
+    return intensity.highest_j(top, dipole, partition or partition_function(top, kelvin), cut), "as the cut requires"
 
 
 def allowed_lines(top: Top, jmax: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, overload
 
@@ -34,6 +35,11 @@ class PartitionFunction:
     jmax: int | None
     relative_error: float
     source: str
+
+    @classmethod
+    def stated(cls, temperature_k: float, q: float, source: str = "given") -> PartitionFunction:
+        """A Q from elsewhere, whose error is not known."""
+        return cls(temperature_k, q, None, math.nan, source)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -145,17 +151,17 @@ def partition_function(
     >>> round(partition_function(top, 300.0).q, 2), partition_function(top, [10.0, 300.0]).q.round(2).tolist()
     (108.79, [3.97, 108.79])
     """
-    temperatures = checked_temperatures(temperature_k)
     weights = [top.spin_weights]
     rotation = rotational_sum(top, effects)
     settings: dict[str, Any] = {"energies": False, "refuse": refuse, "progress": progress}
     if rotation.is_original:
-        sums = level_sums(top, weights, temperatures, relative_error, effects=rotation.effects, **settings)[0]
+        sums = level_sums(top, weights, temperature_k, relative_error, effects=rotation.effects, **settings)[0]
     else:  # energies count from the lowest split level
         from rotor.thermodynamics.spin_sums import spin_sums
 
+        temperatures = checked_temperatures(temperature_k)
         sums = spin_sums(top, weights, temperatures, relative_error, effects, **settings).sums[0]
-    functions = PartitionFunctions(temperatures, sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
+    functions = PartitionFunctions(sums.temperatures_k, sums.q, sums.jmax, sums.error_q, _sources(sums, relative_error))
     return functions if np.ndim(temperature_k) else functions[0]
 
 

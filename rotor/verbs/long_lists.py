@@ -14,6 +14,7 @@ from rotor.reports.progress import progress_bar
 from rotor.spectra.intensity import highest_j
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.spectra.transitions import TooManyLinesError, spin_functions, transition_count
+from rotor.thermodynamics.partition import PartitionFunction
 
 if TYPE_CHECKING:
     from rotor.formats.streamed_lines import SortedLines
@@ -130,9 +131,8 @@ def _highest_j(request: SpectrumRequest) -> int:
     if dipole is None:
         return request.jmax or 0
     try:
-        return highest_j(
-            request.top, dipole, request.temperature_k, request.q or 1e4, least, request.jmax, request.effects
-        )
+        partition = PartitionFunction.stated(request.temperature_k, request.q or 1e4)
+        return highest_j(request.top, dipole, partition, least, request.jmax, request.effects)
     except ValueError:  # the line list raises it with the reason
         return 0
 

@@ -311,9 +311,9 @@ def _highest_j(model: Model) -> int:
     """The J beyond which no line reaches the cut of `line_list`, at most `MOST_J`."""
     top, temperature = model.top, model.record.temperature_k
     assert top.dipole_abc_debye is not None
-    q = partition_function(top, temperature, effects=model.effects).q
+    q = partition_function(top, temperature, effects=model.effects)
     try:
-        return min(highest_j(top, top.dipole_abc_debye, temperature, q, DEFAULT_MIN_LGINT), MOST_J)
+        return min(highest_j(top, top.dipole_abc_debye, q, DEFAULT_MIN_LGINT), MOST_J)
     except ValueError:  # far above what is computed while a page waits
         return MOST_J
 

@@ -12,6 +12,7 @@ from rotor.quantum.tensors import body_tensor
 from rotor.spectra import strong_lines, transitions
 from rotor.spectra.intensity import intensity_cut
 from rotor.spectra.lines import Lines, line_list
+from rotor.thermodynamics import PartitionFunction
 from rotor.tops.top import Top
 
 TOPS = {
@@ -134,7 +135,9 @@ def test_limited_blocks_take_the_way_of_single_pairs():
 
 def test_the_least_that_a_line_needs_has_no_division_by_nothing():
     levels = solve_levels(Top.from_constants(TOPS["prolate, Ir"], spin_weights={"ee": 1, "eo": 0, "oe": 0, "oo": 1}), 3)
-    cut = intensity_cut(levels, 20.0, Q, -9.0)
+    cut = intensity_cut(levels, PartitionFunction.stated(20.0, Q), -9.0)
     assert np.isinf(cut.needed[levels.weight == 0]).all()
     assert (cut.needed[levels.weight > 0] * cut.population[levels.weight > 0]) == pytest.approx(1e-9, rel=1e-15)
-    assert not intensity_cut(levels, 20.0, Q, -400.0).needed.any()  # 10^-400 is 0: every line reaches it
+    assert not intensity_cut(
+        levels, PartitionFunction.stated(20.0, Q), -400.0
+    ).needed.any()  # 10^-400 is 0: every line reaches it

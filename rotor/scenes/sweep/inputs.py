@@ -9,11 +9,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from rotor.formats.toml import read_toml
 from rotor.molecules.readers.sdf_entries import BUILT, entry_bytes, parse_entry
 from rotor.scenes.scene import within
 from rotor.version import version
@@ -92,8 +92,8 @@ def _read_together(path: Path) -> Iterator[Path]:
         yield from (p for s in _SPCAT if s != suffix and (p := path.with_suffix(s)).is_file())
     elif suffix == ".toml":
         try:
-            levels = tomllib.loads(path.read_text(encoding="utf-8-sig")).get("levels", {})
-        except (ValueError, RecursionError):  # no TOML: its reader says so
+            levels = read_toml(path).get("levels", {})
+        except ValueError:  # no TOML: its reader says so
             return
         name = levels.get("file") if isinstance(levels, dict) else None
         if isinstance(name, str) and os.path.isfile(table := path.parent / name):

@@ -17,6 +17,7 @@ from rotor.quantum.tensors import body_tensor
 from rotor.spectra.intensity import intensity_cut
 from rotor.spectra.lines import line_list
 from rotor.spectra.transitions import all_transitions
+from rotor.thermodynamics import PartitionFunction
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 
@@ -78,7 +79,7 @@ def test_elements_are_sums_over_parts(case):
 def test_lines_above_a_cut_are_among_all_lines(case, range_mhz, monkeypatch):
     levels = _levels(case)
     dipoles = {(v, v): DIPOLE for v in (0, 1)} if "v" in levels.quanta else DIPOLE
-    cut = intensity_cut(levels, 5.0, 100.0, -7.0)
+    cut = intensity_cut(levels, PartitionFunction.stated(5.0, 100.0), -7.0)
     together = all_transitions(levels, dipoles, range_mhz, cut)
     monkeypatch.setattr(many_f_lines, "_IN_MEMORY", 0)
     listed = all_transitions(levels, dipoles, range_mhz)
@@ -97,7 +98,9 @@ def test_levels_without_a_weight_make_no_lines():
     levels = _levels("one nucleus")
     weight = levels.weight.copy()
     weight[::3] = 0
-    transitions = all_transitions(replace(levels, weight=weight), DIPOLE, cut=intensity_cut(levels, 5.0, 100.0, -7.0))
+    transitions = all_transitions(
+        replace(levels, weight=weight), DIPOLE, cut=intensity_cut(levels, PartitionFunction.stated(5.0, 100.0), -7.0)
+    )
     assert (weight[transitions.lower] > 0).all()
 
 
