@@ -323,7 +323,7 @@ def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockState
         listed, diabatic = followed | followed[ranks].any(axis=0), {"diabatic_label": labels[ranks]}
     vectors = states.vectors[:, :, listed]
     of_listed = {
-        "slope": -derivatives(inside, fields, vectors) / request.kind.slope_mhz,
+        "slope": 0.0 - derivatives(inside, fields, vectors) / request.kind.slope_mhz,  # without field 0, not -0
         "edge_population": (np.abs(vectors[:, block.j[states.places] > jmax - EDGE]) ** 2).sum(axis=1),
     }
     for name, operator in request.observables.items():

@@ -95,6 +95,7 @@ def test_without_field_levels_are_those_of_the_free_top():
         [labels[str(name)] for name in stark.label], abs=1e-6
     )  # round-off of 1e6 MHz
     assert np.abs(stark.slope).max() < 1e-6  # no dipole without a field
+    assert not np.signbit(stark.slope[stark.slope == 0]).any()  # 0 in tables, not -0
 
 
 @pytest.mark.parametrize(
