@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,17 @@ class NoAnswerError(RuntimeError):
 
 class RunStopped(ValueError):
     """A run stopped after it began; files written so far remain."""
+
+
+@contextmanager
+def leaving(path: str | os.PathLike[str], how: str) -> Iterator[None]:
+    """Context in which the text of an interrupt names a file that it leaves behind, if there is one. how: what the file is good for."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        if stop.args or not Path(path).exists():
+            raise
+        raise KeyboardInterrupt(f"interrupted; {path} {how}") from None
 
 
 class Renamed:

@@ -210,7 +210,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return 0
     except Terminated:
         return TERMINATED
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:  # its text says which files are there
+        with suppress(OSError):
+            print(str(stop) or "interrupted; nothing was written", file=sys.stderr)
         return INTERRUPTED
     except Exception as error:
         return _fail(*_failure(error, arguments), arguments)

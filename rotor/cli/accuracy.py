@@ -50,10 +50,10 @@ def answer(request: AccuracyRequest, work: Work) -> SceneAnswer:
                 progress=lambda knob, setting: write(f"{knob}: {setting}"),
             )  # fmt: skip
     except KeyboardInterrupt:
-        work.note("interrupted: the knobs swept so far follow, no file is written")
-        if so_far:
-            show_parts(show(SceneAnswer(request, scene, so_far[-1]), None))
-        raise
+        if not so_far:
+            raise
+        show_parts(show(SceneAnswer(request, scene, so_far[-1]), None))
+        raise KeyboardInterrupt("interrupted; the table has the knobs swept so far, no file was written") from None
     if "plot" in work.files and not table.rows:
         raise ValueError(f"--plot: there is nothing to draw: {'; '.join(table.remarks)}")
     return SceneAnswer(request, scene, table)

@@ -12,6 +12,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.checks import leaving
 from rotor.cli.shared.scene_file import SceneFile
 from rotor.cli.shared.workers import MOST_WORKERS
 from rotor.frozen import dataclass
@@ -239,7 +240,7 @@ def _sweep(scene: Scene, options: Options, pool: Executor | None) -> SweepRun:
 
     record = options.record or str(Path(options.out) / f"{Path(options.scene).stem}.sweep.jsonl")
     start = time.monotonic()
-    with progress_bar("points") as advance:
+    with progress_bar("points") as advance, leaving(record, "has the finished points; the same command continues"):
         result = run_sweep(
             scene,
             folder=options.folder,

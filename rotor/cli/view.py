@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rotor.checks import leaving
 from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Flag, Names, Quantity, Text, Whole
@@ -121,7 +122,8 @@ def _serve(service: Service, request: ViewRequest) -> None:
 
             webbrowser.open(address)
 
-    server.run(started)
+    with leaving(str(service.session.path), "has the session"):
+        server.run(started)
 
 
 VERB = Tool(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, fields, replace
 from math import isnan
 from pathlib import Path
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.checks import NoAnswerError, RunStopped
+from rotor.checks import NoAnswerError, RunStopped, leaving
 from rotor.fluids.forces.models import MODELS, find_model, find_models, model_shapes
 from rotor.fluids.initial_box import model_labels
 from rotor.fluids.motion.bodies import rigid_bodies
@@ -211,8 +211,13 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
         if csv is not None and not resume:
             write_beside(csv, {**head, "start": request.start})
 
+    goes_on = f"holds the run so far; {'the same command' if from_scene else '--resume'} continues"
+    unfinished = [(path, "has the run so far") for path in (*paths["trajectories"], *paths["csv"])]
     try:
-        with frames_for(outputs, "plot" in work.files) as (files, frames):
+        with ExitStack() as stack:
+            for path, how in (*unfinished, *((path, goes_on) for path in paths["checkpoint"])):
+                stack.enter_context(leaving(path, how))
+            files, frames = stack.enter_context(frames_for(outputs, "plot" in work.files))
             quiet: Mapping[str, Any] = {"progress": lambda *_: None} if from_scene else {}
             run = answer_fluid(request, files, resume=resume, on_start=on_start, **quiet)
             if csv is not None:
@@ -223,10 +228,6 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
             return DrawnFluid(**values, centres=_centres(run, frames))
     except RunStopped as error:
         raise NoAnswerError(str(error)) from error
-    except KeyboardInterrupt:
-        if checkpoint is not None and Path(checkpoint).is_file():
-            work.note(f"interrupted; add --resume to continue from {checkpoint}")
-        raise
 
 
 def _add_errors(csv: str, answer: FluidAnswer) -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rotor.checks import leaving
 from rotor.frozen import dataclass
 from rotor.reports.progress import progress_bar
 from rotor.spectra.intensity import highest_j
@@ -151,8 +152,9 @@ def answer_long(
     if _on_screen(files):
         raise ValueError(_no_screen(files))
     paths = _streamed(files)
-    with _bar("pieces", progress) as advance:
-        whole = _sorted(request, Path(f"{paths[0]}.pieces"), advance)
+    folder = Path(f"{paths[0]}.pieces")
+    with _bar("pieces", progress) as advance, leaving(folder, "has the finished pieces; the same command continues"):
+        whole = _sorted(request, folder, advance)
     if "json" in files and whole.count > JSON_LINES:
         raise ValueError(
             f"{_no_json(str(whole.count))}; the sorted lines are in {whole.plan.folder}; the same command without --json writes them"

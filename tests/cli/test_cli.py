@@ -318,15 +318,28 @@ def test_files_appear_all_or_none(call, folder, monkeypatch):
     assert (folder / "a.csv").read_text(encoding="utf-8") == "old"
 
 
-def test_interrupt_is_quiet_and_leaves_nothing(call, folder, monkeypatch):
+def test_interrupt_says_in_one_line_that_nothing_was_written(call, folder, monkeypatch):
     from rotor.spectra import request
 
     def interrupted(*args, **options):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(request, "line_list", interrupted)
-    assert call("spectrum", "CO", "--csv", "a.csv") == (130, "", "")
+    assert call("spectrum", "CO", "--csv", "a.csv") == (130, "", "interrupted; nothing was written\n")
     assert not list(folder.iterdir())
+
+
+def test_interrupt_of_the_report_names_the_files(call, folder, monkeypatch):
+    from rotor.cli.shared import command
+
+    def interrupted(parts):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "show_parts", interrupted)
+    code, out, err = call("levels", "CO", "--csv", "a.csv")
+    assert (code, out) == (130, "")
+    assert err == "interrupted while the report was printed; a.csv: written before\n"
+    assert (folder / "a.csv").is_file()
 
 
 # Mistakes

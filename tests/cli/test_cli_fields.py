@@ -313,6 +313,14 @@ chi_aa = -4.3
 """
 
 
+def test_the_element_of_g_along_a_linear_axis_is_said_to_do_nothing(call):
+    code, _, err = call("zeeman", "CO", "--g", "1,-0.27", "--field", "1T")
+    assert code == 0
+    assert "note: --g: the element along the axis of a linear molecule, 1, has no effect\n" in err
+    code, _, err = call("zeeman", "CO", "--g", "0,-0.27", "--field", "1T")
+    assert (code, "no effect" in err) == (0, False)
+
+
 def test_a_scene_of_zeeman_keeps_the_tensors_as_entered(call, folder):
     inputs = ("--constants", "B=6081.5 MHz", "--g", "-0.03", "--field", "0,1T", "--states", "J<=1")
     code, _, err = call("zeeman", *inputs, "--save-scene", "s.toml")

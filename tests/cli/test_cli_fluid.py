@@ -213,7 +213,7 @@ def test_ctrl_c_tells_where_to_go_on(call, folder, monkeypatch):
     monkeypatch.setattr(RigidDynamics, "step", interrupted)
     code, out, err = call(*options, "--checkpoint", "a.npz", "--csv", "a.csv")
     assert (code, out) == (130, "")
-    assert err == "note: interrupted; add --resume to continue from a.npz\n"
+    assert err == "interrupted; a.npz holds the run so far; --resume continues\n"
     monkeypatch.setattr(RigidDynamics, "step", step)
     assert call(*options, "--checkpoint", "a.npz", "--csv", "a.csv", "--resume")[0] == 0
     assert call(*options, "--checkpoint", "b.npz", "--csv", "b.csv")[0] == 0

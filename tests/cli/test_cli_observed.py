@@ -69,6 +69,14 @@ def test_faults_of_a_catalogue(call, folder):
     assert code == 0
     assert "c099503.cat" in err
     assert "left out   1" in out
+    before = (folder / "a.rotorcat").read_bytes()
+    code, out, err = call(
+        "catalogue", "add", str(folder / "cats" / "c099503.cat"), "--catalogue", str(folder / "a.rotorcat")
+    )
+    assert (code, out) == (2, "")
+    assert "nothing to add" in err
+    assert "c099503.cat" in err
+    assert (folder / "a.rotorcat").read_bytes() == before
     for words in (("frob",), ("add",), ("show", "--catalogue", str(folder / "none")), ("add", str(folder / "s.txt"))):
         code, _, err = call("catalogue", *words)
         assert code == 2, words

@@ -39,12 +39,16 @@ def deliver(
     Raises NoAnswerError at the end for files whose format cannot hold the result.
     """
     left_out = files.write({**writers, "json": lambda path: write_text(path, json())}, leave_out=True)
-    if not files.on_screen:
-        show()
-    elif files.on_screen == ["json"]:
-        print(json(), end="")
-    else:
-        print_table(writers[files.on_screen[0]])
+    try:
+        if not files.on_screen:
+            show()
+        elif files.on_screen == ["json"]:
+            print(json(), end="")
+        else:
+            print_table(writers[files.on_screen[0]])
+    except KeyboardInterrupt as stop:
+        written = f"; {', '.join(files.names)}: written before" if files.names else ""
+        raise KeyboardInterrupt(*stop.args or (f"interrupted while the report was printed{written}",)) from None
     if left_out:
         raise NoAnswerError("; ".join(left_out))
 

@@ -83,6 +83,7 @@ def add_sources(
     path: path of the catalogue. sources: files (.cat, .cat.gz, .par or .hitran of HITRAN, .states of ExoMol), folders of them, or
     `library`. catdir: table of species with Q(T); by default those beside each .cat file. progress: called with the name of each source.
     Returns: one for each file or molecule, in order; those with a fault gave no lines.
+    Raises ValueError, and changes nothing, if all of them have one.
     Raises FileNotFoundError for a source that does not exist. Raises ValueError for a folder without a file of a known kind; a file that
     is no catalogue in the place of the catalogue.
     """
@@ -105,6 +106,9 @@ def add_sources(
                 if progress:
                     progress(name)
                 report.append(_add(engine, name, read, facts or SourceFacts()))
+            faults = [entry.fault for entry in report if entry.fault]
+            if len(faults) == len(report):
+                raise ValueError(f"nothing to add: {'; '.join(faults)}")
             engine.execute(f"SET memory_limit = '{MEMORY_MB}MB'")
             _sort(engine)
         finally:
