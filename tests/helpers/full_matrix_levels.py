@@ -7,6 +7,7 @@ the oblate basis, where the program turns the sign of H). Parts of a sub-block t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 from math import log10, sqrt
@@ -109,19 +110,31 @@ def _dipole_piece(bra: Piece, ket: Piece, spins2: tuple[int, ...]) -> float:
 
 def strengths(case: Case, upper: Block, lower: Block) -> np.ndarray:
     """|⟨F'||μ||F⟩|² in D² for each pair of eigenvectors."""
-    z = "c" if case.oblate else "a"
+
+    def dipole(bra: Piece, ket: Piece) -> np.ndarray:
+        return vector_elements(case, bra, ket, _dipole(case, bra.v, ket.v))
+
+    return np.abs(amplitudes(case, upper, lower, dipole)) ** 2
+
+
+def vector_elements(case: Case, bra: Piece, ket: Piece, vector: np.ndarray) -> np.ndarray:
+    """⟨N' K'||T¹||N K⟩ of a vector (3,) along a, b, c."""
+    whole = reduced_vector(bra.n, ket.n, vector, "c" if case.oblate else "a")
+    return whole[np.ix_(np.array(bra.ks) + bra.n, np.array(ket.ks) + ket.n)]
+
+
+def amplitudes(case: Case, upper: Block, lower: Block, elements: Callable[[Piece, Piece], np.ndarray]) -> np.ndarray:
+    """⟨F'||T¹||F⟩ for each pair of eigenvectors; elements: ⟨N' K'||T¹||N K⟩ between two pieces, whose N differ by at most 1."""
     total = np.zeros((len(upper.functions), len(lower.functions)), complex)
     rows, columns = _places(upper), _places(lower)
     for i, j in product(range(len(upper.basis)), range(len(lower.basis))):
         bra, ket = upper.basis[i], lower.basis[j]
-        vector = _dipole(case, bra.v, ket.v)
-        if vector.any() and abs(bra.n - ket.n) <= 1:
-            matrix = reduced_vector(bra.n, ket.n, vector, z)[np.ix_(np.array(bra.ks) + bra.n, np.array(ket.ks) + ket.n)]
+        if abs(bra.n - ket.n) <= 1 and (matrix := elements(bra, ket)).any():
             left = wang_columns(bra, [upper.functions[r] for r in rows[i]])
             right = wang_columns(ket, [lower.functions[c] for c in columns[j]])
             factor = _dipole_piece(bra, ket, case.states[ket.v].spins2)
             total[np.ix_(rows[i], columns[j])] = factor * left.T @ matrix @ right
-    return np.abs(upper.vectors.conj().T @ total @ lower.vectors) ** 2
+    return np.asarray(upper.vectors.conj().T @ total @ lower.vectors)
 
 
 def _places(of: Block) -> list[list[int]]:

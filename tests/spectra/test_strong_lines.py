@@ -135,9 +135,8 @@ def test_limited_blocks_take_the_way_of_single_pairs():
 
 def test_the_least_that_a_line_needs_has_no_division_by_nothing():
     levels = solve_levels(Top.from_constants(TOPS["prolate, Ir"], spin_weights={"ee": 1, "eo": 0, "oe": 0, "oo": 1}), 3)
-    cut = intensity_cut(levels, PartitionFunction.stated(20.0, Q), -9.0)
+    partition = PartitionFunction.stated(20.0, Q)
+    cut = intensity_cut(levels, partition, -9.0)
     assert np.isinf(cut.needed[levels.weight == 0]).all()
     assert (cut.needed[levels.weight > 0] * cut.population[levels.weight > 0]) == pytest.approx(1e-9, rel=1e-15)
-    assert not intensity_cut(
-        levels, PartitionFunction.stated(20.0, Q), -400.0
-    ).needed.any()  # 10^-400 is 0: every line reaches it
+    assert not intensity_cut(levels, partition, -400.0).needed.any()  # 10^-400 is 0: every line reaches it

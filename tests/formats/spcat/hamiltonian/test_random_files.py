@@ -9,10 +9,8 @@ import random
 
 import numpy as np
 import pytest
-from full_matrix import wang_columns
 from full_matrix_codes import case_of
-from full_matrix_levels import Block, _dipole_piece, _places, solve
-from full_matrix_rotor import reduced_vector
+from full_matrix_levels import Block, amplitudes, solve, vector_elements
 
 from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.text.int_file import read_int
@@ -59,21 +57,15 @@ def _powers(typ: int, bra: int, ket: int, k_bra: np.ndarray, k_ket: np.ndarray) 
 
 def _amplitudes(case, moments, upper: Block, lower: Block) -> np.ndarray:
     """⟨F'||M||F⟩ between all levels of two F."""
-    total = np.zeros((len(upper.functions), len(lower.functions)), complex)
-    rows, columns, z = _places(upper), _places(lower), "c" if case.oblate else "a"
-    for i, bra in enumerate(upper.basis):
-        for j, ket in enumerate(lower.basis):
-            factor = _dipole_piece(bra, ket, case.states[0].spins2) if abs(bra.n - ket.n) <= 1 else 0.0
-            if not factor:
-                continue
-            ks, others, matrix = np.array(bra.ks), np.array(ket.ks), 0.0
-            for typ, axis, value in moments:
-                cosine = reduced_vector(bra.n, ket.n, np.eye(3)[axis - 1], z)[np.ix_(ks + bra.n, others + ket.n)]
-                matrix = matrix + value * cosine * _powers(typ, bra.n, ket.n, ks, others)
-            left = wang_columns(bra, [upper.functions[r] for r in rows[i]])
-            right = wang_columns(ket, [lower.functions[c] for c in columns[j]])
-            total[np.ix_(rows[i], columns[j])] = factor * left.T @ matrix @ right
-    return upper.vectors.conj().T @ total @ lower.vectors
+
+    def elements(bra, ket):
+        ks, others = np.array(bra.ks), np.array(ket.ks)
+        return sum(
+            value * vector_elements(case, bra, ket, np.eye(3)[axis - 1]) * _powers(typ, bra.n, ket.n, ks, others)
+            for typ, axis, value in moments
+        )
+
+    return amplitudes(case, upper, lower, elements)
 
 
 def _compare(seed: int) -> int:
@@ -96,17 +88,17 @@ def _compare(seed: int) -> int:
         apart = np.minimum(np.diff(energy, prepend=-np.inf), np.diff(energy, append=np.inf)) > 1e-2
         where |= {int(a): (f2, int(b)) for a, b, alone in zip(ours, full, apart, strict=True) if alone}
     lines = all_transitions(levels, dict(group.effect.moments), moments=group.effect.others)
-    amplitudes = {
+    between = {
         (f, g): _amplitudes(case, moments, blocks[f], blocks[g]) for f in all_f2 for g in all_f2 if abs(f - g) <= 2
     }
-    largest, count = max(float(np.abs(a).max()) for a in amplitudes.values()) ** 2, 0
+    largest, count = max(float(np.abs(a).max()) for a in between.values()) ** 2, 0
     for up, low, strength in zip(lines.upper.tolist(), lines.lower.tolist(), lines.strength_debye2, strict=True):
         if up not in where or low not in where:
             continue
         (f, i), (g, j) = where[up], where[low]
         # from the higher F to the lower; with one F either order, as [N², φ] is not Hermitian
-        ways = [abs(amplitudes[g, f][j, i]) ** 2] if f > g else [abs(amplitudes[f, g][i, j]) ** 2]
-        ways += [abs(amplitudes[g, f][j, i]) ** 2] if f == g else []
+        ways = [abs(between[g, f][j, i]) ** 2] if f > g else [abs(between[f, g][i, j]) ** 2]
+        ways += [abs(between[g, f][j, i]) ** 2] if f == g else []
         off = min(abs(strength - expected) for expected in ways)
         assert off <= 1e-9 * largest + 1e-9 * strength, (seed, f, g, strength, ways)
         count += 1
