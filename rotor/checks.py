@@ -82,14 +82,15 @@ class RunStopped(ValueError):
 
 
 @contextmanager
-def leaving(path: str | os.PathLike[str], how: str) -> Iterator[None]:
-    """Context in which the text of an interrupt names a file that it leaves behind, if there is one. how: what the file is good for."""
+def leaving(*files: tuple[str | os.PathLike[str], str]) -> Iterator[None]:
+    """Context in which the text of an interrupt names the first of these files that exists, with what it is good for."""
     try:
         yield
     except KeyboardInterrupt as stop:
-        if stop.args or not Path(path).exists():
+        texts = [f"interrupted; {path} {use}" for path, use in files if Path(path).exists()]
+        if stop.args or not texts:
             raise
-        raise KeyboardInterrupt(f"interrupted; {path} {how}") from None
+        raise KeyboardInterrupt(texts[0]) from None
 
 
 class Renamed:

@@ -240,7 +240,7 @@ def _sweep(scene: Scene, options: Options, pool: Executor | None) -> SweepRun:
 
     record = options.record or str(Path(options.out) / f"{Path(options.scene).stem}.sweep.jsonl")
     start = time.monotonic()
-    with progress_bar("points") as advance, leaving(record, "has the finished points; the same command continues"):
+    with progress_bar("points") as advance, leaving((record, "has the finished points; the same command continues")):
         result = run_sweep(
             scene,
             folder=options.folder,

@@ -122,7 +122,8 @@ def _serve(service: Service, request: ViewRequest) -> None:
 
             webbrowser.open(address)
 
-    with leaving(str(service.session.path), "has the session"):
+    session = service.session.path  # None: not saved
+    with leaving(*[(session, "has the session")] if session else []):
         server.run(started)
 
 

@@ -131,9 +131,8 @@ def population(levels: Levels, partition: PartitionFunction, ground_mhz: float |
         Pure numbers.
     """
     above_k = (levels.energy_mhz - (levels.ground_mhz if ground_mhz is None else ground_mhz)) / units.MHZ_PER_K
-    exponent = np.minimum(
-        -above_k / partition.temperature_k, 600.0
-    )  # unphysical levels may lie far below the ground state
+    # unphysical levels may lie far below the ground state
+    exponent = np.minimum(-above_k / partition.temperature_k, 600.0)
     return np.asarray(levels.weight_per_component / partition.q * np.exp(exponent))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict, fields, replace
 from math import isnan
 from pathlib import Path
@@ -212,12 +212,10 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
             write_beside(csv, {**head, "start": request.start})
 
     goes_on = f"holds the run so far; {'the same command' if from_scene else '--resume'} continues"
-    unfinished = [(path, "has the run so far") for path in (*paths["trajectories"], *paths["csv"])]
+    unfinished = [(path, goes_on) for path in paths["checkpoint"]]
+    unfinished += [(path, "has the run so far") for path in (*paths["csv"], *reversed(paths["trajectories"]))]
     try:
-        with ExitStack() as stack:
-            for path, how in (*unfinished, *((path, goes_on) for path in paths["checkpoint"])):
-                stack.enter_context(leaving(path, how))
-            files, frames = stack.enter_context(frames_for(outputs, "plot" in work.files))
+        with leaving(*unfinished), frames_for(outputs, "plot" in work.files) as (files, frames):
             quiet: Mapping[str, Any] = {"progress": lambda *_: None} if from_scene else {}
             run = answer_fluid(request, files, resume=resume, on_start=on_start, **quiet)
             if csv is not None:

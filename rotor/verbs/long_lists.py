@@ -153,7 +153,7 @@ def answer_long(
         raise ValueError(_no_screen(files))
     paths = _streamed(files)
     folder = Path(f"{paths[0]}.pieces")
-    with _bar("pieces", progress) as advance, leaving(folder, "has the finished pieces; the same command continues"):
+    with _bar("pieces", progress) as advance, leaving((folder, "has the finished pieces; the same command continues")):
         whole = _sorted(request, folder, advance)
     if "json" in files and whole.count > JSON_LINES:
         raise ValueError(

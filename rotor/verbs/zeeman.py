@@ -62,9 +62,9 @@ def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
             return None if numbers is None else tensor_for(top.kind, list(numbers))
 
     g, chi = tensor("g"), tensor("magnetisability")
-    if g is not None and top.kind == "linear" and g[0][0]:
-        reading.note(f"{called['g']}: the element along the axis of a linear molecule, {g[0][0]:g}, has no effect")
     if g is not None:
+        if top.kind == "linear" and g[0][0]:
+            reading.note(f"{called['g']}: the element along the axis of a linear molecule, {g[0][0]:g}, has no effect")
         source = f"given ({called['g']}, {called['magnetisability']})" if chi else f"given ({called['g']})"
         return replace(top, magnetic=MagneticTensors(g, chi, source))
     if top.magnetic is None:
