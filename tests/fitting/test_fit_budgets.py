@@ -1,14 +1,17 @@
 """Error budgets of fits: constants in standard errors, predicted frequencies in MHz, with a confidence that is met."""
 
 import math
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import ndtri, stdtrit
 from stated_bounds import fit_problem
 
 from rotor.fitting.assignment import assignments
-from rotor.fitting.budgets import confidence_text, constants_budget, predictions_budget
+from rotor.fitting.budgets import NORMAL, confidence_text, constants_budget, predictions_budget, student_quantile
 from rotor.fitting.fit import fit_lines
 from rotor.fitting.parameters import parameters
 from rotor.tops.constants import Constants
@@ -87,6 +90,22 @@ def test_what_nothing_checks_is_not_estimated():
     alone = co_lines(np.random.default_rng(3), count=1)[1]
     with pytest.raises(ValueError, match="free"):
         fit_lines(alone, CO, parameters(CO, ["B", "D"]))
+
+
+def test_the_interval_of_students_t_is_that_of_scipy_as_printed():
+    assert pytest.approx(ndtri(0.975), rel=1e-15) == NORMAL  # round-off
+    for free in (*range(1, 300), 5_000, 10**6):
+        assert f"{student_quantile(free):.3g}" == f"{stdtrit(free, 0.975):.3g}"
+
+
+def test_a_fit_loads_no_scipy(tmp_path):
+    """Loading it takes longer than most fits."""
+    (tmp_path / "co.csv").write_text(
+        "j_upper,j_lower,frequency_mhz,error_mhz\n1,0,115271.2,0.1\n2,1,230538.0,0.1\n3,2,345796.0,0.1\n"
+    )
+    command = ["fit", str(tmp_path / "co.csv"), "--constants", "B=57636 D=0.18 MHz", "--free", "B,D"]
+    code = f"import sys; from rotor.cli import run; assert run({command!r}) == 0; assert 'scipy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL, cwd=tmp_path)
 
 
 def test_a_fit_that_begins_at_its_result_stays_there():
