@@ -82,15 +82,28 @@ class RunStopped(ValueError):
 
 
 @contextmanager
-def leaving(*files: tuple[str | os.PathLike[str], str]) -> Iterator[None]:
-    """Context in which the text of an interrupt names the first of these files that exists, with what it is good for."""
+def leaving(*files: tuple[str | os.PathLike[str], str], new: bool = False) -> Iterator[None]:
+    """Context in which the text of an interrupt names the first of these files that exists, with what it is good for.
+
+    new: only files written within the context, not those of an earlier run.
+    """
+    before = {path: _stamp(path) for path, _ in files if new}
     try:
         yield
     except KeyboardInterrupt as stop:
-        texts = [f"interrupted; {path} {use}" for path, use in files if Path(path).exists()]
+        texts = [f"interrupted; {path} {use}" for path, use in files if _stamp(path) not in (None, before.get(path))]
         if stop.args or not texts:
             raise
         raise KeyboardInterrupt(texts[0]) from None
+
+
+def _stamp(path: str | os.PathLike[str]) -> tuple[int, int, int] | None:
+    """Identity, time and size of a file; None if there is none."""
+    try:
+        state = os.stat(path)
+    except OSError:
+        return None
+    return state.st_ino, state.st_mtime_ns, state.st_size
 
 
 class Renamed:

@@ -215,7 +215,7 @@ def answer(request: FluidRequest, work: Work) -> FluidAnswer:
     unfinished = [(path, goes_on) for path in paths["checkpoint"]]
     unfinished += [(path, "has the run so far") for path in (*paths["csv"], *reversed(paths["trajectories"]))]
     try:
-        with leaving(*unfinished), frames_for(outputs, "plot" in work.files) as (files, frames):
+        with leaving(*unfinished, new=not resume), frames_for(outputs, "plot" in work.files) as (files, frames):
             quiet: Mapping[str, Any] = {"progress": lambda *_: None} if from_scene else {}
             run = answer_fluid(request, files, resume=resume, on_start=on_start, **quiet)
             if csv is not None:

@@ -220,6 +220,19 @@ def test_ctrl_c_tells_where_to_go_on(call, folder, monkeypatch):
     assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
 
 
+def test_ctrl_c_before_the_first_row_names_no_file_of_an_earlier_run(call, folder, monkeypatch):
+    from rotor.fluids.motion.dynamics import RigidDynamics
+
+    def interrupted(self):
+        raise KeyboardInterrupt
+
+    Path("a.csv").write_text("an earlier run\n")
+    monkeypatch.setattr(RigidDynamics, "step", interrupted)
+    code, out, err = call(*VAPOUR, "--ensemble", "langevin", "--steps", "20", "--csv", "a.csv")
+    assert (code, out, Path("a.csv").read_text()) == (130, "", "an earlier run\n")
+    assert "a.csv" not in err
+
+
 def test_what_there_is_not_has_no_row(call, folder):
     argon = (
         "fluid", "argon", "--model", "argon", "--molecules", "27", "--density", "0.5", "--cutoff", "6", "--equilibration", "0",

@@ -12,6 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -125,6 +126,19 @@ class VerbCommand(typer.core.TyperCommand):
     def get_params(self, ctx: Any) -> list[Any]:
         """The parameters, --help among them."""
         return [_unconverted(parameter) for parameter in super().get_params(ctx)]
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The words that remain; refuses an option in the place of a value, which the parser takes for the value."""
+        takes_value = {
+            name: not parameter.is_flag
+            for parameter in self.get_params(ctx)
+            for name in parameter.opts
+            if name[:1] == "-"
+        }
+        for option, value in pairwise(args[: args.index("--")] if "--" in args else args):
+            if takes_value.get(option) and value.partition("=")[0] in takes_value:
+                ctx.fail(f"{option}: expected a value, but {value.partition('=')[0]} follows")
+        return super().parse_args(ctx, args)
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Arguments and options, panel by panel."""

@@ -64,6 +64,8 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["emission", "CO", "", "--band", "ALMA3"], "SOURCE: the text given is empty"),
         (["spectrum", "CO", "HCN"], "error: HCN: more than the command takes"),
         (["spectrum", "CO", "--temperature", "5", "K", "--jmax", "3"], "stand in quotes: --temperature '5 K'"),
+        (["spectrum", "CO", "--jmax", "--range", "0:1THz"], "--jmax: expected a value, but --range follows"),
+        (["spectrum", "CO", "--cat", "--range=0:1THz"], "--cat: expected a value, but --range follows"),
         (["structure"], "FAMILY is missing"),
         (["spectrum", "H2O", "--jmax", "1_000"], "--jmax: '1_000': expected a whole number"),
         (["levels", "A=9 B=3 C=2.5 GHz"], "is no file: constants go to --constants"),
