@@ -30,9 +30,9 @@ import numpy as np
 from broadband_cases import make_case
 from isotopologue_cases import isotopologue_cases
 
-from rotor.assignment.answer import AssignAnswer, AssignedSpecies
+from rotor.assignment.answer import AssignAnswer, AssignedSpecies, answer_assign
 from rotor.assignment.peaks import PeakList, peak_list
-from rotor.assignment.request import AssignRequest, answer_assign
+from rotor.assignment.request import AssignRequest
 
 LEAST_SNR = 100.0
 CERTAIN = "certain"

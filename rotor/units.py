@@ -37,6 +37,7 @@ DEBYE_PER_E_ANGSTROM = ELEMENTARY_CHARGE_C * 1e-10 / DEBYE_C_M  # 4.80320...
 # units of ASE, used for classical motion: eV, Å, u, and those derived from them
 ASE_TIME_PS = 1e2 * math.sqrt(ATOMIC_MASS_KG / ELEMENTARY_CHARGE_C)  # 1 Å √(u/eV) in ps: 0.01018...
 HBAR_CLASSICAL = PLANCK_J_S / (2 * math.pi * 1e-10 * math.sqrt(ATOMIC_MASS_KG * ELEMENTARY_CHARGE_C))  # in Å √(u eV)
+NM2_IN_CM2 = 1e-14
 # integrated absorption of 1 cm/molecule in nm² MHz: c in cm/s times 1e8, exact
 NM2_MHZ_PER_CM = SPEED_OF_LIGHT_M_PER_S * 1e10
 EV_PER_K = BOLTZMANN_J_PER_K / ELEMENTARY_CHARGE_C  # exact ratio

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.assignment.guesses import Bounds
 from rotor.assignment.rigid_table import MIXED, RigidTable
 
 STRONGEST = 7  # strongest lines of a type from which families are formed
@@ -38,27 +39,6 @@ class Family:
     lines: Ints
     companions: Ints
     share: float
-
-
-@dataclass(frozen=True, eq=False)
-class Bounds:
-    """Least and greatest A, B, C in MHz (3,) each."""
-
-    low: Floats
-    high: Floats
-
-    @property
-    def array(self) -> Floats:
-        """A low, A high, B low, ... (6,)."""
-        return np.column_stack([self.low, self.high]).ravel()
-
-    def points(self, kappa: Floats) -> slice:
-        """The part of an increasing grid of κ = (2B-A-C)/(A-C) within the bounds; κ increases with B and decreases with A and C."""
-        (a, b, c), (a2, b2, c2) = self.low, self.high
-        lowest = (2 * b - a2 - c2) / (a2 - c2) if a2 > c2 else -1.0
-        highest = (2 * b2 - a - c) / (a - c) if a > c else 1.0
-        first, last = np.searchsorted(kappa, [lowest, highest])
-        return slice(max(int(first) - 1, 0), min(int(last) + 2, len(kappa)))
 
 
 def sample_tops(bounds: Bounds, count: int, rng: np.random.Generator) -> Floats:

@@ -14,8 +14,9 @@ from itertools import combinations
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment.families import Bounds, Family
+from rotor.assignment.families import Family
 from rotor.assignment.growth import Grown, Merged, grow, merged_lines, predict
+from rotor.assignment.guesses import Bounds
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import RigidTable
 from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field, alike

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment.families import SAME_PEAK_MHZ, Bounds, Family
+from rotor.assignment.families import SAME_PEAK_MHZ, Family
+from rotor.assignment.guesses import Bounds
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import MIXED, RigidTable
 

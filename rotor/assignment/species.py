@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment.families import Bounds, Family
+from rotor.assignment.families import Family
 from rotor.assignment.growth import LEAST_RATIO, Grown, grow, line_slopes, predict, regrown
+from rotor.assignment.guesses import Bounds
 from rotor.assignment.rigid_table import MIXED, RigidTable
 from rotor.assignment.search import Candidate, Field, alike, quick_ratios, ranked, search_roots
 

@@ -28,20 +28,20 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.fitting.fit import FitOptions, fit_lines
-from rotor.fitting.parameters import parameters
-from rotor.fitting.result import Fit
-from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
 from rotor.formats.toml import read_toml
 from rotor.molecules.molecule import Molecule
 from rotor.structures.coordinates import Named, named
 from rotor.structures.family import Family, family
 from rotor.tops.constants import Constants
 from rotor.tops.uncertain_numbers import parse_named
+
+if TYPE_CHECKING:
+    from rotor.fitting.fit import FitOptions
+    from rotor.fitting.result import Fit
 
 _TABLES = ("name", "geometry", "coordinates", "held", "isotopologue")
 _SPECIES = ("name", "isotopes", "constants", "source", "lines", "start", "corrections")
@@ -149,6 +149,10 @@ def _constants(
 
 
 def _fitted(path: Path, start: Constants, options: FitOptions | None) -> Fit:
+    from rotor.fitting.fit import fit_lines
+    from rotor.fitting.parameters import parameters
+    from rotor.formats.assigned_lines import QUANTA, read_assigned_lines
+
     lines, _ = read_assigned_lines(path, QUANTA[start.kind])
     return fit_lines(lines, start, parameters(start, list(start.values)), options)
 

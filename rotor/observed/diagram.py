@@ -21,7 +21,6 @@ from rotor.arrays import Floats
 from rotor.observed.model import KM_PER_S, Component, Sight, escape, model
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.spectra.emission import planck_k
-from rotor.spectra.opacity import NM2_IN_CM2
 from rotor.table import Table, counted
 
 _REACH = 2.0  # range of integration on either side of a line, in line widths
@@ -182,7 +181,7 @@ def _points(
     )
     bare = np.log(area / (filling * contrast * per_column))
     width = nu * component.fwhm_km_s / KM_PER_S
-    depth = column * NM2_IN_CM2 * species.intensity_nm2_mhz(t) * math.sqrt(4 * math.log(2) / math.pi) / width
+    depth = column * units.NM2_IN_CM2 * species.intensity_nm2_mhz(t) * math.sqrt(4 * math.log(2) / math.pi) / width
     return (bare - np.log(_mean_escape(depth)) if corrected else bare), bare, depth
 
 

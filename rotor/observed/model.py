@@ -25,7 +25,6 @@ from rotor.arrays import Floats, Ints, numbers_in_runs
 from rotor.checks import require_positive
 from rotor.observed.species import SpeciesLines
 from rotor.spectra.emission import BACKGROUND_K, planck_k
-from rotor.spectra.opacity import NM2_IN_CM2
 
 KM_PER_S = units.SPEED_OF_LIGHT_M_PER_S / 1e3
 REACH = 3.0  # full widths at half maximum on either side: a Gaussian has fallen to 1.5e-11 of its peak
@@ -272,7 +271,7 @@ def component_depth(component: Component, grid_mhz: Floats, slopes: bool = False
     width = centre * component.fwhm_km_s / KM_PER_S
     line, channel = _windows(grid_mhz, centre, REACH * width)
     t = component.excitation_k
-    area = component.column_per_cm2 * NM2_IN_CM2 * lines.intensity_nm2_mhz(t)
+    area = component.column_per_cm2 * units.NM2_IN_CM2 * lines.intensity_nm2_mhz(t)
     u = (grid_mhz[channel] - centre[line]) / width[line]
     peak = area * math.sqrt(_LN16 / math.pi) / (width / shift)  # absorption is integrated in the frame of the gas
     depth = peak[line] * np.exp(-_LN16 * u * u)

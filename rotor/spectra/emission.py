@@ -27,7 +27,6 @@ from numpy.typing import ArrayLike, NDArray
 from rotor import units
 from rotor.arrays import Floats
 from rotor.checks import require_positive
-from rotor.spectra.opacity import NM2_IN_CM2
 from rotor.spectra.profiles import gaussian
 from rotor.table import Table
 
@@ -250,7 +249,7 @@ def _optical_depth(grid: Floats, lines: LinesAtRest, source: Source) -> Floats:
     rest = grid / source.frequency_ratio
     centre = lines.frequency_mhz
     width = centre * source.fwhm_km_s / KM_PER_S
-    area = source.column_per_cm2 * NM2_IN_CM2 * lines.intensity_nm2_mhz
+    area = source.column_per_cm2 * units.NM2_IN_CM2 * lines.intensity_nm2_mhz
     first = np.searchsorted(rest, centre - _REACH * width)
     last = np.searchsorted(rest, centre + _REACH * width)
     for i in np.flatnonzero((last > first) & (area > 0)):
@@ -262,7 +261,7 @@ def _optical_depth(grid: Floats, lines: LinesAtRest, source: Source) -> Floats:
 def peak_depth(lines: LinesAtRest, source: Source) -> Floats:
     """Optical depth (n,) at the centre of each line alone: N I 2 √(ln 2/π)/Δν."""
     width = lines.frequency_mhz * source.fwhm_km_s / KM_PER_S
-    area = source.column_per_cm2 * NM2_IN_CM2 * lines.intensity_nm2_mhz
+    area = source.column_per_cm2 * units.NM2_IN_CM2 * lines.intensity_nm2_mhz
     return np.asarray(area * gaussian(np.zeros_like(width), width))
 
 

@@ -36,10 +36,10 @@ from rotor.spectra.emission import (
     source_grid,
     together,
 )
-from rotor.spectra.emitters import CatalogueLines, EmittedLines, emitted_lines
 from rotor.table import Table, TextOf, counted
 
 if TYPE_CHECKING:
+    from rotor.spectra.emitters import CatalogueLines, EmittedLines
     from rotor.tops.top import Top
 
 LEAST_DEPTH = 1e-6  # weaker lines are left out
@@ -326,6 +326,8 @@ def answer_emission(request: EmissionRequest) -> EmissionAnswer:
     >>> len(answer.lines), round(float(answer.lines.energy_upper_k[0]), 3)
     (1, 5.532)
     """
+    from rotor.spectra.emitters import emitted_lines
+
     effects = request.effects or (SEMI_RIGID,) * len(request.molecules)
     emitted = tuple(
         emitted_lines(molecule, source, request.range_mhz, request.least_depth, hamiltonian)

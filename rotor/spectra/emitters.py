@@ -23,7 +23,6 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.spectra.emission import KM_PER_S, Source, peak_depth
 from rotor.spectra.lines import line_list
-from rotor.spectra.opacity import NM2_IN_CM2
 from rotor.spectra.profiles import gaussian
 
 if TYPE_CHECKING:
@@ -170,7 +169,7 @@ def _top_lines(
 ) -> EmittedLines:
     """Lines of a top. The depth at a centre is N I 2 √(ln 2/π)/Δν; the narrowest Δν, at the lowest frequency, gives the cut."""
     width = rest_mhz[0] * source.fwhm_km_s / KM_PER_S
-    depth_per_area = float(gaussian(np.zeros(1), width)[0]) * source.column_per_cm2 * NM2_IN_CM2
+    depth_per_area = float(gaussian(np.zeros(1), width)[0]) * source.column_per_cm2 * units.NM2_IN_CM2
     least = math.log10(least_depth / depth_per_area)
     lines = line_list(
         top,

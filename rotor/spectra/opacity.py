@@ -18,7 +18,6 @@ from rotor.spectra.lines import Lines
 from rotor.spectra.spectrum import Spectrum, line_peaks
 
 OPTICAL_DEPTH = "optical depth"
-NM2_IN_CM2 = 1e-14
 PASCAL_PER_BAR = 1e5
 
 
@@ -77,7 +76,7 @@ def line_optical_depth(
     ['2.22e-02']
     """
     column = column_density_per_cm2(pressure_bar, path_cm, lines.temperature_k)
-    return column * NM2_IN_CM2 * lines.intensity_nm2_mhz * line_peaks(lines, profile, fwhm_mhz)
+    return column * units.NM2_IN_CM2 * lines.intensity_nm2_mhz * line_peaks(lines, profile, fwhm_mhz)
 
 
 def optical_depth(spectrum: Spectrum, pressure_bar: float, path_cm: float) -> Spectrum:
@@ -90,7 +89,7 @@ def optical_depth(spectrum: Spectrum, pressure_bar: float, path_cm: float) -> Sp
     column = column_density_per_cm2(pressure_bar, path_cm, spectrum.temperature_k)
     return Spectrum(
         spectrum.frequency_mhz,
-        column * NM2_IN_CM2 * spectrum.intensity,
+        column * units.NM2_IN_CM2 * spectrum.intensity,
         OPTICAL_DEPTH,
         spectrum.temperature_k,
         spectrum.profile,

@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.assignment.answer import AssignAnswer, AssignedSpecies
-from rotor.assignment.request import AssignRequest, answer_assign
-from rotor.fitting.publication import value_text
+from rotor.assignment.request import AssignRequest
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
@@ -21,7 +19,10 @@ from rotor.requests.readers import Custom, Range, Text
 from rotor.table import counted
 from rotor.verbs.outputs import Output, Report, picture, table_file
 from rotor.verbs.subjects import saved_inputs
-from rotor.verbs.verb import Place, Subject, SubjectKind, Verb
+from rotor.verbs.verb import Place, Subject, SubjectKind, Verb, Work
+
+if TYPE_CHECKING:
+    from rotor.assignment.answer import AssignAnswer, AssignedSpecies
 
 EXAMPLES = """\
   rotor assign peaks.csv
@@ -93,6 +94,13 @@ class SpectrumFile(SubjectKind):
         return saved_inputs(subject.molecules[0], folder, "the numbers of a spectrum")
 
 
+def answer(request: AssignRequest, work: Work) -> AssignAnswer:
+    """The species that the search finds."""
+    from rotor.assignment.answer import answer_assign
+
+    return answer_assign(request)
+
+
 def write_lines(answer: AssignAnswer, path: Path, report: Report) -> None:
     """Write the assigned lines of the first species, as input of `rotor fit`."""
     from rotor.formats.assigned_lines import write_assigned_lines
@@ -133,6 +141,8 @@ def _verdict(answer: AssignAnswer) -> str:
 
 
 def _table(number: int, species: AssignedSpecies) -> Table:
+    from rotor.fitting.publication import value_text
+
     constants, undetermined = species.constants, species.refined.open_constants
     columns = {
         "constant": "{}",
@@ -181,7 +191,7 @@ VERB = Verb(
     about="Rotational constants of unknown molecules from a spectrum, with the probability that they are right.",
     examples=EXAMPLES,
     request=AssignRequest,
-    answer=lambda request, work: answer_assign(request),
+    answer=answer,
     results=results,
     rows="assignments",
     numerics="rotor.assignment.numerics:ASSIGN",

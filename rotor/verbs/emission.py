@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from rotor.requests.fill import Entries, NamedError, read_instance, written_fiel
 from rotor.requests.plan import MOST_LEFT_OUT
 from rotor.requests.readers import Custom, Quantity, Text, Whole
 from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
-from rotor.spectra.emitters import CatalogueLines
 from rotor.tops.top import Top
 from rotor.verbs.emission_observed import OBSERVED
 from rotor.verbs.molecule import (
@@ -36,6 +35,9 @@ from rotor.verbs.observed_file import SeveralInput, is_catalogue
 from rotor.verbs.outputs import Report, picture, table_file, tables
 from rotor.verbs.subjects import beside, saved_molecule
 from rotor.verbs.verb import Place, Shown, Subject, SubjectKind, Verb
+
+if TYPE_CHECKING:
+    from rotor.spectra.emitters import CatalogueLines
 
 EXAMPLES = """\
   rotor emission CO --range 115.1:115.4GHz --column 1e17 --excitation 20 --width 2

@@ -11,30 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.fitting.publication import value_text
-from rotor.fitting.report import (
-    dfbetas,
-    error_text,
-    far_off,
-    mostly_off,
-    parameter_units,
-    quartics_not_free,
-    scatter_text,
-    statistics_text,
-    status_text,
-)
-from rotor.formats.assigned_lin import lin_notes
-from rotor.formats.assigned_lines import write_assigned_lines
-from rotor.formats.fit_request import (
-    FitAnswer,
-    FitRequest,
-    answer_fit,
-    fit_report,
-    fit_table,
-    fitted_par,
-    write_fitted_par,
-    write_fitted_toml,
-)
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
@@ -49,6 +25,7 @@ from rotor.verbs.verb import ErrorsShown, Extra, Verb, Work
 if TYPE_CHECKING:
     from rotor.fitting.choose import Suggestion, Trial
     from rotor.fitting.result import Fit
+    from rotor.formats.fit_request import FitAnswer, FitRequest
 
 EXAMPLES = """\
   rotor fit case.par --out fitted
@@ -110,7 +87,9 @@ class Parameters(Columns):
 
 def answer(request: FitRequest, work: Work) -> FitAnswer:
     """The fit and the analyses beside it; iterations are shown on a terminal."""
+    from rotor.formats.assigned_lin import lin_notes
     from rotor.formats.fit_further import chosen_fit, with_further
+    from rotor.formats.fit_request import answer_fit
 
     further: FitShown = work.shown
     if further.choose is not None and "save_scene" in work.files:
@@ -149,6 +128,8 @@ def withheld(answer: FitAnswer, names: Sequence[str]) -> dict[str, str]:
 
     The best point of an interrupted fit is written.
     """
+    from rotor.formats.fit_request import fitted_par
+
     fit = answer.fit
     if not fit.converged and fit.minimum.status != "interrupted":
         return dict.fromkeys((name for name in CONSTANTS if name in names), "not converged")
@@ -178,12 +159,33 @@ def _text(path: Path, text: str) -> None:
 
 def write_table(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the table for a publication."""
+    from rotor.formats.fit_request import fit_table
+
     _text(path, fit_table(answer, FORMS[path.suffix.lower()], scaled=report.shown.table_errors == "scatter"))
 
 
 def write_lines(answer: FitAnswer, path: Path, report: Report) -> None:
     """Write the assigned lines, merged."""
+    from rotor.formats.assigned_lines import write_assigned_lines
+
     write_assigned_lines(answer.fit.marked_lines, path)
+
+
+def write_report(answer: FitAnswer, path: Path, report: Report) -> None:
+    """Write the full report."""
+    from rotor.formats.fit_request import fit_report
+
+    _text(path, fit_report(answer))
+
+
+def write_constants(answer: FitAnswer, path: Path, report: Report) -> None:
+    """Write the constants in the format of the suffix: a molecule file, or the files of SPFIT and SPCAT."""
+    from rotor.formats.fit_request import write_fitted_par, write_fitted_toml
+
+    if path.suffix.lower() == ".toml":
+        write_fitted_toml(answer, path)
+    else:
+        write_fitted_par(answer, path, variances=path.suffix.lower() == ".var")
 
 
 def content(answer: FitAnswer, shown: FitShown) -> dict[str, Any]:
@@ -205,6 +207,8 @@ def content(answer: FitAnswer, shown: FitShown) -> dict[str, Any]:
 
 
 def _line_records(fit: Fit) -> list[dict[str, Any]]:
+    from rotor.fitting.report import dfbetas
+
     lines = fit.lines
     leverage = dict(zip(fit.groups.tolist(), fit.statistics.leverages.tolist(), strict=False))
     shifts = dfbetas(fit)
@@ -230,6 +234,8 @@ def _line_records(fit: Fit) -> list[dict[str, Any]]:
 
 def show(answer: FitAnswer, report: Report) -> Iterable[Part | None]:
     """Parameters with errors, statistics and analyses."""
+    from rotor.fitting.report import far_off, statistics_text, status_text
+
     fit = answer.fit
     yield f"{answer.request.title}: {status_text(fit)}"
     yield _parameter_table(fit, answer.spread)
@@ -245,6 +251,8 @@ def show(answer: FitAnswer, report: Report) -> Iterable[Part | None]:
 
 def _advice(fit: Fit) -> list[tuple[str, str]] | None:
     """What may help a fit that failed with most lines far off: distortion constants that are not free."""
+    from rotor.fitting.report import mostly_off, quartics_not_free
+
     names = "" if fit.converged or not mostly_off(fit) else ",".join(quartics_not_free(fit))
     if not names:
         return None
@@ -256,6 +264,9 @@ def _advice(fit: Fit) -> list[tuple[str, str]] | None:
 
 
 def _parameter_table(fit: Fit, spread: Sequence[float]) -> Table:
+    from rotor.fitting.publication import value_text
+    from rotor.fitting.report import error_text, parameter_units, scatter_text
+
     values, errors, scaled = (numbers.tolist() for numbers in (fit.values, fit.errors, fit.scaled_errors))
 
     def value(row: int) -> str:
@@ -323,13 +334,10 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the fitted parameters", "fit"),
-        Output("report", (".fit",), "Write the full report", lambda answer, path, _: _text(path, fit_report(answer)), "out.fit"),
-        Output("toml", (".toml",), "Write a molecule file with the constants, errors and correlations",
-               lambda answer, path, _: write_fitted_toml(answer, path), "out.toml"),
-        Output("par", (".par",), "Write the parameters for SPFIT",
-               lambda answer, path, _: write_fitted_par(answer, path, variances=False), "out.par"),
-        Output("var", (".var",), "Write the parameters with errors and correlations, for SPCAT",
-               lambda answer, path, _: write_fitted_par(answer, path, variances=True), "out.var"),
+        Output("report", (".fit",), "Write the full report", write_report, "out.fit"),
+        Output("toml", (".toml",), "Write a molecule file with the constants, errors and correlations", write_constants, "out.toml"),
+        Output("par", (".par",), "Write the parameters for SPFIT", write_constants, "out.par"),
+        Output("var", (".var",), "Write the parameters with errors and correlations, for SPCAT", write_constants, "out.var"),
         Output("table", (".txt", ".md", ".tex"), "Write a table for a publication", write_table, "table.tex"),
         Output("save_lines", (".lin", ".csv"), "Write the assigned lines, merged", write_lines, "all.lin"),
         picture("Draw the residuals against frequency, J and K", "rest.png"),

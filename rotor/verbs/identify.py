@@ -7,8 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.formats.catalogue.cat_species import read_cat_species
-from rotor.formats.catalogue.catdir import is_catdir
 from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, record_table
@@ -107,6 +105,8 @@ def answer(request: IdentifyRequest, work: Work) -> Identified:
 
 def _candidates(sources: Sequence[str], range_mhz: tuple[float, float]) -> list[SpeciesLines]:
     """Species with lines in the range, from catalogues, folders and files."""
+    from rotor.formats.catalogue.cat_species import read_cat_species
+    from rotor.formats.catalogue.catdir import is_catdir
     from rotor.formats.catalogue.database import LineCatalogue
 
     out: list[SpeciesLines] = []

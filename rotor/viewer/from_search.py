@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from rotor.assignment.answer import answer_assign
 from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.peaks import PeakList
-from rotor.assignment.request import AssignRequest, answer_assign
+from rotor.assignment.request import AssignRequest
 from rotor.observed.spectrum import ObservedSpectrum
 from rotor.viewer.fits import lines_from
 from rotor.viewer.line_actions import free_blend

@@ -15,11 +15,11 @@ from assignment_cases import BAND, SECOND, TRUTH, is_right, lines_of, spectrum
 from places import SHARED
 
 import rotor
-from rotor.assignment.answer import AssignAnswer
-from rotor.assignment.families import Bounds
+from rotor.assignment.answer import AssignAnswer, answer_assign
 from rotor.assignment.growth import prior_weight
+from rotor.assignment.guesses import Bounds
 from rotor.assignment.peaks import PeakList, peak_list, spurs
-from rotor.assignment.request import AssignRequest, answer_assign
+from rotor.assignment.request import AssignRequest
 from rotor.assignment.rigid_table import PARAMETERS
 from rotor.formats.assigned_lines import read_assigned_lines, write_assigned_lines
 

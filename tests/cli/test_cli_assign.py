@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from assignment_cases import BAND, TRUTH, is_right, lines_of, spectrum
 
+from rotor.assignment.answer import answer_assign
 from rotor.assignment.peak_finding import pick_peaks
-from rotor.assignment.request import AssignRequest, answer_assign
+from rotor.assignment.request import AssignRequest
 from rotor.formats.peak_files import read_peaks
 
 Call = Callable[..., tuple[int, str, str]]

@@ -90,6 +90,19 @@ def test_a_short_command_loads_nothing_heavy(folder, words):
     assert sorted(loaded & set(NOT_FOR_SHORT_COMMANDS)) == []
 
 
+NOT_FOR_HELP = (
+    "rotor.spectra.lines", "rotor.fitting.fit", "rotor.fitting.publication", "rotor.formats.fit_request", "rotor.assignment.answer",
+    "rotor.assignment.rigid_table", "rotor.formats.catalogue.cat_species",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("verb", ["emission", "identify", "fit", "assign", "structure"])
+def test_help_loads_no_calculation(verb):
+    """Help needs the declarations alone; these modules, loaded for a constant or a type, cost 10 to 70 ms."""
+    loaded = loaded_after(f"from rotor.cli import run\nassert run([{verb!r}, '--help']) == 0")
+    assert sorted(loaded & set(NOT_FOR_HELP)) == []
+
+
 def test_a_short_motion_compiles_nothing(folder):
     """Kernels as plain Python give the same report; compiling them takes seconds the first time."""
     environment = os.environ | {"PYTHONPATH": str(PROJECT), "NUMBA_CACHE_DIR": str(folder / "cache")}
