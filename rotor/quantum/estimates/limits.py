@@ -252,12 +252,16 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
 
 
 def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: int) -> tuple[float, str]:
-    """Size of the A - E splitting of lines J+1 ← J, and text on the barrier; the dipole decides between ΔK = 0 and ΔK = 1."""
+    """Size of the A - E splitting of lines J+1 ← J, and text on the barrier.
+
+    The size is that of the lines which the larger part of the dipole allows: ΔK = 0 along ρ, ΔK = 1 across it.
+    """
     barrier, rotor = group.barrier, group.rotor
     lines = {"within one K": shifts.same, "between two K": shifts.other}
     sizes = [(where, float(np.median(np.abs(splittings)))) for where, splittings in lines.items()]
-    along = int(np.argmax(np.abs(rotor.rho)))
-    if top.dipole_abc_debye is not None and any(top.dipole_abc_debye) and not top.dipole_abc_debye[along]:
+    dipole = np.array(top.dipole_abc_debye or (0.0, 0.0, 0.0))
+    along = dipole[np.argmax(np.abs(rotor.rho))]
+    if dipole @ dipole > 2 * along**2:
         sizes.reverse()
     assert barrier is not None  # without a barrier the caller states a bound
     source = f"{barrier.v3_cm:g} cm-1, that of a similar molecule ({barrier.molecule})"

@@ -99,7 +99,8 @@ def _group_of(top: Top, with_barrier: bool) -> MethylGroup:
             "their moments of inertia are not, so that there are no species A and E: such a group is not computed"
         )
     if len(groups) != 1:
-        raise ValueError(f"internal rotation of {name}: {len(groups)} methyl groups turn; computed is that of one")
+        several = f"{len(groups)} methyl groups turn; a geometry gives constants of a single one: write those of all, F0_1=... V3_1=..."
+        raise ValueError(f"internal rotation of {name}: {several if groups else 'no methyl group turns'}")
     if with_barrier and (groups[0].barrier is None or not groups[0].rotor.barrier_mhz):
         raise ValueError(
             f"internal rotation of {name}: no similar molecule with a threefold barrier is known; give V3, or scan it"

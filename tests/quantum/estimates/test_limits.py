@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -62,6 +63,16 @@ def test_signs_of_what_is_left_out(source, name):
 def test_no_false_signs(source, name):
     """Methyl on the axis of a symmetric top turns with it; formamide's nitrogen is flat; 12C16O has no spins."""
     assert name not in limits(source)
+
+
+def test_the_larger_part_of_the_dipole_decides_which_lines_a_methyl_group_splits():
+    """Methanol: μ_b > μ_a, and the E lines of ΔK = 1 lie hundreds of GHz from those of a rigid top; of ΔK = 0 less than 1 GHz."""
+    along, across = (
+        {limit.name: limit.size_mhz for limit in model_limits(replace(top, dipole_abc_debye=dipole), 16, SEMI_RIGID)}
+        for top in [rotor.read("CH3OH")]
+        for dipole in ((1.4, 0.9, 0.0), (0.9, 1.4, 0.0))
+    )
+    assert along["internal rotation"] < 1e3 < 1e5 < across["internal rotation"]
 
 
 def test_an_effect_of_the_calculation_is_not_left_out():
