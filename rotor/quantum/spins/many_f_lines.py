@@ -4,7 +4,7 @@ An electric moment does not act on spins: its element between two functions is t
 
     ⟨r' p'‖T^K‖r p⟩ = t(p', p) ⟨r'‖T^K‖r⟩,
 
-see `coupling.moment_coefficients`, which has the coefficients of magnetic moments of spins too.
+see `coupling.Acting`, which has the coefficients of magnetic moments of spins too.
 """
 
 from __future__ import annotations

@@ -27,9 +27,9 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.spins.blocks import Plan
-from rotor.quantum.spins.coupling import coefficients, for_all_f, patterns, powers_between
+from rotor.quantum.spins.pattern_tables import couplings_by_f, pattern_table
 from rotor.quantum.spins.rotor import Channel
-from rotor.quantum.spins.scheme import Scheme
+from rotor.quantum.spins.scheme import Scheme, Spin
 
 # difference of eigenvalues from two methods, relative to the highest energy
 _ROUND_OFF = 4 * float(np.finfo(float).eps)
@@ -208,26 +208,23 @@ def coupling_alone(scheme: Scheme, channel: Channel, highest_n: int) -> Alone:
 @lru_cache(maxsize=64)
 def _alone(twice: tuple[int, ...], channel: Channel, highest_n: int) -> Alone:
     """Bounds with the acting spins only; read-only."""
-    tables = {j: patterns(twice, j) for j in range(sum(twice) % 2, 2 * highest_n + sum(twice) + 1, 2)}
-    tables = {j: patterns_of_j[patterns_of_j[:, 0] <= 2 * highest_n] for j, patterns_of_j in tables.items()}
-
-    def coefficients_of_tables(bra: Ints, ket: Ints) -> Floats:
-        plain = coefficients(twice, channel.acting, channel.rank, bra, ket)
-        return plain * powers_between(twice[0], (channel.ns, channel.n2), bra, ket) if channel.ns else plain
-
-    by_j = for_all_f(
-        {j: (patterns_of_j, patterns_of_j) for j, patterns_of_j in tables.items() if len(patterns_of_j)},
-        coefficients_of_tables,
-    )
+    scheme = Scheme(tuple(Spin(str(place), size) for place, size in enumerate(twice)))
+    limits = scheme.total % 2, 2 * highest_n + scheme.total
+    table, by_j = pattern_table(scheme, *limits), couplings_by_f(scheme, channel, *limits)
     norm = np.zeros((highest_n + 1, highest_n + 1))
     ends = np.full((2, highest_n + 1), -np.inf)
-    for j, values in by_j.items():
-        n, starts = np.unique(tables[j][:, 0] // 2, return_index=True)
+    for (j, all_patterns), of_j in zip(table.patterns.items(), by_j, strict=True):
+        n_of_pattern = all_patterns[all_patterns[:, 0] <= 2 * highest_n, 0] // 2
+        if not len(n_of_pattern):
+            continue
+        chosen = table.places[j][: len(n_of_pattern)]  # N rises
+        values = of_j[np.ix_(chosen, chosen)]
+        n, starts = np.unique(n_of_pattern, return_index=True)
         size, inside = np.abs(values), np.ix_(n, n)
         rows = np.maximum.reduceat(np.add.reduceat(size, starts, axis=1), starts, axis=0)
         columns = np.maximum.reduceat(np.add.reduceat(size, starts, axis=0), starts, axis=1)
         norm[inside] = np.maximum(norm[inside], np.sqrt(rows * columns))
-        diagonal, places = np.diag(values), np.searchsorted(n, tables[j][:, 0] // 2)
+        diagonal, places = np.diag(values), np.searchsorted(n, n_of_pattern)
         radius = np.add.reduceat(size, starts, axis=1)[np.arange(len(values)), places] - np.abs(diagonal)
         circles = np.array([radius - diagonal, radius + diagonal])
         ends[:, n] = np.maximum(ends[:, n], np.maximum.reduceat(circles, starts, axis=1))

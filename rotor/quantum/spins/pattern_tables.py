@@ -5,7 +5,6 @@ They depend only on the spins and on F. The most recent ones stay in memory for 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -13,18 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.coupling import (
-    coefficients,
-    for_all_f,
-    moment_coefficients,
-    moment_products,
-    powers_between,
-    within_reach,
-)
+from rotor.quantum.spins.coupling import Acting, powers_of_n_dot_s
 from rotor.quantum.spins.rotor import Channel
 from rotor.quantum.spins.scheme import Scheme
 
 ROUND_OFF = 1e-13  # round-off of sums of products of a few coefficients of size 1
+WHOLE = slice(None)
 
 
 class PatternTable(NamedTuple):
@@ -38,10 +31,11 @@ class PatternTable(NamedTuple):
     places: dict[int, Ints]
     distances: Ints
 
-    def present(self, twice_f: int) -> NDArray[np.bool_]:
-        """Whether an F has the pattern of each number."""
-        mask = np.zeros(len(self.distances), dtype=bool)
-        mask[self.places.get(twice_f, [])] = True
+    def present(self, twice_f: Ints) -> NDArray[np.bool_]:
+        """Whether each F has the pattern of each number, (F, numbers)."""
+        mask = np.zeros((len(twice_f), len(self.distances)), dtype=bool)
+        for row, f in enumerate(twice_f.tolist()):
+            mask[row, self.places.get(f, [])] = True
         return mask
 
 
@@ -73,9 +67,25 @@ def pattern_table(scheme: Scheme, first: int, last: int) -> PatternTable:
 
 @lru_cache(maxsize=64)
 def couplings_by_f(scheme: Scheme, channel: Channel, first: int, last: int) -> Floats:
-    """c(p', p) of a channel within each F, (F, patterns', patterns), 0 where an F lacks a pattern; shared and read-only."""
+    """c(p', p) of a channel within each F, (F, patterns', patterns), 0 where an F lacks a pattern; shared and read-only.
+
+    With its powers of N·S; 0 between different conserved sums; for two equivalent spins ½(value ± value with both exchanged).
+    """
+    values = _by_f(scheme, Acting(channel.acting, channel.rank), 0, first, last)
+    b = len(scheme.spins) - 1
+    exchanged = tuple(sorted({b: b - 1, b - 1: b}.get(place, place) for place in channel.acting))
+    if exchanged != channel.acting and scheme.equivalent == 2:
+        turned = _by_f(scheme, Acting(exchanged, channel.rank), 0, first, last)
+        values = _without_round_off((values + channel.exchange * turned) / 2)
     table = pattern_table(scheme, first, last)
-    return _by_f(table, couplings_of(scheme, channel, table.patterns), 0)
+    for sums in table.distances[:, scheme.conserved_columns].T:
+        values = np.where(sums[:, None] == sums, values, 0.0)
+    if channel.ns:
+        patterns = table.distances[:, :2] + np.array(list(table.patterns))[:, None, None]
+        powers = powers_of_n_dot_s(scheme.twice[0], (channel.ns, channel.n2), patterns)
+        values = values * ((powers[:, :, None] + powers[:, None, :]) / 2)
+    values.flags.writeable = False
+    return values
 
 
 @lru_cache(maxsize=64)
@@ -84,95 +94,64 @@ def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int, ac
 
     Of a tensor, or of the vector of a spin if one acts (see `coupling`).
     """
-    table = pattern_table(scheme, first, last)
-    return _by_f(table, _coefficients_of_step(scheme, table.patterns, rank, step, acting), step)
+    moment = _moment(rank, acting)
+    values = _by_f(scheme, moment, step, first, last) * scheme.count_of(moment.spins)
+    values.flags.writeable = False
+    return values
 
 
 def column_tensors(
     scheme: Scheme, rank: int, step: int, first: int, last: int, acting: int | None, twice_f: Ints, left: slice,
     right: slice,
 ) -> Floats:  # fmt: skip
-    """Some columns of `tensors_by_f` (twice_f, left, right), without the others: they have distances between patterns in common for all F.
-
-    Spins are not equivalent.
-    """
+    """Some columns of `tensors_by_f` (twice_f, left, right), without the others; spins are not equivalent."""
     table = pattern_table(scheme, first, last)
+    return _one_by_one(scheme, _moment(rank, acting), step, table, twice_f, left, right)
+
+
+def _moment(rank: int, acting: int | None) -> Acting:
+    """A tensor, or the vector of a spin."""
+    return Acting(() if acting is None else (acting,), rank, scalar=False)
+
+
+def _by_f(scheme: Scheme, acting: Acting, step: int, first: int, last: int) -> Floats:
+    """Coefficients from each F to F + step, (F, patterns', patterns)."""
+    plain = pattern_table(scheme.one_by_one, first, last)
+    values = _one_by_one(scheme, acting, step, plain, np.array(list(plain.patterns)))
+    if not scheme.equivalent:
+        return values
+    turns = _turns_by_f(scheme, first, last)
+    count = len(turns) - step // 2
+    out = np.zeros((len(turns), *(2 * turns.shape[2:])))
+    out[:count] = turns[step // 2 :].transpose(0, 2, 1) @ values[:count] @ turns[:count]
+    return _without_round_off(out)
+
+
+def _without_round_off(values: Floats) -> Floats:
+    """Coefficients without round-off, which would connect states of different symmetry."""
+    return np.where(np.abs(values) > ROUND_OFF, values, 0.0)
+
+
+@lru_cache(maxsize=16)
+def _turns_by_f(scheme: Scheme, first: int, last: int) -> Floats:
+    """Amplitudes (F, one by one, total) of patterns with spins coupled one by one in those with a total spin."""
+    plain, table = (pattern_table(each, first, last) for each in (scheme.one_by_one, scheme))
+    out = np.zeros((len(table.patterns), len(plain.distances), len(table.distances)))
+    for row, f in enumerate(table.patterns):
+        out[row, plain.places[f][:, None], table.places[f]] = scheme.recoupling(f)[1]
+    return out
+
+
+def _one_by_one(
+    scheme: Scheme, acting: Acting, step: int, table: PatternTable, twice_f: Ints, left: slice = WHOLE,
+    right: slice = WHOLE,
+) -> Floats:  # fmt: skip
+    """Coefficients (F, left, right) between patterns coupled one by one, whose distances are alike for all F."""
     bra, ket = table.distances[left, :-1] + step, table.distances[right, :-1]
-    up, low = np.nonzero(within_reach(rank, bra, ket))
-    both = [table.present(f + step)[left][up] & table.present(f)[right][low] for f in twice_f.tolist()]
+    up, low = np.nonzero(acting.connects(bra, ket))
+    both = table.present(twice_f + step)[:, left][:, up] & table.present(twice_f)[:, right][:, low]
     at, pair = np.nonzero(both)
     up, low, f = up[pair], low[pair], twice_f[at, None]
     out = np.zeros((len(twice_f), len(bra), len(ket)))
-    out[at, up, low] = moment_products(scheme.twice, rank, acting, bra[up] + f, ket[low] + f)
+    out[at, up, low] = acting.coefficients(scheme.twice, bra[up] + f, ket[low] + f)
     return out
-
-
-def _by_f(table: PatternTable, coefficients: Mapping[int, Floats], step: int) -> Floats:
-    """Coefficients by F as one read-only array (F, patterns', patterns)."""
-    first, count = min(table.patterns), len(table.distances)
-    out = np.zeros((len(table.patterns), count, count))
-    for f, values in coefficients.items():
-        out[(f - first) // 2, table.places[f + step][:, None], table.places[f]] = values
-    out.flags.writeable = False
-    return out
-
-
-@lru_cache(maxsize=1024)
-def _couplings_of_f(scheme: Scheme, channel: Channel, twice_f: int) -> Floats:
-    """c(p', p) of a channel over all patterns of one F with a total spin; read-only, shared by levels and derivatives."""
-    patterns = scheme.patterns(twice_f)
-    values = coefficients_between(scheme, channel, patterns, patterns)
-    values = np.where(np.abs(values) > ROUND_OFF, values, 0.0)  # round-off would connect states of different symmetry
-    values.flags.writeable = False
-    return values
-
-
-def couplings_of(scheme: Scheme, channel: Channel, tables: Mapping[int, Ints]) -> dict[int, Floats]:
-    """c(p', p) of a channel by F, from the patterns of each F."""
-    if scheme.equivalent:
-        return {f: _couplings_of_f(scheme, channel, f) for f in tables}
-    both = {f: (patterns, patterns) for f, patterns in tables.items()}
-    return for_all_f(both, lambda bra, ket: coefficients_between(scheme, channel, bra, ket))
-
-
-def coefficients_between(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints) -> Floats:
-    """c(p', p) of a channel between patterns (..., n, columns), with its powers of N·S; 0 between different conserved sums."""
-    values = _with_total(scheme, channel, bra) if scheme.equivalent else _one_by_one(scheme, channel, bra, ket)
-    for column in scheme.conserved_columns:
-        values = np.where(bra[..., :, None, column] == ket[..., None, :, column], values, 0.0)
-    powers = channel.ns, channel.n2
-    return np.asarray(values * powers_between(scheme.twice[0], powers, bra, ket)) if channel.ns else values
-
-
-def _one_by_one(scheme: Scheme, channel: Channel, bra: Ints, ket: Ints) -> Floats:
-    """c(p', p) between patterns coupled one by one, without powers."""
-    return coefficients(scheme.twice, channel.acting, channel.rank, bra, ket)
-
-
-def _with_total(scheme: Scheme, channel: Channel, patterns: Ints) -> Floats:
-    """c(p', p) over all patterns of an F with a total spin; for two equivalent spins ½(value ± value with both exchanged)."""
-    plain, turn = scheme.recoupling(int(patterns[0, -1]))
-    values = _one_by_one(scheme, channel, plain, plain)
-    b = len(scheme.spins) - 1
-    turned = tuple(sorted({b: b - 1, b - 1: b}.get(place, place) for place in channel.acting))
-    if turned != channel.acting and scheme.equivalent == 2:
-        exchanged = _one_by_one(scheme, channel._replace(acting=turned), plain, plain)
-        values = (values + channel.exchange * exchanged) / 2
-    return np.asarray(turn.T @ values @ turn)
-
-
-def _coefficients_of_step(
-    scheme: Scheme, patterns: Mapping[int, Ints], rank: int, step: int, acting: int | None
-) -> dict[int, Floats]:
-    """t(p', p) between doubled F' = F + step and F, by F, where both have patterns."""
-
-    def compute(bra: Ints, ket: Ints) -> Floats:
-        if not scheme.equivalent:
-            return moment_coefficients(scheme.twice, rank, acting, bra, ket)
-        (up, left), (low, right) = (scheme.recoupling(int(patterns[0, -1])) for patterns in (bra, ket))
-        values = left.T @ moment_coefficients(scheme.twice, rank, acting, up, low) @ right
-        values *= scheme.count_of(() if acting is None else (acting,))
-        return np.where(np.abs(values) > ROUND_OFF, values, 0.0)
-
-    tables = {f: (patterns[f + step], patterns_of_f) for f, patterns_of_f in patterns.items() if f + step in patterns}
-    return {f: compute(*both) for f, both in tables.items()} if scheme.equivalent else for_all_f(tables, compute)

@@ -6,7 +6,7 @@ The scheme has the order of the spins and the names of the sums.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from itertools import accumulate
 from typing import TYPE_CHECKING, Protocol
 
@@ -112,6 +112,11 @@ class Scheme:
         """The coupling patterns N, ..., F of one doubled F, doubled."""
         of = {0: patterns, 2: patterns_of_total, 3: patterns_of_three}[self.equivalent]
         return of(self.twice, twice_f)
+
+    @property
+    def one_by_one(self) -> Scheme:
+        """The scheme without a total of equivalent spins."""
+        return replace(self, spins=tuple(replace(spin, total="") for spin in self.spins)) if self.equivalent else self
 
     def recoupling(self, twice_f: int) -> tuple[Ints, Floats]:
         """Patterns of one F with spins coupled one by one, and their amplitudes in patterns with a total spin, (one by one, total)."""

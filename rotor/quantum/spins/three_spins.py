@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.coupling import patterns
+from rotor.quantum.spins.coupling import patterns, recoupled
 from rotor.quantum.wigner import six_j
 
 A1, A2, EVEN_E, ODD_E = 0, 2, 4, 8
@@ -119,16 +119,8 @@ def recoupling_of_three(spins: tuple[int, ...], one_by_one: Ints, total: Ints) -
         place = np.searchsorted(functions.symmetry, right[0, :, -3], sorter=np.argsort(functions.symmetry))
         amplitudes = functions.amplitudes[:, np.argsort(functions.symmetry)[place]]
         for pair, amplitude in zip(functions.pair_spins.tolist(), amplitudes, strict=True):
-            first = _recoupled(g, i, g2, i, f, pair)
-            second = _recoupled(start, i, g, pair, f, twice_total)
+            first = recoupled(g, i, g2, i, f, pair)
+            second = recoupled(start, i, g, pair, f, twice_total)
             order = -1.0 if (i + pair - twice_total) // 2 % 2 else 1.0
             out[:, columns] += np.where(alike, order * amplitude * first * second, 0.0)
     return out
-
-
-def _recoupled(j1: Ints, j2: int, j12: Ints, j3: int, j: Ints, j23: int) -> Floats:
-    """⟨((j1 j2)j12 j3)j|(j1 (j2 j3)j23)j⟩, all doubled: (-1)^(j1+j2+j3+j) √((2j12+1)(2j23+1)) {j1 j2 j12; j3 j j23}."""
-    sign = np.where((j1 + j2 + j3 + j) // 2 % 2, -1.0, 1.0)
-    return np.asarray(
-        sign * np.sqrt((j12 + 1.0) * (j23 + 1.0)) * six_j(j1 / 2, j2 / 2, j12 / 2, j3 / 2, j / 2, j23 / 2)
-    )

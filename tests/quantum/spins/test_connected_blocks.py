@@ -14,7 +14,7 @@ from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.reduced import connections
 from rotor.quantum.spins import Spin, many_f_lines
-from rotor.quantum.spins.coupling import moment_coefficients
+from rotor.quantum.spins.coupling import Acting
 from rotor.quantum.spins.pattern_tables import column_tensors, pattern_table
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import body_tensor
@@ -70,5 +70,5 @@ def test_many_patterns_are_not_compared_all_with_all():
     part = column_tensors(scheme, 1, 2, 80, 82, None, np.array([80]), *numbers)[0]
     up, low = (table.distances[at, :-1] + f for at, f in zip(numbers, (82, 80), strict=True))
     assert part.any()
-    np.testing.assert_array_equal(part, moment_coefficients(scheme.twice, 1, None, up, low))
+    np.testing.assert_array_equal(part, Acting((), 1, scalar=False).coefficients(scheme.twice, up[:, None], low))
     assert not column_tensors(scheme, 1, 2, 80, 82, None, np.array([82]), *numbers).any()  # there is no F = 42

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rotor.quantum.spins.neglected import coupling_alone
-from rotor.quantum.spins.pattern_tables import couplings_of
+from rotor.quantum.spins.pattern_tables import couplings_by_f
 from rotor.quantum.spins.rotor import Channel
 from rotor.quantum.spins.scheme import Scheme, Spin
 
@@ -35,7 +35,7 @@ def test_bounds_are_those_of_the_whole_chain(scheme, channel, within):
     for f in range(scheme.total % 2, 2 * HIGHEST + scheme.total + 1, 2):
         pattern = scheme.patterns(f)
         pattern = pattern[pattern[:, 0] <= 2 * HIGHEST]
-        whole = couplings_of(scheme, channel, {f: scheme.patterns(f)})[f][: len(pattern), : len(pattern)]
+        whole = couplings_by_f(scheme, channel, f, f)[0][: len(pattern), : len(pattern)]
         rows_by_n = {n: np.flatnonzero(pattern[:, 0] == 2 * n) for n in range(HIGHEST + 1) if 2 * n in pattern[:, 0]}
         for m, rows in rows_by_n.items():
             for n, columns in rows_by_n.items():
