@@ -175,10 +175,10 @@ def parameters(
     for text in ties:
         left, ratio, right, shift = _tie(text, constants)
         if left in chosen or right not in chosen:
-            raise ValueError(f"tie {text!r}: {left} must not be free, and {right} must be")
+            raise ValueError(f"ties {text!r}: {left} must not be free, and {right} must be")
         row = names.index(left)
         if matrix[row].any():
-            raise ValueError(f"tie {text!r}: {left} is tied already")
+            raise ValueError(f"ties {text!r}: {left} is tied already")
         base[row] = shift
         matrix[row, chosen.index(right)] = ratio
     start = np.array([constants[name] for name in chosen])
@@ -216,15 +216,15 @@ def _tie(text: str, constants: ConstantSet) -> tuple[str, float, str, float]:
     match = _TIE.match(text.replace("−", "-"))
     if not match:
         raise ValueError(
-            f"tie {text!r}: write 'X = 2.5*Y' (a ratio) or 'X = Y - 300' (a difference, in MHz or with a unit)"
+            f"ties {text!r}: write 'X = 2.5*Y' (a ratio) or 'X = Y - 300' (a difference, in MHz or with a unit)"
         )
-    left, right = (_spelled_as_in_set(match[i], constants, f"tie {text!r}") for i in (1, 3))
+    left, right = (_spelled_as_in_set(match[i], constants, f"ties {text!r}") for i in (1, 3))
     if left == right:
-        raise ValueError(f"tie {text!r}: {left} cannot follow itself")
+        raise ValueError(f"ties {text!r}: {left} cannot follow itself")
     try:
         shift = parse_quantity(match[5], "MHz") if match[5] else 0.0
     except ValueError as error:
-        raise ValueError(f"tie {text!r}: {error}") from None
+        raise ValueError(f"ties {text!r}: {error}") from None
     return left, float(match[2] or 1.0), right, -shift if match[4] == "-" else shift
 
 

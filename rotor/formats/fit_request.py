@@ -206,7 +206,7 @@ def lines_request(
     with within("free"):
         begin = with_names(has, names)
     for tie in ties:  # a tied constant may be missing from the starting constants
-        with within(f"tie {tie!r}"):
+        with within(f"ties {tie!r}"):
             begin = with_names(begin, [tie.partition("=")[0].strip()] if "=" in tie else [])
     fitted = parameters(begin, names, ties=ties, priors_mhz=priors)
     has_prior = np.isfinite(fitted.prior)  # constants with an a-priori value start there

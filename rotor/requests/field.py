@@ -238,8 +238,3 @@ def changed_fields(instance: Any, names: Iterable[str] = ()) -> list[Field]:
     structure: Any = type(instance)
     fields = declared_fields(structure)
     return [fields[name] for name in names or fields if getattr(instance, name) != fields[name].default]
-
-
-def names_of(structure: Any, style: str) -> dict[str, str]:
-    """Names in errors of all fields of a request, by the name of the field."""
-    return {field.name: text for field in all_fields(structure).values() if (text := field.called(style))}

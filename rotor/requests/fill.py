@@ -9,7 +9,7 @@ from dataclasses import field
 from typing import Any
 
 from rotor.frozen import dataclass
-from rotor.requests.field import OUTPUTS, REQUIRED, Field, Part, all_fields, declared_fields, names_of, parts_of
+from rotor.requests.field import OUTPUTS, REQUIRED, Field, Part, all_fields, declared_fields, parts_of
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def _make(part: Part, entries: Entries, subject: Any) -> Any:
         raise ValueError(f"{' and '.join(field.called(entries.style) for field in present)}: {part.why}")
     if part.whole and not present:
         return None
-    with called(part.inputs, entries.style):
+    with naming(all_fields(part.inputs).values(), entries.style):
         return part.make(part.inputs(**inner), subject)
 
 
@@ -69,7 +69,7 @@ def read_instance(structure: Any, entries: Entries, subject: Any = None) -> Any:
         name = missing[0].called(entries.style)
         texts = f"the key {name!r} is missing", f"{name} is missing; --help shows what the command takes"
         raise ValueError(texts[entries.style == "option"])
-    with called(structure, entries.style):
+    with naming(all_fields(structure).values(), entries.style):
         return structure(**read_fields(structure, entries, subject))
 
 
@@ -106,43 +106,25 @@ def within(place: str) -> Iterator[None]:
 
 
 @contextmanager
-def naming(fields: Iterable[Field], style: str) -> Iterator[None]:
-    """Context in which a NamedError names these fields in the user's style."""
-    try:
-        yield
-    except NamedError as error:
-        names = {name: field.called(style) for field in fields for name in (field.name, field.identity)}
-        raise ValueError(re.sub(r"\{([\w.]+)\}", lambda match: names.get(match[1], match[0]), str(error))) from None
+def naming(fields: Iterable[Field], style: str, *, plain: bool = True) -> Iterator[None]:
+    """Context in which a ValueError names these fields in the user's style.
 
-
-@contextmanager
-def called(structure: Any, style: str) -> Iterator[None]:
-    """Context in which a ValueError names fields of a request in the user's style."""
-    with renaming(names_of(structure, style)):
-        yield
-
-
-@contextmanager
-def renaming(names: Mapping[str, str]) -> Iterator[None]:
-    """Context in which a ValueError replaces field names by other names.
-
-    A name with an underscore is replaced anywhere in the text; a plain word only at the start.
+    A NamedError has them in braces. plain: whether they are replaced in other errors too: a name with an underscore anywhere in the text,
+    a plain word at its start.
     """
     try:
         yield
-    except NamedError:
-        raise
     except ValueError as error:
-        text = renamed(str(error), names)
+        names = {name: field.called(style) for field in fields for name in (field.name, field.identity)}
+        if isinstance(error, NamedError):
+            text = re.sub(r"\{([\w.]+)\}", lambda match: names.get(match[1], match[0]), str(error))
+            raise NamedError(text) from None
+        words = [name for name in names if plain and name and "." not in name]
+        patterns = [rf"(?<![\w.-]){name}\b" if "_" in name else rf"^{name}\b(?!\.)" for name in words]
+        text = re.sub("|".join(patterns), lambda match: names[match[0]], str(error)) if patterns else str(error)
         if text == str(error):
             raise
         raise ValueError(text) from None
-
-
-def renamed(text: str, names: Mapping[str, str]) -> str:
-    """Replace field names in a text."""
-    patterns = [rf"(?<![\w.-]){name}\b" if "_" in name else rf"^{name}\b(?!\.)" for name in names]
-    return re.sub("|".join(patterns), lambda match: names[match[0]], text) if patterns else text
 
 
 def written_fields(request: Any) -> dict[str, Any]:

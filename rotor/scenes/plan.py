@@ -8,6 +8,7 @@ from typing import Any
 
 from rotor.requests.accuracy import Accuracy
 from rotor.requests.budget import ErrorBudget
+from rotor.requests.fill import naming
 from rotor.requests.knob import NOTHING_CHEAPER, Choice
 from rotor.requests.plan import LONG_SEARCH, Plan, Run, timed
 from rotor.scenes.run import Where, files_of, scene_calculation
@@ -54,7 +55,7 @@ def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
         raise ValueError("molecule: a list of molecules; a plan is of one: name a molecule of the list in its place")
     files_of(scene, out)
     calculation = scene_calculation(scene, folder)
-    with calculation.verb.naming("key"):
+    with naming(calculation.verb.named, "key"):
         plan, choice = _plan(calculation)
         if plan.seconds <= SHORT_RUN and plan.memory_mb <= SMALL_MB:
             plan = _with_outcome(plan, calculation, choice)

@@ -87,7 +87,7 @@ class Calculation:
     @cached_property
     def choice(self) -> Choice | None:
         """Settings for the requested accuracy; None without one."""
-        with self.verb.naming(self.entries.style):
+        with naming(self.verb.named, self.entries.style):
             goal = self.accuracy
             return None if goal is None else goal.chosen(self.request, self.entries, self.verb.compute)
 
@@ -116,7 +116,7 @@ class Calculation:
     def _answering(self) -> AbstractContextManager[None]:
         """Context of the answer: a ValueError names inputs as the user does; if no input can be wrong, it is a NoAnswerError."""
         typed = self.entries.style == "option"
-        return answering() if typed and self.verb.sound else self.verb.naming(self.entries.style)
+        return answering() if typed and self.verb.sound else naming(self.verb.named, self.entries.style)
 
     def _refuse_incomplete(self, answer: Any) -> None:
         if reason := self.verb.failure(answer):

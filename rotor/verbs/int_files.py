@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
-from rotor.requests.fill import Entries, NamedError, called
+from rotor.requests.field import all_fields
+from rotor.requests.fill import Entries, NamedError, naming
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest
 from rotor.verbs.outputs import Report
 from rotor.verbs.verb import Note
@@ -77,7 +78,7 @@ def predicted_request(source: str, entries: Entries, note: Note, **basis: bool) 
         note(text)
     prediction = with_names(unnamed, Path(source))
     settings, lines = prediction.request, prediction.lines
-    with called(PredictedRequest, entries.style):
+    with naming(all_fields(PredictedRequest).values(), entries.style):
         return PredictedRequest(
             lines.top,
             temperature_k=settings.temperature_k,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rotor.checks import require_file
 from rotor.frozen import dataclass
 from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
-from rotor.requests.fill import Entries, NamedError, read_instance, renaming, within, written_fields
+from rotor.requests.fill import Entries, NamedError, naming, read_instance, within, written_fields
 from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
@@ -220,9 +220,7 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> FitRequest:
     if subject.top is None:
         request = spfit_request(paths["source"], paths["lin"])
     else:
-        names = {"tie": verb.fields["parameters.ties"].called(entries.style)}
-        names["priors_mhz"] = verb.fields["parameters.priors"].called(entries.style)
-        with renaming(names):
+        with naming([replace(verb.fields["parameters.priors"], name="priors_mhz")], entries.style):
             request = lines_request(
                 paths["source"],
                 subject.top,

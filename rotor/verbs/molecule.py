@@ -14,7 +14,7 @@ import numpy as np
 
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
-from rotor.requests.fill import Entries, read_instance, renamed, within
+from rotor.requests.fill import Entries, naming, read_instance, within
 from rotor.requests.readers import Names, Numbers, Pairs, Quantity, Text
 
 if TYPE_CHECKING:
@@ -398,10 +398,8 @@ def _with_states(top: Top, reading: Reading) -> Top:
         from rotor.tops.states.state_texts import with_state_texts
 
         source = f"given ({', '.join(map(reading.named, texts))})"
-        try:
+        with naming((FIELDS[name] for name in STATES), reading.style):
             top = with_state_texts(top, texts, source)
-        except ValueError as error:
-            raise ValueError(renamed(str(error), {name: reading.named(name) for name in STATES})) from None
     notes = () if top.states is None else tuple(text for text in top.states.notes if text not in top.notes)
     return replace(top, notes=(*top.notes, *notes)) if notes else top
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from typing import Any, ClassVar
 
 from rotor.frozen import dataclass
@@ -47,10 +46,6 @@ class Tool(Verb):
         request = read_instance(self.request, entries)
         source = getattr(request, self.of, "")
         return request, Subject(text=source if isinstance(source, str) else " ".join(source), note=place.note)
-
-    def naming(self, style: str) -> AbstractContextManager[None]:
-        """No context: the request was checked when it was read."""
-        return nullcontext()
 
     def facts(self, answer: Any) -> Mapping[str, Any]:
         """What the JSON says of an answer; nothing without JSON."""

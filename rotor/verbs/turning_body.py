@@ -15,7 +15,7 @@ from rotor.classical.euler import checked_momentum
 from rotor.classical.tumble import COHERENT, SI, Three, TumbleRequest, Units
 from rotor.frozen import dataclass
 from rotor.requests.field import Field
-from rotor.requests.fill import Entries, NamedError, read_instance, renaming, written_fields
+from rotor.requests.fill import Entries, NamedError, naming, read_instance, written_fields
 from rotor.requests.readers import Custom, Grid, Quantity
 from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL
 from rotor.verbs.body_inputs import BODY, MOTION, BodyInput, MotionInput, in_si, three
@@ -145,8 +145,7 @@ def build(verb: Verb, entries: Entries, subject: Subject) -> TumbleRequest | Dri
     if in_scene and start.angular_momentum is not None:
         motion = replace(motion, angular_momentum=start.angular_momentum)
     momentum = (BODY if in_scene and is_body else MOTION)["angular_momentum"]
-    names = {name: BODY[name].called(entries.style) for name in ("moments", "angular_velocity", "attitude")}
-    with renaming(names | {"angular_momentum": momentum.called(entries.style)}):
+    with naming([*BODY.values(), momentum], entries.style):
         if motion.effects:
             return _driven(entries, subject, start, motion)
         _refuse_without_effect(entries)

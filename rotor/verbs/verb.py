@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import field
 from functools import cached_property
 from importlib import import_module
@@ -14,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, json_text, json_with_rows
 from rotor.requests.field import OUTPUT, Field, all_fields, declared
-from rotor.requests.fill import Entries, called, naming, read_fields, read_instance, renaming, written_fields
+from rotor.requests.fill import Entries, naming, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Names, Text
 from rotor.table import Table
 from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
@@ -296,18 +295,13 @@ class Verb:
             {name: value for name, value in entries.values.items() if name not in self.subject.fields}, entries.style
         )
         check_early(self.request, early)
-        with naming(self.named, entries.style):
+        with naming(self.named, entries.style, plain=False):
             subject = self.subject.read(entries, place, self)
-            with called(self.request, entries.style):
+            with naming(all_fields(self.request).values(), entries.style):
                 if self.build is not None:
                     return self.build(self, entries, subject), subject
                 values = read_fields(self.request, entries, subject)
                 return self.request(**subject.values, **values), subject
-
-    def naming(self, style: str) -> AbstractContextManager[None]:
-        """Context in which a ValueError that names a field of the request names its key or its option."""
-        names = {field.name: field.key if style == "key" else field.flag for field in self.fields.values()}
-        return renaming({name: text for name, text in names.items() if text})
 
     def read_shown(self, entries: Entries) -> Any:
         """The display options."""

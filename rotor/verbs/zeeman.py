@@ -17,7 +17,7 @@ from rotor.reports.field_maps import (
     table_of_states,
 )
 from rotor.reports.screen import Table
-from rotor.requests.field import CONDITIONS, declared, names_of
+from rotor.requests.field import CONDITIONS, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, within
 from rotor.requests.readers import Numbers
 from rotor.tops.magnetic import MagneticTensors, tensor_for
@@ -54,7 +54,7 @@ class MagneticInput:
 def with_tensors(top: Top, reading: Reading, entries: Entries) -> Top:
     """The top with the tensors of the inputs, else with those of its file."""
     magnetic = read_instance(MagneticInput, entries)
-    called = names_of(MagneticInput, entries.style)
+    called = {field.name: field.called(entries.style) for field in all_fields(MagneticInput).values()}
 
     def tensor(name: str) -> Tensor | None:
         numbers = getattr(magnetic, name)

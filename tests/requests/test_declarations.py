@@ -301,12 +301,33 @@ def test_files_of_spcat_are_no_scene(call):
     ],
 )
 def test_an_error_names_fields_in_the_style_of_the_user(style, text):
-    from rotor.requests.fill import NamedError, naming, renaming
+    from rotor.requests.fill import NamedError, naming
     from rotor.verbs.body_inputs import MOTION
 
-    with pytest.raises(ValueError) as error, naming(MOTION.values(), style), renaming({"step": "of other errors"}):
+    with pytest.raises(ValueError) as error, naming(MOTION.values(), style):
         raise NamedError("{numerics.step}: expected with {effects}, not '{other}'")
     assert str(error.value) == text
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("step: too long", "--step: too long"),
+        ("step and order: give one", "--step and order: give one"),
+        ("step 5 is too long", "--step 5 is too long"),
+        ("step.x: no field", "step.x: no field"),
+        ("at 5, step: too long", "at 5, step: too long"),
+        ("at 5 K of temperature_k", "at 5 K of --temperature"),
+        ("--temperature_k: typed", "--temperature_k: typed"),
+    ],
+)
+def test_plain_names_in_an_error_are_replaced(text, said):
+    from rotor.requests.fill import naming
+    from rotor.verbs.body_inputs import MOTION
+
+    with pytest.raises(ValueError) as error, naming(MOTION.values(), "option"):
+        raise ValueError(text)
+    assert str(error.value) == said
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ from rotor.cli.shared.output import HELD, at_end, deliver, note
 from rotor.cli.shared.plot_options import PLOT_NAMES, picture_fields, picture_settings, picture_style
 from rotor.reports.screen import show_parts
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, Field
-from rotor.requests.fill import Entries, within
+from rotor.requests.fill import Entries, naming, within
 from rotor.requests.readers import Flag, Text
 from rotor.verbs.calculation import Calculation, Outcome, answering
 from rotor.verbs.molecule import is_file
@@ -238,7 +238,7 @@ def _carry_out(calculation: Calculation, files: Files, places: Mapping[str, Any]
         if "save_scene" in files.paths:
             named = {name: places[name] for name in files.paths}
             writers["save_scene"] = scene_writer(outcome, named)
-        with verb.naming("option"):
+        with naming(verb.named, "option"):
             deliver(files, writers, outcome.json, partial(show_answer, verb, answer, report))
         if reason := verb.failure(answer):
             raise NoAnswerError(reason)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.plots.view import View
 from rotor.requests.field import PICTURE, Field
-from rotor.requests.fill import renaming
+from rotor.requests.fill import naming
 from rotor.requests.readers import Custom, Range, Reader, Text
 
 if TYPE_CHECKING:
@@ -57,6 +57,6 @@ def picture_style(typed: Mapping[str, Any]) -> Iterator[None]:
         if "style" in typed:
             from rotor.plots.picture import users_style
 
-            with renaming({"style": "--style"}):
+            with naming(picture_fields().values(), "option"):
                 stack.enter_context(users_style(typed["style"]))
         yield

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from rotor.formats.molecules.fitted_isotopologue import with_fitted_isotopologue
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
-from rotor.requests.fill import renaming
 from rotor.requests.readers import Names, Quantity
 from rotor.table import Table
 from rotor.tops.constants_budget import constants_budget
@@ -117,8 +116,7 @@ def answer_isotopologues(request: IsotopologuesRequest) -> IsotopologuesAnswer:
     family: list[Isotopologue] = []
     if request.min_abundance is not None or not (request.each or request.site):
         least = MIN_ABUNDANCE if request.min_abundance is None else request.min_abundance
-        with renaming({"least": "min_abundance: least"}):
-            family += isotopologues(request.top, min_abundance=least)
+        family += isotopologues(request.top, min_abundance=least)
     for text in request.each:
         family += _named("each", text, lambda value: single_substitutions(request.top, *_substitution(value)))
     if request.site:

@@ -95,7 +95,7 @@ def isotopologues(parent: Top, *, min_abundance: float = 1e-4) -> tuple[Isotopol
     H[2H]O 0.000289 2
     """
     if not 0 < min_abundance <= 1:
-        raise ValueError(f"least abundance {min_abundance:g}: expected a fraction above 0 and up to 1")
+        raise ValueError(f"min_abundance: least abundance {min_abundance:g}: expected a fraction above 0 and up to 1")
     ancestor = _Ancestor(parent)
     molecule, permutations = ancestor.molecule, ancestor.permutations
     placements: dict[tuple[int, ...], tuple[float, int]] = {}

@@ -93,6 +93,7 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["xyzzy", "CO"], "No such command 'xyzzy'; --help lists the commands"),
         (["isotopologues", "a.var"], "error: no isotope of"),
         (["isotopologues", "CO", "--min-abundance", "2"], "--min-abundance: least abundance 2"),
+        (["tumble", "water", "--omega", "0,0,0"], "--omega: '0,0,0': a body at rest does not tumble"),
         (["fit", "missing.par"], "error: missing.par: no such file"),
         (["fit", "bytes.csv", "--start", "OCS"], "bytes.csv: a .csv file is UTF-8 text"),
         (
