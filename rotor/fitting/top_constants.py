@@ -205,7 +205,7 @@ class TopConstants:
     def _refuse_unknown(self, name: str) -> None:
         """Raise ValueError for a state or spin that the set does not have."""
         states = parse_name(name).states if "(" in name else state_numbers(name) if "[" in name else None
-        count = 1 if self.top.states is None else self.top.states.count
+        count = self.top.state_count
         if states and max(states) >= count:
             raise ValueError(
                 f"{name}: there is no state {max(states)}; the constants to start from have {count}, counted from 0"

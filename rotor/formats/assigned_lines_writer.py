@@ -7,8 +7,8 @@ import os
 
 from rotor.fitting.assignment import Assignments
 from rotor.formats.assigned_lin import as_lin
-from rotor.formats.atomic_write import open_atomic
-from rotor.formats.spcat.text.lin import write_lin
+from rotor.formats.atomic_write import open_atomic, write_whole
+from rotor.formats.spcat.text.lin import format_lin
 from rotor.quantum.quanta import FIELD_STEP_KV_PER_CM, value_text
 from rotor.units import MHZ_PER_CM
 
@@ -22,7 +22,7 @@ def write_assigned_lines(lines: Assignments, path: str | os.PathLike[str]) -> No
     """
     text = os.fspath(path).lower()
     if text.endswith(".lin"):
-        return write_lin(as_lin(lines), path)
+        return write_whole(path, format_lin(as_lin(lines)))
     if not text.endswith(".csv"):
         raise ValueError(f"{path}: assigned lines are written as .lin or .csv")
     names = [name for name in lines.names if name != "field"]

@@ -65,6 +65,12 @@ def open_atomic(path: str | os.PathLike[str], mode: str = "wb", **options: Any) 
         yield handle
 
 
+def write_whole(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file; an existing one is replaced at the end or not at all."""
+    with open_atomic(path) as handle:
+        handle.write(content)
+
+
 @contextmanager
 def naming(path: str | os.PathLike[str]) -> Iterator[None]:
     """Context in which an OSError names this path instead of the unfinished file; errors of libraries for a full disk are converted."""

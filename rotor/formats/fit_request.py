@@ -374,9 +374,10 @@ def _molecule_file(request: FitRequest, path: str | os.PathLike[str]) -> Molecul
 
 def write_fitted_par(answer: FitAnswer, path: str | os.PathLike[str], *, variances: bool) -> None:
     """Write SPFIT's .par file after the fit, or with variances the .var file. Raises ValueError as `fitted_par` does."""
-    from rotor.formats.spcat.text.par import write_par
+    from rotor.formats.atomic_write import write_whole
+    from rotor.formats.spcat.text.par import format_par
 
-    write_par(fitted_par(answer, variances=variances), path)
+    write_whole(path, format_par(fitted_par(answer, variances=variances)))
 
 
 def fitted_par(answer: FitAnswer, *, variances: bool) -> ParameterFile:

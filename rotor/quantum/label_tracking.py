@@ -22,7 +22,11 @@ from rotor.quantum.linear_stacks import LinearBlock, LinearStack, stack_numbers
 from rotor.quantum.wang.basis import WangBlock
 
 if TYPE_CHECKING:
+    from typing import TypeAlias
+
     from rotor.quantum.estimates.contracted import ContractedLevels
+
+    LevelBlocks: TypeAlias = "TrackedLevels | ContractedLevels | ClosedForm"
 
 _CLEAR = 0.8  # share of a sub-block in a state, above which it and the rank by energy in it make the name
 _FIRST = 0.5  # share above which a state has its sub-block before all others
@@ -282,7 +286,7 @@ class AssignedLevels(NamedTuple):
 
     rows: Ints
     columns: Ints
-    blocks: TrackedLevels | ContractedLevels | ClosedForm
+    blocks: LevelBlocks
 
     @property
     def with_level(self) -> Ints:

@@ -313,6 +313,11 @@ class Top:
         return self.constants.kind
 
     @property
+    def state_count(self) -> int:
+        """Number of vibrational or tunnelling states, 1 if none are given."""
+        return 1 if self.states is None else self.states.count
+
+    @property
     def rotational_constants_mhz(self) -> tuple[float, float, float]:
         """A, B, C in MHz for any kind of top; A of a linear top is infinite."""
         return self.constants.rigid

@@ -109,10 +109,11 @@ def top_with_errors(source: str, note: Note = silent) -> Top:
 
 def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Callable[[Path], None]:
     """Function that writes the top in the target's format; content that the format cannot hold is refused or noted."""
+    from rotor.formats.atomic_write import write_whole
     from rotor.formats.molecules.molecule_writer import write_molecule_file
     from rotor.formats.spcat.names.named_parameters import named_parameter_file
-    from rotor.formats.spcat.text.int_file import write_int
-    from rotor.formats.spcat.text.par import write_par
+    from rotor.formats.spcat.text.int_file import format_int
+    from rotor.formats.spcat.text.par import format_par
     from rotor.tops.top import without_internal_rotation
 
     suffix = Path(target).suffix
@@ -125,14 +126,14 @@ def writer_of(top: Top, request: ConvertRequest, target: str, note: Note) -> Cal
         note(f"a {suffix} file cannot hold the table of level energies, which replace energies of the constants")
     if suffix.lower() == ".int":
         intensities = _intensities(top, request.kmax)
-        return lambda path: write_int(intensities, path)
+        return lambda path: write_whole(path, format_int(intensities))
 
     moments = [top.dipole_abc_debye or (0.0, 0.0, 0.0), *(top.states.dipoles.values() if top.states else ())]
     if any(map(any, moments)):
         dipole = ", ".join(f"{mu:g}" for mu in moments[0])
         note(f"a {suffix} file cannot hold the dipole ({dipole} D); an .int file can")
     parameters = named_parameter_file(top, request.kmax)
-    return lambda path: write_par(parameters, path)
+    return lambda path: write_whole(path, format_par(parameters))
 
 
 def molecule_file(top: Top, source: str, stem: str) -> MoleculeFile:

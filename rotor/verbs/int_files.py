@@ -137,12 +137,13 @@ def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
 
 def write_levels(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """Write the levels as SPCAT lists them."""
+    from rotor.formats.atomic_write import write_whole
     from rotor.formats.provenance import provenance_record, write_beside
-    from rotor.formats.spcat.text.egy import write_egy
+    from rotor.formats.spcat.text.egy import format_egy
 
     prediction = _prediction(answer)
     levels = prediction.levels
-    write_egy(levels, path)
+    write_whole(path, format_egy(levels))
     record = provenance_record(prediction.lines, dict(report.provenance))
     write_beside(path, record | {"levels": len(levels)})
 

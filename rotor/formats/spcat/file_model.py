@@ -98,9 +98,8 @@ class Group:
         if self.spins or self.effect.others:
             # F has the parity of the sum of the spins, doubled
             all_f = range(max(twice_f[0], sum(self.spins) % 2), twice_f[1] + 1, 2)
-            exist = None if self.top.kind == "linear" else self._exist
-            if self.effect.pairs:  # labels by l must be known before existing levels can be selected
-                exist = None
+            # labels by l must be known before existing levels can be selected
+            exist = None if self.top.kind == "linear" or self.effect.pairs else self._exist
             levels = levels_of_f(self.top, (self.effect,), all_f, None, None, exist)
         else:
             levels = solve_levels(self.top, twice_f[1] // 2, jmin=twice_f[0] // 2, effects=(self.effect,))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import field, replace
 from functools import cached_property, partial
 
@@ -16,16 +16,8 @@ from rotor.formats.spcat.block_numbers import numbered_blocks
 from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, group_lines, group_transitions
 from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.file_quanta import quanta_format
-from rotor.formats.spcat.hamiltonian.labels import UNDIAGONALIZED_NOTE
-from rotor.formats.spcat.hamiltonian.states import file_states
-from rotor.formats.spcat.prediction_notes import (
-    basis_notes,
-    falling_diagonal_notes,
-    file_notes,
-    full_basis_notes,
-    request_notes,
-)
-from rotor.formats.spcat.solved_groups import SolvedGroup, highest_n, joined_lines, solved_groups
+from rotor.formats.spcat.prediction_notes import prediction_notes
+from rotor.formats.spcat.solved_groups import highest_n, joined_lines, solved_groups
 from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
@@ -108,7 +100,6 @@ def predict(
         files = wavenumbers.files_in_mhz(parameters, intensities)
         in_mhz = predict(*files, as_spcat=as_spcat, full_basis=full_basis)
         return replace(in_mhz, catalogue=wavenumbers.catalogue_in_cm(in_mhz.catalogue), request=request)
-    further = request_notes(request, as_spcat)
     if as_spcat and request.qrot < 1:
         request = replace(request, qrot=1.0)
     highest = highest_n(parameters, request)
@@ -126,7 +117,7 @@ def predict(
         joined_lines(parameters, solved, [lines.transitions for lines in listed], form, request),
         request.qrot,
         request,
-        partial(_notes, parameters, intensities, as_spcat, full_basis, further, without_vectors),
+        partial(prediction_notes, parameters, intensities, as_spcat, full_basis, without_vectors),
         lambda: as_level_list(without_vectors, form, numbered_blocks(parameters, present)),
     )
 
@@ -142,26 +133,3 @@ def _refuse_limits(request: Request) -> None:
         raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
     if not (math.isfinite(request.temperature_k) and request.temperature_k > 0):
         raise ValueError(f"TEMP = {request.temperature_k:g}: a temperature is above 0 K")
-
-
-def _notes(
-    parameters: ParameterFile,
-    intensities: IntensityFile,
-    as_spcat: bool,
-    full_basis: bool,
-    further: Iterable[str],
-    solved: list[SolvedGroup],
-) -> Iterator[str]:
-    """The notes on the files and on their groups that have levels, then further ones."""
-    groups = [each.group for each in solved]
-    highest = highest_n(parameters, intensities.request)
-    yield from file_notes(parameters, intensities, as_spcat)
-    if any(group.diag < 0 and not group.is_diagonal for group in groups):
-        yield UNDIAGONALIZED_NOTE
-    if any(state.is_cut for group in groups for state in group.states):
-        whole = connected_groups(parameters, intensities, as_spcat=as_spcat, full_basis=True, highest_n=highest)
-        yield from basis_notes(solved, whole, intensities.request)
-    yield from falling_diagonal_notes(groups, parameters.options[0].diag, highest)
-    if full_basis:
-        yield from full_basis_notes(file_states(parameters), highest)
-    yield from further

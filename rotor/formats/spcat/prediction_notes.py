@@ -5,11 +5,11 @@ Each number that `as_spcat` changes has a note.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from rotor.formats.spcat.file_model import Group, moments_within_states
+from rotor.formats.spcat.file_model import Group, connected_groups, moments_within_states
 from rotor.formats.spcat.hamiltonian.coded_file import CodedFile, coded_file
 from rotor.formats.spcat.hamiltonian.dipole_codes import (
     EVEN_ORDER,
@@ -17,9 +17,10 @@ from rotor.formats.spcat.hamiltonian.dipole_codes import (
     split_dipole,
     split_dipoles,
 )
+from rotor.formats.spcat.hamiltonian.labels import UNDIAGONALIZED_NOTE
 from rotor.formats.spcat.hamiltonian.phases import with_dipoles
 from rotor.formats.spcat.hamiltonian.states import StateOptions
-from rotor.formats.spcat.solved_groups import SolvedGroup
+from rotor.formats.spcat.solved_groups import SolvedGroup, highest_n
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile, npar_notes
 from rotor.quantum.levels import Levels
@@ -27,15 +28,29 @@ from rotor.quantum.levels import Levels
 SAME_MHZ = 1e-6  # round-off of energies
 
 
-def file_notes(parameters: ParameterFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
-    """Notes that follow from the files without their levels."""
-    coded = coded_file(parameters)
-    return [
-        *npar_notes(parameters),
-        *coded.left_out,
-        *_empty_states(coded),
-        *_moment_notes(coded, intensities, as_spcat),
-    ]
+def prediction_notes(
+    parameters: ParameterFile,
+    intensities: IntensityFile,
+    as_spcat: bool,
+    full_basis: bool,
+    solved: list[SolvedGroup],
+) -> Iterator[str]:
+    """The notes on the files and on their groups that have levels."""
+    coded, groups = coded_file(parameters), [each.group for each in solved]
+    highest = highest_n(parameters, intensities.request)
+    yield from npar_notes(parameters)
+    yield from coded.left_out
+    yield from _empty_states(coded)
+    yield from _moment_notes(coded, intensities, as_spcat)
+    if any(group.diag < 0 and not group.is_diagonal for group in groups):
+        yield UNDIAGONALIZED_NOTE
+    if any(state.is_cut for group in groups for state in group.states):
+        whole = connected_groups(parameters, intensities, as_spcat=as_spcat, full_basis=True, highest_n=highest)
+        yield from _basis_notes(solved, whole, intensities.request)
+    yield from _falling_diagonal_notes(groups, parameters.options[0].diag, highest)
+    if full_basis:
+        yield from _full_basis_notes(coded.states, highest)
+    yield from _request_notes(intensities.request, as_spcat)
 
 
 def _empty_states(coded: CodedFile) -> list[str]:
@@ -48,7 +63,7 @@ def _empty_states(coded: CodedFile) -> list[str]:
     ]
 
 
-def request_notes(request: Request, as_spcat: bool) -> list[str]:
+def _request_notes(request: Request, as_spcat: bool) -> list[str]:
     """Notes on QROT below 1, which SPCAT replaces by 1, and on a .str file (tens digit of FLAGS), which is not written here."""
     notes = []
     if 0 < request.qrot < 1:
@@ -99,12 +114,8 @@ def _moment_notes(coded: CodedFile, intensities: IntensityFile, as_spcat: bool) 
     return notes
 
 
-def basis_notes(solved: Iterable[SolvedGroup], whole: list[Group], request: Request) -> list[str]:
-    """Levels that KNMIN and KNMAX exclude, and the shifts of the remaining levels.
-
-    solved: groups with the basis of the file, and their levels. whole: groups with all K. request: highest F.
-    Returns: one sentence for each group whose basis is cut.
-    """
+def _basis_notes(solved: Iterable[SolvedGroup], whole: list[Group], request: Request) -> list[str]:
+    """A sentence for each group whose basis is cut: levels that KNMIN and KNMAX exclude, and shifts of the others from the whole basis."""
     notes = []
     for group, levels, _ in solved:
         if any(state.is_cut for state in group.states):
@@ -154,7 +165,7 @@ def _energies(solved: Iterable[tuple[Group, Levels]], twice_f: int) -> tuple[dic
     return energies, count
 
 
-def falling_diagonal_notes(groups: Iterable[Group], diag: int, highest_n: int) -> list[str]:
+def _falling_diagonal_notes(groups: Iterable[Group], diag: int, highest_n: int) -> list[str]:
     """A note for DIAG = 0 if the diagonal of the Hamiltonian falls with K, so that labels by energy differ from those by K."""
     falls = [n for group in groups if (n := group.falls_from(highest_n)) is not None]
     if diag or not falls:
@@ -165,7 +176,7 @@ def falling_diagonal_notes(groups: Iterable[Group], diag: int, highest_n: int) -
     ]
 
 
-def full_basis_notes(states: Iterable[StateOptions], highest_n: int) -> list[str]:
+def _full_basis_notes(states: Iterable[StateOptions], highest_n: int) -> list[str]:
     """A note for each ignored KNMIN and KNMAX that would exclude levels up to the highest N."""
     lifted = [state for state in states if state.with_k_to(highest_n).is_cut]
     return [

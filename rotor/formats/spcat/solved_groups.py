@@ -157,7 +157,7 @@ def _shown(parameters: ParameterFile, group: Group) -> Top:
     parameters_of_state = [
         replace(parameter, code=d.in_lowest_state, constrained=False, text="")
         for parameter, d in zip(parameters.parameters, file_codes(parameters), strict=True)
-        if d.is_orthorhombic and not d.is_energy and d.states in ((0, 0), None)
+        if d.has_name
     ]
     option = replace(options_alone(parameters, 0), knmin=0)
     if group.states[0].linear:

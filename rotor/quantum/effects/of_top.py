@@ -70,7 +70,7 @@ def _refuse_unknown_states(top: Top) -> None:
     from rotor.quantum.effects.spin_effect import parse_name
 
     assert top.spin_constants is not None
-    count = 1 if top.states is None else top.states.count
+    count = top.state_count
     for name in top.spin_constants.values:
         states = parse_name(name).states
         if states and states[1] >= count:

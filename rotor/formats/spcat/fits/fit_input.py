@@ -318,27 +318,21 @@ def fitted_file(fit_input: SpfitInput, fit: Fit, *, variances: bool) -> Paramete
             error = float(errors[column]) * abs(ratio) if np.isfinite(fit.errors[column]) else FIXED
         fitted.append(replace(parameter, value=value, error=error))
     leaders = [c for p, c in zip(fit_input.file.parameters, fit_input.columns, strict=True) if not p.constrained]
-    rest = correlation_text(fit, leaders) if variances else ""
+    rest = correlation_text(np.nan_to_num(fit.statistics.correlations), leaders) if variances else ""
     header = replace(fit_input.file.header, npar=len(fitted))
     return replace(fit_input.file, header=header, parameters=tuple(fitted), rest=rest)
 
 
-def correlation_text(fit: Fit, columns: Sequence[int]) -> str:
-    """Text of the correlations at the end of a .var file: C = V Vᵀ, V upper triangular, column by column, eight numbers in a line.
+def correlation_text(correlations: Floats, columns: Sequence[int]) -> str:
+    """Text of the correlations (n, n) at the end of a .var file: C = V Vᵀ, V upper triangular, column by column, eight numbers in a line.
 
     columns: for each parameter without a minus sign its place among those of the fit, -1 if held (no correlations). SPCAT reads this number
     of rows, and ignores the correlations if there are fewer. The sign of a column of V does not affect C."""
-    correlations = np.nan_to_num(fit.statistics.correlations)
-    np.fill_diagonal(correlations, 1.0)
-    return packed_correlations(correlations, columns)
-
-
-def packed_correlations(correlations: Floats, columns: Sequence[int]) -> str:
-    """Text of correlations (n, n), see `correlation_text`."""
     places = np.array(columns)
     free = np.flatnonzero(places >= 0)
     whole = np.eye(len(places))
     whole[np.ix_(free, free)] = correlations[np.ix_(places[free], places[free])]
+    np.fill_diagonal(whole, 1.0)
     factor = _lower_factor(whole[::-1, ::-1])[::-1, ::-1]
     values = [factor[i, j] for j in range(len(factor)) for i in range(j + 1)]
     rows = [values[i : i + 8] for i in range(0, len(values), 8)]

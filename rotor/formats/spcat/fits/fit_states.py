@@ -19,6 +19,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -48,6 +49,9 @@ from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation
+
+if TYPE_CHECKING:
+    from rotor.quantum.label_tracking import LevelBlocks
 
 _SYMMETRIES = 4  # species of the group of twofold rotations; an operator of symmetry s connects t with s ^ t
 
@@ -165,9 +169,13 @@ def _searched(
             return parts
         none = lost[~np.isin(lost, reduced) | (positive[lost, -1] >= HIGHEST_SEARCHED)]
         if len(none):
-            first = " ".join(map(str, labels[none[0]].tolist()))
-            raise MissingLevelsError(f"there is no level {first} ({', '.join(quanta_names(form))}) in this model", none)
+            raise _no_level(labels, none, f" ({', '.join(quanta_names(form))}) in this model")
         positive[lost, -1] += 1
+
+
+def _no_level(labels: Ints, places: Ints, why: str) -> MissingLevelsError:
+    """The error for labels at these places, which have no level."""
+    return MissingLevelsError(f"there is no level {' '.join(map(str, labels[places[0]].tolist()))}{why}", places)
 
 
 def levels_in_blocks(group: Group, angular: Sequence[int]) -> Levels:
@@ -189,13 +197,17 @@ def _with_labels(
         return []
     total = labels[here, -1] if form.spins else labels[here, 0]
     if (total < 0).any():  # a difference of F below 0 marks a level that does not exist
-        first = " ".join(map(str, labels[here[int(np.argmax(total < 0))]].tolist()))
-        raise MissingLevelsError(f"there is no level {first}: F or J is below 0", here[total < 0])
+        raise _no_level(labels, here[total < 0], ": F or J is below 0")
     twice = 2 * total - sum(group.spins) % 2  # F is listed rounded up: doubled, less the half
+    parameters = tuple(group.effect.parameters(group.top))
+    columns = np.array([names.index(name) for name in parameters])
+    # derivatives of a parameter at 0 need a small value to exist
+    start = np.where(values == 0, AT_ZERO_MHZ, values)[columns]
     if group.diag >= 0 and _direct(group, form):
-        return _assign_without_spins(group, form, labels, here, names, values)
-    find = _assign_with_spins if group.diag >= 0 and group.spins else _assign_in_blocks
-    return find(group, form, labels, here, twice, names, values)
+        return [AssignedLevels(here, columns, _assign_without_spins(group, form, labels[here], parameters, start))]
+    assign = _assign_with_spins if group.diag >= 0 and group.spins else _assign_in_blocks
+    assigned = assign(group, form, labels[here], twice, parameters, start)
+    return [AssignedLevels(here[rows], columns, blocks) for rows, blocks in assigned]
 
 
 def _direct(group: Group, form: Format) -> bool:
@@ -205,27 +217,21 @@ def _direct(group: Group, form: Format) -> bool:
 
 
 def _assign_without_spins(
-    group: Group, form: Format, labels: Ints, here: Ints, names: Sequence[str], values: Floats
-) -> list[AssignedLevels]:
-    """Blocks of the labels at the places `here`, for states without spins."""
+    group: Group, form: Format, labels: Ints, parameters: tuple[str, ...], start: Floats
+) -> LevelBlocks:
+    """Blocks of labels, for states without spins."""
     place = {state.number: v for v, state in enumerate(group.states)}
-    v = [place[number] for number in labels[here, 3].tolist()] if form.states else np.zeros(len(here), dtype=np.int64)
-    parameters = tuple(group.effect.parameters(group.top))
-    columns, start = _parameter_columns(group, names, values)
-    requested = np.column_stack([labels[here, 0], v, labels[here, 1:3]])
-    naming = naming_by(group.diag, group.oblate, group.diagonal(int(labels[here, 0].max())))
-    blocks = labelled_states(group.top, (group.effect,), parameters, requested, start, naming)
-    return [AssignedLevels(here, columns, blocks)]
+    v = [place[number] for number in labels[:, 3].tolist()] if form.states else np.zeros(len(labels), dtype=np.int64)
+    requested = np.column_stack([labels[:, 0], v, labels[:, 1:3]])
+    naming = naming_by(group.diag, group.oblate, group.diagonal(int(labels[:, 0].max())))
+    return labelled_states(group.top, (group.effect,), parameters, requested, start, naming)
 
 
 def _assign_with_spins(
-    group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
-) -> list[AssignedLevels]:
-    """Blocks of the labels at the places `here` with these doubled F, for states with spins."""
-    columns, start = _parameter_columns(group, names, values)
-    parameters = tuple(group.effect.parameters(group.top))
-
-    diagonal, naming = group.diagonal(int(labels[here, 0].max())), None
+    group: Group, form: Format, labels: Ints, twice: Ints, parameters: tuple[str, ...], start: Floats
+) -> list[tuple[Ints, LevelBlocks]]:
+    """Rows and blocks of labels with these doubled F, for states with spins."""
+    diagonal, naming = group.diagonal(int(labels[:, 0].max())), None
     # three equivalent nuclei have names by sub-blocks, l-doubled states by l
     if not group.effect.pairs and group.states[0].equivalent < 3:
         highest = unmixed_levels(group.top, (group.effect,), [int(twice.max())])
@@ -237,11 +243,11 @@ def _assign_with_spins(
             levels = named_by_l(levels, group.effect.pairs, str(levels.representation))
         elif naming:
             levels = named_by(levels, group.diag, group.oblate, diagonal)
-        return _label_rows(group, levels, form, labels[here[chosen]])
+        return _label_rows(group, levels, form, labels[chosen])
 
     functions = partial(_label_functions, group) if group.effect.pairs else None
     assigned = assigned_with_spins(group.top, (group.effect,), parameters, start, twice, rows_of, functions, naming)
-    return [AssignedLevels(here[part.rows], columns, part.blocks) for part in assigned]
+    return [(part.rows, part.blocks) for part in assigned]
 
 
 def _label_rows(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
@@ -255,37 +261,27 @@ def _label_rows(group: Group, levels: Levels, form: Format, labels: Ints) -> Int
     return np.array([rows_by_label.get(tuple(label), -1) for label in labels.tolist()])
 
 
-def _parameter_columns(group: Group, names: Sequence[str], values: Floats) -> tuple[Ints, Floats]:
-    """Columns of the parameters of a group, and their values."""
-    columns = np.array([names.index(name) for name in group.effect.parameters(group.top)])
-    # derivatives of a parameter at 0 need a small value to exist
-    return columns, np.where(values == 0, AT_ZERO_MHZ, values)[columns]
-
-
 def _assign_in_blocks(
-    group: Group, form: Format, labels: Ints, here: Ints, twice: Ints, names: Sequence[str], values: Floats
-) -> list[AssignedLevels]:
-    """Blocks of the labels at the places `here` with these doubled J, for states without spins.
+    group: Group, form: Format, labels: Ints, twice: Ints, parameters: tuple[str, ...], start: Floats
+) -> list[tuple[Ints, LevelBlocks]]:
+    """Rows and blocks of labels with these doubled J, for states without spins.
 
     Where DIAG is below 0 each level is one function, with spins or without, and its energy linear in the parameters.
     """
     levels = levels_in_blocks(group, distinct(twice).tolist())
     if group.diag < 0 and group.spins:
         levels = group.named(levels)
-    rows = _label_rows(group, levels, form, labels[here])
-    has_level = rows >= 0
-    if not has_level.any():
+    rows = _label_rows(group, levels, form, labels)
+    has_level = np.flatnonzero(rows >= 0)
+    if not len(has_level):
         return []
-    parameters = tuple(group.effect.parameters(group.top))
-    columns, start = _parameter_columns(group, names, values)
     if group.diag < 0:
         slopes = level_derivatives(group.top, levels, parameters, rows[has_level])
-        return [AssignedLevels(here[has_level], columns, ClosedForm(parameters, slopes))]
+        return [(has_level, ClosedForm(parameters, slopes))]
     functions = _label_functions(group, levels) if group.effect.pairs else None
     named = functions is None and "kc" in levels.quanta
     naming = naming_by(group.diag, group.oblate, group.diagonal(levels.jmax)) if named else None
-    blocks = unit_levels(group.top, levels, rows[has_level], parameters, start, functions, naming)
-    return [AssignedLevels(here[has_level], columns, blocks)]
+    return [(has_level, unit_levels(group.top, levels, rows[has_level], parameters, start, functions, naming))]
 
 
 def _label_functions(group: Group, levels: Levels) -> Functions:
@@ -316,15 +312,8 @@ def spelled_out(labels: Ints, form: Format) -> Ints:
 
 
 def refuse_far_f(labels: Ints, reduced: Ints, form: Format, names: tuple[str, ...], twice_spins: int) -> None:
-    """Refuse labels with F below 0 whose |F| cannot result from N and the spins.
-
-    labels (n, quanta): quantum numbers by level, N first. reduced (m,): places of labels with F below 0. form: format of the quantum
-    numbers of the file. names: names of the columns. twice_spins: twice the sum of all spins.
-    Raises MissingLevelsError with the first such label, and the places of all.
-    """
+    """Raise MissingLevelsError for labels with F below 0, at the places `reduced`, whose |F| cannot result from N and the spins."""
     reduced_labels = labels[reduced]
     far = reduced[np.abs(-spelled_out(reduced_labels, form) - reduced_labels[:, 0]) > (twice_spins + 1) // 2]
     if len(far):
-        first = " ".join(map(str, labels[far[0]].tolist()))
-        text = f"there is no level {first} ({', '.join(names)}): F and N differ by more than the spins"
-        raise MissingLevelsError(text, far)
+        raise _no_level(labels, far, f" ({', '.join(names)}): F and N differ by more than the spins")

@@ -18,7 +18,6 @@ from rotor.formats.spcat.hamiltonian.codes import (
 )
 from rotor.formats.spcat.text.par import ParameterFile
 
-_RIGID: Factors = {code: {name: 1.0} for code, name in SQUARES.items()}
 _B: Factors = {MEAN: {"B": 1.0}}
 
 
@@ -71,7 +70,7 @@ def _names(file: ParameterFile) -> Factors:
         return _B | LINEAR
     if all(d.kind is Kind.SCALAR for d in rotational):
         return _B | SYMMETRIC
-    rigid = _RIGID if set(SQUARES) <= {_rotational(d) for d in rotational} else {}
+    rigid = SQUARES if set(SQUARES) <= {_rotational(d) for d in rotational} else {}
     letters = frozenset().union(*(d.reductions for d in rotational))
     if len(letters) != 1:
         return rigid

@@ -15,7 +15,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.fitting.result import Fit
 from rotor.fitting.top_constants import TopConstants
-from rotor.formats.spcat.fits.fit_input import packed_correlations
+from rotor.formats.spcat.fits.fit_input import correlation_text
 from rotor.formats.spcat.hamiltonian.codes import FIXED
 from rotor.formats.spcat.names.named_parameters import named_parameters
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
@@ -48,7 +48,7 @@ def named_file(fit: Fit, title: str, *, variances: bool) -> ParameterFile:
     columns = [-1 if p.error == FIXED else next(numbers) for p in parameters if not p.constrained]
     covariance = _covariance(fit, free)
     errors = np.sqrt(np.diag(covariance))
-    rest = packed_correlations(covariance / np.outer(errors, errors), columns) if variances else ""
+    rest = correlation_text(covariance / np.outer(errors, errors), columns) if variances else ""
     count = len(fit.lines) if file.header.nline > 0 else -len(fit.lines)
     header = replace(file.header, npar=len(parameters), nline=count, nitr=100)
     return replace(file, header=header, parameters=tuple(parameters), rest=rest)

@@ -142,7 +142,7 @@ def _distortion_factors(codes: Iterable[int], kind: str, reduction: str | None) 
     return factors
 
 
-SQUARES = {join_code(Digits(typ=square_typ(x))): x.upper() for x in "abc"}
+SQUARES: Factors = {join_code(Digits(typ=square_typ(x))): {x.upper(): 1.0} for x in "abc"}
 MEAN, ALONG, ACROSS = term_code(1, 0, 0), term_code(0, 1, 0), term_code(0, 0, 1)  # N², Nz², N₊² + N₋²
 _RIGID = (*SQUARES, MEAN, ALONG, ACROSS)
 
@@ -155,8 +155,7 @@ def _rigid_factors(kind: str, axes: str) -> Factors:
         axis = "A" if kind == "prolate" else "C"
         return {MEAN: {"B": 1.0, axis: 1.0}, ALONG: {axis: 1.0}}
     x, y, z = (axis.upper() for axis in axes)
-    squares = {code: {name: 1.0} for code, name in SQUARES.items()}
-    return squares | {MEAN: dict.fromkeys(RIGID, 1.0), ALONG: {z: 1.0}, ACROSS: {x: 2.0, y: -2.0}}
+    return SQUARES | {MEAN: dict.fromkeys(RIGID, 1.0), ALONG: {z: 1.0}, ACROSS: {x: 2.0, y: -2.0}}
 
 
 def is_linear(options: Options) -> bool:
@@ -204,7 +203,7 @@ def code_factors(constants: Constants) -> Factors:
     rigid: Factors = {MEAN: {"B": 1.0}}
     axis = {"prolate": "A", "oblate": "C"}.get(constants.kind)
     if constants.kind == "asymmetric":
-        rigid = {code: {name: 1.0} for code, name in SQUARES.items()}
+        rigid = SQUARES
     elif axis:
         rigid = {ALONG: {axis: 1.0, "B": -1.0}} | rigid
     vocabulary = _vocabulary(constants.kind, constants.reduction)

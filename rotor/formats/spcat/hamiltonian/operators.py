@@ -182,14 +182,11 @@ def code_operator(digits: Digits, axes: str) -> CodedOperator:
 
 def _refuse(d: Digits) -> None:
     """Raise ValueError for codes that are not supported."""
-    commutator = "a commutator of a spin term with N² (the program's is not ½i[N², S], which C_ab-ba names here)"
-    reasons = {
-        commutator: d.i1 == 0 and d.i2 > 0,
-        "N_z S_z together with another operator": d.projects_spin and (d.kind is not Kind.SCALAR or d.spins),
-    }
-    for reason, applies in reasons.items():
-        if applies:
-            raise ValueError(f"{reason} {NOT_YET}")
+    if d.i1 == 0 and d.i2 > 0:
+        other = "the program's is not ½i[N², S], which C_ab-ba names here"
+        raise ValueError(f"a commutator of a spin term with N² ({other}) {NOT_YET}")
+    if d.projects_spin and (d.kind is not Kind.SCALAR or d.spins):
+        raise ValueError(f"N_z S_z together with another operator {NOT_YET}")
 
 
 def _plain(d: Digits, axes: str) -> Operators:

@@ -70,7 +70,6 @@ def with_dipoles(phases: Phases, dipoles: Iterable[tuple[int, bool]], oblate: bo
     phases: phases of the parameters. dipoles: for each dipole within a state, the axis (1 to 3) and whether it is a commutator with N².
     oblate: whether z is the c axis. as_spcat: whether phases along undecided axes make most dipoles real, as SPCAT (but not SPFIT)
     chooses them.
-    Returns: phases with `between_i`.
     """
     axes, within_states = AXES_OF_PHASE[oblate], list(dipoles)
     least, best = len(within_states), (phases.odd, False)

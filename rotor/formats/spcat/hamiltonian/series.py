@@ -128,7 +128,6 @@ def k_factor(n: int, sine: bool, series: Series, states: tuple[int, int]) -> Wei
     """Factor of an element in a Fourier term: a single K with NOFC; ½(K' + K'') for the sine of n = 0, as in the program.
 
     n: the harmonic. sine: sine or cosine. series: the constants of the file. states: the states of K' and of K''.
-    Returns: function of N', N'', K' and K''.
     """
     rho = [series.rho.get(v, 0.0) for v in states]
     shifted = n - 0.5 * ((rho[0] < 0) != (rho[1] < 0))  # the size of ρ turns; unlike signs shift n by one half

@@ -36,7 +36,6 @@ def forbidden(
     symmetry: of its code. low, high: of the two states; the same twice within one state. del_l: |Δl|, negative where Δk Δl < 0. doubled:
     whether one of the states is l-doubled; the species of its levels are not tested. spins: numbers, from 1, of the spins on which it
     acts.
-    Returns: the reason.
     """
     if (low.fold, low.i_tot) != (high.fold, high.i_tot):
         return "the axes of the two states differ"
@@ -66,7 +65,6 @@ def weights_agree(axis: str, low: StateOptions, high: StateOptions, odd_spins: i
 
     axis: its axis, "" for none. low, high: of the two states; the same twice within one state. odd_spins: 1 if it also changes the sign
     of the function of equivalent spins.
-    Returns: whether such levels exist.
     """
     turn = TURNS[axis]
     for species in SPECIES:

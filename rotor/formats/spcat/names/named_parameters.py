@@ -53,13 +53,9 @@ _KINDS = (NuclearQuadrupole, SpinRotation, SpinSpin)
 Codes = dict[int, dict[str, float]]  # factors of the named constants in the value of each code
 
 
-def _states(constants: TopConstants) -> int:
-    return 1 if constants.top.states is None else constants.top.states.count
-
-
 def _rotational_codes(constants: TopConstants) -> Codes:
     """Factors of the rotational parameters of each state."""
-    top, out, states = constants.top, Codes(), _states(constants)
+    top, out, states = constants.top, Codes(), constants.top.state_count
     for v in range(states):
         values: dict[str, Any] = dict(top.constants.values) if v == 0 or top.states is None else top.states.for_state(v)
         if v:
@@ -77,7 +73,7 @@ def _rotational_codes(constants: TopConstants) -> Codes:
 
 def _interaction_codes(constants: TopConstants) -> Codes:
     """Factors of interactions and spin constants."""
-    out, states, oblate = Codes(), _states(constants), is_oblate(constants.top.constants)
+    out, states, oblate = Codes(), constants.top.state_count, is_oblate(constants.top.constants)
     scheme = scheme_of(constants.top, constants.effects)
     terms = {
         term.name: term
@@ -108,7 +104,7 @@ def _spin_codes(
     parts: ParameterName, term: SpinTerm, scheme: Scheme, constants: TopConstants, oblate: bool
 ) -> dict[Digits, float]:
     """The codes of a spin constant, from the matrix c_ij that it multiplies."""
-    states, places = _states(constants), [scheme.place(spin) + 1 for spin in term.spins]
+    states, places = constants.top.state_count, [scheme.place(spin) + 1 for spin in term.spins]
     i1, i2 = max(places), (min(places) if len(places) == 2 else 0)
     wild = 0 if states == 1 else all_states_digit(states)
     v1, v2 = (wild, wild) if parts.states is None else (max(parts.states), min(parts.states))
@@ -196,7 +192,7 @@ def _label(factors: Mapping[str, float]) -> str:
 def _option_lines(constants: TopConstants, kmax: int) -> tuple[Options, ...]:
     """One option line for all states, or one for each if their weights differ."""
     top = constants.top
-    count = 1 if top.states is None else top.states.count
+    count = top.state_count
     weights = [top.states.weights.get(v, top.spin_weights) if top.states else top.spin_weights for v in range(count)]
     spins = top.spin_constants if constants.hyperfine else None
     lines = [_option_line(top, spins, state_weights, kmax) for state_weights in weights]

@@ -25,13 +25,12 @@ from rotor.formats.spcat.hamiltonian.codes import (
     NO_NAME,
     basis_axes,
     file_constants,
-    is_linear,
 )
 from rotor.formats.spcat.hamiltonian.dipole_codes import split_dipoles
 from rotor.formats.spcat.hamiltonian.operators import CodedOperator
 from rotor.formats.spcat.hamiltonian.states import StateOptions, is_single_state, options_alone
 from rotor.formats.spcat.hamiltonian.symmetry import halved_across
-from rotor.formats.spcat.model import fold_parts, option_weights
+from rotor.formats.spcat.model import class_weights, reduced_weights
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
@@ -182,23 +181,16 @@ def _with_powers(symbol: str, n2: int, nz2: int, ns: int = 0) -> str:
 
 def _weights(file: ParameterFile, states: tuple[StateOptions, ...], symmetric: bool) -> list[SpinWeights]:
     """The weights of all states; ValueError if states have different common divisors."""
-    weights, divisors = [], []
-    for v, state in enumerate(states):
-        option = options_alone(file, v)
-        option = replace(option, iax=abs(option.iax))
-        if state.equivalent == 3:
-            weights.append(SpinWeights())  # with their spins all levels are of A species
-            divisors.append(2 * max(state.plus, 1))
-        elif state.fold in (3, 5) and state.plus != state.minus:
-            option = replace(option, iax=state.iax, wtpl=state.plus, wtmn=state.minus, ewt=-state.e_weight)
-            weights.append(option_weights(option, symmetric))
-            divisors.append(gcd(*fold_parts(state.fold, state.plus, state.minus, state.e_weight)))
-        else:
-            weights.append(option_weights(option))
-            divisors.append(2 * (gcd(state.plus, state.minus) if not is_linear(option) else max(state.plus, 1)))
-    if len(set(divisors)) > 1:
+    # with three equivalent spins all levels are of A species
+    weights = [
+        {"all": 2 * max(state.plus, 1)}
+        if state.equivalent == 3
+        else class_weights(replace(options_alone(file, state.number), iax=state.iax), symmetric)
+        for state in states
+    ]
+    if len({gcd(*by_class.values()) for by_class in weights}) > 1:
         raise ValueError(f"WTPL, WTMN: weights of states whose common divisors differ {NO_NAME}")
-    return weights
+    return [reduced_weights(by_class) for by_class in weights]
 
 
 def _dipoles(

@@ -130,7 +130,6 @@ def predicted_catalogue(
     numbers: frequency_mhz, lgint, energy_lower_cm, g_upper, each (n,), and error_mhz (0 if unknown). quanta_upper, quanta_lower (n, 6):
     quantum numbers of both states. qnfmt (n,): format of the quantum numbers, for all lines or each. tag: tag of the species. linear:
     whether Q rises as for a linear molecule, DR = 2.
-    Returns: (n,) lines, in the order given.
     Raises ValueError for a tag of more than six digits.
     """
     if not 0 <= tag <= MAX_TAG:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.formats.atomic_write import DoesNotFitError, open_atomic
+from rotor.formats.atomic_write import DoesNotFitError
 from rotor.formats.spcat.text.fields import BLANK, read_decimal, read_whole
 from rotor.formats.spcat.text.freeform import Line, encode, read_lines
 from rotor.frozen import dataclass
@@ -156,9 +156,3 @@ def format_egy(levels: LevelList) -> bytes:
             stored if stored and read_level(Line(last, index, "stored text")) == level else format_level(level)
         )
     return encode([*texts, levels.rest])
-
-
-def write_egy(levels: LevelList, path: str | os.PathLike[str]) -> None:
-    """Write an .egy file; an existing one is replaced at the end or not at all."""
-    with open_atomic(path) as handle:
-        handle.write(format_egy(levels))

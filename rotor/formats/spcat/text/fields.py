@@ -33,8 +33,8 @@ def spell_quantum(value: int) -> str:
 
 
 def read_quantum(text: str) -> int:
-    """The quantum number of two characters, `BLANK` for two blanks; the inverse of `spell_quantum`."""
-    if text == "  ":
+    """The quantum number of two characters, `BLANK` for blanks; the inverse of `spell_quantum`."""
+    if not text.strip(" "):
         return BLANK
     lead, unit = text[:1], text[1:]
     if len(unit) == 1 and unit in "0123456789":

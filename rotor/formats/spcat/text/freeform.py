@@ -95,8 +95,7 @@ def read_words(
     text, at, words = line.body, start, list[Word]()
     pending_comma = False
     while len(words) < count:
-        while at < len(text) and text[at] in _GAP:
-            at += 1
+        at = _after_gap(text, at)
         if at >= len(text) or text[at] == "/":
             break
         if text[at] == ",":
@@ -124,15 +123,18 @@ def read_code(line: Line, start: int = 0) -> tuple[list[Word], int]:
 
     One comma behind it belongs to it.
     """
-    text, at = line.body, start
+    text = line.body
+    at = _after_gap(text, start)
+    words, at = read_words(line, at, 1) if text[at : at + 1] not in (",", "/") else ([], at)
+    at = _after_gap(text, at)
+    return words or [Word(None, at)], at + (text[at : at + 1] == ",")
+
+
+def _after_gap(text: str, at: int) -> int:
+    """The place behind blanks."""
     while at < len(text) and text[at] in _GAP:
         at += 1
-    words: list[Word] = []
-    if at < len(text) and text[at] not in ",/":
-        words, at = read_words(line, at, 1)
-    while at < len(text) and text[at] in _GAP:
-        at += 1
-    return words or [Word(None, at)], at + (at < len(text) and text[at] == ",")
+    return at
 
 
 def _ends(text: str, at: int) -> bool:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import field
 
-from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import source_name
 from rotor.formats.spcat.text import freeform
 from rotor.formats.spcat.text.freeform import Line
@@ -119,9 +118,3 @@ def _request_text(r: Request) -> str:
     last = f" {r.maxv}" if r.maxv >= 0 else ""
     range_f, cut = f"{r.fbgn} {r.fend}", f"{r.str0!r} {r.str1!r}"
     return f"{r.flags} {r.tag} {r.qrot!r} {range_f} {cut} {r.fqlim_ghz!r} {r.temperature_k!r}{last}\n"
-
-
-def write_int(file: IntensityFile, path: str | os.PathLike[str]) -> None:
-    """Write an .int file; an existing one is replaced at the end or not at all."""
-    with open_atomic(path) as handle:
-        handle.write(format_int(file))

@@ -14,9 +14,10 @@ import numpy as np
 
 from rotor import units
 from rotor.arrays import Ints
+from rotor.formats.atomic_write import write_whole
 from rotor.formats.provenance import provenance_record, write_beside
 from rotor.formats.spcat.hamiltonian.states import species_numbers
-from rotor.formats.spcat.text.egy import LevelList, write_egy
+from rotor.formats.spcat.text.egy import LevelList, format_egy
 from rotor.quantum.levels import Levels
 from rotor.quantum.request import SelectedLevels
 
@@ -25,7 +26,7 @@ _FIRST = ("n", "j", "k", "ka", "kc", "v")  # the order of SPCAT: rotation, state
 
 def write_level_list(table: SelectedLevels, path: str | os.PathLike[str], settings: Mapping[str, Any]) -> None:
     """Write levels as an .egy file, their provenance beside it; ValueError for labels that are no numbers (irreps)."""
-    write_egy(level_list(table), path)
+    write_whole(path, format_egy(level_list(table)))
     write_beside(path, provenance_record(table, settings))
 
 

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import distinct
-from rotor.formats.atomic_write import open_atomic
 from rotor.formats.spcat.text.fields import BLANK, read_whole
 from rotor.formats.spcat.text.freeform import Line, encode, number, read_lines, read_words
 from rotor.table import counted
@@ -367,18 +366,11 @@ def _line_text(lines: LineList, index: int) -> str:
     return f"{spelled:<{3 * lines.fields}} {numbers[0]!r:>16} {numbers[1]!r:>10} {numbers[2]!r}\n"
 
 
-def write_lin(lines: LineList, path: str | os.PathLike[str]) -> None:
-    """Write a .lin file; an existing one is replaced at the end or not at all."""
-    with open_atomic(path) as handle:
-        handle.write(format_lin(lines))
-
-
 def line_list(quanta_upper: Any, quanta_lower: Any, frequency_mhz: Any, error_mhz: Any, weight: Any = 1.0) -> LineList:
     """A line list from quantum numbers of both states, frequencies and errors.
 
     quanta_upper, quanta_lower (n, k): k up to 10. frequency_mhz (n,): measured. error_mhz (n,) or a number: not negative. weight (n,) or a
     number: shares in blends.
-    Returns: n lines.
     Raises ValueError for shapes that do not fit each other, and errors below 0.
 
     >>> print(format_lin(line_list([[1]], [[0]], [115271.2018], 0.0005)).decode(), end="")

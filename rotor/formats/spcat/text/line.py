@@ -56,7 +56,7 @@ _FIELDS = (
     _Field("LGINT", LGINT, fields.read_decimal),
     _Field("DR", DR, fields.read_whole, True),
     _Field("ELO", ENERGY, fields.read_decimal),
-    _Field("GUP", DEGENERACY, fields.read_degeneracy, True),
+    _Field("GUP", DEGENERACY, fields.read_degeneracy),
     _Field("TAG", TAG, fields.read_whole, True),
     _Field("QNFMT", QNFMT, fields.read_whole),
 )
@@ -93,17 +93,13 @@ def read_record(line: Line) -> Columns:
 def _read_state(line: Line, start: int, qnfmt: int, *, may_be_blank: bool) -> tuple[int, ...]:
     """The quantum numbers of a state; a lower state that is blank altogether is one that the catalogue does not label."""
     columns = range(start, start + 2 * quanta_width(qnfmt), 2)
-    quanta = [line.read(slice(column, column + 2), "quantum number", _quantum) for column in columns]
+    quanta = [line.read(slice(column, column + 2), "quantum number", fields.read_quantum) for column in columns]
     blank = quanta.index(fields.BLANK) if fields.BLANK in quanta else len(quanta)
     if blank < qnfmt % 10 and not (may_be_blank and set(quanta) == {fields.BLANK}):
         raise line.error(
             columns[blank], f"blank, but QNFMT {qnfmt} says that {qnfmt % 10} quantum numbers follow for each state"
         )
     return tuple(quanta)
-
-
-def _quantum(text: str) -> int:
-    return fields.read_quantum(text if text.strip(" ") else "  ")
 
 
 def spell_record(record: Columns, decimals: tuple[int, int, int, int]) -> str:

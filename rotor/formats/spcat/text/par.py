@@ -8,7 +8,6 @@ from dataclasses import field, replace
 from functools import partial
 from pathlib import Path
 
-from rotor.formats.atomic_write import open_atomic
 from rotor.formats.packed import source_name
 from rotor.formats.spcat.text import freeform
 from rotor.formats.spcat.text.freeform import Line
@@ -250,9 +249,3 @@ def _parameter_text(parameter: Parameter) -> str:
     error = "" if parameter.error is None else f" {parameter.error:.8E}"
     label = f" /{parameter.label}" if parameter.label else ""
     return freeform.one_line(f"{code:>13} {freeform.spell(parameter.value):>23}{error}{label}")
-
-
-def write_par(file: ParameterFile, path: str | os.PathLike[str]) -> None:
-    """Write a .par or .var file; an existing one is replaced at the end or not at all."""
-    with open_atomic(path) as handle:
-        handle.write(format_par(file))

@@ -157,22 +157,18 @@ def _put_whole(out: Text, values: NDArray[np.integer]) -> Mask:
     return _put_signed(out, np.abs(wide), wide < 0)
 
 
-def _put_quanta(out: Text, quanta: NDArray[np.int16]) -> Mask:
-    """Two characters for each of the quantum numbers (n, columns) of a state."""
-    legal = np.ones(len(out), dtype=np.bool_)
-    for column, values in enumerate(quanta.T):
-        index = values.astype(np.int64) - (QUANTUM_RANGE[0] - 1)
-        index[values == BLANK] = 0
-        wrong = (index < 0) | (index >= len(quantum_table())) | ((index == 0) & (values != BLANK))
-        index[wrong] = 0
-        legal &= ~wrong
-        _put_group(out[:, 2 * column : 2 * column + 2], quantum_table(), index)
-    return legal
+def _put_quantum(out: Text, values: NDArray[np.int16]) -> Mask:
+    """Two characters for a quantum number of each state."""
+    index = values.astype(np.int64) - (QUANTUM_RANGE[0] - 1)
+    index[index == 0] = -1  # row 0 is that of blanks
+    index[values == BLANK] = 0
+    return _put_rows_of(out, index, quantum_table())
 
 
-def _put_degeneracy(out: Text, values: NDArray[np.int32]) -> Mask:
-    fits = (values >= 0) & (values < len(degeneracy_table()))
-    out[:] = degeneracy_table()[np.where(fits, values, 0)]
+def _put_rows_of(out: Text, index: NDArray[np.integer], table: Text) -> Mask:
+    """Rows of a table of characters; false where it has none."""
+    fits = (index >= 0) & (index < len(table))
+    _put_group(out, table, np.where(fits, index, 0))
     return np.asarray(fits)
 
 
@@ -199,11 +195,11 @@ def put_rows(out: Text, columns: Columns, decimals: tuple[int, int, int, int]) -
         plain &= _put_field(out[:, field], values, partial(_put_decimal, decimals=places))
     for field, whole in ((DR, columns.dr), (TAG, columns.tag), (QNFMT, columns.qnfmt)):
         plain &= _put_field(out[:, field], whole, _put_whole)
-    plain &= _put_field(out[:, DEGENERACY], columns.g_upper, _put_degeneracy)
+    plain &= _put_field(out[:, DEGENERACY], columns.g_upper, partial(_put_rows_of, table=degeneracy_table()))
     start = QUANTA
     for quanta in (columns.quanta_upper, columns.quanta_lower):
         for column in range(quanta.shape[1]):
-            plain &= _put_field(out[:, start : start + 2], quanta[:, column : column + 1], _put_quanta)
+            plain &= _put_field(out[:, start : start + 2], quanta[:, column], _put_quantum)
             start += 2
     out[:, start:] = _BLANK
     return plain

@@ -11,12 +11,13 @@ import pytest
 from changed_files import mutated
 from places import ORACLES, SHARED
 
+from rotor.formats.atomic_write import write_whole
 from rotor.formats.spcat.text.cat import format_lines, read_cat
-from rotor.formats.spcat.text.egy import format_egy, read_egy, write_egy
+from rotor.formats.spcat.text.egy import format_egy, read_egy
 from rotor.formats.spcat.text.fields import BLANK
-from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, format_int, read_int, write_int
-from rotor.formats.spcat.text.lin import LineList, format_lin, line_list, read_lin, remark_notes, write_lin
-from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile, format_par, read_par, write_par
+from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request, format_int, read_int
+from rotor.formats.spcat.text.lin import LineList, format_lin, line_list, read_lin, remark_notes
+from rotor.formats.spcat.text.par import Header, Options, Parameter, ParameterFile, format_par, read_par
 
 SAMPLES = ORACLES / "spcat"
 REFERENCE = SHARED / "reference"
@@ -177,7 +178,7 @@ def test_a_new_parameter_file_reads_back(tmp_path):
         (Options("s", 1, -1, 0, 30, 0, 1, 5, 3, 0, 1, 3),),
         (Parameter(100, 1 / 3, 1e-37, "B"), Parameter(1000, -2e-300, None, "", constrained=True)),
     )
-    write_par(file, tmp_path / "a.par")
+    write_whole(tmp_path / "a.par", format_par(file))
     assert read_par(tmp_path / "a.par") == replace(file, title_text="made up\n")
     with pytest.raises(ValueError, match="one line"):
         format_par(replace(file, title="two\nlines"))
@@ -202,7 +203,7 @@ def test_the_content_of_an_intensity_file():
 def test_a_new_intensity_file_reads_back(tmp_path):
     request = Request(1, 28001, 108.865, 0, 99, -20, -20, 9999.99, 37.5, 2)
     file = IntensityFile("CO", request, (Dipole(1, 0.1101), Dipole(30001, -1.1e-5, grouped=True)))
-    write_int(file, tmp_path / "a.int")
+    write_whole(tmp_path / "a.int", format_int(file))
     assert read_int(tmp_path / "a.int") == replace(file, title_text="CO\n")
     assert format_int(read_int(tmp_path / "a.int")) == (tmp_path / "a.int").read_bytes()
 
@@ -269,7 +270,7 @@ def test_a_blank_line_ends_the_list_and_what_follows_is_kept():
 
 def test_a_new_line_list_reads_back(tmp_path):
     lines = line_list([[10, 2, 8, 9], [1, -1, 0, 123]], [[9, 2, 7, 8], [0, 0, 0, 0]], [1e6 / 3, 2.5], [0.1, 1e-3], 0.5)
-    write_lin(lines, tmp_path / "a.lin")
+    write_whole(tmp_path / "a.lin", format_lin(lines))
     again = read_lin(tmp_path / "a.lin")
     for name in ("quanta", "frequency", "error", "weight"):
         assert np.array_equal(getattr(again, name), getattr(lines, name))
@@ -326,7 +327,7 @@ def test_derivatives_among_the_levels_are_kept(tmp_path):
     levels = read_egy(text)
     assert len(levels) == 2
     assert format_egy(levels) == text
-    write_egy(levels, tmp_path / "a.egy")
+    write_whole(tmp_path / "a.egy", format_egy(levels))
     assert (tmp_path / "a.egy").read_bytes() == text
 
 
