@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from rotor.assignment.growth import LEAST_RATIO, Grown, grown_anew
 from rotor.assignment.guesses import Bounds
 from rotor.assignment.isotopologues import expected_isotopologues, find_isotopologues
 from rotor.assignment.peaks import PeakList, spurs
+from rotor.assignment.progressions import Progression, progressions
 from rotor.assignment.refinement import Refined, excess_scatter, refine
 from rotor.assignment.request import AssignRequest
 from rotor.assignment.rigid_table import JMAX, PARAMETERS, TYPES, rigid_table
@@ -196,6 +197,11 @@ class AssignAnswer(TextOf):
         """The confidence of the first species: certain, likely or not found."""
         return self.species[0].word if self.species else NOT_FOUND
 
+    @cached_property
+    def progressions(self) -> tuple[Progression, ...]:
+        """Linear and symmetric tops whose lines are among the unexplained peaks."""
+        return tuple(progressions(self.request.peaks, self.unexplained))
+
     @property
     def table(self) -> AssignedPeaks:
         """All peaks with their assignments."""
@@ -239,6 +245,7 @@ class AssignAnswer(TextOf):
             "unexplained": int(self.unexplained.sum()),
             "ended_by_time": self.ended,
             "species": [species.facts() for species in self.species],
+            "progressions": [progression.facts() for progression in self.progressions],
         }
 
 
@@ -275,8 +282,8 @@ def answer_assign(request: AssignRequest) -> AssignAnswer:
 
     Notes
     -----
-    The method is described in docs/assign.md. Only asymmetric tops with lines of J up to 30 are found. The answer is reproducible unless
-    the time limit ends the search.
+    The method is described in docs/assign.md. Of asymmetric tops only lines of J up to 30 are used; linear molecules are `progressions` of
+    the answer. The answer is reproducible unless the time limit ends the search.
     """
     if len(request.peaks) < FEWEST:
         none = np.zeros(len(request.peaks), dtype=bool)

@@ -31,6 +31,10 @@ def assignment_figure(answer: AssignAnswer, title: str = "", view: View = WHOLE)
             upper.vlines(f, -height, 0, color=colour, lw=0.7, label=_label(species))
             rows = np.unique(species.peak)
             upper.vlines(peaks.frequency_mhz[rows], 0, peaks.intensity[rows], color=colour, lw=0.7)
+        for number, linear in enumerate(answer.progressions, len(answer.species)):
+            colour, f = PALETTE[number % len(PALETTE)], linear.lines.frequency_mhz
+            label = f"linear top, B = {linear.constants_mhz[0]:.2f} MHz"
+            upper.vlines(f, 0, peaks.intensity[linear.peak], color=colour, lw=1.2, label=label)
         left = answer.unexplained
         lower.vlines(peaks.frequency_mhz[left], 0, peaks.intensity[left], color=GREY, lw=0.7)
         upper.axhline(0, color="black", lw=0.5)

@@ -23,6 +23,7 @@ from rotor.verbs.verb import Place, Subject, SubjectKind, Verb, Work
 
 if TYPE_CHECKING:
     from rotor.assignment.answer import AssignAnswer, AssignedSpecies
+    from rotor.assignment.progressions import Progression
 
 EXAMPLES = """\
   rotor assign peaks.csv
@@ -102,12 +103,13 @@ def answer(request: AssignRequest, work: Work) -> AssignAnswer:
 
 
 def write_lines(answer: AssignAnswer, path: Path, report: Report) -> None:
-    """Write the assigned lines of the first species, as input of `rotor fit`."""
+    """Write the assigned lines of the first species, or of the first linear top, as input of `rotor fit`."""
     from rotor.formats.assigned_lines import write_assigned_lines
 
-    if not answer.species:
+    lines = [species.lines for species in (answer.species or answer.progressions)]
+    if not lines:
         raise ValueError(f"{path}: no species was found: no lines to write")
-    write_assigned_lines(answer.species[0].lines, path)
+    write_assigned_lines(lines[0], path)
 
 
 def show(answer: AssignAnswer, report: Report) -> Iterable[Part | None]:
@@ -124,6 +126,20 @@ def show(answer: AssignAnswer, report: Report) -> Iterable[Part | None]:
         yield _facts(species)
     if answer.species:
         yield error_facts(record.get("errors"))
+    yield [("linear top", _progression_text(progression)) for progression in answer.progressions]
+
+
+def _progression_text(progression: Progression) -> str:
+    """Lines and constants of a linear top among the peaks that are left."""
+    from rotor.fitting.publication import value_text
+
+    values = zip("BD", progression.constants_mhz.tolist(), progression.errors_mhz.tolist(), strict=True)
+    constants = ", ".join(f"{name} {value_text(value, error)}" for name, value, error in values)
+    j = progression.lines.lower[:, 0]
+    return (
+        f"{len(j)} peaks left are its lines, J = {j.min() + 1} - {j.min()} to {j.max() + 1} - {j.max()}: {constants} MHz, "
+        f"rms {1000 * progression.rms_mhz:.1f} kHz; or K = 0 of a symmetric top"
+    )
 
 
 def _hint(answer: AssignAnswer) -> str:
@@ -135,7 +151,7 @@ def _hint(answer: AssignAnswer) -> str:
 
 def _verdict(answer: AssignAnswer) -> str:
     if not answer.species:
-        return "not found: no species stands above chance"
+        return f"not found: no asymmetric top stands above chance{'; lines of a linear top: below' if answer.progressions else ''}"
     words = ", ".join(f"{number}: {species.word}" for number, species in enumerate(answer.species, 1))
     return words + ("; the search was ended by its seconds" if answer.ended else "")
 

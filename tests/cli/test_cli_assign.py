@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from assignment_cases import BAND, TRUTH, is_right, lines_of, spectrum
 
+import rotor
 from rotor.assignment.answer import answer_assign
 from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.request import AssignRequest
@@ -118,7 +119,7 @@ def test_noise_alone_has_no_species(call: Call) -> None:
     np.save("noise.npy", np.column_stack([grid, noise]))
     code, out, _ = call("assign", "noise.npy", "--csv", "peaks.csv", "--plot", "noise.png", "--json", "noise.json")
     assert code == 0
-    assert "not found: no species stands above chance" in out
+    assert "not found: no asymmetric top stands above chance\n" in out
     assert "errors" not in out  # of no species
 
 
@@ -236,3 +237,20 @@ def test_columns_between_blanks(folder: Path, heading: str, ghz: bool) -> None:
     peaks = read_peaks(folder / "peaks.txt")
     assert peaks.frequency_mhz.tolist() == pytest.approx([9000.0, 9100.0])
     assert peaks.intensity.tolist() == [2.0, 5.7719e-3]
+
+
+def test_a_linear_molecule_is_found_by_its_progression(call, folder):
+    """OCS as measured, J = 1 - 0 to 9 - 8, with its frequencies from the library: constants and lines for a fit."""
+    lines = rotor.spectrum("OCS", temperature_k=20, range_mhz="10:120GHz").to_pandas()
+    rows = np.column_stack([lines.frequency_mhz, 10 ** (lines.lgint + 5)])
+    np.savetxt("peaks.csv", rows, delimiter=",", header="frequency_mhz,intensity", comments="", fmt="%.4f")
+    code, out, err = call("assign", "peaks.csv", "--lin", "ocs.csv", "--json", "ocs.json")
+    assert code == 0, err
+    assert "not found: no asymmetric top stands above chance; lines of a linear top: below" in out
+    assert "9 peaks left are its lines, J = 1 - 0 to 9 - 8: B 6081.492" in " ".join(out.split())
+    (progression,) = json.loads(Path("ocs.json").read_text())["progressions"]
+    assert progression["j_lower"] == list(range(9))
+    assert progression["constants_mhz"]["B"] == pytest.approx(6081.49211, abs=1e-4)  # four decimals of the frequencies
+    code, out, err = call("fit", "ocs.csv", "--constants", "B=6081 MHz", "--free", "B,D", "--json", "-")
+    assert code == 0, err
+    assert json.loads(out)["parameters"][0]["value"] == pytest.approx(progression["constants_mhz"]["B"], abs=1e-6)
