@@ -35,14 +35,16 @@ def assignment_figure(answer: AssignAnswer, title: str = "", view: View = WHOLE)
             colour, f = PALETTE[number % len(PALETTE)], linear.lines.frequency_mhz
             label = f"linear top, B = {linear.constants_mhz[0]:.2f} MHz"
             upper.vlines(f, 0, peaks.intensity[linear.peak], color=colour, lw=1.2, label=label)
-        left = answer.unexplained
+        left = np.setdiff1d(
+            np.flatnonzero(answer.unexplained), [row for linear in answer.progressions for row in linear.peak]
+        )
         lower.vlines(peaks.frequency_mhz[left], 0, peaks.intensity[left], color=GREY, lw=0.7)
         upper.axhline(0, color="black", lw=0.5)
         upper.set_ylabel("Intensity: peaks up, predictions down")
         without_signs(upper)
         lower.set_ylabel("Unexplained")
         lower.set_xlabel("Frequency (MHz)")
-        count = f"{os.path.basename(answer.request.peaks.source) or 'Spectrum'}: {len(answer.species)} species"
+        count = f"{os.path.basename(answer.request.peaks.source) or 'Spectrum'}: {len(answer.species) + len(answer.progressions)} species"
         upper.set_title(title or count, loc="left")
         figure.legend(*upper.get_legend_handles_labels(), fontsize=9, loc="outside lower right", ncols=2)
         show_part(upper, view)
