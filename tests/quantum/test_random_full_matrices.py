@@ -253,7 +253,9 @@ def package_levels(case: Case) -> np.ndarray:
 def _turning_in_field(case: Case, top: Top) -> np.ndarray:
     """All torsional states of one species together in an electric field."""
     along = Contraction(tuple(case.dipole), (0.0, 0.0, 1.0))
-    space = solved_space(top, solved_levels(top, LARGEST, ()), LARGEST, [along], together=True)
+    levels = solved_levels(top, LARGEST, ())
+    without_vt = {name: column for name, column in levels.quanta.items() if name != "vt"}
+    space = solved_space(top, replace(levels, quanta=without_vt), LARGEST, [along])
     species = space.levels.quanta["species"]
     blocks = [block for block in space.blocks(abs(case.twice_m) // 2) if species[block.rows[0]] == "AE"[case.sigma]]
     strength = case.kv_per_cm * MHZ_PER_DEBYE_KV_PER_CM

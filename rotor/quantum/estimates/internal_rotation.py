@@ -82,9 +82,9 @@ def species_levels(constants_mhz: tuple[float, float, float], rotor: InternalRot
     [0.0, 5.0, 6.0]
     """
     # the package of internal rotation is loaded for tops that have one alone
-    from rotor.quantum.internal_rotation.frames import RhoAxis
+    from rotor.quantum.internal_rotation.frames import frame_along
 
-    axes = RhoAxis(rotor.f_mhz, np.array(rotor.rho)).axes if any(rotor.rho) else np.eye(3)
+    axes = frame_along(rotor.rho) if any(rotor.rho) else np.eye(3)
     frame = axes[[1, 2, 0]]  # x, y, z with z along ρ
     tensor = frame @ np.diag(constants_mhz) @ frame.T
     k = np.arange(-j, j + 1.0)

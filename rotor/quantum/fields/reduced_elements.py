@@ -7,7 +7,6 @@ g_I I of the spins.
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any, NoReturn
 
 import numpy as np
@@ -32,8 +31,7 @@ class ReducedElements:
         self.blocks: tuple[SolvedBlock, ...] = levels.blocks
         quanta = levels.quanta
         self.states = tuple(np.unique(quanta["v"]).tolist()) if "v" in quanta else (0,)
-        self._cache: dict[tuple[Key, Pair], NDArray[Any] | None] = {}
-        self._pairs: dict[Key, list[Pair]] = {}
+        self._cache: dict[tuple[Key, Pair], NDArray[Any]] = {}
         self._acting: dict[Key, Connections] = {}
 
     @property
@@ -41,23 +39,10 @@ class ReducedElements:
         """Representation of the functions."""
         return str(self.levels.representation)
 
-    @cached_property
-    def combined(self) -> list[bool]:
-        """Whether the functions of each block are combined to real ones."""
-        return [block.combined for block in self.blocks]
-
-    @cached_property
-    def paired(self) -> list[bool]:
-        """Whether the states of each block represent their mirror images too: K and -K, σ and -σ."""
-        return [block.paired for block in self.blocks]
-
     def connected(self, operator: FieldOperator) -> list[Pair]:
         """Pairs of blocks that an operator connects, each once."""
-        if operator.key not in self._pairs:
-            number = {block.start: i for i, block in enumerate(self.blocks)}
-            pairs, _ = self._connections(operator)
-            self._pairs[operator.key] = [(number[up.start], number[low.start]) for up, low in pairs]
-        return self._pairs[operator.key]
+        number = {block.start: i for i, block in enumerate(self.blocks)}
+        return [(number[up.start], number[low.start]) for up, low in self._connections(operator)[0]]
 
     def _connections(self, operator: FieldOperator) -> Connections:
         """Pairs of blocks that an operator connects, and the function that returns the elements between them, computed once."""
@@ -69,20 +54,19 @@ class ReducedElements:
                 self._acting[operator.key] = connections(self.blocks, tensors) if tensors else ([], no_elements)
         return self._acting[operator.key]
 
-    def between(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
-        """Elements (n_up, n_low) of a pair of blocks, F' ≥ F; None where all are 0."""
+    def between(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any]:
+        """Elements (n_up, n_low) of a connected pair of blocks, F' ≥ F."""
         key = operator.key, (up, low)
         if key not in self._cache:
-            self._cache[key] = self._computed(operator, up, low)
+            self._cache[key] = self._computed(operator, self.blocks[up], self.blocks[low])
         return self._cache[key]
 
-    def _computed(self, operator: FieldOperator, up: int, low: int) -> NDArray[Any] | None:
+    def _computed(self, operator: FieldOperator, up: SolvedBlock, low: SolvedBlock) -> NDArray[Any]:
         """Elements of a pair of blocks, computed anew."""
-        first, second = self.blocks[up], self.blocks[low]
-        if first.moments is not None and isinstance(operator, Contraction):
-            return np.asarray(first.moments.reduced(first, second, operator.tensors(self.states, self.representation)))
-        elements = self._connections(operator)[1](first, second)
-        copies = 2 if first.axial_k else first.components
+        if up.moments is not None and isinstance(operator, Contraction):
+            return np.asarray(up.moments.reduced(up, low, operator.tensors(self.states, self.representation)))
+        elements = self._connections(operator)[1](up, low)
+        copies = 2 if up.axial_k else up.components
         return elements / np.sqrt(copies) if copies > 1 else elements  # that of one sign of K, or of one component
 
     def _magnetic_connections(self, magnet: Magnet) -> Connections:

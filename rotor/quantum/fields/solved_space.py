@@ -102,7 +102,7 @@ class SolvedSpace(FieldSpace):
         for place, (members, colours, real) in enumerate(coloured_components(len(self.sectors), edges)):
             if self.sectors[members[0]].twice_f < abs(twice_m):
                 continue
-            paired = self.elements.paired[self.sectors[members[0]].block]
+            paired = self.elements.blocks[self.sectors[members[0]].block].paired
             signs = (1, -1) if paired and twice_m and not magnetic else (1,)
             copies = 2 if paired or (twice_m and not magnetic) else 1
             rows, label = np.concatenate([self.sectors[i].rows for i in members]), self._label(members, place)
@@ -126,7 +126,7 @@ class SolvedSpace(FieldSpace):
     def _pairs(self, operator: FieldOperator) -> Iterator[tuple[int, int, int]]:
         """Pairs of sectors that an operator connects, with 1 where elements lack a factor i, else 0; all are real where M is mixed."""
         for up, low in self.elements.connected(operator):
-            odd = self.m_is_good and operator.rank % 2 and not operator.time_odd and self.elements.combined[low]
+            odd = self.m_is_good and operator.rank % 2 and not operator.time_odd and self.elements.blocks[low].combined
             for a in self._sectors_of[up]:
                 for b in self._sectors_of[low]:
                     if self._same_torsion(a, b) and (up != low or a >= b) and self._connects_m(operator, a, b):
@@ -161,9 +161,9 @@ class SolvedSpace(FieldSpace):
         """Elements of T_q from the states of M, or of all M, of a sector to those of another, F' ≥ F; None where all are 0."""
         first, second = self.sectors[up], self.sectors[low]
         factor = self.factor(operator, up, low, twice_m, q) if self.m_is_good else 1.0
-        elements = self.elements.between(operator, first.block, second.block) if factor else None
-        if elements is None:
+        if not factor:
             return None
+        elements = self.elements.between(operator, first.block, second.block)
         if first.places is not None and second.places is not None:
             elements = elements[np.ix_(first.places, second.places)]
         if self.m_is_good:
@@ -275,17 +275,15 @@ class SolvedSpace(FieldSpace):
         return f"from {self.levels.label(int(self.sectors[members[0]].rows[0]))}" if k is None else f"k={k}"
 
 
-def solved_space(
-    top: Top, levels: Levels, jmax: int, operators: Sequence[FieldOperator], together: bool = False
-) -> SolvedSpace:
-    """The space of solved levels for fields along Z; `together` joins the states of all v_t of a species.
+def solved_space(top: Top, levels: Levels, jmax: int, operators: Sequence[FieldOperator]) -> SolvedSpace:
+    """The space of solved levels for fields along Z.
 
     Raises ValueError for a symmetric top with spins and good K if an operator is not axial, and for g of an unknown spin.
     """
     elements = ReducedElements(levels)
     _refuse_across_axis(top, elements, operators)
     _refuse_unknown_nuclei(elements, operators)
-    sectors = tuple(_sectors(levels, not together))
+    sectors = tuple(_sectors(levels))
     free = FreeLevels.from_levels(levels)
     space = SolvedSpace(free, jmax, sectors, elements, tuple(operators))
     if not set(BEFORE_J) & set(free.quanta):
@@ -298,9 +296,9 @@ def solved_space(
     return replace(space, levels=replace(free, family=family))
 
 
-def _sectors(levels: Levels, by_vt: bool) -> Iterator[FieldSector]:
+def _sectors(levels: Levels) -> Iterator[FieldSector]:
     """Sectors of solved blocks, divided by v_t if there is a torsion."""
-    vt = levels.quanta.get("vt") if by_vt else None
+    vt = levels.quanta.get("vt")
     for number, block in enumerate(levels.blocks):
         rows = np.arange(block.start, block.start + len(block.energies_mhz))
         if vt is None:
@@ -314,7 +312,7 @@ def _sectors(levels: Levels, by_vt: bool) -> Iterator[FieldSector]:
 def _refuse_across_axis(top: Top, elements: ReducedElements, operators: Sequence[FieldOperator]) -> None:
     """Raise ValueError if K of a symmetric top is good and an operator is not axial."""
     axis = {"prolate": 0, "oblate": 2}.get(top.kind)
-    if axis is None or not any(elements.paired):
+    if axis is None or not any(block.paired for block in elements.blocks):
         return
     if not all(operator.axial_about(axis) for operator in operators):
         raise ValueError("a symmetric top with spins: expected tensors that are axial about its axis")

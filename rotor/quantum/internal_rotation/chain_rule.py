@@ -16,8 +16,9 @@ import numpy as np
 
 from rotor.arrays import Floats
 from rotor.quantum.internal_rotation.contracted import Product
+from rotor.quantum.internal_rotation.frames import torsional_kinetics
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
-from rotor.quantum.internal_rotation.several_tops import SeveralTops, torsional_kinetics
+from rotor.quantum.internal_rotation.several_tops import SeveralTops
 
 ANGLE = "angle"  # name of the angle of ρ from the axis a
 RELATIVE_STEP, ANGLE_STEP = 1e-5, 1e-5  # steps (angles in radians) at which central differences are exact to 1e-10

@@ -17,7 +17,7 @@ an exact rotation: A_RAM stands beside F (p - ρPz)². Published A may contain F
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,40 +25,31 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 
 
-@dataclass(frozen=True, eq=False)
-class RhoAxis:
-    """A top in principal axes: F (the unit of A, B, C) and the vector ρ along a, b, c."""
-
-    f: float
-    rho_abc: Floats
-
-    @property
-    def rho(self) -> float:
-        """|ρ|."""
-        return float(np.linalg.norm(self.rho_abc))
-
-    @property
-    def axes(self) -> Floats:
-        """Rows a, b, c of the rho-axis frame (z, x, y) along the principal axes: a along ρ, c as near the principal axis c as possible."""
-        first = self.rho_abc / self.rho
-        third = np.array([0.0, 0.0, 1.0])
-        third = third - (third @ first) * first
-        if np.linalg.norm(third) < 1e-12:  # ρ along c
-            third = np.array([0.0, 1.0, 0.0])
-        third /= np.linalg.norm(third)
-        return np.stack([first, np.cross(third, first), third])
+def frame_along(rho_abc: ArrayLike) -> Floats:
+    """Rows a, b, c of the rho-axis frame (z, x, y) along the principal axes: a along ρ, c as near the principal axis c as possible."""
+    first = np.asarray(rho_abc, dtype=float)
+    first = first / np.linalg.norm(first)
+    third = np.array([0.0, 0.0, 1.0])
+    third = third - (third @ first) * first
+    if np.linalg.norm(third) < 1e-12:  # ρ along c
+        third = np.array([0.0, 1.0, 0.0])
+    third /= np.linalg.norm(third)
+    return np.stack([first, np.cross(third, first), third])
 
 
-def rho_axis(constants: ArrayLike, f0: float, cosines: ArrayLike) -> RhoAxis:
-    """F and ρ of a top from A, B, C, F0 = ħ²/2I_α and the cosines of its axis to a, b, c.
+def torsional_kinetics(rotation: Mapping[str, float], constants: Mapping[str, float]) -> tuple[Floats, Floats]:
+    """F (tops, tops) in the unit of A, B, C, and ρ (tops, 3) along a, b, c, from F0, delta and epsilon of one top, or F0_1 ... of each.
 
-    >>> top = rho_axis([4.382840234, 2.732392836, 2.73075628], 156.758300542, axis_of_angles(0.460684017))  # MTBE of XIAM's test
-    >>> round(top.f, 6), round(top.rho, 9)
+    >>> mtbe = {"A": 4.382840234, "B": 2.732392836, "C": 2.73075628}  # of XIAM's test
+    >>> f, rho = torsional_kinetics(mtbe, {"F0": 156.758300542, "delta": 0.460684017})
+    >>> round(float(f[0, 0]), 6), round(float(np.linalg.norm(rho)), 9)
     (160.922724, 0.026215839)
     """
-    direction = np.asarray(cosines, dtype=float)
-    rho = direction * np.asarray(constants, dtype=float) / f0
-    return RhoAxis(f0 / (1.0 - float(direction @ rho)), rho)
+    abc = np.array([rotation[name] for name in "ABC"])
+    tops = [name.removeprefix("F0") for name in sorted(constants) if name.startswith("F0")]
+    axes = np.array([axis_of_angles(constants[f"delta{top}"], constants.get(f"epsilon{top}", 0.0)) for top in tops])
+    f0 = np.array([constants[f"F0{top}"] for top in tops])
+    return np.linalg.inv(np.diag(1 / f0) - (axes * abc) @ axes.T / np.outer(f0, f0)), axes * abc / f0[:, None]
 
 
 def axis_of_angles(delta: float, epsilon: float = 0.0) -> Floats:

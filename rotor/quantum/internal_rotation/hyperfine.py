@@ -71,10 +71,9 @@ def hyperfine_levels(
     columns = {"components": free.components, "weight": free.weight, **free.quanta}
     labels = np.concatenate([block.labels for block in blocks])
     piece: Columns = {("n" if name == "j" else name): column[labels[:, 0]] for name, column in columns.items()}
-    piece |= _sums(labels, scheme) | {"multiplicity": labels[:, -1] + 1}
+    piece |= scheme.sums_of(labels) | {"multiplicity": labels[:, -1] + 1}
     energies = np.concatenate([block.energies_mhz for block in blocks])
-    halves = frozenset(name for name, half in zip(scheme.names, scheme.half, strict=True) if half)
-    return joined_levels(top, effects, nmax, [piece], energies, blocks, halves)
+    return joined_levels(top, effects, nmax, [piece], energies, blocks, scheme.halves)
 
 
 def coupled_blocks(
@@ -92,12 +91,6 @@ def coupled_blocks(
     solved = solved_blocks(rotor_plan(rotors, REPRESENTATION, scheme, terms), all_f)
     solved.sort(key=lambda block: (min(part.rotor.start for part in block.spins.parts), block.twice_total))
     return [replace(block, components=block.spins.rotor.components) for block in solved]
-
-
-def _sums(labels: Ints, scheme: Scheme) -> dict[str, Ints]:
-    """The sums f1, ... f of labels of coupled blocks, doubled where they are half-integers."""
-    sums = zip(scheme.names, scheme.half, labels[:, 4:].T, strict=True)
-    return {name: column if half else column // 2 for name, half, column in sums}
 
 
 def refuse_unlike_nuclei(scheme: Scheme, terms: Iterable[SpinTerm]) -> None:

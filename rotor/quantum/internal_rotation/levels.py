@@ -21,10 +21,8 @@ from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
 from rotor.quantum.internal_rotation.rho_axis_tensors import (
     REPRESENTATION,
-    Component,
-    tensor_components,
+    operator_beside_spins,
     turned_components,
-    unit_operator,
 )
 from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_tops
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesLevels
@@ -32,7 +30,7 @@ from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
 from rotor.quantum.spins.operators import Rotor
-from rotor.quantum.tensors import Tensors
+from rotor.quantum.tensors import BodyTensor, Tensors
 from rotor.quantum.wang.basis import Part
 from rotor.tops.internal_rotation import InternalRotationConstants, sigma_species
 
@@ -52,15 +50,13 @@ MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a who
 class TorsionMoments(SpeciesMoments):
     """Operators of one species; elements between functions are computed at first use.
 
-    further: operators by which levels are derived besides the terms of the Hamiltonian. _units: elements between states of components of 1
-    along the axes of ρ, which operators beside spins share.
+    further: operators by which levels are derived besides the terms of the Hamiltonian.
     """
 
     levels: SpeciesLevels
     model: TurningTops
     further: Elements | None = None
-    _cache: dict[tuple[complex, ...], ByBlocks] = field(default_factory=dict)
-    _units: dict[Component, dict[tuple[int, int], NDArray[Any]]] = field(default_factory=dict)
+    _cache: dict[Rotor | BodyTensor, ByBlocks] = field(default_factory=dict)
 
     @property
     def combined(self) -> bool:
@@ -77,25 +73,16 @@ class TorsionMoments(SpeciesMoments):
 
     def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
         """The function of the reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
-        components = tensor_components(rotor, self.model.angle, self.model.has_plane)
+        if rotor not in self._cache:
+            operator = operator_beside_spins(rotor, self.model.angle, self.model.has_plane)
+            self._cache[rotor] = self._entries(operator, rotor.rank, rotor.rank == 1)
+        by_blocks = self._cache[rotor]
 
         def between(up: SolvedBlock, low: SolvedBlock) -> NDArray[Any] | None:
-            units = [(value, self._unit(c).get((up.basis.number, low.basis.number))) for c, value in components.items()]
-            acting = [value * matrix for value, matrix in units if matrix is not None]
-            return np.asarray(sum(acting)) if acting else None
+            entries = by_blocks.get((up.basis.number, low.basis.number))
+            return None if entries is None else _contracted(entries, up.vectors, low.vectors)
 
         return between
-
-    def _unit(self, component: Component) -> dict[tuple[int, int], NDArray[Any]]:
-        """Elements between states of a component of 1, by pairs of blocks."""
-        if component not in self._units:
-            entries, states = self._entries(unit_operator(component), component.rank, component.rank == 1), self.states
-            self._units[component] = {
-                (up, low): _contracted(elements, states[up][1], states[low][1])
-                for (up, low), elements in entries.items()
-                if up in states and low in states
-            }
-        return self._units[component]
 
     @cached_property
     def states(self) -> dict[int, tuple[Ints, NDArray[Any]]]:
@@ -126,17 +113,16 @@ class TorsionMoments(SpeciesMoments):
     def _between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
         """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
         body = tensors[0, 0]
-        components = tuple(body.components)
-        if components not in self._cache:
-            turned = turned_components(np.array(components), self.model.angle)
+        if body not in self._cache:
+            turned = turned_components(np.array(body.components), self.model.angle)
             if self.model.has_plane and np.iscomplexobj(turned):
                 raise ValueError(
                     "a dipole along c beside internal rotation: the molecule has the plane ab as a mirror"
                     if body.rank == 1
                     else "a tensor along ac or bc beside internal rotation: the molecule has the plane ab as a mirror"
                 )
-            self._cache[components] = self._entries(body_tensor(turned), body.rank)
-        return self._cache[components]
+            self._cache[body] = self._entries(body_tensor(turned), body.rank)
+        return self._cache[body]
 
     def _entries(self, operator: Operator, rank: int, time_odd: bool = False) -> ByBlocks:
         """Reduced elements of a tensor of the rotation from J to J' ≥ J by pairs of blocks."""

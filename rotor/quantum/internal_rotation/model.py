@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import Product, Terms, Torsion, contracted_torsion
-from rotor.quantum.internal_rotation.frames import axis_of_angles, rho_axis
+from rotor.quantum.internal_rotation.frames import torsional_kinetics
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
 from rotor.quantum.internal_rotation.terms import Axes, products_of, torsional_products
@@ -134,6 +134,7 @@ def model_of_principal_axes(values: Mapping[str, float]) -> RamModel:
     (165519.071, 0.05257323, 0.29466597)
     """
     others = {name: value for name, value in values.items() if name not in ("F0", "delta")}
-    abc = [values[name] for name in "ABC"]
-    top = rho_axis(abc, values["F0"], axis_of_angles(values["delta"]))
-    return RamModel({**others, "F": top.f, "rho": top.rho}, angle=float(np.arctan2(top.rho_abc[1], top.rho_abc[0])))
+    f, (rho,) = torsional_kinetics(values, values)
+    return RamModel(
+        {**others, "F": f[0, 0], "rho": float(np.linalg.norm(rho))}, angle=float(np.arctan2(rho[1], rho[0]))
+    )

@@ -8,7 +8,7 @@ axes, from which ρ lies at an angle, in the PAM. The torsional functions multip
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,33 +53,17 @@ def turned_components(components: NDArray[Any], angle: float) -> NDArray[Any]:
     return _real(components)
 
 
-class Component(NamedTuple):
-    """A component along two axes (0, 1, 2 for a, b, c): T²_gh (rank 2) or ½{Φ_g, N_h} (rank 1)."""
-
-    rank: int
-    g: int
-    h: int
-
-
-def tensor_components(rotor: Rotor, angle: float, has_plane: bool) -> dict[Component, float]:
-    """T²(c) or Σ_gh c_gh ½{Φ_g, N_h} by components along the axes of ρ; has_plane: without those that a mirror ab excludes."""
+def operator_beside_spins(rotor: Rotor, angle: float, has_plane: bool) -> Operator:
+    """T²(c) or Σ_gh c_gh ½{Φ_g, N_h} along the axes of ρ; has_plane: without the components that a mirror ab excludes."""
     assert isinstance(rotor, Cosines | CosinesWithN)
     matrix = turned_by(np.array(rotor.components, dtype=float), angle)
     if has_plane:
         matrix[:2, 2] = matrix[2, :2] = 0.0
-    if isinstance(rotor, Cosines):  # symmetric; the sum of aa, bb and cc is 0
-        matrix = np.triu(matrix + matrix.T) - np.diag(np.diag(matrix) + matrix[2, 2])
-    return {Component(rotor.rank, g, h): float(matrix[g, h]) for g, h in np.argwhere(matrix).tolist()}
-
-
-def unit_operator(component: Component) -> Operator:
-    """The operator of the rotation of a component of 1."""
-    rank, g, h = component
-    unit, along = np.eye(3), (j_z(), j_x(), j_y())
-    if rank == 1:
-        return half_anticommutator(body_tensor(_real(spherical_components(unit[g], 1, REPRESENTATION))), along[h])
-    matrix = (np.outer(unit[g], unit[h]) + np.outer(unit[h], unit[g])) / 2
-    return body_tensor(_real(spherical_components(matrix, 2, REPRESENTATION)))
+    if isinstance(rotor, Cosines):
+        return body_tensor(_real(spherical_components(matrix, 2, REPRESENTATION)))
+    vectors = [body_tensor(_real(spherical_components(column, 1, REPRESENTATION))) for column in matrix.T]
+    pairs = zip(vectors, (j_z(), j_x(), j_y()), strict=True)
+    return sum((half_anticommutator(vector, along) for vector, along in pairs), Operator())
 
 
 def _real(components: NDArray[Any]) -> NDArray[Any]:

@@ -21,7 +21,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product, Torsion, contracted_torsion
 from rotor.quantum.internal_rotation.exchange import TURNS, ExchangedTops, exchange_axis
-from rotor.quantum.internal_rotation.frames import axis_of_angles
+from rotor.quantum.internal_rotation.frames import torsional_kinetics
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
 from rotor.quantum.internal_rotation.terms import products_of
@@ -286,15 +286,6 @@ def several_tops(rotation: Mapping[str, float], constants: Mapping[str, float]) 
     elif len(tops) > 2:
         _refuse_exchange(tops)
     return SeveralTops(rotation, tuple(tops), between, axis)
-
-
-def torsional_kinetics(rotation: Mapping[str, float], constants: Mapping[str, float]) -> tuple[Floats, Floats]:
-    """F (tops, tops) in MHz and ρ (tops, 3) along a, b, c."""
-    abc = np.array([rotation[name] for name in "ABC"])
-    numbers = [name.removeprefix("F0_") for name in sorted(constants) if name.startswith("F0_")]
-    axes = np.array([axis_of_angles(constants[f"delta_{i}"], constants.get(f"epsilon_{i}", 0.0)) for i in numbers])
-    f0 = np.array([constants[f"F0_{i}"] for i in numbers])
-    return np.linalg.inv(np.diag(1 / f0) - (axes * abc) @ axes.T / np.outer(f0, f0)), axes * abc / f0[:, None]
 
 
 def _refuse_exchange(tops: list[InternalTop]) -> None:

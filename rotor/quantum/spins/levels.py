@@ -103,8 +103,7 @@ def _table(
     elif top.kind != "linear":
         quanta |= {"ka": labels[:, 1], "kc": labels[:, 2]}
     scheme = shared.scheme
-    for column, (name, half) in enumerate(zip(scheme.names, scheme.half, strict=True), 4):
-        quanta[name] = labels[:, column] if half else labels[:, column] // 2
+    quanta |= scheme.sums_of(labels)
     return levels_of_blocks(
         top,
         effects,
@@ -114,5 +113,5 @@ def _table(
         shared.representation,
         multiplicity=labels[:, -1] + 1,
         components=np.where(labels[:, 1] > 0, 2, 1) if axial else np.ones(len(labels), dtype=np.int64),
-        halves=frozenset(name for name, half in zip(scheme.names, scheme.half, strict=True) if half),
+        halves=scheme.halves,
     )

@@ -152,6 +152,16 @@ class Scheme:
         return (*halves[: len(halves) - self.equivalent], *total_halves)
 
     @property
+    def halves(self) -> frozenset[str]:
+        """Names of the sums that are half-integers."""
+        return frozenset(name for name, half in zip(self.names, self.half, strict=True) if half)
+
+    def sums_of(self, labels: Ints) -> dict[str, Ints]:
+        """The sums of labels (levels, columns as `SolvedBlock.labels`) by name, doubled where they are half-integers."""
+        columns = zip(self.names, self.half, labels[:, 4:].T, strict=True)
+        return {name: column if half else column // 2 for name, half, column in columns}
+
+    @property
     def conserved_columns(self) -> list[int]:
         """Columns of the patterns that hold conserved sums."""
         return [column for column, name in enumerate(("n", *self.names)) if name in self.conserved]

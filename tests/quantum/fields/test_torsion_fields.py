@@ -14,7 +14,10 @@ from rotor.tops.internal_rotation import InternalRotationConstants
 
 
 def blocks_of_species(top, jmax, along, m, species, together):
-    space = solved_space(top, solved_levels(top, jmax, ()), jmax, [along], together=together)
+    levels = solved_levels(top, jmax, ())
+    if together:  # without v_t the states of all v_t of a species are in one sector
+        levels = replace(levels, quanta={name: column for name, column in levels.quanta.items() if name != "vt"})
+    space = solved_space(top, levels, jmax, [along])
     return [block for block in space.blocks(m) if space.levels.quanta["species"][block.rows[0]] == species]
 
 
@@ -98,12 +101,12 @@ def test_maps_do_not_depend_on_the_frame():
     """PAM against the same molecule in the rho-axis frame."""
     from rho_axis_frame import ram_of_pam
 
-    from rotor.quantum.internal_rotation.frames import axis_of_angles, rho_axis
+    from rotor.quantum.internal_rotation.frames import torsional_kinetics
 
     top = turning(frame="PAM", vt_max=0)
-    rho = rho_axis(list(ABC.values()), 158e3, axis_of_angles(0.7))
-    ram = ram_of_pam(list(ABC.values()), rho)
-    angle = np.arctan2(rho.rho_abc[1], rho.rho_abc[0])
+    f, (rho,) = torsional_kinetics(ABC, {"F0": 158e3, "delta": 0.7})
+    ram = ram_of_pam(list(ABC.values()), f[0, 0], rho)
+    angle = np.arctan2(rho[1], rho[0])
     turned = (
         DIPOLE[0] * np.cos(angle) + DIPOLE[1] * np.sin(angle), DIPOLE[1] * np.cos(angle) - DIPOLE[0] * np.sin(angle), 0.0
     )  # fmt: skip
