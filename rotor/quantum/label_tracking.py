@@ -101,7 +101,7 @@ def tracked_blocks(
     find: from the number of a block and the names (n, columns) of its states to the places of labels in it, and which states have them.
     """
     tracked, space = list[Tracked](), Workspace()
-    for numbers in stack_numbers([block for block, _ in blocks]):
+    for numbers in stack_numbers([block.shape for block, _ in blocks]):
         stack = LinearStack.from_blocks([blocks[i][0] for i in numbers.tolist()])
         members = _members([blocks[i][1].sub_blocks for i in numbers.tolist()], stack.size)
         energies, vectors, matrices = stack.solved(values_mhz, space)
@@ -340,7 +340,7 @@ class TrackedLevels(LevelModel):
 
     @cached_property
     def _labelled(self) -> list[_Labelled]:
-        numbers = stack_numbers([block.block for block in self.tracked])
+        numbers = stack_numbers([block.block.shape for block in self.tracked])
         return [
             _Labelled.from_tracked([self.tracked[i] for i in numbers_of_stack.tolist()]) for numbers_of_stack in numbers
         ]

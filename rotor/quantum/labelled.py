@@ -1,34 +1,26 @@
 """Chosen levels and their derivatives for constants that change: what a fit asks for, again and again.
 
 A model is made once for the labels that occur. Linear, spherical and symmetric tops have E = Σ c x(label): the derivatives are
-a constant matrix. An asymmetric top is solved in those Wang blocks alone in which a label lies; a block is a sum of unit
-matrices ½[Jz^2q, J₊^2n + J₋^2n]₊ X^p made once, for all blocks side by side, so that new constants cost one LAPACK call a block
-and
-
-    ∂E_i/∂c = ⟨i|∂H/∂c|i⟩ = Σ_d (2 - δ_d0) Σ_K v_K v_K+2d U_d(K)
-
-over the diagonals d of each unit matrix U, all states of many blocks at once. A label is (J, block, rank in the order of energy),
-so that it never changes its state by accident; `overlaps` says where a state has become another.
+a constant matrix. An asymmetric top is solved in those Wang blocks alone in which a label lies, side by side (`linear_stacks`). A label is
+(J, block, rank in the order of energy), so that it never changes its state by accident; `overlaps` says where a state has become another.
 """
 
 from __future__ import annotations
 
-import os
-import sys
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, Workspace
+from rotor.arrays import Floats, Ints, Workspace, distinct, numbers_in_runs
 from rotor.frozen import dataclass
+from rotor.quantum.basis.state_elements import StateTerms, wang_stacks
 from rotor.quantum.effects.watson import operators_by_name
-from rotor.quantum.label_blocks import Chunk, chunks_of, occurring_blocks
-from rotor.quantum.solvers.tridiagonal import vectors_of_values
+from rotor.quantum.linear_stacks import LinearStack, numbered
+from rotor.quantum.wang.basis import SPECIES, WangBlock, names_of_blocks, wang_blocks
 from rotor.quantum.wang.turn import order_beyond_the_turn, turned
-from rotor.quantum.wang.unit_diagonals import expectations
 from rotor.table import with_article
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
@@ -76,7 +68,7 @@ def level_model(constants: Constants, labels: Ints, *, kmax: int | None = None) 
         )
     _refuse_labels(constants.kind, labels)
     if constants.kind == "asymmetric":
-        return WangLevels.from_labels(constants, labels, kmax)
+        return RankedLevels.from_labels(constants, labels, kmax)
     if "Dt" in constants.values:
         raise ValueError(
             "D_t splits the levels of a spherical top, which J alone does not label; it cannot be fitted here"
@@ -122,171 +114,99 @@ class ClosedForm(LevelModel):
         return self.slopes @ values_mhz, self.slopes
 
 
+class _Labels(NamedTuple):
+    """Wang blocks of like size side by side, the places of the labels in them (blocks, most labels), the one behind all where padded, and
+    which states they are."""
+
+    stack: LinearStack
+    rows: Ints
+    states: Ints
+
+
 @dataclass(frozen=True)
-class WangLevels(LevelModel):
-    """An asymmetric top, the blocks that occur.
+class RankedLevels(LevelModel):
+    """An asymmetric top, the Wang blocks in which labels lie; a label is a rank in its block.
 
     rise: 1 where energies rise with K (z is a), -1 where they fall (c), 0 where neither (b)
-    terms: unique (q, n) but for (0, 0); powers: p, (q, n) as a place in `terms` or -1, of every column of factors (terms of the
-    Hamiltonian, names)
     """
 
     names: tuple[str, ...]
     count: int
-    powers: tuple[tuple[int, int], ...]
-    factors: Floats
-    chunks: tuple[Chunk, ...] = field(repr=False)
-    j: Ints = field(repr=False)
     rise: int
+    parts: tuple[_Labels, ...] = field(repr=False)
 
     @classmethod
-    def from_labels(cls, constants: Constants, labels: Ints, kmax: int | None) -> WangLevels:
+    def from_labels(cls, constants: Constants, labels: Ints, kmax: int | None) -> RankedLevels:
         """The model for labels (J, Ka, Kc) of a set of constants."""
-        by_name = operators_by_name(constants)
-        hamiltonian = sorted({powers for terms in by_name.values() for powers in terms})
-        units = sorted({(q, n) for _, q, n in hamiltonian if q or n})
-        factors = np.array([[terms.get(powers, 0.0) for terms in by_name.values()] for powers in hamiltonian])
-        places = tuple((p, units.index((q, n)) if q or n else -1) for p, q, n in hamiltonian)
-        chunks = tuple(
-            chunks_of(
-                occurring_blocks(labels, str(constants.representation), kmax), units, [p for p, _, _ in hamiltonian]
-            )
-        )
-        axis = REPRESENTATIONS[str(constants.representation)][2]
-        rise = {"a": 1, "c": -1}.get(axis, 0)
-        return cls(tuple(by_name), len(labels), places, factors, chunks, labels[:, 0], rise)
+        by_name, representation = operators_by_name(constants), str(constants.representation)
+        terms = StateTerms.from_operators([0], [(0, i, powers) for i, powers in enumerate(by_name.values())], ())
+        blocks, number, rank = _blocks_of_labels(labels, representation, kmax)
+        order, counts = np.argsort(number, kind="stable"), np.bincount(number)
+        shape, places = (len(blocks), counts.max(initial=0)), numbers_in_runs(counts)
+        rows, states = np.full(shape, len(labels)), np.zeros(shape, dtype=np.int64)
+        rows[places], states[places] = order, rank[order]
+        parts = []
+        for numbers, stack in wang_stacks(blocks, terms, len(by_name)):
+            most = counts[numbers].max()
+            parts.append(_Labels(stack, rows[numbers, :most], states[numbers, :most]))
+        axis = REPRESENTATIONS[representation][2]
+        return cls(tuple(by_name), len(labels), {"a": 1, "c": -1}.get(axis, 0), tuple(parts))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         """See `LevelModel`. Raises ValueError where a block is not finite or LAPACK does not converge."""
-        coefficients = self.factors @ values_mhz
-        energies, slopes = np.empty(self.count), np.empty((self.count, len(self.names)))
-        places = [place for _, place in self.powers]  # that of a scalar is -1, the column of ones
-        for chunk in self.chunks:
-            solved, vectors = self._labelled(chunk, coefficients)
-            energies[chunk.rows] = solved[chunk.block, chunk.rank]
-            expected = np.ones((len(chunk.rows), chunk.units[0].shape[2] + 1))
-            means = expectations(chunk.units, vectors, self._space)
-            expected[:, :-1] = means[chunk.block, chunk.rank if chunk.states is None else chunk.slot]
-            slopes[chunk.rows] = (expected[:, places] * chunk.powers) @ self.factors
-        alone = [i for i, place in enumerate(places) if place < 0]
-        for chunk in self.chunks:
-            energies[chunk.rows] += chunk.powers[:, alone] @ coefficients[alone]
-        return energies, slopes
+        energies, slopes = np.empty(self.count + 1), np.empty((self.count + 1, len(self.names)))
+        vectors = []
+        for part in self.parts:
+            solved, all_vectors = self._solved(part.stack, values_mhz)
+            energies[part.rows] = np.take_along_axis(solved, part.states, axis=1)
+            slopes[part.rows] = part.stack.slopes(all_vectors, part.states, self._space)
+            vectors.append(np.take_along_axis(all_vectors, part.states[:, None, :], axis=2))
+        if len(self._vectors) > 1:
+            self._vectors.popitem()  # the last one
+        self._vectors[values_mhz.tobytes()] = vectors
+        return energies[:-1], slopes[:-1]
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
         """See `LevelModel`."""
-        out = np.empty(self.count)
-        for chunk in self.chunks:
-            both = []
-            for values in (before_mhz, after_mhz):
-                both.append(self._solved(chunk, self.factors @ values)[1][chunk.block, :, chunk.rank])
-            out[chunk.rows] = np.einsum("lk,lk->l", *both) ** 2
-        return out
+        both, out = list[list[Floats]](), np.empty(self.count + 1)
+        for values in (before_mhz, after_mhz):
+            if values.tobytes() not in self._vectors:
+                self.levels(values)
+            both.append(self._vectors[values.tobytes()])
+        for part, before, after in zip(self.parts, *both, strict=True):
+            out[part.rows] = np.einsum("bks,bks->bs", before, after) ** 2
+        return out[:-1]
 
-    def _solved(self, chunk: Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
-        """Eigenvalues (blocks, size) and eigenvectors (blocks, size, size) with the coefficients of the terms, in the order of labels."""
-        bands = self._bands(chunk, coefficients)
-        return self._in_order(chunk, bands, self._turned(chunk, bands))
-
-    def _turned(self, chunk: Chunk, bands: Sequence[Floats]) -> tuple[Ints, Ints] | None:
-        """Which blocks turn and where, see `turn`; None where there are none."""
-        turned_order = turned(self.rise * bands[0], chunk.sizes) if self.rise else None
-        return turned_order if turned_order is not None and len(turned_order[0]) else None
-
-    def _in_order(self, chunk: Chunk, bands: Sequence[Floats], turn: tuple[Ints, Ints] | None) -> tuple[Floats, Floats]:
-        energies, vectors = _diagonalised(bands, chunk, self._space)
-        if turn is not None:
-            order_beyond_the_turn(turn, chunk.sizes, energies, vectors)
+    def _solved(self, stack: LinearStack, values_mhz: Floats) -> tuple[Floats, Floats]:
+        """Energies (blocks, size) and vectors (blocks, size, size) in the order of labels."""
+        energies, vectors, matrices = stack.solved(values_mhz, self._space)
+        if self.rise:
+            turning = turned(self.rise * stack.diagonals(matrices), stack.sizes)
+            order_beyond_the_turn(turning, stack.sizes, energies, vectors)
         return energies, vectors
 
-    def _labelled(self, chunk: Chunk, coefficients: Floats) -> tuple[Floats, Floats]:
-        """Eigenvalues (blocks, size), and the eigenvectors of the labelled states (blocks, size, most labels), or of all states."""
-        bands, states = self._bands(chunk, coefficients), chunk.states
-        turn = self._turned(chunk, bands)
-        if states is None:
-            return self._in_order(chunk, bands, turn)
-        if len(bands) == 2 and _dense() and turn is None:
-            energies = _banded(bands, chunk, self._space)
-            by_recursion = vectors_of_values(bands[0], bands[1], energies, chunk.block, chunk.rank, self._space)
-            if by_recursion is not None:
-                chosen = self._space.array("chosen", len(states), len(by_recursion), states.shape[1])
-                chosen.fill(0.0)
-                chosen.transpose(1, 0, 2)[:, chunk.block, chunk.slot] = by_recursion
-                return energies, chosen
-        energies, vectors = self._in_order(chunk, bands, turn)
-        count, size, most = len(vectors), vectors.shape[1], states.shape[1]
-        rows = size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]
-        chosen = self._space.array("chosen", count, size, most)
-        return energies, vectors.ravel().take(rows + states[:, None, :], out=chosen, mode="clip")
-
-    def _bands(self, chunk: Chunk, coefficients: Floats) -> list[Floats]:
-        """Diagonals (blocks, size) of the Hamiltonian."""
-        weights = (chunk.x * coefficients) @ self._unit_of_term
-        bands = [(unit @ weights[:, :, None])[:, :, 0] for unit in chunk.units]
-        if not all(np.isfinite(band.sum()) for band in bands):
-            raise ValueError("a block of the Hamiltonian is not finite with these constants")
-        return bands
-
     @cached_property
-    def _unit_of_term(self) -> Floats:
-        """1 where a term of the Hamiltonian has a unit matrix, (terms, units)."""
-        places = np.array([place for _, place in self.powers])
-        return np.asarray(places[:, None] == np.arange(1 + max(places.max(initial=-1), -1)), dtype=float)
+    def _vectors(self) -> dict[bytes, list[Floats]]:
+        """Those of the labelled states at the first and at the last values, which a fit compares."""
+        return {}
 
     @cached_property
     def _space(self) -> Workspace:
         return Workspace()
 
 
-def _diagonalised(bands: Sequence[Floats], chunk: Chunk, space: Workspace) -> tuple[Floats, Floats]:
-    """Eigenvalues (blocks, size), rising, and eigenvectors (blocks, size, size) in columns, padded with zeros."""
-    count, size = bands[0].shape
-    vectors, least = space.array("vectors", count, size, size), chunk.sizes[0]
-    vectors[:, least:, :] = vectors[:, :, least:] = 0.0
-    if len(bands) <= 2 and not _dense():
-        energies = np.zeros((count, size))
-        _tridiagonal(bands, chunk.sizes, energies, vectors)
-        return energies, vectors
-    return _banded(bands, chunk, space, vectors), vectors
-
-
-def _dense() -> bool:
-    """Whether tridiagonal blocks too are solved by numpy's dense routine: where scipy.linalg is not loaded.
-
-    Loading it takes as long as 500 iterations of a fit to 5,000 lines gain by it. Only where BLAS has one thread: several of them wait for
-    each other on small blocks.
-    """
-    return "scipy.linalg" not in sys.modules and os.environ.get("OPENBLAS_NUM_THREADS") == "1"
-
-
-def _tridiagonal(bands: Sequence[Floats], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
-    from scipy.linalg.lapack import dstevd
-
-    diagonal, beside = bands[0], bands[1] if len(bands) == 2 else np.zeros_like(bands[0])
-    for b, n in enumerate(sizes):
-        if n == 1:
-            energies[b, 0], vectors[b, 0, 0] = diagonal[b, 0], 1.0
-            continue
-        eigenvalues, states, info = dstevd(diagonal[b, :n], beside[b, : n - 1])
-        if info:
-            raise ValueError(f"LAPACK dstevd did not converge on a block of size {n} (info = {info})")
-        energies[b, :n] = eigenvalues
-        vectors[b, :n, :n] = states
-
-
-def _banded(bands: Sequence[Floats], chunk: Chunk, space: Workspace, vectors: Floats | None = None) -> Floats:
-    """Eigenvalues, infinite beyond a block, by LAPACK's dense routine, which reads the lower triangle; blocks of one size at a time.
-
-    Eigenvectors are put into `vectors` where it is given; without them it takes a third of the time.
-    """
-    energies, whole = np.full(bands[0].shape, np.inf), space.array("matrices", int(chunk.offsets[-1]))
-    whole.fill(0.0)
-    for band, (inside, places) in zip(bands, chunk.bands, strict=False):
-        whole[places] = band.take(inside)
-    for first, stop, n in chunk.runs:
-        matrices = whole[chunk.offsets[first] : chunk.offsets[stop]].reshape(stop - first, n, n)
-        if vectors is None:
-            energies[first:stop, :n] = np.linalg.eigvalsh(matrices)
-        else:
-            energies[first:stop, :n], vectors[first:stop, :n, :n] = np.linalg.eigh(matrices)
-    return energies
+def _blocks_of_labels(labels: Ints, representation: str, kmax: int | None) -> tuple[list[WangBlock], Ints, Ints]:
+    """The Wang blocks of the labels, cut at the highest K; block and rank in it of each label."""
+    j, ka, kc = labels.T
+    occurring, number = numbered(4 * j + 2 * (ka % 2) + kc % 2, 4 * int(j.max(initial=0)) + 4)
+    whole = {j: {block.species: block for block in wang_blocks(j, representation)} for j in distinct(j).tolist()}
+    blocks = [whole[key // 4][SPECIES[key % 4]] for key in occurring.tolist()]
+    if kmax is not None:
+        blocks = [block._replace(size=min(block.size, max(0, (kmax - block.first_k) // 2 + 1))) for block in blocks]
+    lowest, sizes = names_of_blocks(blocks, [1] * len(blocks), representation)[0], np.array([b.size for b in blocks])
+    rank = (ka - lowest[number]) // 2
+    missing = np.flatnonzero((rank < 0) | (rank >= sizes[number]))
+    if len(missing):
+        label = " ".join(map(str, labels[missing[0]].tolist()))
+        raise ValueError(f"level {label} is not among the states with K up to {kmax}; raise KNMAX")
+    return blocks, number, rank

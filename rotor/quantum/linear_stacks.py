@@ -38,6 +38,11 @@ class LinearBlock(NamedTuple):
     mix: Floats
     parameters: Ints
 
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Its size, and how many elements and units it has."""
+        return self.size, *self.factors.shape
+
     def matrices(self) -> Floats:
         """The O_i of its parameters, whole: (parameters, size, size)."""
         lower = np.zeros((len(self.parameters), self.size, self.size))
@@ -177,6 +182,12 @@ class LinearStack:
         n = int(self.sizes[place])
         return matrices[self.offsets[place] : self.offsets[place + 1]].reshape(n, n)
 
+    def diagonals(self, matrices: Floats) -> Floats:
+        """The diagonals (blocks, size) of the matrices, one behind the other, 0 beyond a block."""
+        out = np.zeros((len(self.sizes), self.size))
+        out[np.arange(self.size) < self.sizes[:, None]] = matrices[self._diagonal]
+        return out
+
     def slopes(self, vectors: Floats, states: Ints, space: Workspace) -> Floats:
         """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""
         (count, most), size, elements = states.shape, self.size, self.rows.shape[1]
@@ -188,12 +199,12 @@ class LinearStack:
         return np.asarray(weights.transpose(0, 2, 1) @ self.factors @ self.mix)
 
 
-def stack_numbers(blocks: Sequence[LinearBlock]) -> list[Ints]:
-    """Positions of the blocks that are worked on together: of like size, of like numbers of elements, of bounded memory."""
-    order = sorted(range(len(blocks)), key=lambda i: (blocks[i].size, len(blocks[i].rows), blocks[i].factors.shape[1]))
-    sizes = [blocks[i].size for i in order]
-    costs = [len(blocks[i].rows) * max(blocks[i].factors.shape[1], blocks[i].size) for i in order]
-    return [np.array(order[run]) for run in runs_of_similar_size(sizes, _LIKE, most=_AT_ONCE, costs=costs)]
+def stack_numbers(shapes: Sequence[tuple[int, int, int]]) -> list[Ints]:
+    """Positions of the blocks that are worked on together, from size, elements and units of each: of like size, of bounded memory."""
+    order = sorted(range(len(shapes)), key=lambda i: shapes[i])
+    costs = [elements * max(units, size) for size, elements, units in shapes]
+    runs = runs_of_similar_size([shapes[i][0] for i in order], _LIKE, most=_AT_ONCE, costs=[costs[i] for i in order])
+    return [np.array(order[run]) for run in runs]
 
 
 class WeightedElements(NamedTuple):

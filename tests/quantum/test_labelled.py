@@ -63,6 +63,24 @@ def test_a_cut_basis_is_a_submatrix():
         level_model(constants, np.array([[2, 2, 0]]), kmax=1)
 
 
+def test_a_model_of_no_labels_has_no_levels():
+    energies, slopes = level_model(Constants(**RIGID), np.zeros((0, 3), dtype=int)).levels(
+        np.array(list(RIGID.values()))
+    )
+    assert energies.shape == (0,)
+    assert slopes.shape == (0, 3)
+
+
+def test_a_cut_at_high_k_takes_away_the_levels_of_high_kc_where_z_is_c():
+    """J = 3, odd K: without K = 3 a block has one function, (A + B)/2 · 12 + C - (A + B)/2 ± (A - B)/4 · 12; Kc = 3 is cut."""
+    constants = Constants(A=9000.0, B=8000.0, C=3000.0, representation="IIIl")
+    model = level_model(constants, np.array([[3, 3, 1], [3, 2, 1]]), kmax=2)
+    energies, _ = model.levels(np.array([constants[name] for name in model.names]))
+    assert energies == pytest.approx([8500 * 12 - 5500 + 3000, 8500 * 12 - 5500 - 3000], rel=1e-13)  # round-off
+    with pytest.raises(ValueError, match="level 3 0 3 is not among the states with K up to 2"):
+        level_model(constants, np.array([[3, 0, 3]]), kmax=2)
+
+
 @pytest.mark.parametrize(
     ("label", "rule"),
     [([2, 3, 0], "there is no level 2 3 0"), ([2, 1, 3], "there is no level"), ([-1, 0, 0], "there is no level"),

@@ -179,7 +179,7 @@ def test_linear_blocks_have_the_energies_and_slopes_of_the_solved_blocks(name):
     values = group.effect.parameters(group.top)
     linear = linear_blocks_of(group.top, levels, tuple(values), levels.blocks)
     energies = np.empty(len(levels))
-    for numbers in stack_numbers(linear):
+    for numbers in stack_numbers([block.shape for block in linear]):
         stack = LinearStack.from_blocks([linear[i] for i in numbers.tolist()])
         solved, *_ = stack.solved(np.array(list(values.values())), Workspace())
         for place, block in enumerate(levels.blocks[i] for i in numbers.tolist()):

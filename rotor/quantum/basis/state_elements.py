@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, distinct
+from rotor.arrays import Floats, Ints, distinct, numbers_in_runs
 from rotor.quantum.basis.wang_functions import BetweenStates, WangElements, WangFunctions
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.effect import QuantumEffect, couplings_of
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.linear_stacks import LinearBlock, numbered
+from rotor.quantum.linear_stacks import LinearBlock, LinearStack, numbered, stack_numbers
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.states import Coupling, State
 from rotor.quantum.wang.basis import SpeciesFactors, WangBlock, parts_of
@@ -150,6 +150,33 @@ def wang_elements(blocks: set[WangBlock], powers: Sequence[tuple[int, int]]) -> 
         chosen = order[bounds[number] : bounds[number + 1]]
         out[block] = UnitElements(i[chosen] + distance[chosen], i[chosen], unit[chosen], value[chosen])
     return out
+
+
+def wang_stacks(blocks: Sequence[WangBlock], terms: StateTerms, count: int) -> Iterator[tuple[Ints, LinearStack]]:
+    """Wang blocks of one state by themselves, those of like size side by side, with their numbers; count: of the parameters."""
+    units, order = len(terms.powers), max(n for _, n in terms.powers)
+    for numbers in stack_numbers([(block.size, block.size * (order + 1), units) for block in blocks]):
+        yield numbers, _wang_stack([blocks[i] for i in numbers.tolist()], terms, count)
+
+
+def _wang_stack(blocks: Sequence[WangBlock], terms: StateTerms, count: int) -> LinearStack:
+    """Wang blocks in order of size."""
+    sizes, j = np.array([(block.size, block.j) for block in blocks]).T
+    size, starts = int(sizes[-1]), np.cumsum(sizes**2) - sizes**2
+    diagonals = unit_diagonals(blocks, sizes.tolist(), terms.powers[1:])[:size]
+    distance, columns = numbers_in_runs(size - np.arange(len(diagonals)))
+    rows = columns + distance
+    inside = rows < sizes[:, None]
+    factors = np.empty((*inside.shape, len(terms.powers)))
+    factors[:, :, 0] = inside & (distance == 0)
+    np.concatenate([values[:, : size - d] for d, values in enumerate(diagonals)], axis=1, out=factors[:, :, 1:])
+    half = np.where(distance, 0.5, 1.0)
+    factors /= half[:, None]
+    places = np.where(inside, starts[:, None] + rows * sizes[:, None] + columns, (sizes**2).sum())
+    mixes = {each: terms.mix(each, count) for each in distinct(j).tolist()}
+    first, parameters = size * np.arange(len(blocks))[:, None], np.broadcast_to(np.arange(count), (len(blocks), count))
+    mix = np.stack([mixes[each] for each in j.tolist()])
+    return LinearStack(sizes, places, rows + first, columns + first, half, factors, mix, parameters)
 
 
 class LinkElements(NamedTuple):

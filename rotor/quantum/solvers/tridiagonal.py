@@ -1,11 +1,10 @@
-"""Selected eigenvectors of many tridiagonal matrices at once, from their eigenvalues.
+"""Eigenvectors of many tridiagonal matrices at once, from their eigenvalues.
 
 T - λ = L D⁺ Lᵀ from above and U D⁻ Uᵀ from below meet in row k, where γ_k = D⁺_k + D⁻_k - (T_kk - λ) is smallest. There z_k = 1, and
 
     z_(i+1) = -T_(i,i+1) z_i / D⁻_(i+1) below,    z_(i-1) = -T_(i-1,i) z_i / D⁺_(i-1) above.
 
-Source: I. S. Dhillon and B. N. Parlett, Linear Algebra Appl. 387 (2004) 1 (twisted factorization). A fit needs only the vectors of labelled
-states; if these are few this is faster than a diagonalisation with all vectors.
+Source: I. S. Dhillon and B. N. Parlett, Linear Algebra Appl. 387 (2004) 1 (twisted factorization).
 """
 
 from __future__ import annotations
@@ -13,41 +12,6 @@ from __future__ import annotations
 import numpy as np
 
 from rotor.arrays import Floats, Ints, Workspace
-
-_NEAR = 1e-6  # closer eigenvalues, relative to the largest, would give vectors with less than nine digits
-_ASIDE = 1e-15  # shift of λ, relative to the largest eigenvalue, that avoids division by a pivot of exactly 0
-_NOTHING = 1e-280  # replaces the largest eigenvalue of a zero matrix
-_RESIDUAL = 1e-12  # |γ| above this, relative to the largest eigenvalue times the size, is more than round-off
-
-
-def vectors_of_values(
-    diagonal: Floats, beside: Floats, values: Floats, matrix: Ints, state: Ints, space: Workspace
-) -> Floats | None:
-    """Normalised eigenvectors (size, n) of selected states of many matrices; None if two eigenvalues are too close, or a division fails.
-
-    diagonal, beside: elements (i, i) and (i, i + 1), (matrices, size), 0 beyond a matrix. values: all eigenvalues, rising, infinite beyond
-    a matrix. matrix, state: of each vector, the number of the matrix and of the eigenvalue.
-
-    >>> matrix = np.zeros((1, 2)), np.array([[1.0, 0.0]])
-    >>> vectors = vectors_of_values(*matrix, np.array([[-1.0, 1.0]]), np.array([0]), np.array([1]), Workspace())
-    >>> np.round(vectors[:, 0] ** 2, 12).tolist()
-    [0.5, 0.5]
-    """
-    size, inside = diagonal.shape[1], np.isfinite(values)
-    finite_values = np.where(inside, values, 0.0)
-    largest = np.abs(finite_values).max(axis=1) + _NOTHING
-    near = np.diff(finite_values, axis=1) <= _NEAR * largest[:, None]
-    if (near & inside[:, 1:]).any():
-        return None
-    full = np.where(inside, diagonal, 4.0 * largest[:, None]).T.copy()
-    shifted, off = space.array("shifted", 2, size, len(matrix))
-    full.take(matrix, axis=1, out=shifted, mode="clip")
-    shifted -= values[matrix, state] + _ASIDE * largest[matrix]
-    beside.T.copy().take(matrix, axis=1, out=off, mode="clip")
-    vectors, squares, gamma, _ = twisted(shifted, off[:-1], space)
-    lengths = np.sqrt(squares)
-    right = np.abs(gamma) <= _RESIDUAL * size * largest[matrix] * lengths
-    return vectors if right.all() and np.isfinite(lengths).all() else None
 
 
 def twisted(shifted: Floats, beside: Floats, space: Workspace) -> tuple[Floats, Floats, Floats, Ints]:

@@ -180,7 +180,7 @@ def names_of_blocks(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """`names_of` of the lowest states of each block, one block behind the other."""
     first, total = np.array([_first_of_part(block, representation) for block in blocks]).reshape(-1, 2).T
-    number, place = numbers_in_runs(np.asarray(counts))
+    number, place = numbers_in_runs(np.asarray(counts, dtype=np.int64))
     ka = first[number] + 2 * place
     return ka, total[number] - ka
 

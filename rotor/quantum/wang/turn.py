@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from rotor.arrays import Floats, Ints
 
 
-def turned(diagonal: Floats, sizes: Sequence[int]) -> tuple[Ints, Ints]:
+def turned(diagonal: Floats, sizes: Ints) -> tuple[Ints, Ints]:
     """Numbers of the blocks whose diagonal has its maximum (the turn) before the end, and the place of the maximum in each block."""
-    size = np.asarray(sizes)
-    turn = np.where(np.arange(diagonal.shape[1]) < size[:, None], diagonal, -np.inf).argmax(axis=1)
-    return np.flatnonzero((turn > 0) & (turn < size - 1)), turn
+    turn = np.where(np.arange(diagonal.shape[1]) < sizes[:, None], diagonal, -np.inf).argmax(axis=1)
+    return np.flatnonzero((turn > 0) & (turn < sizes - 1)), turn
 
 
-def order_beyond_the_turn(turning: tuple[Ints, Ints], sizes: Sequence[int], energies: Floats, vectors: Floats) -> None:
+def order_beyond_the_turn(turning: tuple[Ints, Ints], sizes: Ints, energies: Floats, vectors: Floats) -> None:
     """Move states beyond the turn of the diagonal to the end of their block, ordered by mean K, in place.
 
     Constants that describe K up to 20 may shift states of K = 60 down among lower K, where the distortion series diverges. These states are
