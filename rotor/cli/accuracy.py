@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rotor.cli.shared.scene_file import SceneAnswer, SceneFile
 from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
-from rotor.reports.screen import Part, record_table, show_parts
+from rotor.reports.screen import Part, listed, record_table, show_parts
 from rotor.requests.field import declared
 from rotor.requests.readers import Quantity
 from rotor.verbs.outputs import PICTURES, Output, Report
@@ -90,9 +90,8 @@ def show(answer: SceneAnswer, _: Any) -> Iterable[Part | None]:
         yield record_table(f"{knob}: {error_of}", columns, rows)
     if table.rows:
         yield "* value in the scene; processor seconds, without start-up and compilation"
-    facts = [("against", f"{name}: {text}") for name, text in table.references.items()]
-    facts += [("remark", text) for text in table.remarks]
-    yield [(name if not n or facts[n - 1][0] != name else "", text) for n, (name, text) in enumerate(facts)]
+    against = (f"{name}: {text}" for name, text in table.references.items())
+    yield [*listed("against", against), *listed("remark", table.remarks)]
 
 
 VERB = Tool(

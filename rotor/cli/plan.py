@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from rotor.cli.shared.scene_file import SceneAnswer, SceneFile
-from rotor.reports.screen import Part
-from rotor.reports.top_facts import left_out_facts
+from rotor.reports.screen import Part, listed
 from rotor.verbs.tool import Tool
 from rotor.verbs.verb import verb_of
 
@@ -31,8 +30,7 @@ def show(answer: SceneAnswer, _: Any) -> Iterable[Part | None]:
 
     plan: Plan = answer.result
     yield answer.scene.heading
-    texts = left_out_texts(plan.left_out, lambda part: part.size, lambda part: part.name)
-    yield [*plan.rows(verb_of(plan.kind).invariants), *left_out_facts(texts)]
+    yield [*plan.rows(verb_of(plan.kind).invariants), *listed("left out", left_out_texts(plan.left_out))]
 
 
 VERB = Tool(

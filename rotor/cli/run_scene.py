@@ -16,7 +16,6 @@ from rotor.checks import leaving
 from rotor.cli.shared.scene_file import SceneFile
 from rotor.cli.shared.workers import MOST_WORKERS
 from rotor.frozen import dataclass
-from rotor.reports.error_table import error_parts
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.reports.screen import Part, Table, evenly, json_with_rows
 from rotor.requests.field import NUMERICS, OUTPUT, Rule, declared
@@ -25,7 +24,7 @@ from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
 from rotor.verbs.outputs import Report
 from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Work
+from rotor.verbs.verb import ErrorsShown, Work
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -84,7 +83,6 @@ class Options(SceneFile):
         panel=SWEEP,
     )
     retry_failed: bool = declared(False, Flag(), "Run failed points again", panel=SWEEP)
-    errors: bool = declared(False, Flag(), "Print the table of errors: each source with its size", panel=OUTPUT)
 
 
 @dataclass(frozen=True)
@@ -126,8 +124,6 @@ class SceneRun:
         yield from parts
         files = ", ".join(map(str, result.files)) or "none: [outputs] names none"
         yield [("files", files), ("seconds", f"{result.seconds:.3g}"), *_accuracy(result)]
-        if self.options.errors:
-            yield from error_parts(report.content)
 
 
 @dataclass(frozen=True)
@@ -160,7 +156,7 @@ class SweepRun:
         return [_sampled_rows(self.result)]
 
 
-def answer(options: Options, _: Work) -> SceneRun | SweepRun:
+def answer(options: Options, work: Work) -> SceneRun | SweepRun:
     """Run a scene, or the points of its sweep that are not done."""
     from rotor.scenes.run import refuse_outside
     from rotor.scenes.sweep import is_sweep
@@ -171,7 +167,7 @@ def answer(options: Options, _: Work) -> SceneRun | SweepRun:
     swept = is_sweep(scene, options.folder)
     if not swept and (options.record is not None or options.retry_failed):
         raise ValueError(f"{'--retry-failed' if options.record is None else '--record'}: this scene has no sweep")
-    if swept and options.errors:
+    if swept and work.shown.errors:
         raise ValueError("--errors: needs a single scene; files of a sweep hold the errors of each point")
     refuse_outside(scene, options.out)
     with _workers(options) as pool:
@@ -296,6 +292,7 @@ VERB = Tool(
     examples=EXAMPLES,
     request=Options,
     of="scene",
+    shown=ErrorsShown,
     answer=answer,
     notes=lambda answer: answer.notes,
     failure=lambda answer: answer.failure,

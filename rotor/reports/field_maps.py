@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 from rotor.reports.screen import Table, record_table
@@ -32,9 +32,9 @@ def accuracy_fact(states: FieldMap) -> tuple[str, str]:
     return "numerical error", f"{accuracy}, {rounding}; edge population {record['edge_population']:.1e}"
 
 
-def refuse_picture_of_one_field(fields: Sequence[float], outputs: Collection[str]) -> None:
+def refuse_picture_of_one_field(request: Any, outputs: Collection[str], shown: Any) -> None:
     """Refuse a picture of a single field."""
-    if "plot" in outputs and len(fields) < 2:
+    if "plot" in outputs and len(request.map.fields) < 2:
         raise NamedError("{outputs.plot}: a picture of a map needs two fields or more; give {conditions.field} a range")
 
 

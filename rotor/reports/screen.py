@@ -40,6 +40,15 @@ class _Cells(string.Formatter):
         return "-" if isinstance(value, float) and not math.isfinite(value) else format(value, form)
 
 
+def listed(name: str, texts: Iterable[str]) -> list[tuple[str, str]]:
+    """Several texts as facts, of which the first carries the name.
+
+    >>> listed("left out", ["spins", "vibration"])
+    [('left out', 'spins'), ('', 'vibration')]
+    """
+    return [("" if number else name, text) for number, text in enumerate(texts)]
+
+
 def record_table(title: str, columns: Mapping[str, Any], records: Iterable[Any], left: Collection[str] = ()) -> Table:
     """Table with a row for each record, a mapping or an object.
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from rotor.reports.screen import Facts, Part
+from rotor.reports.screen import Facts, Part, listed
 from rotor.tops.components import known_dipole
 from rotor.tops.facts import top_formula
 
@@ -91,7 +91,7 @@ def model_facts(report: Any) -> list[tuple[str, str]]:
     """
     content = report.content
     if "limits" not in content:
-        return [*error_facts(content.get("errors")), *left_out_facts(content.get("left_out", ()))]
+        return [*error_facts(content.get("errors")), *listed("left out", content.get("left_out", ()))]
     from rotor.quantum.estimates.beyond import Limit
     from rotor.requests.plan import left_out_texts
 
@@ -103,13 +103,11 @@ def model_facts(report: Any) -> list[tuple[str, str]]:
     if content.get("constants_reason"):
         return [*facts, ("left out", "not estimated: sizes follow from named constants")]
     known = [Limit(**limit) for limit in content["limits"]]
-    limits = left_out_texts(
-        known, lambda limit: limit.size_mhz, lambda limit: limit.name, lambda limit: limit.sentence(report.with_spins)
-    )
+    limits = left_out_texts(known, lambda limit: limit.sentence(report.with_spins))
     unknown = (
         NOTHING_KNOWN if not content.get("spins") else NOTHING_KNOWN.replace("nuclear spins", "further nuclear spins")
     )
-    return facts + left_out_facts(limits or [NOTHING_SEEN if content["mass_u"] is not None else unknown])
+    return facts + listed("left out", limits or [NOTHING_SEEN if content["mass_u"] is not None else unknown])
 
 
 def report_on_top(
@@ -133,11 +131,6 @@ def report_on_top(
         yield [*source_facts(answer.request.top, sources, report.sources), *model_facts(report)]
 
     return show
-
-
-def left_out_facts(sentences: Sequence[str]) -> list[tuple[str, str]]:
-    """Rows for the neglected effects; only the first row carries the heading."""
-    return [("left out" if not i else "", sentence) for i, sentence in enumerate(sentences)]
 
 
 def states_facts(top: Top) -> list[tuple[str, str]]:
@@ -228,7 +221,7 @@ def weights_facts(top: Top, mapping: Mapping[str, int]) -> list[tuple[str, str]]
         f"{states.name_of(v)}: {weights_text(weights.to_mapping())}" for v, weights in sorted(states.weights.items())
     ]
     texts[0] += f" ({_COMPONENTS[top.kind]})" if top.kind in _COMPONENTS else ""
-    return [("" if i else "spin weights", text) for i, text in enumerate(texts)]
+    return listed("spin weights", texts)
 
 
 def hyperfine_lines(used: dict[str, Any] | None) -> list[tuple[str, str]]:

@@ -42,18 +42,17 @@ def largest_first(parts: Iterable[LeftOut]) -> tuple[LeftOut, ...]:
     return tuple(sorted(parts, key=lambda part: (part.size is None, -(part.size or 0.0))))
 
 
-def left_out_texts(
-    items: Sequence[T], size: Callable[[T], float | None], name: Callable[[T], str], text: Callable[[T], str] = str
-) -> list[str]:
-    """Texts of up to four items of at least a tenth of the largest size (or without a size), and one that names the others.
+def left_out_texts(effects: Sequence[Any], text: Callable[[Any], str] = str) -> list[str]:
+    """Texts of up to four neglected effects of at least a tenth of the largest size (or without a size), and one that names the others.
 
-    >>> left_out_texts([5.0, 4.0, 0.1], lambda size: size, str)
-    ['5.0', '4.0', 'and smaller or not estimated: 0.1']
+    effects: with `name` and `size`.
+    >>> left_out_texts([LeftOut("spins", 5.0, "MHz", "as split"), LeftOut("field", 0.1, "MHz", "of the Earth")])
+    ['spins: about 5 MHz; as split', 'and smaller or not estimated: field']
     """
-    least = SMALL * max((value for item in items if (value := size(item)) is not None), default=0.0)
-    larger = [item for item in items if (value := size(item)) is None or value >= least]
+    least = SMALL * max((effect.size for effect in effects if effect.size is not None), default=0.0)
+    larger = [effect for effect in effects if effect.size is None or effect.size >= least]
     shown = larger if len(larger) <= MOST_LEFT_OUT else larger[: MOST_LEFT_OUT - 1]
-    others = [name(item) for item in items if item not in shown]
+    others = [effect.name for effect in effects if effect not in shown]
     return [*map(text, shown), *([f"and smaller or not estimated: {', '.join(others)}"] if others else [])]
 
 

@@ -23,11 +23,12 @@ import numpy as np
 from rotor import units
 from rotor.quantum.estimates.beyond import ESTIMATED, Limit
 from rotor.quantum.estimates.budgets import NO_SAMPLES, model_term
-from rotor.quantum.estimates.limits import ELECTRON_SPIN, QUADRUPOLE, all_limits, populated_j
+from rotor.quantum.estimates.limits import ELECTRON_SPIN, QUADRUPOLE, all_limits
 from rotor.quantum.estimates.splittings import depth_lost, splitting_nuclei
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.spectra.emission import KM_PER_S, contrast_k
 from rotor.spectra.emitters import CatalogueLines
+from rotor.thermodynamics.classical_limit import populated_j
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -12,7 +12,7 @@ from rotor.arrays import Ints
 from rotor.checks import require_top
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.estimates.budgets import parameter_names
-from rotor.quantum.estimates.limits import all_limits, limit_facts, populated_j
+from rotor.quantum.estimates.limits import all_limits, limit_facts
 from rotor.quantum.estimates.uncertainty import known_covariance, level_spread, line_errors, source_of_errors
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
@@ -34,6 +34,7 @@ from rotor.spectra.raman import (
 )
 from rotor.table import TextOf
 from rotor.thermodynamics import VibrationalStates
+from rotor.thermodynamics.classical_limit import populated_j
 from rotor.thermodynamics.partition_table import partition_facts
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.facts import top_facts

@@ -18,7 +18,7 @@ from rotor.arrays import Floats, Ints
 from rotor.checks import require_top
 from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.limits import all_limits, limit_facts, populated_j
+from rotor.quantum.estimates.limits import all_limits, limit_facts
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.quantum.hyperfine_method import hyperfine_facts
 from rotor.requests.budget import ErrorBudget
@@ -31,6 +31,7 @@ from rotor.spectra.intensity_accuracy import cut_knob
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.table import TextOf
 from rotor.thermodynamics import VibrationalStates
+from rotor.thermodynamics.classical_limit import populated_j
 from rotor.thermodynamics.partition_table import partition_facts
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.covariance import Covariance

@@ -20,13 +20,14 @@ from rotor.checks import require_top
 from rotor.classical.gas.correlations import ShortTime, plateau, short_time
 from rotor.classical.gas.ensembles import Correlations, Ensemble, free_gas_correlations, thermal_ensemble
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.estimates.limits import SPIN_LIMITS, model_limits, model_sizes, populated_j
+from rotor.quantum.estimates.limits import SPIN_LIMITS, model_limits, model_sizes
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.statistics.degrees_of_freedom import count_degrees
 from rotor.statistics.equipartition import Equipartition, equipartition
 from rotor.table import TextOf
+from rotor.thermodynamics.classical_limit import populated_j
 from rotor.thermodynamics.classical_onset import classical_above_if_known
 from rotor.tops.facts import top_facts
 

@@ -284,3 +284,15 @@ def _classical_operator(powers: tuple[int, int, int], x: Floats, y: Floats, z: F
     p, q, n = powers
     raised = 2 * ((x + 1j * y) ** (2 * n)).real if n else 1.0
     return np.asarray((x * x + y * y + z * z) ** p * z ** (2 * q) * raised)
+
+
+def populated_j(top: Top, temperature_k: float) -> int:
+    """The most populated J at a temperature: √(kT/2B) - ½ for a linear top, √(kT/B) - ½ for others with B the mean of B and C.
+
+    >>> from rotor.tops.top import Top
+    >>> populated_j(Top.from_constants("B=57635.968 MHz"), 300.0)
+    7
+    """
+    _, b, c = top.rotational_constants_mhz
+    ratio = temperature_k * units.MHZ_PER_K / ((b + c) / 2)
+    return max(1, round(math.sqrt(ratio / 2 if top.kind == "linear" else ratio) - 0.5))

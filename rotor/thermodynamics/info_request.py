@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 from rotor.frozen import dataclass
 from rotor.molecules.readers.sdf_entries import BUILT
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.estimates.limits import limit_facts, populated_j
+from rotor.quantum.estimates.limits import limit_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OBSERVABLES, check_fields, declared
 from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.table import Table
+from rotor.thermodynamics.classical_limit import populated_j
 from rotor.thermodynamics.partition_table import partition_table
 from rotor.tops.constants_budget import constants_budget
 from rotor.tops.facts import top_facts

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.estimates.plans import plan_fields
 from rotor.requests.knob import Knob
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut
+from rotor.thermodynamics.classical_limit import populated_j
 
 TEMPERATURES = Knob(
     key="conditions.temperature",

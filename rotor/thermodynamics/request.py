@@ -11,14 +11,14 @@ from rotor.checks import require_positive, require_top
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.limits import all_limits, limit_facts, populated_j
+from rotor.quantum.estimates.limits import all_limits, limit_facts
 from rotor.quantum.hamiltonian_input import effects_field
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import check_fields, declared
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Custom, Grid, Quantity, Text
 from rotor.table import TextOf
-from rotor.thermodynamics.classical_limit import classical_limit, rotational_temperatures_k
+from rotor.thermodynamics.classical_limit import classical_limit, populated_j, rotational_temperatures_k
 from rotor.thermodynamics.classical_onset import classical_above_if_known
 from rotor.thermodynamics.electronic import ElectronicStates
 from rotor.thermodynamics.functions import (

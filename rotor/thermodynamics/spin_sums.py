@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from rotor import units
 from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.levels import weights_of_levels
 from rotor.quantum.solve import solve_levels
+from rotor.thermodynamics.classical_limit import populated_j
 from rotor.thermodynamics.level_sums import LevelSums, Progress, level_sums, lowest_level_k
 from rotor.thermodynamics.spin_factor import rotational_sum
 from rotor.tops.spins.spin_weights import SpinWeights

@@ -12,8 +12,8 @@ from rotor.checks import require_file
 from rotor.frozen import dataclass
 from rotor.quantum.quanta import headings
 from rotor.reports.line_tables import first_rows_title
-from rotor.reports.screen import Part, Table, record_table, table_records
-from rotor.reports.top_facts import error_facts, hyperfine_lines, left_out_facts, short_source
+from rotor.reports.screen import Part, Table, listed, record_table, table_records
+from rotor.reports.top_facts import error_facts, hyperfine_lines, short_source
 from rotor.requests.field import OUTPUT, REQUIRED, Field, all_fields, declared, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT
@@ -229,20 +229,21 @@ def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
 
 def _limits(answer: EmissionAnswer, with_spins: str) -> list[tuple[str, str]]:
     """Neglected effects: of the source, and the largest of each molecule; of many molecules, those of the largest."""
-    from rotor.quantum.estimates.limits import model_limits, populated_j
+    from rotor.quantum.estimates.limits import model_limits
+    from rotor.thermodynamics.classical_limit import populated_j
 
     request, largest = answer.request, []
     for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):
         limits = model_limits(top, populated_j(top, source.excitation_k), lines.effects) if isinstance(top, Top) else ()
         largest += [(name, limit) for limit in limits[:1]]
     if len(largest) >= MOST_LEFT_OUT:
-        largest.sort(key=lambda pair: -(pair[1].size_mhz or 0.0))
+        largest.sort(key=lambda pair: -(pair[1].size or 0.0))
     shown = largest if len(largest) < MOST_LEFT_OUT else largest[: MOST_LEFT_OUT - 2]
     sentences = ["departures from one excitation temperature; structure of the source in the beam"]
     sentences += [f"{name}: {limit.sentence(with_spins)}" for name, limit in shown]
     if others := [f"{name}: {limit.name}" for name, limit in largest[len(shown) :]]:
         sentences.append(f"smaller or not estimated: {', '.join(others)}")
-    return left_out_facts(sentences)
+    return listed("left out", sentences)
 
 
 def _table(answer: EmissionAnswer, shown: int) -> Table:

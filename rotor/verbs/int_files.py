@@ -126,26 +126,28 @@ def answer_of(request: PredictedRequest) -> SpectrumAnswer:
 
 def write_catalogue(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """Write the catalogue as SPCAT does: with its weights, its zero of energy, and K doublets as two lines."""
-    from rotor.formats.provenance import provenance_record, write_beside
     from rotor.formats.spcat.text.cat import write_cat
 
     prediction = _prediction(answer)
     write_cat(prediction.catalogue, path)
-    record = provenance_record(prediction.lines, dict(report.provenance))
-    write_beside(path, record | {"q": prediction.q, "lines": len(prediction.catalogue)})
+    _write_record(prediction, path, report, q=prediction.q, lines=len(prediction.catalogue))
 
 
 def write_levels(answer: SpectrumAnswer, path: Path, report: Report) -> None:
     """Write the levels as SPCAT lists them."""
     from rotor.formats.atomic_write import write_whole
-    from rotor.formats.provenance import provenance_record, write_beside
     from rotor.formats.spcat.text.egy import format_egy
 
     prediction = _prediction(answer)
-    levels = prediction.levels
-    write_whole(path, format_egy(levels))
-    record = provenance_record(prediction.lines, dict(report.provenance))
-    write_beside(path, record | {"levels": len(levels)})
+    write_whole(path, format_egy(prediction.levels))
+    _write_record(prediction, path, report, levels=len(prediction.levels))
+
+
+def _write_record(prediction: Prediction, path: Path, report: Report, **numbers: float) -> None:
+    """Write the provenance of a file beside it."""
+    from rotor.formats.provenance import provenance_record, write_beside
+
+    write_beside(path, provenance_record(prediction.lines, dict(report.provenance)) | numbers)
 
 
 def _prediction(answer: SpectrumAnswer) -> Prediction:

@@ -262,11 +262,6 @@ class Verb:
         others = () if self.other is None else self.other.outputs
         return (*self.outputs, *(output for output in others if output.name not in names))
 
-    @property
-    def spread(self) -> str:
-        """What --workers shares out, here or in `other`."""
-        return self.workers or ("" if self.other is None else self.other.workers)
-
     def verb_for(self, typed: Collection[str]) -> Verb:
         """This verb, or `other` if one of its options is typed (by identity).
 
@@ -324,10 +319,6 @@ class Verb:
             if table is None
             else json_with_rows(table, self.rows, content)
         )
-
-    def output(self, name: str) -> Output:
-        """A file by its name."""
-        return next(output for output in self.outputs if output.name == name)
 
 
 def verb_of(name: str) -> Verb:

@@ -14,7 +14,6 @@ from rotor.quantum.effects.of_top import spin_effects
 from rotor.quantum.effects.watson import SEMI_RIGID, operators_by_name
 from rotor.quantum.estimates.beyond import next_order
 from rotor.quantum.estimates.left_out import neglected_in_levels, stray_field
-from rotor.quantum.estimates.limits import populated_j
 from rotor.quantum.solve import solve_levels
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
@@ -22,7 +21,7 @@ from rotor.scenes.scene import LevelsScene, parse_scene, read_scene
 from rotor.spectra.numerics import allowed_lines
 from rotor.spectra.spectrum import Spectrum
 from rotor.spectra.widths import doppler
-from rotor.thermodynamics.classical_limit import classical_partition_function
+from rotor.thermodynamics.classical_limit import classical_partition_function, populated_j
 from rotor.thermodynamics.gas_numerics import neglected_in_gas
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants

@@ -8,8 +8,8 @@ from __future__ import annotations
 import inspect
 import os
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Collection, Mapping
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
@@ -33,7 +33,7 @@ from rotor.verbs.outputs import Files, Report
 from rotor.verbs.verb import Verb, Work
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
+    pass
 
 JSON_HELP = "Everything printed, as JSON; - is standard output"
 FILE, COUNT = Text(metavar="FILE"), Text(metavar="N")
@@ -50,10 +50,8 @@ def options_of(verb: Verb) -> dict[str, Field]:
         fields["save_scene"] = Field(FILE, SCENE_HELP, name="save_scene", panel=OUTPUT)
     if any(output.name == "plot" for output in verb.outputs):
         fields |= {name: field for name, field in picture_fields().items() if name not in _left_out(verb)}
-    if verb.spread:
-        fields["workers"] = Field(
-            COUNT, f"Processes over which {verb.spread} are spread", name="workers", panel=NUMERICS
-        )
+    if spread := verb.workers or (verb.other and verb.other.workers):
+        fields["workers"] = Field(COUNT, f"Processes over which {spread} are spread", name="workers", panel=NUMERICS)
     return fields if verb.has_scenes else {name: replace(field, common=True) for name, field in fields.items()}
 
 
@@ -206,12 +204,11 @@ def run_verb(
     extras = {each.option: texts[each.option] for each in verb.extras if each.files is None and each.option in texts}
     entries = Entries({**fields_of_extras(verb, extras, values.keys()), **values}, "option")
     inputs = values | extras
-    places = with_files(verb, {name: value for name, value in texts.items() if name not in inputs})
+    places, flags = with_files(verb, {name: value for name, value in texts.items() if name not in inputs})
     shown = verb.read_shown(entries)
-    with as_typed(verb, places):
-        files = files_of_options(verb, places)
-        if files.paths:
-            refuse_overwriting(files, inputs)
+    files = files_of_options(verb, places, flags)
+    if files.paths:
+        refuse_overwriting(files, inputs)
     view = picture_settings(verb, places, "plot" in files.paths)
     outputs = {**files.paths, **dict.fromkeys(files.on_screen, ())}
     work = Work(None, shown, outputs, note, True, {"command": str(context.obj)}, view, at_end)
@@ -256,30 +253,16 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
     show_parts(parts)
 
 
-def with_files(verb: Verb, typed: Mapping[str, Any]) -> dict[str, Any]:
-    """The texts by output; options that name several files are replaced by these files."""
+def with_files(verb: Verb, typed: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
+    """The texts by output, those of options that name several files among them, and these options by output, for errors."""
     files: dict[str, Any] = {}
+    flags: dict[str, str] = {}
     for extra in verb.extras:
         if extra.files is not None and extra.option in typed:
-            files |= extra.files(typed[extra.option])
-    return {**files, **typed}
-
-
-@contextmanager
-def as_typed(verb: Verb, typed: Mapping[str, Any]) -> Iterator[None]:
-    """Context in which a ValueError about a file names the option that was typed, which may stand for several files."""
-    try:
-        yield
-    except ValueError as error:
-        flag, text = str(error).partition(" ")[::2]
-        for extra in verb.extras:
-            if (
-                extra.files is not None
-                and any(flag == verb.output(name).flag for name in extra.files(""))
-                and extra.option in typed
-            ):
-                raise ValueError(f"{extra.option} {text}") from None
-        raise
+            named = extra.files(typed[extra.option])
+            files |= named
+            flags |= dict.fromkeys(named.keys() - typed.keys(), extra.option)
+    return {**files, **typed}, flags
 
 
 def withhold(verb: Verb, answer: Any, files: Files) -> None:
@@ -304,8 +287,8 @@ def fields_of_extras(verb: Verb, typed: Mapping[str, Any], others: Collection[st
     return values if verb.read_extras is None else {**values, **verb.read_extras(typed)}
 
 
-def files_of_options(verb: Verb, typed: Mapping[str, Any]) -> Files:
-    """The files to write; ValueError for a suffix or folder in which they cannot be written."""
+def files_of_options(verb: Verb, typed: Mapping[str, Any], flags: Mapping[str, str]) -> Files:
+    """The files to write; ValueError for a suffix or folder in which they cannot be written. flags: options for several files."""
     files = Files(growing={output.name for output in verb.outputs if output.grows})
     for output in verb.outputs:
         paths = typed.get(output.name, ())
@@ -313,7 +296,7 @@ def files_of_options(verb: Verb, typed: Mapping[str, Any]) -> Files:
             files.on_screen.append(output.name)
             continue
         for path in paths if isinstance(paths, tuple) else (paths,):
-            files.add(output.name, output.flag, path, output.suffixes)
+            files.add(output.name, flags.get(output.name, output.flag), path, output.suffixes)
     if "save_scene" in typed:
         files.add("save_scene", "--save-scene", typed["save_scene"], (".toml",))
     if typed.get("json") == "-":
@@ -349,13 +332,12 @@ def working(verb: Verb, workers: Any) -> Any:
     """The executor of --workers; None for a verb without this option."""
     if not verb.workers:
         return nullcontext()
+    from rotor.cli.shared.workers import MOST_WORKERS
     from rotor.cli.shared.workers import working as pool
     from rotor.requests.readers import Whole
 
     with within("--workers"):
-        count = Whole().read(workers)
-    executor: Executor | Any = pool(count, verb.workers.split()[0])
-    return executor
+        return pool(Whole(1, MOST_WORKERS).read(workers), verb.workers.split()[0])
 
 
 def scene_writer(outcome: Outcome, typed: Mapping[str, Any]) -> Any:

@@ -14,14 +14,9 @@ MOST_WORKERS = 256
 
 @contextmanager
 def working(workers: int, what: str) -> Iterator[Executor | None]:
-    """An executor with a bar on standard error; None for one worker without a terminal.
-
-    Raises ValueError for fewer than one worker, and for more than 256.
-    """
+    """An executor with a bar on standard error; None for one worker without a terminal."""
     import sys
 
-    if not 1 <= workers <= MOST_WORKERS:
-        raise ValueError(f"--workers: {workers}: a whole number from 1 to {MOST_WORKERS} is expected")
     terminal = sys.stderr.isatty()
     if workers == 1:
         with progress_bar(what) if terminal else _nothing() as advance:

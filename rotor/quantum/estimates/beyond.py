@@ -38,6 +38,11 @@ class Limit:
     at_most: bool = False
     levels: str = ""
 
+    @property
+    def size(self) -> float | None:
+        """The size in MHz, as that of `rotor.requests.plan.LeftOut`."""
+        return self.size_mhz
+
     def sentence(self, with_spins: str = COMPUTE) -> str:
         """Name, size and consequence, as reports print them. with_spins: how the effects of spins are added."""
         estimate = "not estimated" if self.size_mhz is None else f"about {two_digits(self.size_mhz)} MHz"

@@ -52,18 +52,6 @@ AMMONIA_MHZ, HEAVY_AMMONIA_MHZ = (
 )
 
 
-def populated_j(top: Top, temperature_k: float) -> int:
-    """The most populated J at a temperature: √(kT/2B) - ½ for a linear top, √(kT/B) - ½ for others with B the mean of B and C.
-
-    >>> from rotor.tops.top import Top
-    >>> populated_j(Top.from_constants("B=57635.968 MHz"), 300.0)
-    7
-    """
-    _, b, c = top.rotational_constants_mhz
-    ratio = temperature_k * units.MHZ_PER_K / ((b + c) / 2)
-    return max(1, round(math.sqrt(ratio / 2 if top.kind == "linear" else ratio) - 0.5))
-
-
 def model_sizes(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
     """Sizes at one J of the effects of a calculation and of those that it neglects, largest first."""
     return sorted([*effect_sizes(top, j, effects), *absent_sizes(top, effects)], key=lambda effect: -effect.size_mhz)

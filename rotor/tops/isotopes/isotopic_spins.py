@@ -19,6 +19,7 @@ from rotor.arrays import Floats
 from rotor.frozen import dataclass
 from rotor.molecules.nuclei import Isotope
 from rotor.tops.spins.spin_constants import SpinConstants, spin_names
+from rotor.tops.spins.tensor_elements import chi_tensor
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
@@ -132,29 +133,6 @@ def _ratio(new: float | None, old: float | None, what: str, change: _Change) -> 
             f"{what} of {change.new.label} or {change.old.label} is not known: give the constants of this isotopologue"
         )
     return new / old
-
-
-def chi_tensor(chi: Mapping[str, float]) -> Floats:
-    """Traceless tensor (3, 3) along a, b, c from chi_aa, chi_bb-cc, ...; chi_aa alone gives -½ chi_aa along b and c.
-
-    >>> chi_tensor({"chi_aa": 2.0, "chi_bb-cc": 1.0}).diagonal().tolist()
-    [2.0, -0.5, -1.5]
-    """
-    tensor = np.zeros((3, 3))
-    for name, value in chi.items():
-        letters = name.removeprefix("chi_")
-        first, _, second = letters.partition("-")
-        i, k = ("abc".index(letter) for letter in first)
-        if second:
-            j = "abc".index(second[0])
-            tensor[i, i] += value / 2
-            tensor[j, j] -= value / 2
-        elif i == k:
-            # axial about one axis, without a trace: (3 n nᵀ - 1)/2
-            tensor += value * (1.5 * np.outer(np.eye(3)[i], np.eye(3)[i]) - 0.5 * np.eye(3))
-        else:
-            tensor[i, k] = tensor[k, i] = value
-    return tensor
 
 
 def named_chi(tensor: Floats) -> dict[str, float]:

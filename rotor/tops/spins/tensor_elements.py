@@ -17,6 +17,10 @@ import re
 from collections.abc import Mapping
 from math import hypot
 
+import numpy as np
+
+from rotor.arrays import Floats
+
 _TWO_ORDERS = re.compile(r"(?P<tensor>C|eps)_(?P<axes>ba|ca|cb)(?P<rest>(?:_[JKS]+)?\(.*)")
 _SYMMETRIC = re.compile(r"(?P<tensor>chi|T|D)_(?P<axes>ba|ca|cb)(?P<rest>(?:_[JKS]+)?\(.*)")
 
@@ -113,3 +117,26 @@ def in_both_orders(values: dict[str, float], errors: dict[str, float]) -> tuple[
 def _in_short(name: str) -> str:
     """The short form of a name: chi_bb-cc(14N) for chi_bb_minus_cc(14N)."""
     return re.sub(r"^([A-Za-z]+_[abc]{2})_minus_([abc]{2})", r"\1-\2", name)
+
+
+def chi_tensor(chi: Mapping[str, float]) -> Floats:
+    """Traceless tensor (3, 3) along a, b, c from chi_aa, chi_bb-cc, ...; chi_aa alone gives -½ chi_aa along b and c.
+
+    >>> chi_tensor({"chi_aa": 2.0, "chi_bb-cc": 1.0}).diagonal().tolist()
+    [2.0, -0.5, -1.5]
+    """
+    tensor = np.zeros((3, 3))
+    for name, value in chi.items():
+        letters = name.removeprefix("chi_")
+        first, _, second = letters.partition("-")
+        i, k = ("abc".index(letter) for letter in first)
+        if second:
+            j = "abc".index(second[0])
+            tensor[i, i] += value / 2
+            tensor[j, j] -= value / 2
+        elif i == k:
+            # axial about one axis, without a trace: (3 n nᵀ - 1)/2
+            tensor += value * (1.5 * np.outer(np.eye(3)[i], np.eye(3)[i]) - 0.5 * np.eye(3))
+        else:
+            tensor[i, k] = tensor[k, i] = value
+    return tensor

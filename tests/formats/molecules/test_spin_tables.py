@@ -15,9 +15,10 @@ from rotor.formats.spcat.text.cat import read_cat
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.splittings import casimir, splitting_nuclei
 from rotor.spectra.lines import line_list
-from rotor.tops.isotopes.isotopic_spins import chi_tensor, named_chi
+from rotor.tops.isotopes.isotopic_spins import named_chi
 from rotor.tops.isotopes.isotopologues import isotopologue
 from rotor.tops.spins.spin_constants import SpinConstants
+from rotor.tops.spins.tensor_elements import chi_tensor
 
 FILE = """
 name = "something"

@@ -16,10 +16,11 @@ from rotor.molecules.readers.read import read_molecule
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.estimates.limits import VIBRATION_CM, VIBRATION_POWER, model_limits, model_sizes, populated_j
+from rotor.quantum.estimates.limits import VIBRATION_CM, VIBRATION_POWER, model_limits, model_sizes
 from rotor.quantum.estimates.splittings import GRADIENT_MHZ_PER_BARN, GRADIENTS, splitting_nuclei
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Spin
+from rotor.thermodynamics.classical_limit import populated_j
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 
