@@ -10,7 +10,7 @@ element by
 
     ⟨F₁' (N' I)‖T²‖F₁ (N I)⟩ = (-1)^(N'+I+F₁+2) √((2F₁'+1)(2F₁+1)) {N' F₁' I; F₁ N 2} ⟨N'‖T²‖N⟩
 
-(A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, eq. 7.1.7; `spins.coupling.Acting`). The sum over all F of two
+(A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, eq. 7.1.7; `spins.coupling.ChainOperator`). The sum over all F of two
 rotational levels is Π(2I+1) times the strength without spins, since Σ (2F'+1)(2F+1) {N' F' I; F N 2}² = 2I+1. Components that nuclear
 spins form within one rotational level belong to the Rayleigh line and are not listed; components from electron spins are listed.
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from plain_elements import tensor_elements
 
-from rotor.quantum.spins.coupling import Acting
+from rotor.quantum.spins.coupling import ChainOperator
 from rotor.quantum.spins.operators import AxialState
 
 
@@ -14,7 +14,7 @@ def elements_of_parts(up, low, tensors):
     total, scheme = np.zeros((len(up.vectors), len(low.vectors))), up.spins.shared.scheme
     if not abs(up.twice_total - low.twice_total) <= 2 <= up.twice_total + low.twice_total:
         return total
-    vector = Acting((), 1, scalar=False)
+    vector = ChainOperator((), 1, scalar=False)
     if scheme.equivalent:
         (bra, left), (ket, right) = (scheme.recoupling(block.twice_total) for block in (up, low))
         t = left.T @ vector.coefficients(scheme.twice, bra[:, None], ket) @ right

@@ -78,6 +78,8 @@ class ContractedTorsion:
 
     def tables(self, operator: Operator | None, change: int) -> Floats:
         """⟨K + change, t'|o|K t⟩ as (K, t', t), zero where K + change is beyond k_max."""
+        if operator is None and not change:
+            return np.broadcast_to(np.eye(self.count), (len(self.energies), self.count, self.count))
         tables = np.zeros((len(self.energies), self.count, self.count))
         first, last = max(0, -change), len(tables) - max(0, change)
         source = self.vectors[first:last]

@@ -12,17 +12,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Ints
 from rotor.quantum.basis.elements import ROUND_OFF, Elements
 from rotor.quantum.basis.labelled import Basis, rotation_labels
 from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product
-from rotor.quantum.operators.algebra import Operator
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +96,8 @@ class TorsionRotation:
             if np.iscomplexobj(plain.values):
                 raise ValueError("functions of K and -K are combined for real operators only")
             return self._gathered(len(terms), *self._folded(terms, plain, (rank + time_odd) % 2))
-        tables = _Tables(self.torsion)
         change = self._k(plain.rows) - self._k(plain.columns)
-        values = self._values(terms, plain, np.arange(len(change)), change, tables)
+        values = self._values(terms, plain, np.arange(len(change)), change)
         rows, columns = self._rows[0][plain.rows], self._rows[0][plain.columns]
         return self._gathered(len(terms), rows, columns, values)
 
@@ -118,11 +116,9 @@ class TorsionRotation:
     def _k(self, rows: Ints) -> Ints:
         return self.rotation.labels["K"][rows]
 
-    def _values(
-        self, terms: Sequence[Sequence[Product]], plain: Elements, chosen: Ints, change: Ints, tables: _Tables
-    ) -> NDArray[Any]:
+    def _values(self, terms: Sequence[Sequence[Product]], plain: Elements, chosen: Ints, change: Ints) -> NDArray[Any]:
         """Values (terms, entries, t', t) of chosen entries of the rotation, whose K changes by `change`."""
-        size = self.torsion.count
+        size, tables = self.torsion.count, cache(self.torsion.tables)
         values = np.zeros((len(terms), len(chosen), size, size), dtype=plain.values.dtype)
         source = self._k(plain.columns[chosen]) + self.torsion.k_max
         for step in np.unique(change).tolist():
@@ -133,7 +129,7 @@ class TorsionRotation:
                     elements = plain.values[number, chosen[here]]
                     number += 1
                     if elements.any():
-                        values[i, here] += elements[:, None, None] * tables.of(factor.torsion, step)[source[here]]
+                        values[i, here] += elements[:, None, None] * tables(factor.torsion, step)[source[here]]
         return values
 
     def _folded(
@@ -148,7 +144,7 @@ class TorsionRotation:
         rows, columns = plain.rows[chosen], plain.columns[chosen]
         k_row, k_column = self._k(rows), self._k(columns)
         j_row, j_column = self.rotation.labels["J"][rows], self.rotation.labels["J"][columns]
-        values = self._values(terms, plain, chosen, k_row - k_column, _Tables(self.torsion))
+        values = self._values(terms, plain, chosen, k_row - k_column)
         weight = np.where(k_column > 0, np.sqrt(2), 1.0) * np.where(k_row != 0, np.sqrt(0.5), 1.0)
         target = self.rotation.rows({"J": j_row, "K": np.abs(k_row)})
         odd = (j_row + j_column + parity) % 2  # whether the sign s changes
@@ -188,24 +184,3 @@ class TorsionRotation:
         scale = ROUND_OFF * np.abs(flat).max(axis=1, keepdims=True, initial=0.0)
         retained = np.flatnonzero((np.abs(flat) > scale).any(axis=0) & (r >= 0) & (c >= 0))
         return Elements(len(self.plain_labels["J"]), r[retained], c[retained], flat[:, retained])
-
-
-class _Tables:
-    """Torsional matrices by operator and change of K, each computed once."""
-
-    def __init__(self, torsion: ContractedTorsion) -> None:
-        self._torsion = torsion
-        self._cache: dict[tuple[Operator | None, int], Floats] = {}
-
-    def of(self, operator: Operator | None, step: int) -> Floats:
-        """⟨K + step, t'|o|K t⟩ as (K, t', t)."""
-        key = operator, step
-        if key not in self._cache:
-            unit = operator is None and step == 0
-            size = self._torsion.count
-            self._cache[key] = (
-                np.broadcast_to(np.eye(size), (len(self._torsion.energies), size, size))
-                if unit
-                else self._torsion.tables(operator, step)
-            )
-        return self._cache[key]

@@ -244,7 +244,10 @@ def rotor_plan(blocks: list[SolvedBlock], representation: str, scheme: Scheme, t
     contracted = [(by_channel[c], [other for other, first in firsts.items() if first == c]) for c in distinct]
     if hamiltonians:
         contracted.append(([within_blocks(stack, hamiltonians) for stack in stacks], [ALONE]))
-    families = families_of(len(blocks), links_of_stacks(contracted), max(scheme.equivalent, 1))
+    if hamiltonians:  # divided by the exchange later, see `three_equivalent`
+        families = [[(number, 0) for number in range(len(blocks))]]
+    else:
+        families = families_of(len(blocks), links_of_stacks(contracted), max(scheme.equivalent, 1))
     return Plan(Shared(scheme, representation, stacks), blocks, families, contracted)
 
 

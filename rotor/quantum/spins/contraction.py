@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, numbers_in_runs, runs_of_similar_size
 from rotor.quantum.levels import SolvedBlock, SpeciesMoments
-from rotor.quantum.spins.operators import Fixed, Rotor
+from rotor.quantum.spins.operators import AxialState, Fixed, Rotor
 from rotor.quantum.spins.rotor import Piece, acts
 from rotor.quantum.spins.stack_elements import Pairs, Section, both_signs, rotor_elements
 from rotor.quantum.tensors import Tensors, rank_of
@@ -98,8 +98,7 @@ def stacks_of(blocks: Sequence[SolvedBlock], contract: bool = True) -> list[Stac
         sizes = [len(blocks[number].energies_mhz) for number in rising.tolist()]
         whole = not contract or blocks[members[0]].moments is not None  # tables of species have one size anyway
         runs = [slice(None)] if whole else runs_of_similar_size(sizes, _LIKE, _SMALL)
-        make = _stack if isinstance(blocks[members[0]].basis, WangBlock) else _state_stack
-        stacks += [make(blocks, place, rising[run], all_n[rising[run]], sizes[run], contract) for run in runs]
+        stacks += [_stack(blocks, place, rising[run], all_n[rising[run]], sizes[run], contract) for run in runs]
     return stacks
 
 
@@ -113,28 +112,20 @@ def _kinds(blocks: Sequence[SolvedBlock]) -> Iterator[Any]:
             yield block.parts[0].v if block.moments is None else (id(block.moments), basis.place)
 
 
-def _state_stack(
-    blocks: Sequence[SolvedBlock], kind: int, numbers: Ints, n: Ints, sizes: list[int], contract: bool
-) -> Stack:
-    """The stack of these blocks of |N K⟩ or of a species."""
+def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: Ints, n: Ints, sizes: list[int], contract: bool) -> Stack:
+    """The stack of these blocks."""
     members = [blocks[number] for number in numbers.tolist()]
     if members[0].moments is not None:
         return Stack(kind, numbers, n, None, (), None, sizes, members, [False] * len(members))
-    parts = tuple([block.parts[0] for block in members])
-    k = np.array([part.basis.axial_k for part in parts])
-    section = Section(parts[0].v, parts[0].basis, slice(0, 1), parts)
-    vectors = np.ones((len(members), 1, 1)) if contract else None
-    return Stack(kind, numbers, n, k, (section,), vectors, sizes, members, [False] * len(members))
-
-
-def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: Ints, n: Ints, sizes: list[int], contract: bool) -> Stack:
-    """The stack of these blocks of Wang functions."""
-    members = [blocks[number] for number in numbers.tolist()]
-    sections, start = [], 0
+    sections, start = list[Section](), 0
     for parts in zip(*(block.parts for block in members), strict=True):
         largest = max((part.basis for part in parts), key=lambda basis: basis.size)
         sections.append(Section(parts[0].v, largest, slice(start, start + largest.size), parts))
         start += largest.size
+    if isinstance(sections[0].basis, AxialState):
+        k, single = np.array([part.basis.axial_k for part in sections[0].parts]), [False] * len(members)
+        vectors = np.ones((len(members), 1, 1)) if contract else None
+        return Stack(kind, numbers, n, k, tuple(sections), vectors, sizes, members, single)
     single = [
         size == 1 or any(part.basis.size == 1 for part in block.parts)
         for size, block in zip(sizes, members, strict=True)

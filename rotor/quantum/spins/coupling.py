@@ -130,7 +130,7 @@ def _sign(doubled: Ints) -> Floats:
 _RECOUPLED = {0: 1.0, 2: -sqrt(5 / 3)}  # of T^L with the vector of a first spin, as the rank L demands
 
 
-class Acting(NamedTuple):
+class ChainOperator(NamedTuple):
     """T^K(N), of which T^0 is a plain matrix and not a reduced one, with the spins in the places `spins`.
 
     A scalar acts on (i,) the vector of one spin (K = 1), (i, i) its quadrupole (K = 2), (i, j) the product of two, coupled to K = 0

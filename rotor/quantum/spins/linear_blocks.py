@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, runs_of_similar_size
+from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.effect import QuantumEffect
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
-# most numbers in an array of vectors (2 MB), ratio of sizes in it, sizes that all share one
-_PADDED, _LIKE, _SMALL = 1 << 18, 1.5, 24
 Kinds = tuple[int, int, int]  # kinds of both blocks and the distance of their rows
 
 
@@ -267,15 +265,12 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
     tables = function_tables(top, levels.effects, names, levels.blocks[0].spins.shared)
     out = np.zeros((len(levels) + 1, len(names)))  # the last row takes the padding
     for states in groups_of_blocks(levels.blocks, len(levels)):
-        group, sizes = states.group, [len(block.vectors) for block in states.blocks]
-        for run in runs_of_similar_size(sizes, _LIKE, _SMALL, _PADDED):
-            places = np.arange(run.start, run.stop)
-            at, vectors = states.in_group[places], states.vectors(places)
-            over_functions = tables.over_functions(group, at, vectors)
-            total = np.zeros((len(places), vectors.shape[3], len(names)))
-            for acting in tables.acting(group, at):
+        for at, vectors, places in states.runs():
+            over_functions = tables.over_functions(states.group, at, vectors)
+            total = np.zeros((len(at), vectors.shape[3], len(names)))
+            for acting in tables.acting(states.group, at):
                 total[:, :, acting.unit.parameters] += acting.twice * _slopes(acting, over_functions)
-            out[states.rows[run, : vectors.shape[3]]] = total
+            out[places] = total
     return np.asarray(out[:-1][rows])
 
 

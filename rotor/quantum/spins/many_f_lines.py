@@ -4,7 +4,7 @@ An electric moment does not act on spins: its element between two functions is t
 
     ⟨r' p'‖T^K‖r p⟩ = t(p', p) ⟨r'‖T^K‖r⟩,
 
-see `coupling.Acting`, which has the coefficients of magnetic moments of spins too.
+see `coupling.ChainOperator`, which has the coefficients of magnetic moments of spins too.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from rotor.frozen import dataclass
 from rotor.quantum.levels import Connections, SolvedBlock
 from rotor.quantum.spins.blocks import Shared
 from rotor.quantum.spins.contraction import Contracted, tensors_of_stacks
+from rotor.quantum.spins.coupling import ChainOperator
 from rotor.quantum.spins.many_f import (
     Between,
     Coefficients,
@@ -42,6 +43,7 @@ from rotor.quantum.tensors import Tensors, rank_of
 # ratio of sizes of blocks in one array, sizes that all share one, most numbers in it
 _LIKE, _SMALL, _MOST = 1.5, 24, 1 << 20
 _LARGE = 20_000  # elements of a block whose columns are multiplied one kind after another
+_IN_CACHE = 1 << 18  # most numbers in the vectors of a run of blocks: 2 MB
 _IN_MEMORY = 1 << 22  # most numbers in the vectors of a group that lie side by side: 32 MB
 
 
@@ -49,19 +51,15 @@ Operator = Callable[[slice, NDArray[Any], NDArray[Any]], NDArray[Any]]
 """Elements V' X V (blocks, n', n) of a run of its blocks between vectors (blocks, columns, states, n)."""
 
 
-class Acting(NamedTuple):
-    """A moment: its rotational elements, their rank, and the place of the spin that it contains, if any."""
-
-    tables: Tables
-    rank: int
-    spin: int | None = None
+Moment = tuple[Tables, ChainOperator]
+"""Elements of the rotation, and what acts on the spins."""
 
 
 class Moments(NamedTuple):
     """Moments of one rank; those of an inner sequence interfere, squares of the sums are added."""
 
     rank: int
-    sums: Sequence[Sequence[Acting]]
+    sums: Sequence[Sequence[Moment]]
 
 
 class Rows(NamedTuple):
@@ -78,12 +76,16 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class GroupStates:
-    """Solved blocks of a group by rising row. places: index by doubled row. rows: of the levels, (blocks, states)."""
+    """Solved blocks of a group by rising row. rows: of the levels, (blocks, states)."""
 
     group: Group
     blocks: list[SolvedBlock]
-    places: dict[int, int]
     rows: Indices
+
+    @cached_property
+    def places(self) -> dict[int, int]:
+        """Number of each block by doubled row."""
+        return {block.spins.twice_row: place for place, block in enumerate(self.blocks)}
 
     @cached_property
     def sizes(self) -> Ints:
@@ -99,6 +101,12 @@ class GroupStates:
     def heights(self) -> Ints:
         """The largest number of states of a rotational block, for each block."""
         return self.group.heights[self.in_group]
+
+    def runs(self) -> Iterator[tuple[Ints, NDArray[Any], Indices]]:
+        """Numbers in the group, vectors and rows of the levels of blocks of similar size."""
+        for run in runs_of_similar_size(self.sizes.tolist(), _LIKE, _SMALL, _IN_CACHE):
+            vectors = self.vectors(np.arange(run.start, run.stop))
+            yield self.in_group[run], vectors, self.rows[run, : vectors.shape[3]]
 
     def vectors(self, places: Ints) -> NDArray[Any]:
         """Vectors (blocks, columns, rotational states, states) of some blocks."""
@@ -131,7 +139,7 @@ def tensor_moments(shared: Shared, tensors: Tensors) -> Moments:
     """A tensor of the molecule by pairs of states."""
     rank, frame = rank_of(tensors), shared.cache["frame"]
     elements = tensors_of_stacks(shared.stacks, tensors, shared.representation)
-    return Moments(rank, [[Acting(tables_of(elements, frame), rank)]])
+    return Moments(rank, [[(tables_of(elements, frame), ChainOperator((), rank, scalar=False))]])
 
 
 def amplitudes_of_groups(
@@ -192,22 +200,18 @@ def _between_blocks(
 
 def groups_of_blocks(blocks: Sequence[SolvedBlock], levels: int) -> list[GroupStates]:
     """The groups in which blocks were solved with these blocks; levels: the row of padding."""
-    members: dict[int, tuple[list[SolvedBlock], list[int]]] = {}
-    rows = np.array([block.spins.twice_row for block in blocks])
-    for number, row in zip((order := np.argsort(rows, kind="stable")).tolist(), rows[order].tolist(), strict=True):
-        blocks_and_rows = members.setdefault(id(blocks[number].spins.group), ([], []))
-        blocks_and_rows[0].append(blocks[number])
-        blocks_and_rows[1].append(row)
-    return [_states_of_group(*alike, levels) for alike in members.values()]
+    members: dict[int, list[SolvedBlock]] = {}
+    for block in sorted(blocks, key=lambda block: block.spins.twice_row):
+        members.setdefault(id(block.spins.group), []).append(block)
+    return [_states_of_group(alike, levels) for alike in members.values()]
 
 
-def _states_of_group(blocks: list[SolvedBlock], twice_rows: list[int], levels: int) -> GroupStates:
+def _states_of_group(blocks: list[SolvedBlock], levels: int) -> GroupStates:
     """Blocks of one group by rising row."""
     sizes = np.array([len(block.energies_mhz) for block in blocks])
     starts, numbers = np.array([block.start for block in blocks], dtype=np.int32), np.arange(max(sizes), dtype=np.int32)
     rows = np.where(numbers < sizes[:, None], starts[:, None] + numbers, np.int32(levels))
-    group = blocks[0].spins.group
-    return GroupStates(group, blocks, {row: place for place, row in enumerate(twice_rows)}, rows)
+    return GroupStates(blocks[0].spins.group, blocks, rows)
 
 
 def _between(
@@ -220,9 +224,9 @@ def _between(
     chosen = [row for row in chosen if 2 * low.blocks[low.places[row]].spins.twice_f + rise >= 2 * moments.rank]
     sums = [
         [
-            (acting.tables, _coefficients(shared.scheme, frame, acting, rise))
-            for acting in interfering
-            if are_connected(up.group, low.group, step, acting.tables)
+            (tables, _coefficients(shared.scheme, frame, moment, rise))
+            for tables, moment in interfering
+            if are_connected(up.group, low.group, step, tables)
         ]
         for interfering in moments.sums
     ]
@@ -247,9 +251,9 @@ def _between(
             yield Rows(up_rows, low_rows, amplitudes, up is low and not step)
 
 
-def _coefficients(scheme: Scheme, frame: Frame, acting: Acting, rise: int) -> Coefficients:
+def _coefficients(scheme: Scheme, frame: Frame, moment: ChainOperator, rise: int) -> Coefficients:
     """Coefficients of a moment from each doubled F to F + rise: of all patterns, or of each pair of groups where these are many."""
-    arguments = scheme, acting.rank, rise, frame.twice_f[0], frame.twice_f[-1], acting.spin
+    arguments = scheme, moment, rise, frame.twice_f[0], frame.twice_f[-1]
     if scheme.equivalent or len(frame.twice_f) * len(frame.n_patterns) ** 2 <= _IN_MEMORY:
         return coefficients_by_f(tensors_by_f(*arguments), frame)
     return lambda twice_f: partial(column_tensors, *arguments, twice_f)

@@ -16,21 +16,23 @@ from rotor.quantum.levels import Levels
 from rotor.quantum.moments import Moment
 from rotor.quantum.spins.blocks import Shared
 from rotor.quantum.spins.contraction import pieces_in_both_orders
-from rotor.quantum.spins.many_f import tables_of
-from rotor.quantum.spins.many_f_lines import Acting, Moments
+from rotor.quantum.spins.coupling import ChainOperator
+from rotor.quantum.spins.many_f import Tables, tables_of
+from rotor.quantum.spins.many_f_lines import Moments
 from rotor.quantum.spins.operators import Cosines
 from rotor.quantum.spins.rotor import Piece
 
 
 def spin_moments(shared: Shared, moments: Sequence[Moment]) -> Moments:
     """Moments between levels with spins; electric and magnetic, real and imaginary ones do not interfere."""
-    kinds: dict[tuple[bool, bool], list[Acting]] = {}
+    kinds: dict[tuple[bool, bool], list[tuple[Tables, ChainOperator]]] = {}
     for moment in moments:
         piece = Piece(moment.value_debye, moment.rotor, *moment.states, 0, 0)
         elements = pieces_in_both_orders(shared.stacks, [piece], moment.conjugate_sign, shared.representation)
-        place = shared.scheme.place(moment.spin) if moment.spin else None
-        acting = Acting(tables_of(elements, shared.cache["frame"]), moment.rotor.rank, place)
-        kinds.setdefault((moment.electric, moment.imaginary), []).append(acting)
+        place = (shared.scheme.place(moment.spin),) if moment.spin else ()
+        acting = ChainOperator(place, moment.rotor.rank, scalar=False)
+        tables = tables_of(elements, shared.cache["frame"])
+        kinds.setdefault((moment.electric, moment.imaginary), []).append((tables, acting))
     return Moments(1, list(kinds.values()))
 
 

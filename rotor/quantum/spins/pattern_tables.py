@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.spins.coupling import Acting, powers_of_n_dot_s
+from rotor.quantum.spins.coupling import ChainOperator, powers_of_n_dot_s
 from rotor.quantum.spins.rotor import Channel
 from rotor.quantum.spins.scheme import Scheme
 
@@ -71,11 +71,11 @@ def couplings_by_f(scheme: Scheme, channel: Channel, first: int, last: int) -> F
 
     With its powers of N·S; 0 between different conserved sums; for two equivalent spins ½(value ± value with both exchanged).
     """
-    values = _by_f(scheme, Acting(channel.acting, channel.rank), 0, first, last)
+    values = _by_f(scheme, ChainOperator(channel.acting, channel.rank), 0, first, last)
     b = len(scheme.spins) - 1
     exchanged = tuple(sorted({b: b - 1, b - 1: b}.get(place, place) for place in channel.acting))
     if exchanged != channel.acting and scheme.equivalent == 2:
-        turned = _by_f(scheme, Acting(exchanged, channel.rank), 0, first, last)
+        turned = _by_f(scheme, ChainOperator(exchanged, channel.rank), 0, first, last)
         values = _without_round_off((values + channel.exchange * turned) / 2)
     table = pattern_table(scheme, first, last)
     for sums in table.distances[:, scheme.conserved_columns].T:
@@ -89,32 +89,21 @@ def couplings_by_f(scheme: Scheme, channel: Channel, first: int, last: int) -> F
 
 
 @lru_cache(maxsize=64)
-def tensors_by_f(scheme: Scheme, rank: int, step: int, first: int, last: int, acting: int | None = None) -> Floats:
-    """t(p', p) from each F to F + step, (F, patterns', patterns), 0 where there is no F + step; shared and read-only.
-
-    Of a tensor, or of the vector of a spin if one acts (see `coupling`).
-    """
-    moment = _moment(rank, acting)
+def tensors_by_f(scheme: Scheme, moment: ChainOperator, step: int, first: int, last: int) -> Floats:
+    """t(p', p) of a moment from each F to F + step, (F, patterns', patterns), 0 where there is no F + step; shared and read-only."""
     values = _by_f(scheme, moment, step, first, last) * scheme.count_of(moment.spins)
     values.flags.writeable = False
     return values
 
 
 def column_tensors(
-    scheme: Scheme, rank: int, step: int, first: int, last: int, acting: int | None, twice_f: Ints, left: slice,
-    right: slice,
-) -> Floats:  # fmt: skip
+    scheme: Scheme, moment: ChainOperator, step: int, first: int, last: int, twice_f: Ints, left: slice, right: slice
+) -> Floats:
     """Some columns of `tensors_by_f` (twice_f, left, right), without the others; spins are not equivalent."""
-    table = pattern_table(scheme, first, last)
-    return _one_by_one(scheme, _moment(rank, acting), step, table, twice_f, left, right)
+    return _one_by_one(scheme, moment, step, pattern_table(scheme, first, last), twice_f, left, right)
 
 
-def _moment(rank: int, acting: int | None) -> Acting:
-    """A tensor, or the vector of a spin."""
-    return Acting(() if acting is None else (acting,), rank, scalar=False)
-
-
-def _by_f(scheme: Scheme, acting: Acting, step: int, first: int, last: int) -> Floats:
+def _by_f(scheme: Scheme, acting: ChainOperator, step: int, first: int, last: int) -> Floats:
     """Coefficients from each F to F + step, (F, patterns', patterns)."""
     plain = pattern_table(scheme.one_by_one, first, last)
     values = _one_by_one(scheme, acting, step, plain, np.array(list(plain.patterns)))
@@ -143,7 +132,7 @@ def _turns_by_f(scheme: Scheme, first: int, last: int) -> Floats:
 
 
 def _one_by_one(
-    scheme: Scheme, acting: Acting, step: int, table: PatternTable, twice_f: Ints, left: slice = WHOLE,
+    scheme: Scheme, acting: ChainOperator, step: int, table: PatternTable, twice_f: Ints, left: slice = WHOLE,
     right: slice = WHOLE,
 ) -> Floats:  # fmt: skip
     """Coefficients (F, left, right) between patterns coupled one by one, whose distances are alike for all F."""

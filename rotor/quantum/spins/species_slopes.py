@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints, runs_of_similar_size
+from rotor.arrays import Floats, Ints
 from rotor.quantum.levels import Levels, Mixtures, SolvedBlock
 from rotor.quantum.spins.blocks import Shared
 from rotor.quantum.spins.contraction import operators_of_stacks
@@ -28,8 +28,6 @@ from rotor.quantum.spins.rotor import Channels, parameter_channels
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
-
-_LIKE, _SMALL = 1.5, 24  # largest ratio of sizes of blocks in one array, and sizes that all share one
 
 
 def species_derivatives(top: Top, levels: Levels, names: Sequence[str]) -> Floats:
@@ -59,12 +57,9 @@ def slopes_by_spins(blocks: Sequence[SolvedBlock], by_parameter: Sequence[Channe
     number = blocks[-1].start + len(blocks[-1].energies_mhz)
     out = np.zeros((number + 1, len(by_parameter)))  # the last row takes the padding
     for states in groups_of_blocks(blocks, number):
-        for run in runs_of_similar_size(states.sizes.tolist(), _LIKE, _SMALL):
-            places = np.arange(run.start, run.stop)
-            at, vectors = states.in_group[places], states.vectors(places)
+        for at, vectors, rows in states.runs():
             for parameter, terms in enumerate(operators):
-                total = sum(_expectations(states.group, at, vectors, *term, frame) for term in terms)
-                out[states.rows[run, : vectors.shape[3]], parameter] = total
+                out[rows, parameter] = sum(_expectations(states.group, at, vectors, *term, frame) for term in terms)
     return out[:-1]
 
 

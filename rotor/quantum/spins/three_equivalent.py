@@ -20,7 +20,7 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, symmetric_from_lower
 from rotor.quantum.connected import part_numbers
-from rotor.quantum.spins.blocks import Members, Plan, States, diagonalised
+from rotor.quantum.spins.blocks import Members, Plan, States, blocks_of_f, diagonalised
 from rotor.quantum.spins.hamiltonians import hamiltonians
 from rotor.quantum.spins.many_f import groups_of
 from rotor.quantum.spins.parts import PartColumns, SpinPart
@@ -35,11 +35,11 @@ _ZERO = 1e-12  # smaller elements, relative to the largest, are round-off of sum
 
 def allowed_states(plan: Plan, patterns: Mapping[int, Ints], exist: Exist | None) -> tuple[Members, Iterator[States]]:
     """The blocks of all F over allowed functions in which a level exists, and their states."""
-    wholes = [(f, parts) for f, patterns_of_f in patterns.items() if (parts := _parts(plan, patterns_of_f))]
+    all_f, columns = blocks_of_f(plan, patterns)
+    wholes = [(f, columns.block_parts(number)) for number, f in enumerate(all_f.tolist())]
     allowed = [_allowed(plan, patterns[f], parts) for f, parts in wholes]
     found = dict[int, Floats]()
-    columns = PartColumns.from_parts(plan.blocks, [parts for _, parts in wholes])
-    grouped = groups_of(np.array([f for f, _ in wholes], dtype=np.int64), columns, plan.shared.cache["frame"])
+    grouped = groups_of(all_f, columns, plan.shared.cache["frame"])
     sizes = [(len(each.products),) for each in allowed]
     for numbers, matrices in hamiltonians(plan, grouped, sizes, np.zeros(len(wholes))):
         for number, matrix in zip(numbers, symmetric_from_lower(np.tril(matrices)), strict=True):
@@ -69,18 +69,6 @@ def _columns(plan: Plan, members: Sequence[tuple[int, tuple[SpinPart, ...], Allo
     return Members(
         np.array([f for f, *_ in members], dtype=np.int64), parts, names, sizes, counts[0], counts[1], allowed
     )
-
-
-def _parts(plan: Plan, patterns: Ints) -> tuple[SpinPart, ...]:
-    """All solved blocks whose N couples to the F, each with all patterns of its N."""
-    parts, start = [], 0
-    for number, block in enumerate(plan.blocks):
-        rows = np.flatnonzero(patterns[:, 0] == 2 * block.j)
-        if len(rows):
-            stop = start + len(rows) * len(block.energies_mhz)
-            parts.append(SpinPart(number, block, slice(int(rows[0]), int(rows[-1]) + 1), slice(start, stop)))
-            start = stop
-    return tuple(parts)
 
 
 def _allowed(plan: Plan, patterns: Ints, parts: Sequence[SpinPart]) -> Allowed:

@@ -14,7 +14,7 @@ from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.reduced import connections
 from rotor.quantum.spins import Spin, many_f_lines
-from rotor.quantum.spins.coupling import Acting
+from rotor.quantum.spins.coupling import ChainOperator
 from rotor.quantum.spins.pattern_tables import column_tensors, pattern_table
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import body_tensor
@@ -67,8 +67,9 @@ def test_many_patterns_are_not_compared_all_with_all():
     scheme = Scheme(tuple(Spin(name, twice) for name, twice in (("a", 7), ("b", 8), ("c", 1), ("d", 8))))
     table = pattern_table(scheme, 80, 82)
     numbers = slice(0, 40), slice(100, 140)
-    part = column_tensors(scheme, 1, 2, 80, 82, None, np.array([80]), *numbers)[0]
+    vector = ChainOperator((), 1, scalar=False)
+    part = column_tensors(scheme, vector, 2, 80, 82, np.array([80]), *numbers)[0]
     up, low = (table.distances[at, :-1] + f for at, f in zip(numbers, (82, 80), strict=True))
     assert part.any()
-    np.testing.assert_array_equal(part, Acting((), 1, scalar=False).coefficients(scheme.twice, up[:, None], low))
-    assert not column_tensors(scheme, 1, 2, 80, 82, None, np.array([82]), *numbers).any()  # there is no F = 42
+    np.testing.assert_array_equal(part, vector.coefficients(scheme.twice, up[:, None], low))
+    assert not column_tensors(scheme, vector, 2, 80, 82, np.array([82]), *numbers).any()  # there is no F = 42
