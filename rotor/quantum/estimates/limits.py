@@ -6,6 +6,7 @@
 | constants from a geometry only | centrifugal distortion | 4D(J+1)³, D = 4B³/ν² |
 | the same | vibration-rotation difference, B_e - B_0 | δB/B (`zero_point`) · 2B(J+1) |
 | a methyl group beside atoms off its axis | internal rotation | A - E difference of lines (`internal_rotation`); at most F |
+| O-H or S-H whose turn leads to an equal geometry | torsional tunnelling | not estimated |
 | a pyramidal nitrogen with two hydrogens | inversion | at most about 24 GHz, as in NH3; 1.6 GHz, as in ND3, for heavy hydrogens |
 | an odd number of electrons, an odd electronic state | electron spin | its largest known constant, else not estimated |
 | nuclei with spin | spin-rotation and spin-spin coupling | not estimated |
@@ -218,10 +219,46 @@ def _geometry_limits(top: Top, molecule: Molecule, j: int, present: set[str]) ->
     if (nitrogens := _pyramidal_nitrogens(molecule, bonds)) and "interacting states" not in present:
         text = "nitrogen is pyramidal: its levels are pairs that this leaves out; the size is ammonia's, heavier groups have less"
         limits.append(Limit("inversion", max(_inversion_mhz(molecule, near) for near in nitrogens), text, at_most=True))
+    if (bonds_turned := _turning_hydrogens(molecule, bonds)) and "interacting states" not in present:
+        text = f"hydrogen turns about {bonds_turned} to an equal position: levels are pairs or more, by rotor torsion --bond"
+        limits.append(Limit("torsional tunnelling", None, text))
     electrons = sum(nucleus.element_number for nucleus in molecule.nuclei) - molecule.charge
     if (electrons % 2 or molecule.electronic == "odd") and "spin-rotation" not in present:
         limits.append(Limit(ELECTRON_SPIN, molecule.electron_spin_mhz, _MULTIPLETS))
     return limits
+
+
+def _turning_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> str:
+    """The bonds, such as C2-O3, about which the hydrogens of O-H and S-H turn to equal geometries; empty if they do not.
+
+    They do where the other nuclei have symmetry that the molecule lacks. Groups beside a methyl group turn against it: internal rotation.
+    """
+    from rotor.molecules.symmetry.point_group import NEAR, NEAR_UP_TO, find_symmetry
+
+    symbols, turned = molecule.symbols, dict[int, tuple[int, int]]()
+    attached = [sum(symbols[i] == "H" for i in near.tolist()) for near in bonds]
+    for atom, near in enumerate(bonds):
+        if symbols[atom] in ("O", "S") and len(near) == 2 and attached[atom] == 1:
+            hydrogen, other = sorted(near.tolist(), key=lambda i: symbols[i] != "H")
+            if attached[other] < 3:
+                turned[hydrogen] = (other, atom)
+    if not turned or len(symbols) > NEAR_UP_TO:
+        return ""
+    bearers = {atom for _, atom in turned.values()}
+    kinds = [(symbol, i in bearers) for i, symbol in enumerate(symbols)]
+    rest = [i for i in range(len(symbols)) if i not in turned]
+    whole, skeleton = (
+        find_symmetry([kinds[i] for i in rows], molecule.masses_u[rows], molecule.positions_angstrom[rows], NEAR)
+        for rows in (list(range(len(symbols))), rest)
+    )
+    orders = [len(group.rotations) + len(group.improper) for group in (whole, skeleton)]
+    # a linear skeleton has all operations about its axis: only mirror images differ
+    equal = not whole.improper if skeleton.linear else orders[1] > orders[0]
+    names = [
+        "-".join(f"{symbols[i]}{i + 1}" for i in pair)
+        for pair in sorted({(min(pair), max(pair)) for pair in turned.values()})
+    ]
+    return ", ".join(names) if equal else ""
 
 
 def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit:

@@ -76,6 +76,22 @@ def test_the_larger_part_of_the_dipole_decides_which_lines_a_methyl_group_splits
     assert along["internal rotation"] < 1e3 < 1e5 < across["internal rotation"]
 
 
+@pytest.mark.parametrize(
+    ("source", "bonds"),
+    [
+        ("SMILES:OO", "O1-O2"), ("SMILES:CCO", "C2-O3"), ("SMILES:Oc1ccccc1", "O1-C2"), ("SMILES:OCCO", "O1-C2, C3-O4"),
+        ("SMILES:SCC", "S1-C2"), ("H2O2", "O1-O2"),
+        ("SMILES:OC=O", ""), ("SMILES:OCC=O", ""), ("SMILES:OCl", ""), ("SMILES:CO", ""), ("water", ""), ("SMILES:CC(=O)O", ""),
+    ],
+)  # fmt: skip
+def test_hydrogens_that_turn_to_an_equal_position(source, bonds):
+    """Gauche ethanol, phenol and H2O2 have equal minima; a carboxylic acid, HOCl and planar glycolaldehyde have none."""
+    shown = {limit.name: limit.text for limit in model_limits(rotor.read(source), 5, SEMI_RIGID)}
+    assert ("torsional tunnelling" in shown) == bool(bonds)
+    if bonds:
+        assert f"about {bonds} to an equal position" in shown["torsional tunnelling"]
+
+
 def test_an_effect_of_the_calculation_is_not_left_out():
     top, coupling = rotor.read("HCN"), NuclearQuadrupole({"chi_aa(14N)": -4.7}, (Spin("14N", 2),))
     effects = (*SEMI_RIGID, coupling)
