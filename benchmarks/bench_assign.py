@@ -30,7 +30,8 @@ import numpy as np
 from broadband_cases import make_case
 from isotopologue_cases import isotopologue_cases
 
-from rotor.assignment.answer import AssignAnswer, AssignedSpecies, answer_assign
+from rotor.assignment.answer import AssignAnswer, AssignedSpecies
+from rotor.assignment.assign import answer_assign
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.assignment.request import AssignRequest
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.alignment.qutip_objects import solve_windows as solve_windows
     from rotor.alignment.request import AlignRequest as AlignRequest
     from rotor.alignment.request import answer_align as answer_align
-    from rotor.assignment.answer import answer_assign as answer_assign
+    from rotor.assignment.assign import answer_assign as answer_assign
     from rotor.assignment.intensities import fit_intensities as fit_intensities
     from rotor.assignment.peak_finding import pick_peaks as pick_peaks
     from rotor.assignment.request import AssignRequest as AssignRequest

@@ -16,20 +16,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.assignment import _kernels
+from rotor.assignment.grown import LEAST_RATIO, Grown
 from rotor.assignment.growth import (
-    LEAST_RATIO,
     ROUNDS,
     SMALLEST_MHZ,
     WINDOW,
-    Grown,
-    Predicted,
     grown_from,
-    line_slopes,
-    merged_lines,
-    predict,
     prior_weight,
     quartic_prior,
 )
+from rotor.assignment.likelihood import Predicted, line_slopes, merged_lines, predict
 from rotor.assignment.search import DETECTED, SPREAD, Field
 
 CLEAR = 0.999  # least probability of a clear place
@@ -138,8 +135,6 @@ def _places(
     seen: Field, species: Grown, taken: Mask, column: int, least: int, sigma0: float, all_types: bool
 ) -> Places | None:
     """Likelihood of the group at all its places; None where the other lines place it, or do not predict it."""
-    from rotor.assignment import _kernels
-
     constants, covariance = _others(seen, species, taken)
     predicted = predict(seen, species.constants, species.temperature_k)
     scales = np.where(species.ratios > LEAST_RATIO, species.scales, -np.inf)

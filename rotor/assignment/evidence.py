@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rotor.assignment.growth import Grown
+from rotor.assignment.grown import Grown
 
 CERTAIN, LIKELY, NOT_FOUND = "certain", "likely", "not found"
 LEAST_CERTAIN, LEAST_LIKELY = 0.99, 0.5

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment.guesses import Bounds
+from rotor.assignment._kernels import strongest_lines
+from rotor.assignment.bounds import Bounds, sample_tops
 from rotor.assignment.rigid_table import MIXED, RigidTable
 
 STRONGEST = 7  # strongest lines of a type from which families are formed
@@ -39,28 +40,6 @@ class Family:
     lines: Ints
     companions: Ints
     share: float
-
-
-def sample_tops(bounds: Bounds, count: int, rng: np.random.Generator) -> Floats:
-    """A, B, C (count, 3): A and B log-uniform, C between that of a planar molecule and B."""
-    rows = list[Floats]()
-    total = 0
-    low, high = np.log(bounds.low), np.log(bounds.high)
-    for _ in range(200):
-        u = rng.random((4 * count, 3))  # four times as many as needed, since many are rejected
-        a, b = (np.exp(low[i] + (high[i] - low[i]) * u[:, i]) for i in (0, 1))
-        planar = a * b / (a + b)
-        # C lies between planarity and B
-        least, most = np.maximum(planar, bounds.low[2]), np.minimum(b, bounds.high[2])
-        c = least + (most - least) * u[:, 2] ** 1.5  # a power of 1.5: more tops near planarity
-        selected = (a > 1.02 * b) & (c < 0.999 * b) & (most > least)  # nearly symmetric tops are left out
-        rows.append(np.column_stack([a, b, c])[selected])
-        total += len(rows[-1])
-        if total >= count:
-            return np.concatenate(rows)[:count]
-    if not total:
-        raise ValueError("bounds: no A > B > C with 1/C of at most 1/A + 1/B lies within them; widen them")
-    return np.concatenate(rows)
 
 
 def families(
@@ -93,8 +72,6 @@ def families(
     list of Family
         Ordered by greedy cover: families that cover most tops first.
     """
-    from rotor.assignment._kernels import strongest_lines
-
     tops = sample_tops(bounds, samples, rng)
     temperatures = np.exp(rng.uniform(np.log(temperature_k[0]), np.log(temperature_k[1]), len(tops)))
     j = table.quanta[:, 0].astype(np.float64)

@@ -13,76 +13,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field
-from rotor.units import MHZ_PER_K
+from rotor.assignment import _kernels
+from rotor.assignment.grown import LEAST_RATIO, Grown
+from rotor.assignment.likelihood import (
+    best_temperature,
+    joint_ratio,
+    line_errors,
+    line_slopes,
+    merged_lines,
+    predict,
+    type_ratios,
+    variances,
+)
+from rotor.assignment.search import SPREAD, Candidate, Field
 
 SOFTEST_MHZ = 3e6  # 100 cm⁻¹: vibrational wavenumber for the a-priori sizes of quartic constants
 ROUNDS = 24
 WINDOW = 3.5  # standard errors
 MOST_IN_WINDOW = 12  # peaks; a line with more is not matched
-LEAST_RATIO = 3.0  # ln of the likelihood ratio above which a type counts as present
 FEW = 12  # lines up to which a window may hold more chance peaks
 FIRST_CHANCE, LAST_CHANCE, RISE = 0.003, 0.05, 1.6  # this limit with more lines, increasing by round: safe lines first
 SMALLEST_MHZ = 0.003  # smallest standard error of a peak
-BLENDED_MHZ = 0.08  # predicted lines closer than this form one peak
-TEMPERATURES = (0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0, 12.0)
 # smallest share of a peak for an assigned line; the peak does not measure the frequency of a weaker one
 LEAST_SHARE = 0.1
-MOST_LINES = 400
 MOST_OF_TYPE = 60  # strongest lines of a type that tell its intensity while lines are added
-OPEN = 1e-3  # relative standard error above which a constant is not determined
-FEWEST_MOVED = 4  # lines with ΔJ ≠ 0: wrong twins of Q branches had two by chance, right constants five or more
 FIRST_MHZ = 0.05  # standard error of the family's lines, for distortion
 LARGER = (10.0, 40.0)  # factors of the errors when a species is grown again
-SHARP_MHZ = 0.03  # largest standard error of predicted lines used for the temperature
-
-
-@dataclass(frozen=True, eq=False)
-class Predicted:
-    """Predicted lines of all types in the band: row in the table, frequency, ln of relative intensity, type, lower energy."""
-
-    row: Ints
-    frequency: Floats
-    expected: Floats
-    kind: Ints
-    energy: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Grown:
-    """A species with all lines that could be matched.
-
-    constants (8,), covariance (8, 8) in MHz: A, B, C, DJ, DJK, DK, d1, d2. temperature_k. ratios (3,), scales (3,) by type: ln of
-    likelihood ratios and of intensity scales (-inf: absent). rows, peak, residual, share, weight (m,) : assigned lines, their peaks,
-    obs - calc in MHz, share in the peak, weight in the fit (1/MHz²). rms_mhz. evidence : ln of the evidence ratio against chance.
-    start : the root from which it was grown. moved : how many of the peaks have lines with ΔJ ≠ 0, which a change of A + C moves.
-    """
-
-    constants: Floats
-    covariance: Floats
-    temperature_k: float
-    ratios: Floats
-    scales: Floats
-    rows: Ints
-    peak: Ints
-    residual: Floats
-    share: Floats
-    weight: Floats
-    rms_mhz: float
-    evidence: float
-    start: Candidate | None = None
-    moved: int = 0
-
-    @property
-    def determined(self) -> bool:
-        """Whether B and C are known to 0.1 %. Q branches alone do not determine A + C; with few other lines a twin fits as well."""
-        errors = np.sqrt(np.diag(self.covariance)[1:3])
-        return self.moved >= FEWEST_MOVED and bool((errors < OPEN * self.constants[1:3]).all())
-
-    @property
-    def lines(self) -> int:
-        """Number of peaks assigned."""
-        return len(set(self.peak.tolist()))
 
 
 def quartic_sizes(constants: Floats) -> Floats:
@@ -108,40 +64,6 @@ def prior_weight(field: Field, constants: Floats, sizes: Floats) -> Floats:
     # without a stated spread 5 % of each constant
     spread = 0.05 * constants[:3] if field.spread is None else field.spread
     return np.diag(1 / np.concatenate([spread, sizes]) ** 2)
-
-
-def predict(field: Field, constants: Floats, temperature_k: float, most: int = MOST_LINES) -> Predicted:
-    """The strongest lines of each type in the band."""
-    from rotor.assignment import _kernels
-
-    table = field.table
-    size = len(table.upper)
-    energy, row, f, s_nu = np.empty(len(field.jj)), np.empty(size, np.int64), np.empty(size), np.empty(size)
-    _kernels.level_energies(table.levels, table.theta, field.jj, constants, energy)
-    count = _kernels.lines_in_band(
-        table.theta, table.upper, table.lower, table.strength, constants, field.peaks.windows, energy, row, f, s_nu
-    )
-    row, f = row[:count], f[:count]
-    below = energy[table.lower[row]]
-    expected = np.log(s_nu[:count]) - below / (MHZ_PER_K * temperature_k)
-    kind = table.kind[row]
-    selected = np.zeros(count, dtype=bool)
-    for q in range(3):
-        rows = np.flatnonzero(kind == q)
-        if len(rows) > most:
-            # stable: equal strengths keep the order of lines
-            rows = rows[np.argsort(-expected[rows], kind="stable")[:most]]
-        selected[rows] = True
-    return Predicted(row[selected], f[selected], expected[selected], kind[selected], below[selected])
-
-
-def line_slopes(field: Field, rows: Ints, constants: Floats) -> Floats:
-    """∂ν/∂c of lines (rows, 8)."""
-    from rotor.assignment import _kernels
-
-    table = field.table
-    slopes: Floats = _kernels.derivatives(table.levels, table.theta, table.upper, table.lower, rows, constants)
-    return slopes
 
 
 def grow(field: Field, start: Candidate, rounds: int = ROUNDS) -> Grown | None:
@@ -214,52 +136,6 @@ class _Matched:
     scales: Floats
 
 
-def best_temperature(field: Field, constants: Floats, covariance: Floats, sigma0: float) -> float:
-    """The temperature with the largest likelihood ratio, among the given ones or on a grid."""
-    from rotor.assignment import _kernels
-
-    if len(field.temperatures) == 1:
-        return float(field.temperatures[0])
-    lines = predict(field, constants, TEMPERATURES[-1], 4000)  # the highest temperature shows the most lines
-    errors = _errors(line_slopes(field, lines.row, constants), covariance, sigma0)
-    # at least thirty lines, however uncertain
-    sharp = errors <= max(SHARP_MHZ, float(np.partition(errors, min(30, len(errors) - 1))[min(30, len(errors) - 1)]))
-    strength = lines.expected[sharp] + lines.energy[sharp] / (MHZ_PER_K * TEMPERATURES[-1])
-    peaks, best, temperature = field.peaks, -np.inf, TEMPERATURES[0]
-    for t in TEMPERATURES:
-        expected = strength - lines.energy[sharp] / (MHZ_PER_K * t)
-        ratios, _ = _kernels.best_scales(
-            lines.frequency[sharp], expected, lines.kind[sharp], errors[sharp], peaks.frequency_mhz, peaks.log_intensity,
-            peaks.log_density, peaks.log_threshold, SPREAD, DETECTED, 300, 6,
-        )  # fmt: skip
-        if ratios.sum() > best:
-            best, temperature = float(ratios.sum()), t
-    return temperature
-
-
-def _variances(slopes: Floats, covariance: Floats) -> Floats:
-    """gᵀCg of each row g."""
-    # round-off may make a variance of 0 negative
-    return np.asarray(np.maximum(((slopes @ covariance) * slopes).sum(axis=1), 0.0))
-
-
-def _errors(slopes: Floats, covariance: Floats, sigma0: float) -> Floats:
-    """Standard errors of predicted lines, from the constants and from the measurement."""
-    return np.asarray(np.sqrt(_variances(slopes, covariance) + sigma0**2))
-
-
-def _ratios(field: Field, lines: Predicted, errors: Floats, most: int) -> tuple[Floats, Floats]:
-    """Likelihood ratios and scales by type, from the strongest lines of each; errors of lines (lines,)."""
-    from rotor.assignment import _kernels
-
-    peaks = field.peaks
-    ratios: tuple[Floats, Floats] = _kernels.best_scales(
-        lines.frequency, lines.expected, lines.kind, errors, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density,
-        peaks.log_threshold, SPREAD, DETECTED, most, 16,
-    )  # fmt: skip
-    return ratios
-
-
 def _matched(
     field: Field,
     constants: Floats,
@@ -271,59 +147,19 @@ def _matched(
 ) -> _Matched | None:
     """The lines matched to peaks."""
     lines = predict(field, constants, temperature_k)
-    errors = np.minimum(_errors(line_slopes(field, lines.row, constants), covariance, sigma0), 2.0)
-    ratios, scales = _ratios(field, lines, errors, MOST_OF_TYPE)
+    errors = np.minimum(line_errors(line_slopes(field, lines.row, constants), covariance, sigma0), 2.0)
+    ratios, scales = type_ratios(field, lines, errors, MOST_OF_TYPE)
     if not (ratios > LEAST_RATIO).any():
         return None
     merged = merged_lines(field, constants, lines, np.where(ratios > LEAST_RATIO, scales, -np.inf))
     if not len(merged.centre):
         return None
-    variance = _variances(merged.slope, covariance)
+    variance = variances(merged.slope, covariance)
     centre, variance = _predicted_by_others(field, before, merged.main, merged.centre, variance)
     chosen = _nearest(field, centre, merged.height, np.sqrt(variance + sigma0**2), most_chance)
     peak = _without_doubles(chosen, merged.height)[merged.blend]
     mask = (peak >= 0) & (merged.share > LEAST_SHARE)
     return _Matched(merged.row[mask], peak[mask], merged.share[mask], ratios, scales)
-
-
-@dataclass(frozen=True, eq=False)
-class Merged:
-    """Predicted lines of all types, merged into peaks.
-
-    row, share, blend (lines,) : row in the table, share in the peak, index of the peak. centre, height, main (peaks,), slope (peaks, 8) :
-    frequency, ln of the intensity, row of the strongest line, ∂ν/∂c
-    """
-
-    row: Ints
-    share: Floats
-    blend: Ints
-    centre: Floats
-    height: Floats
-    main: Ints
-    slope: Floats
-
-
-def merged_lines(field: Field, constants: Floats, lines: Predicted, scales: Floats) -> Merged:
-    """Predicted lines above the threshold; those closer than the width of a peak are merged."""
-    level = lines.expected + scales[lines.kind]
-    # lines just below the weakest peak may still be seen
-    selected = np.flatnonzero(level > field.peaks.log_threshold - 1.0)
-    # stable: lines of one frequency keep their order
-    selected = selected[np.argsort(lines.frequency[selected], kind="stable")]
-    row, f, level = lines.row[selected], lines.frequency[selected], level[selected]
-    if not len(selected):
-        none = np.zeros(0)
-        return Merged(row, none, row, none, none, row, np.zeros((0, 8)))
-    blend = np.concatenate([[0], np.cumsum(np.diff(f) > BLENDED_MHZ)])
-    starts = np.flatnonzero(np.diff(np.concatenate([[-1], blend])))
-    weight = np.exp(level - level.max())  # relative to the strongest line, so that exp does not overflow
-    total = np.add.reduceat(weight, starts)
-    share = weight / total[blend]
-    strongest = np.lexsort((-share, blend))[starts]
-    slope = np.add.reduceat(share[:, None] * line_slopes(field, row, constants), starts, axis=0)
-    return Merged(
-        row, share, blend, np.add.reduceat(share * f, starts), np.log(total) + level.max(), row[strongest], slope
-    )
 
 
 def _predicted_by_others(
@@ -344,8 +180,6 @@ def _predicted_by_others(
 
 def _nearest(field: Field, centre: Floats, height: Floats, errors: Floats, most_chance: float) -> Ints:
     """The peak matched to each line (lines,), or -1."""
-    from rotor.assignment import _kernels
-
     peaks = field.peaks
     chosen: Ints = _kernels.nearest_peaks(
         centre, height, errors, WINDOW, most_chance, peaks.frequency_mhz, peaks.log_intensity, peaks.log_density, SPREAD,
@@ -374,8 +208,6 @@ def _refitted(
     start: Candidate,
 ) -> tuple[Floats, Floats, float, Grown]:
     """A step of weighted least squares; distant lines have lower weights."""
-    from rotor.assignment import _kernels
-
     peaks = field.peaks
     energy = np.empty(len(field.jj))
     _kernels.level_energies(field.table.levels, field.table.theta, field.jj, constants, energy)
@@ -419,14 +251,14 @@ def with_evidence(field: Field, grown: Grown) -> Grown:
     """
     sigma0 = 1.3 * max(1.4826 * float(np.median(np.abs(grown.residual))), SMALLEST_MHZ)
     lines = predict(field, grown.constants, grown.temperature_k)
-    ratios, scales = _ratios(field, lines, np.full(len(lines.row), sigma0), 2 * MOST_OF_TYPE)
+    ratios, scales = type_ratios(field, lines, np.full(len(lines.row), sigma0), 2 * MOST_OF_TYPE)
     active = ratios > LEAST_RATIO
-    best = _joint_ratio(field, grown.constants, lines, np.where(active, scales, -np.inf), sigma0)
+    best = joint_ratio(field, grown.constants, lines, np.where(active, scales, -np.inf), sigma0)
     for q in np.flatnonzero(active).tolist():
         fewer = active.copy()
         fewer[q] = False
         rest = np.where(fewer, scales, -np.inf)
-        without = _joint_ratio(field, grown.constants, lines, rest, sigma0) if fewer.any() else 0.0
+        without = joint_ratio(field, grown.constants, lines, rest, sigma0) if fewer.any() else 0.0
         if without > best:
             best, active = without, fewer
     centre, sizes = quartic_prior(field, grown.constants)
@@ -444,17 +276,3 @@ def with_evidence(field: Field, grown: Grown) -> Grown:
     return replace(
         grown, ratios=np.where(active, ratios, 0.0), scales=np.where(active, scales, -np.inf), evidence=best + occam
     )
-
-
-def _joint_ratio(field: Field, constants: Floats, lines: Predicted, scales: Floats, sigma0: float) -> float:
-    """ln of the likelihood ratio of the lines of all types; lines of a peak are merged, and each peak is matched once."""
-    from rotor.assignment import _kernels
-
-    merged = merged_lines(field, constants, lines, scales)
-    order = np.argsort(-merged.height, kind="stable")
-    peaks = field.peaks
-    value = _kernels.joint_ratio(
-        merged.centre[order], merged.height[order], np.full(len(order), sigma0), peaks.frequency_mhz, peaks.log_intensity,
-        peaks.log_density, peaks.log_threshold, SPREAD, DETECTED,
-    )  # fmt: skip
-    return float(value)

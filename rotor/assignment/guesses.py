@@ -1,38 +1,13 @@
-"""Bounds of A, B, C, and guesses: numbers, or the conformers of a SMILES by a force field."""
+"""Guesses of A, B, C: numbers, or the conformers of a SMILES by a force field."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from rotor.arrays import Floats
 from rotor.requests.readers import Numbers
 
 PREFIX = "SMILES:"
 WORST = 0.03  # largest median relative error of the constants of a geometry that serves as a guess
-
-
-@dataclass(frozen=True, eq=False)
-class Bounds:
-    """Least and greatest A, B, C in MHz (3,) each."""
-
-    low: Floats
-    high: Floats
-
-    @property
-    def array(self) -> Floats:
-        """A low, A high, B low, ... (6,)."""
-        return np.column_stack([self.low, self.high]).ravel()
-
-    def points(self, kappa: Floats) -> slice:
-        """The part of an increasing grid of κ = (2B-A-C)/(A-C) within the bounds; κ increases with B and decreases with A and C."""
-        (a, b, c), (a2, b2, c2) = self.low, self.high
-        lowest = (2 * b - a2 - c2) / (a2 - c2) if a2 > c2 else -1.0
-        highest = (2 * b2 - a - c) / (a - c) if a > c else 1.0
-        first, last = np.searchsorted(kappa, [lowest, highest])
-        return slice(max(int(first) - 1, 0), min(int(last) + 2, len(kappa)))
 
 
 def guess_values(guess: Any) -> tuple[float, ...]:

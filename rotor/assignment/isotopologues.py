@@ -14,9 +14,12 @@ from itertools import combinations
 import numpy as np
 
 from rotor.arrays import Floats, Ints
+from rotor.assignment import _kernels
+from rotor.assignment.bounds import Bounds
 from rotor.assignment.families import Family
-from rotor.assignment.growth import Grown, Merged, grow, merged_lines, predict
-from rotor.assignment.guesses import Bounds
+from rotor.assignment.grown import Grown
+from rotor.assignment.growth import grow
+from rotor.assignment.likelihood import Merged, merged_lines, predict
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import RigidTable
 from rotor.assignment.search import DETECTED, SPREAD, Candidate, Field, alike
@@ -180,8 +183,6 @@ def _shifts(peaks: PeakList, lines: Merged, three: Ints, expected: Expected) -> 
 
 def _ratio(peaks: PeakList, lines: Merged, visible: Ints, shift: Floats) -> float:
     """ln of the likelihood ratio of the visible lines at shifted constants."""
-    from rotor.assignment import _kernels
-
     centre = lines.centre[visible] + lines.slope[visible, :3] @ shift
     value = _kernels.joint_ratio(
         centre, lines.height[visible], np.full(len(visible), ROUGH_MHZ), peaks.frequency_mhz, peaks.log_intensity,

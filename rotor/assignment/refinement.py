@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.assignment.growth import OPEN, SMALLEST_MHZ, Grown, quartic_sizes
+from rotor.assignment.grown import OPEN, Grown
+from rotor.assignment.growth import SMALLEST_MHZ, quartic_sizes
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import PARAMETERS, RigidTable
 from rotor.fitting.assignment import Assignments, assignments

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rotor.arrays import Floats
-from rotor.assignment.guesses import Bounds, guess_values
+from rotor.assignment.bounds import Bounds
+from rotor.assignment.guesses import guess_values
 from rotor.assignment.peaks import PeakList
-from rotor.molecules.molecule import Molecule
 from rotor.requests.field import check_fields, declared
 from rotor.requests.readers import Custom, Flag, Numbers, Quantity, Whole
 
 if TYPE_CHECKING:
-    from rotor.assignment.growth import Grown
+    from rotor.assignment.grown import Grown
+    from rotor.molecules.molecule import Molecule
 
 LOWEST_MHZ, HIGHEST_MHZ = (500.0, 200.0, 150.0), (20000.0, 12000.0, 9000.0)  # default bounds of A, B, C
 TRIED_K = (1.0, 2.0, 4.0, 8.0)

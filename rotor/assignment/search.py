@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.assignment import _kernels
+from rotor.assignment._sweep import sweep
+from rotor.assignment.bounds import Bounds
 from rotor.assignment.families import SAME_PEAK_MHZ, Family
-from rotor.assignment.guesses import Bounds
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.rigid_table import MIXED, RigidTable
 
@@ -104,8 +106,6 @@ class Field:
 
 def search_roots(field: Field, family: Family, seeds: Ints, need: int) -> Floats:
     """Roots of a family (n, 5): hits, misses, A, B, C."""
-    from rotor.assignment._sweep import sweep
-
     table = field.table
     # the line with the largest change of J first: two Q branches alone do not give ½(A+C)
     lines = family.lines[np.argsort(-np.abs(_jj_change(field, family.lines)), kind="stable")]
@@ -153,8 +153,6 @@ def quick_ratios(field: Field, tops: Floats, kind: int, least: float = 0.0) -> t
 
     least : of a ratio of one type that matters; lower ones count as 0.
     """
-    from rotor.assignment import _kernels
-
     table, peaks = field.table, field.peaks
     lines = table.with_type(kind)
     ratios: tuple[Floats, Floats] = _kernels.quick_ratios(

@@ -11,9 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.assignment import _kernels
+from rotor.assignment.bounds import Bounds
 from rotor.assignment.families import Family
-from rotor.assignment.growth import LEAST_RATIO, Grown, grow, line_slopes, predict, regrown
-from rotor.assignment.guesses import Bounds
+from rotor.assignment.grown import LEAST_RATIO, Grown
+from rotor.assignment.growth import grow, regrown
+from rotor.assignment.likelihood import line_slopes, predict
+from rotor.assignment.peaks import peak_list
 from rotor.assignment.rigid_table import MIXED, RigidTable
 from rotor.assignment.search import Candidate, Field, alike, quick_ratios, ranked, search_roots
 
@@ -129,8 +133,6 @@ def _finished(seen: Field, grown: list[Grown], candidates: list[Candidate]) -> l
 @lru_cache(maxsize=1)
 def compiled(table: RigidTable) -> bool:
     """Load the compiled loops by a search of five peaks, so that the time limit does not include the compiler."""
-    from rotor.assignment.peaks import peak_list
-
     peaks = peak_list([9000.0, 9500.0, 10000.0, 10100.0, 11000.0], np.ones(5), 0.1)
     seen = Field(peaks, table, Bounds(np.array([2.0e3, 500, 400]), np.array([4.0e3, 2e3, 2e3])), np.array([2.0, 4.0]))
     low = _lowest_a_lines(seen)
@@ -218,8 +220,6 @@ def _multiple_row(low: Ints, upper: Ints, row: int, ratio: float) -> int:
 
 def _fitted_top(seen: Field, top: Floats, lines: Ints, frequency: Floats) -> Floats:
     """A, B, C near `top` from lines with their frequencies, by least squares."""
-    from rotor.assignment import _kernels
-
     constants, energy = np.concatenate([top, np.zeros(5)]), np.empty(len(seen.jj))
     for _ in range(3):
         if not constants[0] > constants[1] > constants[2] > 0:
@@ -258,8 +258,6 @@ def _mirrored_row(table: RigidTable, row: int) -> int | None:
 
 def _shifted(seen: Field, start: Floats, present: NDArray[np.bool_], slow: Ints) -> list[Candidate]:
     """Candidates A + x, B + x, C + x; present : types of lines (3,). slow : lines of Q branches that the candidates begin with."""
-    from rotor.assignment import _kernels
-
     table, constants = seen.table, start.copy()
     energy = np.empty(len(seen.jj))
     _kernels.level_energies(table.levels, table.theta, seen.jj, constants, energy)

@@ -97,7 +97,7 @@ class SpectrumFile(SubjectKind):
 
 def answer(request: AssignRequest, work: Work) -> AssignAnswer:
     """The species that the search finds."""
-    from rotor.assignment.answer import answer_assign
+    from rotor.assignment.assign import answer_assign
 
     return answer_assign(request)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rotor.assignment.answer import answer_assign
 from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.peaks import PeakList
 from rotor.assignment.request import AssignRequest
@@ -21,6 +20,8 @@ USUAL_SECONDS, MOST_SECONDS = 20.0, 600.0
 
 def search(spectrum: ObservedSpectrum, message: Mapping[str, Any], peaks: PeakList | None = None) -> Any:
     """Run `rotor assign` on the peaks of a spectrum. The message has species (1 to 5), seconds, temperature_k."""
+    from rotor.assignment.assign import answer_assign
+
     count = int(read_number(message, "species", above=0, default=1))
     seconds = min(read_number(message, "seconds", above=0, default=USUAL_SECONDS), MOST_SECONDS)
     temperature = read_number(message, "temperature_k", above=0) if message.get("temperature_k") is not None else None

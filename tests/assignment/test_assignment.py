@@ -15,9 +15,10 @@ from assignment_cases import BAND, SECOND, TRUTH, is_right, lines_of, spectrum
 from places import SHARED
 
 import rotor
-from rotor.assignment.answer import AssignAnswer, answer_assign
+from rotor.assignment.answer import AssignAnswer
+from rotor.assignment.assign import answer_assign
+from rotor.assignment.bounds import Bounds
 from rotor.assignment.growth import prior_weight
-from rotor.assignment.guesses import Bounds
 from rotor.assignment.peaks import PeakList, peak_list, spurs
 from rotor.assignment.request import AssignRequest
 from rotor.assignment.rigid_table import PARAMETERS

@@ -9,8 +9,8 @@ import pytest
 
 from rotor.arrays import Floats
 from rotor.assignment import _kernels, _sweep
+from rotor.assignment.bounds import Bounds
 from rotor.assignment.families import families
-from rotor.assignment.guesses import Bounds
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.assignment.rigid_table import JMAX, rigid_table
 from rotor.assignment.search import (

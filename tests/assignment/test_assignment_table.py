@@ -9,10 +9,11 @@ import pytest
 
 import rotor
 from rotor.assignment import _kernels
+from rotor.assignment.bounds import Bounds, sample_tops
 from rotor.assignment.evidence import probability, word
-from rotor.assignment.families import families, sample_tops
-from rotor.assignment.growth import FEWEST_MOVED, Grown, line_slopes, predict
-from rotor.assignment.guesses import Bounds
+from rotor.assignment.families import families
+from rotor.assignment.grown import FEWEST_MOVED, Grown
+from rotor.assignment.likelihood import line_slopes, predict
 from rotor.assignment.peaks import peak_list
 from rotor.assignment.rigid_table import JMAX, PARAMETERS, rigid_table
 from rotor.assignment.search import Field

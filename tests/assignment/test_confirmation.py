@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from assignment_cases import BAND, SECOND, lines_of
 
+from rotor.assignment.bounds import Bounds
 from rotor.assignment.confirmation import _line_scales, confirmed
 from rotor.assignment.evidence import differs
 from rotor.assignment.families import Family
-from rotor.assignment.growth import Grown, grow, line_slopes, predict, prior_weight, quartic_sizes
-from rotor.assignment.guesses import Bounds
+from rotor.assignment.grown import Grown
+from rotor.assignment.growth import grow, prior_weight, quartic_sizes
+from rotor.assignment.likelihood import line_slopes, predict
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.assignment.rigid_table import PARAMETERS, rigid_table
 from rotor.assignment.search import Candidate, Field

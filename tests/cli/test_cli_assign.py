@@ -11,7 +11,7 @@ import pytest
 from assignment_cases import BAND, TRUTH, is_right, lines_of, spectrum
 
 import rotor
-from rotor.assignment.answer import answer_assign
+from rotor.assignment.assign import answer_assign
 from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.request import AssignRequest
 from rotor.formats.peak_files import read_peaks
