@@ -69,13 +69,6 @@ def draw(answer: SceneAnswer, path: Path, report: Report) -> None:
     plot_work_precision(panels_of(answer.result), path, title=title, facts=facts)
 
 
-def write_rows(answer: SceneAnswer, path: Path, report: Report) -> None:
-    """The table as a file."""
-    from rotor.formats import write
-
-    write(answer.result, path)
-
-
 def show(answer: SceneAnswer, _: Any) -> Iterable[Part | None]:
     """A table for each knob, then the references and remarks."""
     table: WorkPrecision = answer.result
@@ -101,9 +94,10 @@ VERB = Tool(
     request=AccuracyRequest,
     of="scene",
     answer=answer,
+    table=lambda answer: answer.result,
     show=show,
     outputs=(
-        Output("csv", (".csv",), "All settings with error and time", write_rows),
+        Output("csv", (".csv",), "All settings with error and time"),
         Output("plot", PICTURES, "Error against time, one panel for each knob", draw),
     ),
     stepwise=True,

@@ -138,8 +138,21 @@ class SweepRun:
 
     @property
     def failure(self) -> str:
-        """The failed points, grouped by reason."""
-        return _failures(self.result, self.record) if self.result.failed else ""
+        """The failed points, grouped by reason; empty without any."""
+        from rotor.scenes.sweep.points import text_of
+
+        result, reasons = self.result, dict[str, list[str]]()
+        for point in result.failed:
+            reasons.setdefault(point["error"], []).append(text_of(point["values"]))
+        if not reasons:
+            return ""
+        listed = [
+            f"{'; '.join(points[:SHOWN_OF_REASON])}{' and others' if len(points) > SHOWN_OF_REASON else ''}: {reason}"
+            for reason, points in reasons.items()
+        ]
+        more = f"; and {len(listed) - SHOWN} more reasons, see {self.record}" if len(listed) > SHOWN else ""
+        count = f"{counted(len(result.failed), 'point')} of {len(result)} failed (--retry-failed runs them again)"
+        return f"{count}: {' | '.join(listed[:SHOWN])}{more}"
 
     def facts(self) -> dict[str, Any]:
         """Points computed now and points that failed."""
@@ -266,24 +279,6 @@ def _summary(result: SweepResult, record: str, seconds: float) -> str:
     parts += [f"{before} done before ({record})"] if before else []
     parts += [f"{len(result.failed)} failed"] if result.failed else []
     return f"{counted(len(result), 'point')}: {', '.join(parts)}"
-
-
-def _failures(result: SweepResult, record: str) -> str:
-    """The failed points, grouped by reason."""
-    from rotor.scenes.sweep.points import text_of
-
-    reasons: dict[str, list[str]] = {}
-    for point in result.failed:
-        reasons.setdefault(point["error"], []).append(text_of(point["values"]))
-    listed = [
-        f"{'; '.join(points[:SHOWN_OF_REASON])}{' and others' if len(points) > SHOWN_OF_REASON else ''}: {reason}"
-        for reason, points in reasons.items()
-    ]
-    more = f"; and {len(listed) - SHOWN} more reasons, see {record}" if len(listed) > SHOWN else ""
-    hint = "--retry-failed runs them again"
-    return (
-        f"{counted(len(result.failed), 'point')} of {len(result)} failed ({hint}): {' | '.join(listed[:SHOWN])}{more}"
-    )
 
 
 VERB = Tool(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -44,17 +44,16 @@ class OneMolecule(SubjectKind):
     @cached_property
     def fields(self) -> Mapping[str, Field]:  # type: ignore[override]
         """The inputs of a molecule, and further ones."""
-        return {**{field.identity: field for field in FIELDS.values()}, **self._further_fields}
+        return self._with_further(FIELDS)
 
-    @property
-    def _further_fields(self) -> Mapping[str, Field]:
-        return {} if self.further is None else all_fields(self.further)
+    def _with_further(self, names: Iterable[str]) -> Mapping[str, Field]:
+        further = {} if self.further is None else all_fields(self.further)
+        return {FIELDS[name].identity: FIELDS[name] for name in names} | further
 
     @property
     def options(self) -> Mapping[str, Field]:
         """The inputs for which the verb has options."""
-        common = {field.identity: field for name, field in FIELDS.items() if name not in self.without}
-        return {**common, **self._further_fields}
+        return self._with_further(name for name in FIELDS if name not in self.without)
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read the molecule and prepare its top."""

@@ -79,6 +79,10 @@ def test_wrong_arguments_are_named():
         rotor.spectrum("CO", temperature_k=-3)
     with pytest.raises(ValueError, match="expected either"):
         rotor.levels()
+    with pytest.raises(
+        ValueError, match=r"^tolerance_mhz: 1e-13: energies at the highest field"
+    ):  # while it is computed
+        rotor.stark("OCS", fields_kv_per_cm="0:200kV/cm:3", tolerance_mhz=1e-13)
 
 
 def test_notes_of_the_command_are_those_of_the_result(call):

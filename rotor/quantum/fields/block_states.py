@@ -27,6 +27,7 @@ from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.map_request import MapRequest, terms_over
 from rotor.quantum.fields.solver import DENSE, Matrix, Terms, solve_fields, solve_together
 
+ROUND_OFF = 2 * float(np.finfo(np.float64).eps)  # of eigenvalues, relative to the norm of the matrix
 FIRST_BASIS = 64
 HELD = 1 << 17  # most numbers in a temporary array: more leave the cache
 # states solved above a few followed ones, of which the rest may lower one below them; states of one K, which differ in J alone, do
@@ -183,3 +184,10 @@ def _with_mixing(energies: Floats, lowering: Floats) -> Floats:
     with np.errstate(divide="ignore", invalid="ignore"):
         mixed = np.where(gaps > both, both**2 / gaps, both)
     return np.asarray(lowering + mixed.sum(axis=2))
+
+
+def round_off_mhz(terms: Terms, fields: Floats) -> float:
+    """Round-off (MHz) of eigenvalues at any field: LAPACK's are exact for a matrix that differs by a few units in the last place of |H|."""
+    strongest = float(np.abs(fields).max())
+    norms = [strongest**n * np.abs(term).sum(axis=1).max() for n, term in enumerate(terms)]
+    return ROUND_OFF * float(sum(norms))

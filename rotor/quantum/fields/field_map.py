@@ -24,11 +24,19 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import AxialSpace
-from rotor.quantum.fields.block_states import BlockStates, basis_order, count_of, solve_blocks
+from rotor.quantum.fields.block_states import BlockStates, basis_order, count_of, round_off_mhz, solve_blocks
 from rotor.quantum.fields.blocks import FieldBlock
 from rotor.quantum.fields.chains import TOGETHER
 from rotor.quantum.fields.map_request import MapRequest, over, terms_over
-from rotor.quantum.fields.solver import DENSE, SPANNED, Terms, at_fields, derivatives, expectation, spanned_states
+from rotor.quantum.fields.solver import (
+    DENSE,
+    SPANNED,
+    Terms,
+    at_fields,
+    derivatives,
+    expectation,
+    spanned_states,
+)
 from rotor.table import Table
 
 Of = TypeVar("Of")
@@ -38,7 +46,6 @@ HIGHEST_J = 300
 STEP_J = 6
 # a bound below this shows that levels outside the basis cross those of the map as if they were not coupled: labels need none of them
 NARROW_MHZ = 1e-3
-ROUND_OFF = 2 * float(np.finfo(np.float64).eps)  # of eigenvalues, relative to the norm of the matrix
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -225,7 +232,7 @@ def _smallest_of_block(request: MapRequest, lowest: int, highest: int, block: Fi
         states = solve_blocks(request, [(block, terms)], strongest, jmax)[0]
         return float(states.error[:, states.j <= request.j_highest].max()) <= request.tolerance_mhz
 
-    least = _round_off(terms_over(terms, np.sort(basis_order(block, lowest))), strongest)
+    least = round_off_mhz(terms_over(terms, np.sort(basis_order(block, lowest))), strongest)
     if least > request.tolerance_mhz:
         raise ValueError(
             f"tolerance_mhz: {request.tolerance_mhz:g}: energies at the highest field have a round-off of {least:.1e} MHz; give more"
@@ -280,13 +287,6 @@ def _is_small(request: MapRequest, blocks: Sequence[FieldBlock]) -> bool:
     return max(map(len, blocks), default=0) * len(request.fields) * states <= TOGETHER
 
 
-def _round_off(terms: Terms, fields: Floats) -> float:
-    """Round-off (MHz) of eigenvalues at any field: LAPACK's are exact for a matrix that differs by a few units in the last place of |H|."""
-    strongest = float(np.abs(fields).max())
-    norms = [strongest**n * np.abs(term).sum(axis=1).max() for n, term in enumerate(terms)]
-    return ROUND_OFF * float(sum(norms))
-
-
 def _tabulated(request: MapRequest, jmax: int, executor: Executor | None) -> FieldMap:
     """The map with J max of the basis, by block and rank."""
     blocks = blocks_of_map(request, jmax)
@@ -336,7 +336,12 @@ def _columns_of(request: MapRequest, jmax: int, terms: Terms, states: BlockState
         "free_mhz": levels.energy_mhz[states.rows],
         "weight": levels.weight[states.rows],
     }
-    by_block = {"m": block.m, "block": block.label, "copies": block.copies, "round_off_mhz": _round_off(terms, fields)}
+    by_block = {
+        "m": block.m,
+        "block": block.label,
+        "copies": block.copies,
+        "round_off_mhz": round_off_mhz(terms, fields),
+    }
     count = int(listed.sum())
     return {
         "field": np.tile(fields, count),
