@@ -117,6 +117,16 @@ def numbers_in_runs(counts: Ints, firsts: Ints | int = 0) -> tuple[Ints, Ints]:
     return run, np.arange(len(run)) + (firsts - np.cumsum(counts) + counts)[run]
 
 
+def rows_of_keys(table: Ints, keys: Ints) -> Ints:
+    """The rows (n,) of keys (n, k) in a table (m, k) of whole numbers, -1 where there is none.
+
+    >>> rows_of_keys(np.array([[1, 0], [2, 1]]), np.array([[2, 1], [3, 0]])).tolist()
+    [1, -1]
+    """
+    row_of = {tuple(row): number for number, row in enumerate(table.tolist())}
+    return np.array([row_of.get(tuple(key), -1) for key in keys.tolist()], dtype=np.int64)
+
+
 def end_to_end(columns: Sequence[NDArray[Any]]) -> NDArray[Any]:
     """One column of several tables, concatenated; that of a single table is not copied."""
     return np.concatenate(columns) if len(columns) > 1 else columns[0]

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, rows_of_keys
 from rotor.fitting.top_constants import DIPOLES, TopConstants
 from rotor.quantum.basis.state_elements import linear_blocks_of
 from rotor.quantum.effects.stark import StarkRequest, dipole_derivative
@@ -71,10 +71,6 @@ class StarkLevels(LevelModel):
                 return energies, slopes
             jmax += 1
 
-    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """Always 1: states are labelled by the order of energies in their block."""
-        return np.ones(len(self.labels))
-
     def groups(self, request: MapRequest, jmax: int) -> list[Labelled]:
         """The labels grouped by block. Raises MissingLevelsError for labels without a level."""
         space = request.space(jmax + request.margin)
@@ -113,9 +109,7 @@ class StarkLevels(LevelModel):
         m = np.abs(m)
         columns_of_levels = {"j": levels.j, **levels.quanta}
         keys = np.column_stack([columns_of_levels[name] for name in columns])
-        place = {key: row for row, key in enumerate(map(tuple, keys.tolist()))}
-        labels = np.column_stack(list(columns.values())).tolist()
-        return np.array([place.get(tuple(key), -1) for key in labels]), m
+        return rows_of_keys(keys, np.column_stack(list(columns.values()))), m
 
     def _slopes(self, constants: TopConstants, group: Labelled, states: BlockStates, number: Ints) -> Floats:
         """∂E/∂c (labels, names)."""

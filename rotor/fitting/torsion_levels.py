@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, rows_of_keys
 from rotor.fitting.top_constants import TopConstants
 from rotor.quantum.basis.elements import Elements
 from rotor.quantum.internal_rotation.chain_rule import ANGLE, ChainRule, chain_rule, further_operators
@@ -95,7 +95,7 @@ class Spins:
 
 @dataclass(frozen=True, eq=False)
 class TorsionLevels(LevelModel):
-    """Levels of all species by label, for any values of the constants."""
+    """Levels of all species by label, that of the dominant basis state, for any values of the constants."""
 
     names: tuple[str, ...]
     count: int
@@ -137,10 +137,6 @@ class TorsionLevels(LevelModel):
         slopes |= dict(zip(further, direct[:, count:].T, strict=True))
         slopes |= {key: slopes.get(key, 0.0) + slope for key, slope in spin_slopes.items()}
         return values, chain.slopes(self.names, slopes, len(values))
-
-    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """Always 1: levels are labelled by their dominant basis state at any constants."""
-        return np.ones(self.count)
 
     def _solved(self, part: LabelledSpecies, name: str, model: TurningTops) -> SpeciesLevels:
         """The torsion-rotation levels of a species; with spins up to the v_t of predictions, as basis of the hyperfine levels."""
@@ -263,7 +259,7 @@ def _doubled_sums(columns: Mapping[str, Ints], spins: Spins | None, halves: froz
 
 def _label_rows(quanta: Mapping[str, Ints], names: Sequence[str], part: LabelledSpecies, keys: Ints) -> Ints:
     """Indices of the labelled levels among those of a species; MissingLevelsError for labels without a level."""
-    rows = _rows(np.column_stack([quanta[name] for name in names]), keys)
+    rows = rows_of_keys(np.column_stack([quanta[name] for name in names]), keys)
     if (rows < 0).any():
         missing = np.flatnonzero(rows < 0)
         label = ", ".join(f"{name} = {value}" for name, value in zip(names, keys[missing[0]].tolist(), strict=True))
@@ -277,14 +273,3 @@ def _exist(keys: Ints) -> NDArray[np.bool_]:
     """Whether (J, v_t, Ka, Kc) is a valid label: Ka + Kc is J or J + 1."""
     j, vt, ka, kc = keys.T
     return np.asarray((keys >= 0).all(axis=1) & (ka <= j) & (kc <= j) & np.isin(ka + kc - j, (0, 1)) & (vt >= 0))
-
-
-def _rows(table: Ints, keys: Ints) -> Ints:
-    """Indices of keys (m, k) among the rows of a table (n, k) of non-negative integers; -1 if missing."""
-    spans = np.maximum(table.max(axis=0), keys.max(axis=0)) + 1
-    codes, needed = (np.ravel_multi_index(tuple(array.T), tuple(spans.tolist())) for array in (table, keys))
-    order = np.argsort(codes)
-    # a key beyond the last meets the last row, and differs from it
-    place = np.minimum(np.searchsorted(codes[order], needed), len(codes) - 1)
-    rows = order[place]
-    return np.asarray(np.where(codes[rows] == needed, rows, -1))

@@ -113,7 +113,7 @@ def solve_coupled(model: Model, all_j: Sequence[int]) -> list[SolvedBlock]:
     operators = [(v, 0, operators) for v, operators in model.states.items()]
     links = [(0, Link.from_couplings(couplings)) for couplings in _alike(model)]
     terms = StateTerms.from_operators(model.states, operators, links)
-    elements = StateElements(terms, 1, model.representation, vertices)
+    elements = StateElements(terms, 1, vertices)
     by_j: dict[int, list[SolvedBlock]] = {}
     for j in sorted(all_j, reverse=True):
         here = elements.at(j)

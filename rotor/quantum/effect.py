@@ -123,18 +123,15 @@ class EffectSize(NamedTuple):
     present: bool
 
 
-def effect_sizes(
-    top: Top, j: int, present: Sequence[QuantumEffect], absent: Iterable[QuantumEffect] = ()
-) -> list[EffectSize]:
-    """The sizes of effects at one J that are above 0, largest first; `absent` ones are not in the calculation.
+def effect_sizes(top: Top, j: int, effects: Sequence[QuantumEffect]) -> list[EffectSize]:
+    """The sizes of the effects of a calculation at one J that are above 0, largest first.
 
     >>> from rotor.quantum.effects.watson import SEMI_RIGID
     >>> from rotor.tops.top import Top
     >>> [(s.name, round(s.size_mhz, 6)) for s in effect_sizes(Top.from_constants("B=6000 D=0.001 MHz"), 10, SEMI_RIGID)]
     [('rigid rotor', 660000.0), ('centrifugal distortion', 12.1)]
     """
-    sizes = [EffectSize(effect.name or type(effect).__name__, effect.size_mhz(top, j), True) for effect in present]
-    sizes += [EffectSize(effect.name or type(effect).__name__, effect.size_mhz(top, j), False) for effect in absent]
+    sizes = [EffectSize(effect.name or type(effect).__name__, effect.size_mhz(top, j), True) for effect in effects]
     return sorted((size for size in sizes if size.size_mhz > 0), key=lambda size: -size.size_mhz)
 
 

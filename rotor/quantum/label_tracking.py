@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Ints, Workspace
+from rotor.arrays import Floats, Ints, Workspace, rows_of_keys
 from rotor.frozen import dataclass
 from rotor.quantum.labelled import ClosedForm, LevelModel
 from rotor.quantum.linear_stacks import LinearBlock, LinearStack, stack_numbers
@@ -98,7 +98,7 @@ def tracked_blocks(
 ) -> TrackedLevels:
     """The blocks, solved at values of named parameters, in which labels lie, of which there are `count`.
 
-    find: from the number of a block and the names (n, columns) of its states to the places of labels in it, and which states have them.
+    find: from the number of a block and the names (n, columns) of its states to the places of labels that may be in it, and their names.
     """
     tracked, space = list[Tracked](), Workspace()
     for numbers in stack_numbers([block.shape for block, _ in blocks]):
@@ -109,7 +109,11 @@ def tracked_blocks(
             _names(blocks[i][1], stack.matrix(matrices, k), energies[k], vectors[k])
             for k, i in enumerate(numbers.tolist())
         ]
-        tracked_rows = [find(i, names) for i, names in zip(numbers.tolist(), state_names, strict=True)]
+        tracked_rows = list[tuple[Ints, Ints]]()
+        for i, names_of_block in zip(numbers.tolist(), state_names, strict=True):
+            rows, requested = find(i, names_of_block)
+            states = rows_of_keys(names_of_block, requested)
+            tracked_rows.append((rows[states >= 0], states[states >= 0]))
         slopes = stack.slopes(vectors, _padded([states for _, states in tracked_rows], 0), space)
         leading, shares = _leading(members, energies, vectors)
         for place, (rows, states) in enumerate(tracked_rows):
@@ -205,7 +209,9 @@ class _Labelled:
         for b in np.flatnonzero(moved).tolist():
             block = self.tracked[b]
             state_names = _names(block.named, self.stack.matrix(matrices, b), energies[b], vectors[b])
-            states[b, : len(block.rows)] = _states_of(state_names, block.names)
+            states[b, : len(block.rows)] = new = rows_of_keys(state_names, block.names)
+            if (new < 0).any():
+                raise ValueError("a labelled level has no state of its name with these constants")
         return states
 
     @cached_property
@@ -270,15 +276,6 @@ def _counts(leading: Ints, chosen: NDArray[np.bool_], parts: int) -> Ints:
     blocks = len(leading)
     numbers = (leading + parts * np.arange(blocks)[:, None])[chosen]
     return np.bincount(numbers, minlength=blocks * parts).reshape(blocks, parts)
-
-
-def _states_of(state_names: Ints, names: Ints) -> Ints:
-    """Which states have the names, of the names of all."""
-    state_by_name = {tuple(name): state for state, name in enumerate(state_names.tolist())}
-    states = [state_by_name.get(tuple(name), -1) for name in names.tolist()]
-    if min(states) < 0:
-        raise ValueError("a labelled level has no state of its name with these constants")
-    return np.array(states)
 
 
 class AssignedLevels(NamedTuple):
@@ -352,10 +349,6 @@ class TrackedLevels(LevelModel):
             energies[part.rows], derived = part.blocks.levels(values_mhz[part.columns])
             slopes[part.rows[:, None], part.columns] = derived
         return energies, slopes
-
-    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """1 for all levels: labels follow the dominant function at any constants."""
-        return np.ones(self.count)
 
     def _tracked_levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
         if all(np.array_equal(block.start.values_mhz, values_mhz[block.block.parameters]) for block in self.tracked):

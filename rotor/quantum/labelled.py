@@ -49,8 +49,8 @@ class LevelModel(ABC):
         """Energies (levels,) in MHz and their derivatives (levels, names) at constants (names,) in MHz."""
 
     def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """|⟨before|after⟩|² (levels,) of each labelled state at two sets of constants; 1 where vectors do not depend on them."""
-        return np.ones(len(self.levels(after_mhz)[0]))
+        """|⟨before|after⟩|² (levels,) of each labelled state at two sets of constants; a single 1 where labels follow their states."""
+        return np.ones(1)
 
 
 def level_model(constants: Constants, labels: Ints, *, kmax: int | None = None) -> LevelModel:

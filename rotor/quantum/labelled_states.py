@@ -43,7 +43,7 @@ def labelled_states(
         j: [(v, block) for v in states for block in blocks_within(j, representation, limits.get(v))] for j in rows_of_j
     }
     terms = StateTerms.from_effects(top, effects, names, representation)
-    elements = StateElements(terms, len(names), representation, vertices)
+    elements = StateElements(terms, len(names), vertices)
     blocks, inside = list[NamedBlock](), list[Ints]()
     for j, rows in sorted(rows_of_j.items(), reverse=True):
         here = elements.at(j)
@@ -54,13 +54,9 @@ def labelled_states(
                 blocks.append((here.block(members), named(members_here, representation)))
                 inside.append(rows)
 
-    def find(number: int, state_names: Ints) -> tuple[Ints, Ints]:
-        state_of = {tuple(name): state for state, name in enumerate(state_names.tolist())}
-        rows = inside[number]
-        states = np.array([state_of.get(tuple(name), -1) for name in labels[rows, 1:].tolist()], dtype=np.int64)
-        return rows[states >= 0], states[states >= 0]
-
-    return tracked_blocks(names, blocks, len(labels), find, values_mhz)
+    return tracked_blocks(
+        names, blocks, len(labels), lambda number, _: (inside[number], labels[inside[number], 1:]), values_mhz
+    )
 
 
 def by_overlaps(blocks: Sequence[Vertex], representation: str) -> NamedFunctions:

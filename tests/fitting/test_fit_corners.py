@@ -83,7 +83,6 @@ def test_n_of_0_among_large_blocks(monkeypatch):
     values = np.array(list(constants.values.values()))
     energies, slopes = top_levels(constants, labels).levels(values)
     monkeypatch.setattr(labelled_spins, "_LARGE", 0)
-    monkeypatch.setattr(contracted, "_LARGE", 0)
     monkeypatch.setattr(contracted, "_WIDE", np.inf)
     model = top_levels(constants, labels)
     assert not model.tracked

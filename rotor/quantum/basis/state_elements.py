@@ -193,9 +193,7 @@ class LinkElements(NamedTuple):
 class StateElements:
     """Linear blocks over Wang blocks of states: `vertices` by J, each a state v and one of its Wang blocks."""
 
-    def __init__(
-        self, terms: StateTerms, count: int, representation: str, vertices: Mapping[int, Sequence[Vertex]]
-    ) -> None:
+    def __init__(self, terms: StateTerms, count: int, vertices: Mapping[int, Sequence[Vertex]]) -> None:
         """count: of the parameters."""
         self.terms, self._count = terms, count
         self._vertices, self._links = vertices, dict[int, LinkElements]()
@@ -309,19 +307,17 @@ def linear_blocks_of(
 ) -> list[LinearBlock]:
     """The linear blocks of solved blocks of levels, over the functions that their vectors have."""
     terms = StateTerms.from_effects(top, levels.effects, names, str(levels.representation))
-    return blocks_of_terms(terms, len(names), str(levels.representation), blocks)
+    return blocks_of_terms(terms, len(names), blocks)
 
 
-def blocks_of_terms(
-    terms: StateTerms, count: int, representation: str, blocks: Sequence[SolvedBlock]
-) -> list[LinearBlock]:
+def blocks_of_terms(terms: StateTerms, count: int, blocks: Sequence[SolvedBlock]) -> list[LinearBlock]:
     """The linear blocks of so many parameters over the functions of solved blocks."""
     members, by_j = [vertices_of(block) for block in blocks], dict[int, list[int]]()
     for number, vertices_of_block in enumerate(members):
         by_j.setdefault(vertices_of_block[0][1].j, []).append(number)
     # a block may stand there several times, its vertices once
     vertices = {j: list(dict.fromkeys(vertex for i in numbers for vertex in members[i])) for j, numbers in by_j.items()}
-    elements = StateElements(terms, count, representation, vertices)
+    elements = StateElements(terms, count, vertices)
     out: dict[int, LinearBlock] = {}
     for j in sorted(by_j, reverse=True):
         here, number_of = elements.at(j), {vertex: i for i, vertex in enumerate(vertices[j])}

@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 TOLERANCE_MHZ = 1e-6  # error of a level
-_LARGE = 400  # smaller blocks are solved whole, which is then faster
 _WIDE = 0.15  # largest window relative to the spread of energies; a wider one contains too many functions
 _LEAST_RATIO = 10.0  # smallest window relative to the norm of a column of V
 _SPREAD = 0.01  # levels this close, relative to the window, share E₀; the neglected term is χ²(E - E₀)²/W³
@@ -214,19 +213,25 @@ def _eliminated(
 
 
 def contracted_levels(
-    top: Top, effects: tuple[QuantumEffect, ...], levels: Levels, rows: Ints, names: Sequence[str], values_mhz: Floats
+    top: Top,
+    effects: tuple[QuantumEffect, ...],
+    levels: Levels,
+    rows: Ints,
+    names: Sequence[str],
+    values_mhz: Floats,
+    large: int,
 ) -> ContractedLevels | None:
     """Labelled levels, rows of `spins.levels.unmixed_levels` in the order of the answer, as functions of the parameters.
 
-    None where whole blocks are solved faster or V is too large at approximate values of the parameters.
+    None where whole blocks are solved faster, with fewer functions than `large`, or V is too large at approximate values of the parameters.
     """
     chosen = _blocks_with(levels, rows)
-    if max(len(block.energies_mhz) for block, _ in chosen) < _LARGE:
+    if max(len(block.energies_mhz) for block, _ in chosen) < large:
         return None
     shared = levels.blocks[0].spins.shared
     rotors = {part.number: part.rotor for block, _ in chosen for part in block.spins.parts}
     terms = StateTerms.from_effects(top, effects, names, shared.representation)
-    rotations = rotation_blocks(terms, len(names), list(rotors.values()), shared.representation)
+    rotations = rotation_blocks(terms, len(names), list(rotors.values()))
     linear = linear_blocks_of_spins(top, effects, names, [block for block, _ in chosen])
     blocks = tuple(
         (block.spins.parts, matrices, targets) for (block, targets), matrices in zip(chosen, linear, strict=True)

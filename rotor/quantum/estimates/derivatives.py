@@ -3,7 +3,7 @@
     ∂E_i/∂c = ⟨i|∂H/∂c|i⟩
 
 (H. Hellmann, Einführung in die Quantenchemie (1937) 285; R. P. Feynman, Phys. Rev. 56 (1939) 340), where ∂H/∂c is a sum of
-terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊. Their elements over Wang functions are those of fits (`wang.unit_diagonals`); the states of
+terms J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊. Their elements over Wang functions are those of fits (`linear_stacks`); the states of
 blocks of like size are computed together.
 """
 
@@ -15,23 +15,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.arrays import Floats, Workspace, distinct, runs_of_similar_size
-from rotor.quantum.basis.state_elements import linear_blocks_of
+from rotor.arrays import Floats, Workspace, distinct
+from rotor.quantum.basis.state_elements import StateTerms, linear_blocks_of, wang_stacks
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import are_with_spins
 from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
-from rotor.quantum.wang.unit_diagonals import expectations, unit_diagonals
 from rotor.tops.operators import Operators, Powers
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 Rows = NDArray[np.integer]
-
-_AT_ONCE = 1 << 18  # coefficients in memory at a time: 2 MB, which stay in the cache of a core
-_LIKE, _SMALL = 1.5, 8  # largest ratio of sizes of blocks whose vectors share an array, and sizes that all do
 
 
 def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = None, rows: Rows | None = None) -> Floats:
@@ -137,33 +133,29 @@ def _derivatives_of_spherical(top: Top, levels: Levels, names: Sequence[str], ro
 
 def term_expectations(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Floats:
     """⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms) of levels."""
-    j = levels.rotational[rows].astype(float)
-    x = j * (j + 1)
     if "kc" in levels.quanta:
-        units = list(dict.fromkeys((q, n) for _, q, n in terms))
-        by_k = _expectations_of_blocks(levels, units, rows)[:, [units.index((q, n)) for _, q, n in terms]]
-    else:
-        k = levels.quanta["k"][rows].astype(float) if "k" in levels.quanta else np.zeros_like(j)
-        by_k = np.stack([k ** (2 * q) for _, q, _ in terms], axis=1)
-    return np.asarray(by_k * np.stack([x**p for p, _, _ in terms], axis=1))
+        return _expectations_in_blocks(levels, terms, rows)
+    j = levels.rotational[rows].astype(float)
+    k = levels.quanta["k"][rows].astype(float) if "k" in levels.quanta else np.zeros_like(j)
+    return np.stack([(j * (j + 1)) ** p * k ** (2 * q) for p, q, _ in terms], axis=1)
 
 
-def _expectations_of_blocks(levels: Levels, terms: Sequence[tuple[int, int]], rows: Rows) -> Floats:
-    """⟨½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms) of states of Wang blocks."""
+def _expectations_in_blocks(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Floats:
+    """⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms) of states of Wang blocks."""
     if not levels.blocks:
         raise ValueError("these levels were solved without vectors; solve them with vectors=True")
     starts = np.array([block.start for block in levels.blocks])
     numbers = distinct(np.searchsorted(starts, rows, side="right") - 1)
-    blocks = sorted((levels.blocks[i] for i in numbers.tolist()), key=lambda block: block.basis.size)
+    blocks = [levels.blocks[i] for i in numbers.tolist()]
+    of_terms = StateTerms.from_operators([0], [(0, i, {powers: 1.0}) for i, powers in enumerate(terms)], ())
     out, space = np.empty((len(levels), len(terms))), Workspace()
-    for run in runs_of_similar_size([block.basis.size for block in blocks], _LIKE, _SMALL, _AT_ONCE):
-        alike = blocks[run]
-        sizes = [block.basis.size for block in alike]
-        diagonals = unit_diagonals([block.basis for block in alike], sizes, terms)
-        vectors = np.zeros((len(alike), sizes[-1], sizes[-1]))
+    for positions, stack in wang_stacks([block.basis for block in blocks], of_terms, len(terms)):
+        alike = [blocks[i] for i in positions.tolist()]
+        vectors = np.zeros((len(alike), stack.size, stack.size))
         for place, block in enumerate(alike):
-            vectors[place, : sizes[place], : sizes[place]] = block.vectors
-        total = expectations(diagonals, vectors, space)
+            vectors[place, : block.basis.size, : block.basis.size] = block.vectors
+        states = np.broadcast_to(np.arange(stack.size), vectors.shape[:2])
+        total = stack.slopes(vectors, states, space)
         for place, block in enumerate(alike):
-            out[block.start : block.start + sizes[place]] = total[place, : sizes[place]]
+            out[block.start : block.start + block.basis.size] = total[place, : block.basis.size]
     return out[rows]

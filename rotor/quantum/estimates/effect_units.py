@@ -63,28 +63,19 @@ def unit_levels(
     units = list(_named_blocks(top, levels, names, blocks, functions, naming, spin_naming))
     inside = [np.flatnonzero(block_of_row == number) for number in numbers]
 
+    quanta = np.stack([levels.quantum("v"), levels.quantum("ka"), levels.quantum("kc")], axis=1)
+
     def find(place: int, names: Ints) -> tuple[Ints, Ints]:
-        """Rows of the labels in a block, and the states that have these labels."""
+        """Rows of the labels in a block, and their names."""
         block, rows_of_block = blocks[place], inside[place]
+        states = rows[rows_of_block] - block.start
         if spin_naming:
-            return rows_of_block, rows[rows_of_block] - block.start
-        state_of = {tuple(name): state for state, name in enumerate(names.tolist())}
+            return rows_of_block, names[states]
         if functions and block.spins:
-            requested = _names_by(block, *functions(block))[rows[rows_of_block] - block.start]
-        else:
-            requested = (
-                _quanta(levels)[rows[rows_of_block]]
-                if functions or naming
-                else _names(block)[rows[rows_of_block] - block.start]
-            )
-        return rows_of_block, np.array([state_of[tuple(name)] for name in requested.tolist()])
+            return rows_of_block, _names_by(block, *functions(block))[states]
+        return rows_of_block, quanta[rows[rows_of_block]] if functions or naming else _names(block)[states]
 
     return tracked_blocks(names, units, len(rows), find, values_mhz)
-
-
-def _quanta(levels: Levels) -> Ints:
-    """v, Ka, Kc of all levels."""
-    return np.stack([levels.quantum("v"), levels.quanta["ka"], levels.quanta["kc"]], axis=1)
 
 
 def _names(block: SolvedBlock) -> Ints:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rotor.tops.top import Top
 
 _MOST_ELEMENTS = 1e7  # most elements of vectors of the F that are solved together
-_LARGE = 400  # blocks of an F with more functions may be contracted
+_LARGE = 400  # blocks of an F with fewer functions are solved whole, which is then faster
 
 
 def assigned_with_spins(
@@ -53,7 +53,7 @@ def assigned_with_spins(
         here = np.flatnonzero(rows >= 0)
         if not len(here):
             return []
-        contracted = contracted_levels(top, effects, levels, rows[here], names, values_mhz)
+        contracted = contracted_levels(top, effects, levels, rows[here], names, values_mhz, _LARGE)
         if contracted is not None:
             return [AssignedLevels(here, columns, contracted)]
     out = list[AssignedLevels]()

@@ -163,12 +163,10 @@ def _vectors(
     return out
 
 
-def rotation_blocks(
-    terms: StateTerms, count: int, blocks: Sequence[SolvedBlock], representation: str
-) -> list[LinearBlock]:
+def rotation_blocks(terms: StateTerms, count: int, blocks: Sequence[SolvedBlock]) -> list[LinearBlock]:
     """Linear blocks of the rotation alone, `count` parameters, over the functions of rotational blocks."""
     if not isinstance(blocks[0].parts[0].basis, AxialState):
-        return blocks_of_terms(terms, count, representation, blocks)
+        return blocks_of_terms(terms, count, blocks)
     first, parameters = np.zeros(1, dtype=np.int64), np.arange(count)
     parts = [block.parts[0] for block in blocks]
     v, n, k = np.array([(part.v, part.basis.j, part.basis.axial_k) for part in parts]).T
@@ -202,7 +200,7 @@ def _rotation_elements(
     """Elements of the rotation alone between Wang functions, with both triangles."""
     frame: Frame = shared.cache["frame"]
     of_kind: dict[int, list[tuple[int, Ints, Ints, LinearBlock]]] = {}
-    for number, linear in enumerate(rotation_blocks(terms, count, blocks, shared.representation)):
+    for number, linear in enumerate(rotation_blocks(terms, count, blocks)):
         places = functions[number][linear.rows], functions[number][linear.columns]
         of_kind.setdefault(frame.kinds[number], []).append((number, *places, linear))
     out = {}

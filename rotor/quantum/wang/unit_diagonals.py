@@ -1,4 +1,4 @@
-"""Diagonals of the unit matrices ½[Jz^2q, J₊^2n + J₋^2n]₊ over Wang blocks side by side, and their expectation values.
+"""Diagonals of the unit matrices ½[Jz^2q, J₊^2n + J₋^2n]₊ over Wang blocks side by side.
 
 Labelled levels of fits and derivatives have them in common; the elements are those of `wang_matrix`.
 """
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from rotor.arrays import Floats, Workspace
+from rotor.arrays import Floats
 from rotor.quantum.wang.basis import WangBlock
 from rotor.quantum.wang.wang_matrix import WangRows
 
@@ -29,18 +29,6 @@ def unit_diagonals(
         elements = _elements(j, np.arange(-2.0 * n, js[-1] + 1), q, n)
         rows.add(elements, n, n, [diagonal[:, :, place] for diagonal in out])
     return out
-
-
-def expectations(diagonals: Sequence[Floats], vectors: Floats, space: Workspace) -> Floats:
-    """⟨unit⟩ (blocks, states, units) of states (blocks, size, states) by `unit_diagonals`."""
-    size = vectors.shape[1]
-    products = np.multiply(vectors, vectors, out=space.array("products", *vectors.shape))
-    total = np.matmul(products.transpose(0, 2, 1), diagonals[0])
-    for d, unit in enumerate(diagonals[1:size], 1):
-        products = space.array("products", len(vectors), size - d, vectors.shape[2])
-        np.multiply(vectors[:, :-d, :], vectors[:, d:, :], out=products)
-        total += 2.0 * np.matmul(products.transpose(0, 2, 1), unit[:, :-d])
-    return np.asarray(total)
 
 
 def _elements(j: Floats, k: Floats, q: int, n: int) -> Floats:

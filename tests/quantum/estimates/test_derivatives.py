@@ -108,12 +108,12 @@ def test_what_cannot_be_derived_is_said():
 
 
 def test_pieces_give_the_same(monkeypatch):
-    from rotor.quantum.estimates import derivatives
+    from rotor.quantum import linear_stacks
 
     top = Top(S_SET)
     levels = solve_levels(top, 15)
     whole = level_derivatives(top, levels)
-    monkeypatch.setattr(derivatives, "_AT_ONCE", 100)
+    monkeypatch.setattr(linear_stacks, "_AT_ONCE", 100)
     assert np.allclose(level_derivatives(top, levels), whole, rtol=1e-13, atol=1e-9)  # other summation order
 
 

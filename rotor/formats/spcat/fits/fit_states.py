@@ -150,10 +150,6 @@ class FileLevels(LevelModel):
             slopes[rows, columns] = 0.0
         return energies, slopes
 
-    def overlaps(self, before_mhz: Floats, after_mhz: Floats) -> Floats:
-        """See `TrackedLevels`."""
-        return self.whole.overlaps(before_mhz, after_mhz)
-
 
 def _searched(
     file: ParameterFile, groups: Sequence[Group], form: Format, labels: Ints, reduced: Ints
