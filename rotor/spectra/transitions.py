@@ -131,8 +131,7 @@ def _connections(
 ) -> tuple[list[Pair], Amplitudes]:
     """Pairs of blocks that the moments connect, and the function of their amplitudes."""
     if moments:
-        from rotor.quantum.spins.many_f_lines import connections_of
-        from rotor.quantum.spins.moments import moments_of
+        from rotor.quantum.spins.many_f_lines import connections_of, moments_of
 
         pairs, between = connections_of(blocks, moments_of(levels, dict(dipoles), moments))
         return pairs, _side_by_side(between)

@@ -72,8 +72,7 @@ class ReducedElements:
     def _magnetic_connections(self, magnet: Magnet) -> Connections:
         """`connections` of ½ Σ g_ij {Φ_i, N_j} in each state, and of g_I I of the spins."""
         from rotor.quantum.spins.contraction import operators_of_stacks, stacks_of
-        from rotor.quantum.spins.many_f_lines import connections_of, connections_of_stacks
-        from rotor.quantum.spins.moments import spin_moments
+        from rotor.quantum.spins.many_f_lines import connections_of, connections_of_stacks, spin_moments
         from rotor.quantum.spins.operators import EVERY_STATE, CosinesWithN, Scalar
         from rotor.quantum.spins.rotor import Piece
 

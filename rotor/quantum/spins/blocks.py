@@ -19,11 +19,18 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints, numbers_in_runs
 from rotor.frozen import dataclass
+from rotor.quantum.connected import part_numbers
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.hyperfine_method import FIRST_ORDER
 from rotor.quantum.levels import SolvedBlock, Used
-from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, stacks_of, within_blocks
-from rotor.quantum.spins.families import families_of, links_of_stacks
+from rotor.quantum.spins.contraction import (
+    Contracted,
+    Stack,
+    acting_numbers,
+    operators_of_stacks,
+    stacks_of,
+    within_blocks,
+)
 from rotor.quantum.spins.many_f import Group, frame_of, groups_by_number, groups_of
 from rotor.quantum.spins.parts import PartColumns, SpinPart, named_states
 from rotor.quantum.spins.pattern_tables import pattern_table
@@ -174,7 +181,7 @@ class Placed(NamedTuple):
 class Plan:
     """Solved rotation, operators of each channel, and the blocks that they connect.
 
-    families: members (block, class), see `families`. contracted: operators in stacks, each with the channels that share it.
+    families: members (block, class), see `_families`. contracted: operators in stacks, each with the channels that share it.
     """
 
     shared: Shared
@@ -202,7 +209,7 @@ class Plan:
         shared = replace(self.shared, used=used)
         if operators is None:
             return replace(self, shared=shared)
-        families = families_of(len(self.blocks), links_of_stacks(operators), max(shared.scheme.equivalent, 1))
+        families = _families(len(self.blocks), _links(operators), max(shared.scheme.equivalent, 1))
         return Plan(shared, self.blocks, families, operators)
 
 
@@ -247,8 +254,38 @@ def rotor_plan(blocks: list[SolvedBlock], representation: str, scheme: Scheme, t
     if hamiltonians:  # divided by the exchange later, see `three_equivalent`
         families = [[(number, 0) for number in range(len(blocks))]]
     else:
-        families = families_of(len(blocks), links_of_stacks(contracted), max(scheme.equivalent, 1))
+        families = _families(len(blocks), _links(contracted), max(scheme.equivalent, 1))
     return Plan(Shared(scheme, representation, stacks), blocks, families, contracted)
+
+
+def _links(contracted: InStacks) -> Ints:
+    """Links (links, 3) of operators in stacks, each with the channels that share it.
+
+    A link is two blocks that an operator connects, and 1 if the operator changes sign with the exchange, else 0.
+    """
+    links = [np.zeros((0, 3), dtype=np.int64)]
+    for matrices, channels in contracted:
+        pairs = acting_numbers(matrices)
+        for changed in {int(channel.exchange < 0) for channel in channels}:
+            links.append(np.column_stack([pairs, np.full(len(pairs), changed)]))
+    return np.concatenate(links)
+
+
+def _families(count: int, links: Ints, classes: int) -> list[list[tuple[int, int]]]:
+    """Families of members (block, class) that links connect, each once, by the lowest one of each.
+
+    classes: number of equivalent spins, or 1. With two each block has functions that are symmetric (0) and antisymmetric (1) under their
+    exchange, and an operator that changes sign with the exchange connects the two classes.
+    """
+    first, second, changed = links.T
+    each = np.arange(classes)[:, None]
+    numbers = part_numbers(
+        count * classes, (first * classes + each).ravel(), (second * classes + (each ^ changed)).ravel()
+    )
+    families: list[list[tuple[int, int]]] = [[] for _ in range(int(numbers.max(initial=-1)) + 1)]
+    for member, number in enumerate(numbers.tolist()):
+        families[number].append(divmod(member, classes))
+    return families
 
 
 def _alike(channels: Channels) -> dict[Channel, Channel]:

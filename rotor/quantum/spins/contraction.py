@@ -130,11 +130,11 @@ def _stack(blocks: Sequence[SolvedBlock], kind: int, numbers: Ints, n: Ints, siz
         size == 1 or any(part.basis.size == 1 for part in block.parts)
         for size, block in zip(sizes, members, strict=True)
     ]
-    vectors = _padded_vectors(members, sections, sizes) if contract else None
+    vectors = padded_vectors(members, sections, sizes) if contract else None
     return Stack(kind, numbers, n, None, tuple(sections), vectors, sizes, members, single)
 
 
-def _padded_vectors(members: Sequence[SolvedBlock], sections: Sequence[Section], sizes: Sequence[int]) -> Floats:
+def padded_vectors(members: Sequence[SolvedBlock], sections: Sequence[Section], sizes: Sequence[int]) -> Floats:
     """Vectors of the blocks of a stack (blocks, rows, states), zero beyond a block."""
     rows = sections[-1].rows.stop
     if min(sizes) == rows:

@@ -22,7 +22,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
 from rotor.quantum.spins.blocks import Shared, SpinFunctions
-from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, stacks_of
+from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, padded_vectors, stacks_of
 from rotor.quantum.spins.many_f import Frame, Group
 from rotor.quantum.spins.many_f_lines import groups_of_blocks
 from rotor.quantum.spins.operators import AxialState
@@ -118,7 +118,7 @@ def function_tables(top: Top, effects: Sequence[QuantumEffect], names: Sequence[
         blocks = [rotors[number] for number in range(len(rotors))]
         stacks = stacks_of(blocks, contract=False)
         functions = _functions(stacks, len(blocks))
-        vectors = _vectors(blocks, stacks, functions, frame)
+        vectors = _vectors(stacks, frame)
         rotation = _rotation_elements(terms, len(names), blocks, functions, shared)
     channels = [(couplings_by_f(shared.scheme, ALONE, first, last), rotation)]
     by_parameter = parameter_channels(top, effects, names, shared.scheme)
@@ -149,17 +149,13 @@ def _functions(stacks: Sequence[Stack], count: int) -> list[Ints]:
     return out
 
 
-def _vectors(
-    blocks: Sequence[SolvedBlock], stacks: Sequence[Stack], functions: Sequence[Ints], frame: Frame
-) -> dict[int, Floats]:
+def _vectors(stacks: Sequence[Stack], frame: Frame) -> dict[int, Floats]:
     """Eigenvectors of the rotational blocks by kind, (table rows, functions, states)."""
     out = {}
     for stack in stacks:
-        count, states = frame.energies_mhz[stack.kind].shape
-        out[stack.kind] = np.zeros((count, stack.sections[-1].rows.stop, states))
-        for number in stack.numbers.tolist():
-            vectors = blocks[number].vectors
-            out[stack.kind][frame.rows[number], functions[number], : vectors.shape[1]] = vectors
+        vectors = padded_vectors(stack.blocks, stack.sections, stack.sizes)
+        out[stack.kind] = np.zeros((len(frame.n_of_rows), *vectors.shape[1:]))
+        out[stack.kind][frame.rows[stack.numbers]] = vectors
     return out
 
 

@@ -1,10 +1,14 @@
 """Reduced elements of moments and molecule-fixed tensors between levels with spins, of many F at once (see `many_f`).
 
-An electric moment does not act on spins: its element between two functions is that of the rotation times a product of 6j symbols,
+The element of an electric moment, which does not act on spins, is that of the rotation times a product of 6j symbols,
 
-    ⟨r' p'‖T^K‖r p⟩ = t(p', p) ⟨r'‖T^K‖r⟩,
+    ⟨r' p'‖T^K‖r p⟩ = t(p', p) ⟨r'‖T^K‖r⟩.
 
-see `coupling.ChainOperator`, which has the coefficients of magnetic moments of spins too.
+The magnetic moment of a spin S contains T^0 or T² of the rotation in place of a vector; with L the rank,
+
+    ⟨p'‖[T^L x S]^1‖p⟩ = m(p', p) ⟨N'‖T^L‖N⟩,     Σ_q T²_pq S_q = -√(5/3) [T² x S]^1_p
+
+(A. R. Edmonds, Angular Momentum in Quantum Mechanics, 1957, eq. 7.1.5; the factor, and t and m, as in `coupling.ChainOperator`).
 """
 
 from __future__ import annotations
@@ -19,9 +23,10 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Indices, Ints, Workspace, runs_of_similar_size
 from rotor.frozen import dataclass
-from rotor.quantum.levels import Connections, SolvedBlock
+from rotor.quantum.levels import Connections, Levels, SolvedBlock
+from rotor.quantum.moments import Moment
 from rotor.quantum.spins.blocks import Shared
-from rotor.quantum.spins.contraction import Contracted, tensors_of_stacks
+from rotor.quantum.spins.contraction import Contracted, pieces_in_both_orders, tensors_of_stacks
 from rotor.quantum.spins.coupling import ChainOperator
 from rotor.quantum.spins.many_f import (
     Between,
@@ -36,7 +41,9 @@ from rotor.quantum.spins.many_f import (
     tables_of,
     write_between,
 )
+from rotor.quantum.spins.operators import Cosines
 from rotor.quantum.spins.pattern_tables import column_tensors, tensors_by_f
+from rotor.quantum.spins.rotor import Piece
 from rotor.quantum.spins.scheme import Scheme
 from rotor.quantum.tensors import Tensors, rank_of
 
@@ -51,7 +58,7 @@ Operator = Callable[[slice, NDArray[Any], NDArray[Any]], NDArray[Any]]
 """Elements V' X V (blocks, n', n) of a run of its blocks between vectors (blocks, columns, states, n)."""
 
 
-Moment = tuple[Tables, ChainOperator]
+ActingMoment = tuple[Tables, ChainOperator]
 """Elements of the rotation, and what acts on the spins."""
 
 
@@ -59,7 +66,7 @@ class Moments(NamedTuple):
     """Moments of one rank; those of an inner sequence interfere, squares of the sums are added."""
 
     rank: int
-    sums: Sequence[Sequence[Moment]]
+    sums: Sequence[Sequence[ActingMoment]]
 
 
 class Rows(NamedTuple):
@@ -140,6 +147,36 @@ def tensor_moments(shared: Shared, tensors: Tensors) -> Moments:
     rank, frame = rank_of(tensors), shared.cache["frame"]
     elements = tensors_of_stacks(shared.stacks, tensors, shared.representation)
     return Moments(rank, [[(tables_of(elements, frame), ChainOperator((), rank, scalar=False))]])
+
+
+def spin_moments(shared: Shared, moments: Sequence[Moment]) -> Moments:
+    """Moments between levels with spins; electric and magnetic, real and imaginary ones do not interfere."""
+    kinds: dict[tuple[bool, bool], list[ActingMoment]] = {}
+    for moment in moments:
+        piece = Piece(moment.value_debye, moment.rotor, *moment.states, 0, 0)
+        elements = pieces_in_both_orders(shared.stacks, [piece], moment.conjugate_sign, shared.representation)
+        place = (shared.scheme.place(moment.spin),) if moment.spin else ()
+        acting = ChainOperator(place, moment.rotor.rank, scalar=False)
+        tables = tables_of(elements, shared.cache["frame"])
+        kinds.setdefault((moment.electric, moment.imaginary), []).append((tables, acting))
+    return Moments(1, list(kinds.values()))
+
+
+def moments_of(
+    levels: Levels, dipoles: dict[tuple[int, int], tuple[float, float, float]], moments: Sequence[Moment]
+) -> Moments:
+    """Dipoles by pairs of states and other moments, for levels with spins; ValueError for levels without."""
+    if not levels.blocks or levels.blocks[0].spins is None:
+        raise ValueError("moments besides plain dipoles need levels that were solved with spins")
+    return spin_moments(levels.blocks[0].spins.shared, with_dipoles(dipoles, moments))
+
+
+def with_dipoles(
+    dipoles: dict[tuple[int, int], tuple[float, float, float]], moments: Sequence[Moment]
+) -> tuple[Moment, ...]:
+    """All moments: plain dipoles by pairs of states, then the others."""
+    plain = [Moment(1.0, states, Cosines(along)) for states, along in dipoles.items() if any(along)]
+    return (*plain, *(moment for moment in moments if moment.value_debye))
 
 
 def amplitudes_of_groups(

@@ -14,8 +14,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints, end_to_end
 from rotor.quantum.levels import SolvedBlock
 from rotor.quantum.spins.blocks import Members, Plan, SpinFunctions, States, blocks_of_f, diagonalised
-from rotor.quantum.spins.hamiltonians import hamiltonians
-from rotor.quantum.spins.many_f import Group, frame_of, groups_by_number, groups_of
+from rotor.quantum.spins.many_f import Frame, Group, frame_of, groups_by_number, groups_of, hamiltonians
 from rotor.quantum.spins.parts import labels_by_shares, names_of_parts, over_functions
 from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import Exist
@@ -39,7 +38,7 @@ def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) 
         members = _members(plan, patterns)
         members = members if exist is None or not len(members.twice_f) else members.existing(exist)
         grouped = groups_of(members.twice_f, members.parts, frame)
-        solutions = _states(plan, members, grouped)
+        solutions = _states(plan, members, frame, grouped)
     groups = groups_by_number(grouped)
     twice_f, starts = members.twice_f.tolist(), members.first_levels.tolist()
     out: list[SolvedBlock] = [None] * len(twice_f)  # type: ignore[list-item]
@@ -79,14 +78,14 @@ def _members(plan: Plan, patterns: dict[int, Ints]) -> Members:
     return Members(twice_f, parts, names, sizes, levels, subs)
 
 
-def _states(plan: Plan, members: Members, grouped: Sequence[tuple[Group, list[int]]]) -> Iterator[States]:
+def _states(plan: Plan, members: Members, frame: Frame, grouped: Sequence[tuple[Group, list[int]]]) -> Iterator[States]:
     """The states of blocks, those of one size together."""
     zeros = np.array([block.energies_mhz[0] for block in plan.blocks])[
         members.parts.lowest
     ]  # energy zero of each block
     kinds = _kinds(plan, members)
     alike: dict[tuple[int, ...], list[tuple[list[int], Floats]]] = {}
-    for numbers, matrices in hamiltonians(plan, grouped, kinds, zeros):
+    for numbers, matrices in hamiltonians(plan.shared.scheme, plan.contracted, frame, grouped, kinds, zeros):
         kind = kinds[numbers[0]]
         if kind[0] > _LARGE:
             yield _solved(numbers, matrices, kind[2], zeros)

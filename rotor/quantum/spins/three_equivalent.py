@@ -21,8 +21,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints, symmetric_from_lower
 from rotor.quantum.connected import part_numbers
 from rotor.quantum.spins.blocks import Members, Plan, States, blocks_of_f, diagonalised
-from rotor.quantum.spins.hamiltonians import hamiltonians
-from rotor.quantum.spins.many_f import groups_of
+from rotor.quantum.spins.many_f import groups_of, hamiltonians
 from rotor.quantum.spins.parts import PartColumns, SpinPart
 from rotor.quantum.spins.rotor import Exist
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
@@ -39,9 +38,12 @@ def allowed_states(plan: Plan, patterns: Mapping[int, Ints], exist: Exist | None
     wholes = [(f, columns.block_parts(number)) for number, f in enumerate(all_f.tolist())]
     allowed = [_allowed(plan, patterns[f], parts) for f, parts in wholes]
     found = dict[int, Floats]()
-    grouped = groups_of(all_f, columns, plan.shared.cache["frame"])
+    frame = plan.shared.cache["frame"]
+    grouped = groups_of(all_f, columns, frame)
     sizes = [(len(each.products),) for each in allowed]
-    for numbers, matrices in hamiltonians(plan, grouped, sizes, np.zeros(len(wholes))):
+    for numbers, matrices in hamiltonians(
+        plan.shared.scheme, plan.contracted, frame, grouped, sizes, np.zeros(len(wholes))
+    ):
         for number, matrix in zip(numbers, symmetric_from_lower(np.tril(matrices)), strict=True):
             found[number] = allowed[number].products.T @ matrix @ allowed[number].products
     members, solved = list[tuple[int, tuple[SpinPart, ...], Allowed]](), list[Floats]()

@@ -18,7 +18,7 @@ from rotor.formats.spcat.hamiltonian.dipole_codes import line_moment, split_dipo
 from rotor.formats.spcat.text.int_file import Dipole, read_int
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.spins.moments import moments_of
+from rotor.quantum.spins.many_f_lines import moments_of
 from rotor.spectra.transitions import all_transitions
 from rotor.tops.top import Top
 
