@@ -27,13 +27,13 @@ def field_space(
     effects: the Hamiltonian without the field; by default all effects of the top except spins. Raises ValueError for a spherical top, and
     for a field at an angle with Z beside spins or internal rotation.
     """
-    if not all(operator.along_z for operator in operators):
-        return tilted_space(top, jmax, operators, effects)
     if top.kind == "spherical":
         raise ValueError(
             f"{top.name or 'this top'} is a spherical top: it has neither a dipole nor an anisotropy, and no field of the first "
             "or second order turns it"
         )
+    if not all(operator.along_z for operator in operators):
+        return tilted_space(top, jmax, operators, effects)
     axis = 2 if top.kind == "oblate" else 0
     axial = top.kind != "asymmetric" and not effects and top.states is None
     if axial and all(operator.axial_about(axis) for operator in operators):
@@ -46,9 +46,7 @@ def field_space(
 def tilted_space(
     top: Top, jmax: int, operators: Sequence[FieldOperator], effects: Sequence[QuantumEffect] = ()
 ) -> SolvedSpace:
-    """The space of a top for fields of any direction; ValueError for a spherical top, spins, internal rotation and magnetic fields."""
-    if top.kind == "spherical":
-        raise ValueError(f"{top.name or 'this top'} is a spherical top: neither a dipole nor an anisotropy turns it")
+    """The space of a top for fields of any direction; ValueError for spins, internal rotation and magnetic fields."""
     if any(effect.spins(top) for effect in effects):
         raise ValueError("a top with spins is solved in fields along Z alone; leave out the angle")
     if top.internal_rotation is not None:

@@ -158,16 +158,9 @@ def torsion_rotation_levels(
         species = species_blocks(model, name, jmin, jmax, constants.functions).solve_once(
             model.coefficients, constants.vt_max, constants.names == "energy"
         )
-        components = degeneracies.components(name)
-        blocks += species_rotors(TorsionMoments(species, model), components)
-        pieces.append(
-            {
-                "species": np.full(len(species.rows), name),
-                "components": np.full(len(species.rows), components),
-                "weight": degeneracies.weights(name, species.functions, species.rows),
-                **{key: species.quanta[key] for key in ("vt", "j", "ka", "kc")},
-            }
-        )
+        blocks += species_rotors(TorsionMoments(species, model), degeneracies.components(name))
+        quanta = {key: species.quanta[key] for key in ("vt", "j", "ka", "kc")}
+        pieces.append(degeneracies.columns(name, species.functions, species.rows) | quanta)
     energies = np.concatenate([block.energies_mhz for block in blocks])
     return joined_levels(top, effects, jmax, pieces, energies, tuple(placed(blocks)))
 
@@ -202,19 +195,10 @@ def energies_alone(
             solved = ~np.isnan(each)
         energies.append(each[solved])
         labels = {key: column[solved] for key, column in linear.labels.items()}
-        k = labels["K"]
-        ka = np.abs(k)
-        kc = labels["J"] - ka + np.where((k > 0) & (labels["s"] >= 0), 1, 0)
-        columns = {
-            "species": np.full(len(k), name),
-            "components": np.full(len(k), degeneracies.components(name)),
-            "weight": degeneracies.weights(name, blocks.functions, np.flatnonzero(solved)),
-            "vt": labels["t"],
-            "j": labels["J"],
-            "ka": ka,
-            "kc": kc,
-        }
-        pieces.append(columns)
+        j, ka = labels["J"], np.abs(labels["K"])
+        kc = j - ka + np.where((labels["K"] > 0) & (labels["s"] >= 0), 1, 0)
+        columns = degeneracies.columns(name, blocks.functions, np.flatnonzero(solved))
+        pieces.append(columns | {"vt": labels["t"], "j": j, "ka": ka, "kc": kc})
     return joined_levels(top, effects, jmax, pieces, np.concatenate(energies))
 
 
@@ -316,6 +300,14 @@ class Degeneracies:
                 "V6, and angles such as delta_2 = pi - delta_1"
             )
         return cls(constants, equivalent)
+
+    def columns(self, species: str, functions: TorsionRotation, rows: Ints) -> Columns:
+        """Species, components and weight of the levels at `rows` of the functions."""
+        fixed: Columns = {
+            "species": np.full(len(rows), species),
+            "components": np.full(len(rows), self.components(species)),
+        }
+        return fixed | {"weight": self.weights(species, functions, rows)}
 
     def components(self, species: str) -> int:
         """States that coincide: σ and -σ, except for A, AA and AAA; for equivalent tops also AE and EA."""

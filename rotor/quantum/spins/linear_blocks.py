@@ -113,9 +113,9 @@ def function_tables(top: Top, effects: Sequence[QuantumEffect], names: Sequence[
         vectors = {kind: np.ones((len(energies), 1, 1)) for kind, energies in frame.energies_mhz.items()}
         rotation = _axial_elements(terms, len(names), stacks, frame)
     else:
-        numbered = (zip(stack.numbers.tolist(), stack.blocks, strict=True) for stack in shared.stacks)
-        rotors = {number: block for pairs in numbered for number, block in pairs}
-        blocks = [rotors[number] for number in range(len(rotors))]
+        numbers = np.concatenate([stack.numbers for stack in shared.stacks])
+        members = [block for stack in shared.stacks for block in stack.blocks]
+        blocks = [members[place] for place in np.argsort(numbers).tolist()]
         stacks = stacks_of(blocks, contract=False)
         functions = _functions(stacks, len(blocks))
         vectors = _vectors(stacks, frame)
