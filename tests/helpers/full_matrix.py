@@ -6,7 +6,8 @@ angular momentum, ⟨(j's')J'||[T^a x U^b]^c||(j s)J⟩ = √((2J'+1)(2c+1)(2J+1
 (A. R. Edmonds, Angular Momentum in Quantum Mechanics, eq. 7.1.5). Numbers that may be half-integer are doubled.
 
 Phase between states v < v': ⟨v|H|v'⟩ = value x operator where it is even in N and S together, i x value x operator where it is
-odd, with [Na, Nb] = -i Nc.
+odd, with [Na, Nb] = -i Nc. In an oblate basis it is -i: the program has one algebra of N± = Nx ± i Ny for x, y, z = c, b, a (prolate) and
+a, b, c (oblate; documentation, "NVIB"), and these frames differ in handedness.
 """
 
 from __future__ import annotations
@@ -234,11 +235,12 @@ def term_matrix(term: Term, basis: list[Piece], states: tuple[State, ...], z: st
     low, high = term.pair
     if low == high and is_odd(term):
         raise ValueError(f"{term}: an operator odd under time reversal has no place within one state")
+    phase = 1 if not is_odd(term) else 1j if z == "a" else -1j
     for i, j in product(range(len(basis)), repeat=2):
         if (basis[i].v, basis[j].v) == (low, high):
             block = element(term, basis[i], basis[j], states, z)
             if block is not None:
-                total[starts[i] : starts[i + 1], starts[j] : starts[j + 1]] += (1j if is_odd(term) else 1) * block
+                total[starts[i] : starts[i + 1], starts[j] : starts[j + 1]] += phase * block
     return total if low == high else total + total.conj().T
 
 
