@@ -62,16 +62,17 @@ def class_weights(options: Options, symmetric: bool = True) -> dict[str, int]:
 
 
 def _fold_weights(options: Options, plus: int, minus: int, symmetric: bool) -> dict[str, int]:
-    """Twice the weights of K = 0 and of the E levels; if WTPL or WTMN is 0, only half of the E levels exist."""
+    """Twice the weights of K = 0 and of the E levels; of a threefold axis, Wang blocks whose WTPL or WTMN is 0 have no E levels."""
     factor = 100 if options.ewt >= 0 else 1000  # EWT has two or three digits for the weight, by its sign
     if abs(options.ewt) >= factor - 1:
         raise ValueError(f"EWT = {options.ewt}: l-doubled states, and E levels without a weight, {PLURAL_NOT_YET}")
     if plus != minus and not symmetric:
         raise ValueError(f"IAX = {options.iax} of an asymmetric top with unlike WTPL and WTMN {NO_NAME}")
     # a negative weight marks missing levels: 0 of them
-    at_zero = {"0": 2 * plus} if plus == minus else {"0even": max(2 * plus, 0), "0odd": max(2 * minus, 0)}
-    e_weight = abs(options.ewt) * (2 if plus == minus or min(plus, minus) > 0 else 1)
-    return at_zero | {str(k): e_weight for k in range(1, FOLD[options.iax])}
+    fold, (even, odd) = FOLD[options.iax], (max(plus, 0), max(minus, 0))
+    at_zero = {"0": 2 * even} if even == odd else {"0even": 2 * even, "0odd": 2 * odd}
+    blocks = 2 if fold > 3 else (even > 0) + (odd > 0)
+    return at_zero | {str(k): blocks * abs(options.ewt) for k in range(1, fold)}
 
 
 def option_line(constants: Constants, weights: SpinWeights, kmax: int) -> Options:
@@ -92,7 +93,7 @@ def option_line(constants: Constants, weights: SpinWeights, kmax: int) -> Option
     )
     values = dict.fromkeys(weights.values)
     for iax, plus, minus in product((*_HALF_TURNS, *FOLD), values, values):
-        # SPCAT lists only one level of each E pair if WTPL or WTMN is 0
+        # twice, where SPCAT lists only one level of each E pair
         for ewt in (times * value for value in values for times in (1, 2)) if iax in FOLD else (0,):
             weighted = replace(line, iax=iax, wtpl=plus, wtmn=minus, ewt=ewt)
             if _has_weights(weighted, weights):

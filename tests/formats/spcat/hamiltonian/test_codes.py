@@ -7,6 +7,7 @@ import pytest
 from places import ORACLES
 
 from rotor.formats.spcat import model
+from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.hamiltonian import codes
 from rotor.formats.spcat.names.named_parameters import named_parameter_file
 from rotor.formats.spcat.names.named_top import named_top
@@ -258,6 +259,37 @@ def test_weights_of_a_threefold_axis_with_one_class_missing():
     assert computed == {"0even": 0, "0odd": 4, "1": 1, "2": 1}
     with pytest.raises(ValueError, match="IAX = 6 of an asymmetric top"):
         model.option_weights(Options(iax=6, wtpl=0, wtmn=4, ewt=2), False)
+
+
+@pytest.mark.parametrize("oblate", [False, True])
+@pytest.mark.parametrize(
+    "fields", [(6, 4, 4, 2), (6, 0, 4, 2), (6, 10, 1, 4), (9, 8, 8, 3), (9, 8, 0, 3), (9, 0, 8, 3), (9, 2, 5, 1)]
+)
+def test_weights_of_a_fold_are_those_of_the_levels(fields, oblate):
+    """Levels of the file itself, one for each component and both of E species unless WTPL or WTMN of a threefold axis is 0."""
+    iax, plus, minus, ewt = fields
+    along = -3000.0 if oblate else 3000.0
+    text = f"x\n 2 1\ns -1 {-1 if oblate else 1} 0 20 0 {iax} {plus} {minus} 0 {ewt}\n1000 {along} 1\n100 5000.0 1\n"
+    file = read_par(text.encode())
+    weights = named_top(file).spin_weights
+    (group,) = connected_groups(file, read_int(b"x\n0 1 1 0 7\n1 1.0\n3 1.0\n"))
+    levels = group.levels((0, 14))
+    listed = {}
+    for j, k, weight in zip(
+        levels.rotational.tolist(), group.basis_k(levels).tolist(), levels.weight.tolist(), strict=True
+    ):
+        listed[j, k] = listed.get((j, k), 0) + weight
+    named = {jk: int(weights.symmetric_weights(*jk)) for jk in listed}
+    assert any(named.values())
+    (j, k), factor = next((jk, listed[jk] / named[jk]) for jk in listed if named[jk])
+    assert listed == {jk: factor * weight for jk, weight in named.items()}
+
+
+def test_states_whose_weights_have_unlike_divisors_are_refused():
+    """(4, 2) and (4, 4) are 2:1 and 1:1 of 2 and 4 in the file, so that states reduced each by itself weigh wrongly against each other."""
+    text = "x\n 3 1\ns -1 2 0 20 0 6 4 4 -1 2\n -1 1 0 20 0 6 4 4 0 4\n1099 3000.0 1\n199 5000.0 1\n11 900.0 1\n"
+    with pytest.raises(ValueError, match="common divisors differ"):
+        named_top(read_par(text.encode()))
 
 
 # There and back
