@@ -60,6 +60,21 @@ def require_file(path: str | os.PathLike[str], rule: str = "") -> None:
         raise ValueError(f"{path}: no such file{rule and '; '}{rule}")
 
 
+def read_text(path: str | os.PathLike[str]) -> str:
+    """The text of a file without a byte-order mark; ValueError, with the line, for bytes that are not UTF-8."""
+    try:
+        return Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise not_text(error, os.fspath(path)) from None
+
+
+def not_text(error: UnicodeDecodeError, where: str) -> ValueError:
+    """The error for bytes that are not the text expected; error: of the whole content."""
+    line = error.object[: error.start].count(b"\n") + 1
+    encoding = error.encoding.upper().removesuffix("-SIG")
+    return ValueError(f"{where}, line {line}: not {encoding} text ({error.reason}); save it as UTF-8")
+
+
 def require_choice(name: str, value: str, allowed: Collection[str]) -> str:
     """The value; ValueError unless it is one of the allowed words."""
     if value not in allowed:

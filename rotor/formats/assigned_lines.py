@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats
+from rotor.checks import read_text
 from rotor.fitting.assignment import Assignments, assignments
 from rotor.formats.assigned_catalogue import catalogue_lines, whole_catalogue_lines
 from rotor.formats.assigned_lin import with_excluded_lines
@@ -281,11 +282,8 @@ def _is_marked(path: object, line: int, row: Mapping[str, str]) -> bool:
 
 def _read_csv(path: str | os.PathLike[str]) -> tuple[list[str], list[dict[str, str]]]:
     """Names of the columns and the rows of a .csv file, without blank lines and comments."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: a .csv file is UTF-8 text: {error}") from None
-    reader = csv.DictReader(row for row in io.StringIO(text) if row.strip() and not row.lstrip().startswith("#"))
+    text = io.StringIO(read_text(path))
+    reader = csv.DictReader(row for row in text if row.strip() and not row.lstrip().startswith("#"))
     columns = [name.strip().lower() for name in reader.fieldnames or ()]
     reader.fieldnames = columns
     return columns, list(reader)

@@ -7,8 +7,9 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
+
+from rotor.checks import read_text
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")  # keys without quotation marks
 MOST_DEPTH = 50  # deepest nesting of lists and tables; the files here have four levels
@@ -16,11 +17,7 @@ MOST_DEPTH = 50  # deepest nesting of lists and tables; the files here have four
 
 def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     """The tables of a TOML file; ValueError as `parse_toml`, and for bytes that are not UTF-8."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: a TOML file is UTF-8 text: {error}") from None
-    return parse_toml(text, str(path))
+    return parse_toml(read_text(path), str(path))
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

@@ -130,12 +130,15 @@ def beside(lines: Catalogue, request: CatRequest, note: Note) -> Compared:
 
 
 def read_catalogue(path: str) -> Catalogue:
-    """Read a catalogue; ValueError for another kind of file."""
+    """Read a catalogue; ValueError for another kind of file, and for one without lines."""
     from rotor.formats.spcat.text.cat import read_cat
 
     if not path.lower().endswith((".cat", ".cat.gz")):
         raise ValueError(f"{path}: expected a catalogue, .cat or .cat.gz")
-    return read_cat(path)
+    catalogue = read_cat(path)
+    if not len(catalogue):
+        raise ValueError(f"{path}: the file is empty; expected lines of a catalogue")
+    return catalogue
 
 
 def temperature_of(file: str, option: float | None) -> tuple[float, str]:

@@ -160,7 +160,10 @@ class MeasuredLines(SubjectKind):
         if is_par:
             _refuse_start(entries, verb)
             return Subject(values, (lines, None), text, place.note)
-        molecule = _start(entries, Path(place.folder) / lines.source if is_file else None)
+        source = Path(place.folder) / lines.source if is_file else None
+        if source and source.suffix.lower() == ".var":
+            raise NamedError(f"{lines.source}: {_instead_of_var(source)}")
+        molecule = _start(entries, source)
         values["top"] = top_of(Reading(molecule, entries.style, place.folder, place.note))
         if molecule.source is not None:
             file = Path(place.folder) / str(molecule.source)
@@ -194,6 +197,18 @@ def _refuse_start(entries: Entries, verb: Verb) -> None:
     if others:
         names = ", ".join(f"{{{field.identity}}}" for field in others)
         raise NamedError(f"{names}: a .par file states the free parameters and the start")
+
+
+def _instead_of_var(path: Path) -> str:
+    """What is missing if a .var file is given in place of lines, and what would do."""
+    par, lin = path.with_suffix(".par"), path.with_suffix(".lin")
+    given = "the constants of a fit, not measured lines; "
+    if par.is_file():
+        return f"{given}give {par.name}, which says what is free" + (
+            "" if lin.is_file() else f", and lines in {lin.name}"
+        )
+    lines = lin.name if lin.is_file() else "measured lines (.lin, .csv, .cat)"
+    return f"{given}there is no {par.name} beside it, which would say what is free; give {lines} with {{start}} {path.name}"
 
 
 def _start(entries: Entries, source: Path | None) -> MoleculeInput:

@@ -236,3 +236,12 @@ def test_a_comparison_is_drawn_as_a_mirror_with_differences():
 def test_the_plot_of_a_comparison_is_written(call, tmp_path):
     assert call("cat", OCS, "--compare", "OCS", "--plot", "both.svg")[0] == 0
     assert "Difference" in (tmp_path / "both.svg").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("content", [b"", b"\n \r\n"])
+@pytest.mark.parametrize("words", [["empty.cat"], [OCS, "--compare", "empty.cat"], [OCS, "--measured", "empty.cat"]])
+def test_a_file_without_lines_is_no_catalogue(call, tmp_path, words, content):
+    (tmp_path / "empty.cat").write_bytes(content)
+    code, out, err = call("cat", *words)
+    assert (code, out) == (2, "")
+    assert err == "error: empty.cat: the file is empty; expected lines of a catalogue\n"

@@ -457,3 +457,22 @@ def test_a_fit_from_constants_is_not_named_after_its_lines(call, folder):
     assert code == 0, err
     assert out.startswith("linear top: CONVERGED")
     assert rotor.read("f.toml").name == "linear top"
+
+
+@pytest.mark.parametrize(
+    ("beside", "said"),
+    [
+        (
+            [],
+            "there is no a.par beside it, which would say what is free; give measured lines (.lin, .csv, .cat) with --start a.var",
+        ),
+        (["a.lin"], "there is no a.par beside it, which would say what is free; give a.lin with --start a.var"),
+        (["a.par"], "give a.par, which says what is free, and lines in a.lin"),
+        (["a.par", "a.lin"], "give a.par, which says what is free"),
+    ],
+)
+def test_a_var_file_in_place_of_lines_is_told_what_is_missing(call, folder, beside, said):
+    for name in ("a.var", *beside):
+        (folder / name).write_text(PAR)
+    code, _, err = call("fit", "a.var")
+    assert (code, err) == (2, f"error: a.var: the constants of a fit, not measured lines; {said}\n")

@@ -100,6 +100,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from pathlib import Path
 
+from rotor.checks import read_text
 from rotor.formats.magnetic_table import read_magnetic
 from rotor.formats.molecules.internal_rotation_table import read_internal_rotation
 from rotor.formats.molecules.molecule_tables import (
@@ -212,11 +213,7 @@ def read_molecule_file(path: str | os.PathLike[str], *, listed: bool = False) ->
     Raises ValueError, with file, table and key, for text that is no TOML, unknown tables and keys, numbers that
     cannot be, and a file with neither constants nor a geometry.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: a molecule file is UTF-8 text: {error}") from None
-    return parse_molecule_file(text, str(path), Path(path).stem, Path(path).parent, listed=listed)
+    return parse_molecule_file(read_text(path), str(path), Path(path).stem, Path(path).parent, listed=listed)
 
 
 def parse_molecule_file(

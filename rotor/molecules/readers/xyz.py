@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from rotor.checks import not_text
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.nuclei import Isotope, element_symbol, isotope, isotope_by_mass
 from rotor.units import DEBYE_PER_E_ANGSTROM
@@ -38,9 +39,8 @@ def decode(content: bytes, where: str) -> str:
     encoding = next((name for mark, name in _ENCODINGS if content.startswith(mark)), "utf-8")
     try:
         return content.decode(encoding)
-    except UnicodeDecodeError as reason:
-        line = content[: reason.start].count(b"\n") + 1
-        raise ValueError(f"{where}, line {line}: not {encoding} text ({reason.reason}); save it as UTF-8") from None
+    except UnicodeDecodeError as error:
+        raise not_text(error, where) from None
 
 
 def parse_xyz(text: str, where: str = "xyz text") -> Molecule:

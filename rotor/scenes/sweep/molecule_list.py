@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 from pathlib import Path
 
+from rotor.checks import read_text
 from rotor.frozen import dataclass
 from rotor.molecules.readers.sdf_entries import LIST_SUFFIXES, SDF_SUFFIXES, entry_names
 from rotor.scenes.scene import within
@@ -43,10 +45,9 @@ def list_entries(source: str, folder: str | os.PathLike[str]) -> list[Entry]:
 
 def _csv_entries(path: Path) -> list[Entry]:
     try:
-        with open(path, encoding="utf-8-sig", newline="") as handle:
-            rows = [row for row in csv.reader(handle) if any(cell.strip() for cell in row)]
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"{path}: a list of molecules is comma-separated UTF-8 text: {error}") from None
+        rows = [row for row in csv.reader(io.StringIO(read_text(path))) if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise ValueError(f"{path}: a list of molecules is comma-separated text: {error}") from None
     heads = [head.strip().lower() for head in rows[0]] if rows else []
     smiles, word = _column(heads, SMILES_COLUMNS), _column(heads, MOLECULE_COLUMNS)
     if smiles is None and word is None:
@@ -70,10 +71,7 @@ def _csv_entries(path: Path) -> list[Entry]:
 
 def _smiles_entries(path: Path) -> list[Entry]:
     """Lines of a SMILES and a name, with or without a heading."""
-    try:
-        lines = [line.split(maxsplit=1) for line in path.read_text(encoding="utf-8-sig").splitlines() if line.strip()]
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: a list of SMILES is UTF-8 text: {error}") from None
+    lines = [line.split(maxsplit=1) for line in read_text(path).splitlines() if line.strip()]
     if lines and lines[0][0].lower() in SMILES_COLUMNS:
         lines = lines[1:]
     if not lines:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from rotor.checks import read_text
 
 Record = Mapping[str, Any]
 _CUT_OFF = '{"key"'  # start of a line that a stop has cut off
@@ -21,14 +24,10 @@ def read_records(path: str | os.PathLike[str] | None) -> dict[str, Record]:
     if path is None or not Path(path).exists():
         return {}
     records = {}
-    try:
-        with open(path, encoding="utf-8") as handle:
-            for number, line in enumerate(handle, 1):
-                record = _record(line, f"{os.fspath(path)}, line {number}")
-                if record is not None:
-                    records[record["key"]] = record
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{os.fspath(path)}: a record of a sweep is UTF-8 text: {error}; give another name") from None
+    for number, line in enumerate(io.StringIO(read_text(path)), 1):
+        record = _record(line, f"{os.fspath(path)}, line {number}")
+        if record is not None:
+            records[record["key"]] = record
     return records
 
 

@@ -95,7 +95,7 @@ def test_no_file_that_is_read_is_written_over(files, words, said):
         (["isotopologues", "CO", "--min-abundance", "2"], "--min-abundance: least abundance 2"),
         (["tumble", "water", "--omega", "0,0,0"], "--omega: '0,0,0': a body at rest does not tumble"),
         (["fit", "missing.par"], "error: missing.par: no such file"),
-        (["fit", "bytes.csv", "--start", "OCS"], "bytes.csv: a .csv file is UTF-8 text"),
+        (["fit", "bytes.csv", "--start", "OCS"], "bytes.csv, line 1: not UTF-8 text (invalid"),
         (
             ["fit", "nan.csv", "--start", "OCS", "--free", "B"],
             "nan.csv, line 1 of the table: frequency_mhz reads 'nan'",

@@ -107,7 +107,7 @@ def test_a_byte_order_mark_is_skipped_and_other_encodings_are_told(tmp_path):
     (tmp_path / "bom.toml").write_bytes("\ufeff[constants]\r\nB = 5\r\n".encode())
     assert read_molecule_file(tmp_path / "bom.toml").constants["B"] == 5
     (tmp_path / "latin.toml").write_bytes("name = 'é'".encode("latin-1"))
-    with pytest.raises(ValueError, match=r"latin.toml: a molecule file is UTF-8"):
+    with pytest.raises(ValueError, match=r"latin.toml, line 1: not UTF-8 text"):
         read_molecule_file(tmp_path / "latin.toml")
 
 

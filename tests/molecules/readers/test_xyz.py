@@ -96,7 +96,7 @@ def test_mistakes_are_told_with_their_line(old, new, message):
 
 
 def test_bytes_that_are_no_text():
-    with pytest.raises(ValueError, match=r"a\.xyz, line 2: not utf-8 text"):
+    with pytest.raises(ValueError, match=r"a\.xyz, line 2: not UTF-8 text"):
         decode(b"1\n\xff\xfa\nH 0 0 0\n", "a.xyz")
 
 
