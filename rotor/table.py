@@ -9,6 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.frozen import dataclass
+
 EXTRA = 'python -m pip install "molrotor[tables]"'
 _SHOWN = 6  # rows in the text of a table: half from the start, half from the end
 
@@ -106,6 +108,18 @@ class Table(ABC):
         if not short:
             lines.insert(_SHOWN // 2, ["..."] * len(texts))
         return list(texts), lines
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ColumnTable(Table):
+    """A table made of columns."""
+
+    values: dict[str, NDArray[Any]]
+
+    @property
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Columns by name."""
+        return self.values
 
 
 class TextOf:

@@ -4,32 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.arrays import Floats
 from rotor.observed.gas_cell import absorbance
 from rotor.observed.model import KM_PER_S, Component, Sight, model
 from rotor.observed.spectrum import ABSORBANCE, ObservedSpectrum
-from rotor.table import Table
+from rotor.table import ColumnTable
 
 VISIBLE = 3.0  # smallest listed line of the model, in standard deviations
 BLEND = 1 / 3  # brightness of other species at the centre of a line, relative to it, above which it is a blend
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ColumnTable(Table):
-    """A table made of columns."""
-
-    values: dict[str, NDArray[Any]]
-
-    @property
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """Columns by name."""
-        return self.values
 
 
 def modelled(spectrum: ObservedSpectrum, components: Sequence[Component], sight: Sight) -> Floats:

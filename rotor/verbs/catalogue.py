@@ -15,6 +15,7 @@ from rotor.reports.screen import Part, Table, record_table, table_records
 from rotor.reports.top_facts import error_facts
 from rotor.requests.field import OUTPUT, REQUIRED, declared
 from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
+from rotor.table import ColumnTable
 from rotor.table import Table as Columns
 from rotor.verbs.outputs import table_file
 from rotor.verbs.tool import Tool
@@ -102,18 +103,6 @@ def list_species(request: CatalogueRequest, work: Work) -> CatalogueAnswer:
     )
 
 
-@dataclass(frozen=True, repr=False)
-class StoredLines(Columns):
-    """Lines of a catalogue, in order of frequency."""
-
-    data: dict[str, Any]
-
-    @property
-    def columns(self) -> dict[str, Any]:
-        """The columns by name."""
-        return self.data
-
-
 def find_lines(request: CatalogueRequest, work: Work) -> CatalogueAnswer:
     """Lines of a range, in order of frequency; the report has the strongest at 300 K."""
     from rotor.formats.catalogue.database import LineCatalogue
@@ -129,7 +118,7 @@ def find_lines(request: CatalogueRequest, work: Work) -> CatalogueAnswer:
     return CatalogueAnswer(content, [shown, _table(lines, request.top_lines)], lines)
 
 
-def _stored_lines(species: Sequence[Any]) -> StoredLines:
+def _stored_lines(species: Sequence[Any]) -> ColumnTable:
     """The lines of all species, in order of frequency."""
 
     def intensity(lines: Any) -> Any:
@@ -148,10 +137,10 @@ def _stored_lines(species: Sequence[Any]) -> StoredLines:
     }
     joined = {name: np.concatenate(parts) if parts else np.zeros(0) for name, parts in columns.items()}
     order = np.argsort(joined["frequency_mhz"], kind="stable")
-    return StoredLines({name: column[order] for name, column in joined.items()})
+    return ColumnTable({name: column[order] for name, column in joined.items()})
 
 
-def _table(lines: StoredLines, shown: int) -> Table:
+def _table(lines: Columns, shown: int) -> Table:
     columns = {
         "species": "{species}",
         "frequency (MHz)": "{frequency_mhz:.4f}",

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
@@ -17,7 +16,7 @@ from rotor.reports.top_facts import error_facts
 from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, Rule, declared
 from rotor.requests.fill import NamedError
 from rotor.requests.readers import Flag, NameList, Text, Whole
-from rotor.table import Table as Columns
+from rotor.table import ColumnTable
 from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
 from rotor.verbs.outputs import Output, Report, picture, tables
 from rotor.verbs.verb import ErrorsShown, Extra, Verb, Work
@@ -66,23 +65,16 @@ class FitShown(ErrorsShown):
     )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Parameters(Columns):
+def parameter_records(answer: FitAnswer) -> ColumnTable:
     """The free parameters of a fit, by the keys of the JSON."""
-
-    fit: Fit
-
-    @property
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """name, value, error, scaled_error, start."""
-        fit = self.fit
-        numbers = {
-            "value": fit.values,
-            "error": fit.errors,
-            "scaled_error": fit.scaled_errors,
-            "start": fit.parameters.start,
-        }
-        return {"name": np.array(fit.parameters.names), **numbers}
+    fit = answer.fit
+    numbers = {
+        "value": fit.values,
+        "error": fit.errors,
+        "scaled_error": fit.scaled_errors,
+        "start": fit.parameters.start,
+    }
+    return ColumnTable({"name": np.array(fit.parameters.names), **numbers})
 
 
 def answer(request: FitRequest, work: Work) -> FitAnswer:
@@ -330,7 +322,7 @@ VERB = Verb(
         "lines_used": answer.fit.used.sum(), "weighted_rms": answer.fit.weighted_rms, "rms_mhz": answer.fit.rms_mhz(),
     },
     rows="parameters",
-    records=lambda answer: Parameters(answer.fit),
+    records=parameter_records,
     show=show,
     outputs=(
         *tables("the fitted parameters", "fit"),

@@ -94,9 +94,7 @@ def drawing(name: str) -> Callable[[Any, Path, Report], None]:
         from rotor.plots.view import View
 
         comparison = compared(answer, report)
-        view = View(
-            report.view.get("title"), report.view.get("range_mhz"), report.view.get("vertical"), report.view.get("log")
-        )
+        view = View(*map(report.view.get, ("title", "range_mhz", "vertical", "log")))
         getattr(over, name)(
             comparison.lines, comparison.heights, comparison.peaks, path, view=view, provenance=report.command
         )
