@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from rotor.quantum.spins.contraction import (
     stacks_of,
     within_blocks,
 )
-from rotor.quantum.spins.many_f import Group, frame_of, groups_by_number, groups_of
+from rotor.quantum.spins.many_f import Frame, Group, frame_of, groups_by_number, groups_of
 from rotor.quantum.spins.parts import PartColumns, SpinPart, named_states
 from rotor.quantum.spins.pattern_tables import pattern_table
 from rotor.quantum.spins.rotor import (
@@ -58,18 +58,13 @@ InStacks = list[tuple[list[Contracted], list[Channel]]]
 
 @dataclass(frozen=True)
 class Shared:
-    """Data of all blocks of a calculation: coupling scheme, representation, blocks of the rotation in stacks, and a cache of elements."""
+    """Data of all blocks of a calculation: coupling scheme, representation, blocks of the rotation in stacks, and the frame of all F."""
 
     scheme: Scheme
     representation: str
     stacks: list[Stack] = field(repr=False, compare=False)
-    cache: dict[Any, Any] = field(default_factory=dict, repr=False, compare=False)
-    used: Used | None = None
-
-    @property
-    def state_by_state(self) -> bool:
-        """Whether spins mix no rotational states (first order)."""
-        return self.used is not None and self.used.method == FIRST_ORDER
+    frame: Frame = field(repr=False, compare=False)
+    used: Used | None
 
     @property
     def axial(self) -> bool:
@@ -184,10 +179,22 @@ class Plan:
     families: members (block, class), see `_families`. contracted: operators in stacks, each with the channels that share it.
     """
 
-    shared: Shared
+    scheme: Scheme
+    representation: str
+    stacks: list[Stack] = field(repr=False)
     blocks: list[SolvedBlock]
     families: list[list[tuple[int, int]]]
     contracted: InStacks = field(repr=False)
+    used: Used | None = None
+
+    def shared(self, frame: Frame) -> Shared:
+        """The data of all blocks, with the frame of their F."""
+        return Shared(self.scheme, self.representation, self.stacks, frame, self.used)
+
+    @property
+    def state_by_state(self) -> bool:
+        """Whether spins mix no rotational states (first order)."""
+        return self.used is not None and self.used.method == FIRST_ORDER
 
     @cached_property
     def sizes(self) -> list[int]:
@@ -206,11 +213,10 @@ class Plan:
 
     def with_method(self, used: Used, operators: InStacks | None = None) -> Plan:
         """This rotation with the operators of a treatment of the spins (all by default), which `used` describes."""
-        shared = replace(self.shared, used=used)
         if operators is None:
-            return replace(self, shared=shared)
-        families = _families(len(self.blocks), _links(operators), max(shared.scheme.equivalent, 1))
-        return Plan(shared, self.blocks, families, operators)
+            return replace(self, used=used)
+        families = _families(len(self.blocks), _links(operators), max(self.scheme.equivalent, 1))
+        return replace(self, families=families, contracted=operators, used=used)
 
 
 def contracted_plan(
@@ -255,7 +261,7 @@ def rotor_plan(blocks: list[SolvedBlock], representation: str, scheme: Scheme, t
         families = [[(number, 0) for number in range(len(blocks))]]
     else:
         families = _families(len(blocks), _links(contracted), max(scheme.equivalent, 1))
-    return Plan(Shared(scheme, representation, stacks), blocks, families, contracted)
+    return Plan(scheme, representation, stacks, blocks, families, contracted)
 
 
 def _links(contracted: InStacks) -> Ints:
@@ -331,7 +337,7 @@ def _runs_of_patterns(plan: Plan, patterns: Mapping[int, Ints]) -> _Runs:
         return _Runs(*np.zeros((4, 0), dtype=np.int64))
     place, row = numbers_in_runs(counts)
     f, rows = np.array(list(patterns))[place], np.concatenate([each for each in patterns.values() if len(each)])
-    keys = _key(rows[:, 0] // 2, plan.shared.scheme.classes(rows))
+    keys = _key(rows[:, 0] // 2, plan.scheme.classes(rows))
     begins = np.flatnonzero(np.append(True, (f[1:] != f[:-1]) | (keys[1:] != keys[:-1])))
     lengths = np.diff(np.append(begins, len(rows)))
     return _Runs(f[begins], keys[begins], row[begins], row[begins] + lengths)
@@ -344,8 +350,8 @@ def _key(n: Ints, symmetry_class: Ints) -> Ints:
 
 def functions_of_blocks(plan: Plan, all_f: Sequence[int]) -> list[SolvedBlock]:
     """Basis functions of the blocks of all F, without vectors: labels and energies are those of the rotational states."""
-    table = pattern_table(plan.shared.scheme, all_f[0], all_f[-1])
-    frame = plan.shared.cache["frame"] = frame_of(plan.shared.stacks, table)
+    table = pattern_table(plan.scheme, all_f[0], all_f[-1])
+    shared = plan.shared(frame := frame_of(plan.stacks, table))
     all_twice_f, columns = blocks_of_f(plan, {f: table.patterns[f] for f in all_f if f in table.patterns})
     groups = groups_by_number(groups_of(all_twice_f, columns, frame))
     out = []
@@ -353,7 +359,7 @@ def functions_of_blocks(plan: Plan, all_f: Sequence[int]) -> list[SolvedBlock]:
         patterns, parts = table.patterns[twice_f], columns.block_parts(number)
         energies = np.concatenate([np.tile(part.rotor.energies_mhz, part.repeats) for part in parts])
         labels = np.concatenate([_labels_of_functions(part, patterns[part.patterns]) for part in parts])
-        spins = SpinFunctions(twice_f, patterns, columns, number, plan.shared, *groups[number])
+        spins = SpinFunctions(twice_f, patterns, columns, number, shared, *groups[number])
         mixing = np.ones(len(energies))
         out.append(SolvedBlock((), energies, np.zeros((0, 0)), labels=labels, mixing=mixing, spins=spins))
     return out

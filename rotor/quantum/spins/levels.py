@@ -56,7 +56,7 @@ def levels_of_f(
     if n_range:
         solved = [within_n(block, n_range) for block in solved]
     blocks = tuple(placed(solved))
-    return _table(top, effects, plan.shared, blocks, highest if n_range is None else n_range[1])
+    return _table(top, effects, blocks, highest if n_range is None else n_range[1])
 
 
 def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence[int]) -> Levels:
@@ -66,12 +66,12 @@ def unmixed_levels(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence
     """
     lowest, highest = _range_of_n(top, effects, all_f)
     plan = contracted_plan(top, effects, lowest, highest, None)
-    if plan.shared.scheme.equivalent == 3:
+    if plan.scheme.equivalent == 3:
         raise ValueError(
             "functions of three equivalent nuclei are not products of a rotational state and a coupling pattern"
         )
     blocks = tuple(placed(functions_of_blocks(plan, all_f)))
-    return _table(top, effects, plan.shared, blocks, highest)
+    return _table(top, effects, blocks, highest)
 
 
 def _range_of_n(top: Top, effects: tuple[QuantumEffect, ...], all_f: Sequence[int]) -> tuple[int, int]:
@@ -88,9 +88,7 @@ def within_n(block: SolvedBlock, n_range: tuple[int, int]) -> SolvedBlock:
     return replace(block, vectors=block.vectors[:, chosen], **cut)
 
 
-def _table(
-    top: Top, effects: tuple[QuantumEffect, ...], shared: Shared, blocks: tuple[SolvedBlock, ...], jmax: int
-) -> Levels:
+def _table(top: Top, effects: tuple[QuantumEffect, ...], blocks: tuple[SolvedBlock, ...], jmax: int) -> Levels:
     """The table of the levels of these blocks."""
     if not blocks:
         raise ValueError("no level with these spins exists in the range of F")
@@ -102,6 +100,7 @@ def _table(
         quanta |= {"k": labels[:, 1]}
     elif top.kind != "linear":
         quanta |= {"ka": labels[:, 1], "kc": labels[:, 2]}
+    shared: Shared = blocks[0].spins.shared
     scheme = shared.scheme
     quanta |= scheme.sums_of(labels)
     return levels_of_blocks(

@@ -104,7 +104,7 @@ class FunctionTables:
 
 def function_tables(top: Top, effects: Sequence[QuantumEffect], names: Sequence[str], shared: Shared) -> FunctionTables:
     """Elements of parameters over the functions of all rotational blocks of a calculation."""
-    frame: Frame = shared.cache["frame"]
+    frame = shared.frame
     first, last = frame.twice_f[0], frame.twice_f[-1]
     terms = StateTerms.from_effects(top, effects, names, shared.representation)
     if shared.axial:
@@ -194,7 +194,7 @@ def _rotation_elements(
     terms: StateTerms, count: int, blocks: Sequence[SolvedBlock], functions: Sequence[Ints], shared: Shared
 ) -> dict[Kinds, UnitElements]:
     """Elements of the rotation alone between Wang functions, with both triangles."""
-    frame: Frame = shared.cache["frame"]
+    frame = shared.frame
     of_kind: dict[int, list[tuple[int, Ints, Ints, LinearBlock]]] = {}
     for number, linear in enumerate(rotation_blocks(terms, count, blocks)):
         places = functions[number][linear.rows], functions[number][linear.columns]

@@ -144,9 +144,9 @@ class GroupStates:
 
 def tensor_moments(shared: Shared, tensors: Tensors) -> Moments:
     """A tensor of the molecule by pairs of states."""
-    rank, frame = rank_of(tensors), shared.cache["frame"]
+    rank = rank_of(tensors)
     elements = tensors_of_stacks(shared.stacks, tensors, shared.representation)
-    return Moments(rank, [[(tables_of(elements, frame), ChainOperator((), rank, scalar=False))]])
+    return Moments(rank, [[(tables_of(elements, shared.frame), ChainOperator((), rank, scalar=False))]])
 
 
 def spin_moments(shared: Shared, moments: Sequence[Moment]) -> Moments:
@@ -157,7 +157,7 @@ def spin_moments(shared: Shared, moments: Sequence[Moment]) -> Moments:
         elements = pieces_in_both_orders(shared.stacks, [piece], moment.conjugate_sign, shared.representation)
         place = (shared.scheme.place(moment.spin),) if moment.spin else ()
         acting = ChainOperator(place, moment.rotor.rank, scalar=False)
-        tables = tables_of(elements, shared.cache["frame"])
+        tables = tables_of(elements, shared.frame)
         kinds.setdefault((moment.electric, moment.imaginary), []).append((tables, acting))
     return Moments(1, list(kinds.values()))
 
@@ -187,7 +187,7 @@ def amplitudes_of_groups(
     Amplitudes are zero beyond a block, complex where those of the rotation are. both_orders: pairs of blocks of one F occur in both orders.
     """
     shared = blocks[0].spins.shared
-    frame: Frame = shared.cache["frame"]
+    frame = shared.frame
     groups = groups_of_blocks(blocks, levels)
     spaces = [Workspace() for _ in moments.sums]
     rises_of_k = range(-moments.rank, moments.rank + 1) if shared.axial else range(1)
@@ -256,7 +256,7 @@ def _between(
     spaces: Sequence[Workspace],
 ) -> Iterator[Rows]:  # fmt: skip
     """Elements between two groups, whose doubled F differ by `rise` and doubled rows by `step`; spaces: for each sum of moments."""
-    frame: Frame = shared.cache["frame"]
+    frame = shared.frame
     chosen = [row for row in low.places if row + step in up.places]
     chosen = [row for row in chosen if 2 * low.blocks[low.places[row]].spins.twice_f + rise >= 2 * moments.rank]
     sums = [

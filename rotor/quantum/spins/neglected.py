@@ -74,7 +74,7 @@ def largest_shifts(plan: Plan) -> tuple[float, float]:
     n = np.array([block.j for block in plan.blocks], dtype=np.int64)
     highest = int(n.max(initial=0))
     acting = {channel for _, _, matrices in _matrices(plan) for _, channels in matrices for channel in channels}
-    alone = {channel: coupling_alone(plan.shared.scheme, channel, highest) for channel in acting}
+    alone = {channel: coupling_alone(plan.scheme, channel, highest) for channel in acting}
     states = _states(plan, n, starts, alone)
     elements = [_elements(matrices, n, starts, alone) for matrices in _matrices(plan)]
     other_n, same_n = _shifts(states, [*_together(states, elements)])

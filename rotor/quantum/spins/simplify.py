@@ -25,11 +25,11 @@ def simplified(plan: Plan, effects: Sequence[QuantumEffect], all_f: Sequence[int
     requested = next((effect for effect in effects if isinstance(effect, HyperfineMethod)), None)
     if requested is None:
         return plan
-    if plan.shared.scheme.equivalent == 3 and requested.method not in (EXACT, "auto"):
+    if plan.scheme.equivalent == 3 and requested.method not in (EXACT, "auto"):
         raise ValueError(
             f"method {requested.method} with a total spin of three nuclei: only the exact method computes them"
         )
-    if requested.method == EXACT or plan.shared.scheme.equivalent == 3:
+    if requested.method == EXACT or plan.scheme.equivalent == 3:
         return plan.with_method(Used(EXACT, 0.0, requested.tolerance_mhz))
     from rotor.quantum.spins.neglected import largest_shifts
 

@@ -24,15 +24,14 @@ _LARGE = 100  # functions of blocks that are solved as their matrices are made, 
 
 def solved_blocks(plan: Plan, all_f: Sequence[int], exist: Exist | None = None) -> list[SolvedBlock]:
     """Solve the blocks of all doubled F in which a level exists (`levels.levels_of_f`): by F, then by the lowest member of each family."""
-    shared = plan.shared
-    table = pattern_table(shared.scheme, all_f[0], all_f[-1])
+    table = pattern_table(plan.scheme, all_f[0], all_f[-1])
     patterns = {f: table.patterns[f] for f in all_f if f in table.patterns}
-    frame = shared.cache["frame"] = frame_of(shared.stacks, table)
+    shared = plan.shared(frame := frame_of(plan.stacks, table))
     solutions: Iterable[States]
-    if shared.scheme.equivalent == 3:
+    if plan.scheme.equivalent == 3:
         from rotor.quantum.spins.three_equivalent import allowed_states
 
-        members, solutions = allowed_states(plan, patterns, exist)
+        members, solutions = allowed_states(plan, frame, patterns, exist)
         grouped = groups_of(members.twice_f, members.parts, frame)
     else:
         members = _members(plan, patterns)
@@ -85,7 +84,7 @@ def _states(plan: Plan, members: Members, frame: Frame, grouped: Sequence[tuple[
     ]  # energy zero of each block
     kinds = _kinds(plan, members)
     alike: dict[tuple[int, ...], list[tuple[list[int], Floats]]] = {}
-    for numbers, matrices in hamiltonians(plan.shared.scheme, plan.contracted, frame, grouped, kinds, zeros):
+    for numbers, matrices in hamiltonians(plan.scheme, plan.contracted, frame, grouped, kinds, zeros):
         kind = kinds[numbers[0]]
         if kind[0] > _LARGE:
             yield _solved(numbers, matrices, kind[2], zeros)
@@ -106,7 +105,7 @@ def _solved(numbers: list[int], matrices: Floats, repeats: int, zeros: Floats) -
 def _kinds(plan: Plan, members: Members) -> list[tuple[int, int, int]]:
     """Functions and sub-blocks of each block, and the number of patterns where each rotational state is solved by itself, else 1."""
     parts, repeats = members.parts, np.ones(len(members.levels), dtype=np.int64)
-    if plan.shared.state_by_state:
+    if plan.state_by_state:
         repeats = np.where(parts.counts == 1, (parts.last - parts.first)[parts.begins], 1)
     return list(zip(members.levels.tolist(), members.sub_blocks.tolist(), repeats.tolist(), strict=True))
 

@@ -52,7 +52,7 @@ def slopes_by_rotation(block: SolvedBlock, mixture_slopes: Callable[[Mixtures], 
 def slopes_by_spins(blocks: Sequence[SolvedBlock], by_parameter: Sequence[Channels]) -> Floats:
     """Derivatives (states, parameters) of the states of blocks by parameters, from their spin terms."""
     shared: Shared = blocks[0].spins.shared
-    frame: Frame = shared.cache["frame"]
+    frame = shared.frame
     operators = [list(_operators(shared, channels)) for channels in by_parameter]
     number = blocks[-1].start + len(blocks[-1].energies_mhz)
     out = np.zeros((number + 1, len(by_parameter)))  # the last row takes the padding
@@ -65,7 +65,7 @@ def slopes_by_spins(blocks: Sequence[SolvedBlock], by_parameter: Sequence[Channe
 
 def _operators(shared: Shared, channels: Channels) -> Iterator[tuple[Tables, Coefficients]]:
     """Elements of the rotation and coefficients of each channel."""
-    frame: Frame = shared.cache["frame"]
+    frame = shared.frame
     for channel, pieces in channels.items():
         (contracted,) = operators_of_stacks(shared.stacks, channel.rank, [pieces], shared.representation)
         couplings = couplings_by_f(shared.scheme, channel, frame.twice_f[0], frame.twice_f[-1])

@@ -21,7 +21,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints, symmetric_from_lower
 from rotor.quantum.connected import part_numbers
 from rotor.quantum.spins.blocks import Members, Plan, States, blocks_of_f, diagonalised
-from rotor.quantum.spins.many_f import groups_of, hamiltonians
+from rotor.quantum.spins.many_f import Frame, groups_of, hamiltonians
 from rotor.quantum.spins.parts import PartColumns, SpinPart
 from rotor.quantum.spins.rotor import Exist
 from rotor.quantum.spins.three_spins import EVEN_E, ODD_E, STEP, Allowed
@@ -32,18 +32,17 @@ from rotor.tops.operators import axis_order
 _ZERO = 1e-12  # smaller elements, relative to the largest, are round-off of sums that cancel
 
 
-def allowed_states(plan: Plan, patterns: Mapping[int, Ints], exist: Exist | None) -> tuple[Members, Iterator[States]]:
+def allowed_states(
+    plan: Plan, frame: Frame, patterns: Mapping[int, Ints], exist: Exist | None
+) -> tuple[Members, Iterator[States]]:
     """The blocks of all F over allowed functions in which a level exists, and their states."""
     all_f, columns = blocks_of_f(plan, patterns)
     wholes = [(f, columns.block_parts(number)) for number, f in enumerate(all_f.tolist())]
     allowed = [_allowed(plan, patterns[f], parts) for f, parts in wholes]
     found = dict[int, Floats]()
-    frame = plan.shared.cache["frame"]
     grouped = groups_of(all_f, columns, frame)
     sizes = [(len(each.products),) for each in allowed]
-    for numbers, matrices in hamiltonians(
-        plan.shared.scheme, plan.contracted, frame, grouped, sizes, np.zeros(len(wholes))
-    ):
+    for numbers, matrices in hamiltonians(plan.scheme, plan.contracted, frame, grouped, sizes, np.zeros(len(wholes))):
         for number, matrix in zip(numbers, symmetric_from_lower(np.tril(matrices)), strict=True):
             found[number] = allowed[number].products.T @ matrix @ allowed[number].products
     members, solved = list[tuple[int, tuple[SpinPart, ...], Allowed]](), list[Floats]()
@@ -117,11 +116,9 @@ def _product(part: SpinPart, function: int, pattern: int) -> int:
 
 def _along(plan: Plan) -> int:
     """Column of K among v, Ka and Kc: 1 or 2."""
-    axis = axis_order(plan.shared.representation)[2]
+    axis = axis_order(plan.representation)[2]
     if axis == "b":
-        raise ValueError(
-            f"representation {plan.shared.representation}: the threefold axis is a or c, the z of the basis"
-        )
+        raise ValueError(f"representation {plan.representation}: the threefold axis is a or c, the z of the basis")
     return 1 if axis == "a" else 2
 
 
