@@ -12,7 +12,6 @@ from collections.abc import Callable, Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -125,19 +124,6 @@ class VerbCommand(typer.core.TyperCommand):
         """The parameters, --help among them."""
         return [_unconverted(parameter) for parameter in super().get_params(ctx)]
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """The words that remain; refuses an option in the place of a value, which the parser takes for the value."""
-        takes_value = {
-            name: not parameter.is_flag
-            for parameter in self.get_params(ctx)
-            for name in parameter.opts
-            if name[:1] == "-"
-        }
-        for option, value in pairwise(args[: args.index("--")] if "--" in args else args):
-            if takes_value.get(option) and value.partition("=")[0] in takes_value:
-                ctx.fail(f"{option}: expected a value, but {value.partition('=')[0]} follows")
-        return super().parse_args(ctx, args)
-
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Arguments and options, panel by panel."""
         show_all = "--help-all" in (ctx.meta.get("rotor.help") or ())
@@ -165,7 +151,14 @@ class PlainGroup(typer.core.TyperGroup):
 
 def _unconverted(parameter: Any) -> Any:
     def process_value(context: Any, value: Any) -> Any:
-        """The value after the callback of its parameter."""
+        """The value after the callback of its parameter; another option in its place, which the parser takes for it, is refused."""
+        dashed = (
+            [word.partition("=")[0] for word in value if word[:1] == "-"] if isinstance(value, list | tuple) else []
+        )
+        if dashed and parameter.opts[0][:1] == "-":
+            names = {name for other in context.command.get_params(context) for name in other.opts}
+            if other := next((word for word in dashed if word in names), ""):
+                context.fail(f"{parameter.opts[0]}: expected a value, but {other} follows")
         return parameter.callback(context, parameter, value) if parameter.callback else value
 
     parameter.process_value = process_value
