@@ -41,6 +41,12 @@ def hold_freed_memory() -> None:
     np.empty(1 << 24, dtype=np.uint8)
 
 
+def writable(array: Any) -> Floats:
+    """The array in C order, copied only if it is not writable: compiled loops have one signature more for each kind of array."""
+    rows = np.ascontiguousarray(array, dtype=np.float64)
+    return rows if rows.flags.writeable else rows.copy()
+
+
 def distinct(values: NDArray[Any]) -> NDArray[Any]:
     """The distinct values of an array in rising order, like `np.unique`, which would load numpy.ma (30 ms).
 

@@ -1,5 +1,7 @@
 """Compiled loops of the search. `rotor.api.line_list` (lines of a top) and loops in the tests are the plain forms."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -191,9 +193,10 @@ def joint_ratio(
     """
     first, last = np.empty(len(f), np.int64), np.empty(len(f), np.int64)
     _windows(f, sigma, peaks, first, last)
+    mark: Any = np.int64(1)  # a literal has a type of its own, for which the function called is compiled once more
     return _joint(
         f, height, 0.0, sigma, first, last, peaks, log_peaks, log_density, log_threshold, spread, detected,
-        np.zeros(len(peaks), np.int64), 1, np.zeros(len(f) + 1), -np.inf,
+        np.zeros(len(peaks), np.int64), mark, np.zeros(len(f) + 1), -np.inf,
     )  # fmt: skip
 
 
@@ -362,6 +365,7 @@ def quick_ratios(
     """
     out, best = np.full(len(tops), -np.inf), np.zeros(len(tops))
     energy = np.empty(len(jj))
+    proposals: Any = np.int64(8)  # not a literal, as in `joint_ratio`
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
     for t in range(len(tops)):
         rigid_energies(reduced, theta, jj, tops[t], energy)
@@ -376,11 +380,11 @@ def quick_ratios(
             if mixed:
                 ratio = best_scales(
                     f[chosen], expected[chosen], kind[row[chosen]], sigma, peaks, log_peaks, log_density, log_threshold, spread,
-                    detected, most, 8,
+                    detected, most, proposals,
                 )[0].sum()  # fmt: skip
             else:
                 ratio = best_scale(
-                    f[chosen], expected[chosen], sigma, peaks, log_peaks, log_density, log_threshold, spread, detected, 8,
+                    f[chosen], expected[chosen], sigma, peaks, log_peaks, log_density, log_threshold, spread, detected, proposals,
                     max(least, out[t]),
                 )[0]  # fmt: skip
             if ratio > out[t]:

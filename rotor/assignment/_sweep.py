@@ -1,5 +1,7 @@
 """Compiled loops over roots: pairs of peaks as the first two lines of a family, and the third line along κ (`rotor.assignment.search`)."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -162,6 +164,9 @@ def sweep(
     `tolerance` and `softness` B. bounds (6,) : of A, B, C. stride : grid points of κ between tests for a crossing.
     out (m, 5) : hits, misses, A, B, C
     """
+    nowhere: Any = np.int64(
+        0
+    )  # a literal 0 has a type of its own, for which the functions called are compiled once more
     n, points, roots, per_mhz, fifths = len(seeds), len(kappa), 0, 1 / bin_width, 5 / bin_width
     linear = _linear(difference, jj, kappa)
     coarse = np.minimum(np.arange((points + stride - 2) // stride + 1) * stride, points - 1)
@@ -178,7 +183,7 @@ def sweep(
                 continue
             sb = seeds[b]
             above = jj[0] * sb - jj[1] * sa
-            before, p, at = -1.0, 0, 0
+            before, p, at = -1.0, 0, nowhere
             for step in range(opening[b], closing[b]):
                 if b < begin[step] or b >= end[step]:
                     before = -1.0  # a new stretch of κ: no crossing with what was before it

@@ -191,7 +191,7 @@ def test_the_best_scale_is_that_of_all_trials() -> None:
     f = np.concatenate(
         [peaks.frequency_mhz[::3] + 0.1 * rng.normal(size=len(peaks.frequency_mhz[::3])), rng.uniform(8000, 18000, 9)]
     )
-    expected, sigma = np.sort(rng.uniform(-3.0, 0.0, len(f)))[::-1], np.full(len(f), 0.2)
+    expected, sigma = -np.sort(-rng.uniform(-3.0, 0.0, len(f))), np.full(len(f), 0.2)
     trials = {
         float(scale): plain_joint(f, expected + scale, sigma, peaks)
         for n in range(8)

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, writable
 from rotor.classical.effect import Torque, frame_field, vector_field
 from rotor.classical.torque_form import BODY_FIXED, SPACE_FIXED, TorqueForm, torque_form
 
@@ -20,14 +20,14 @@ def from_body(vector: ArrayLike, attitude: Floats) -> Floats:
     """A vector (3,) of space in body axes, (..., 3) for unit attitudes (..., 4)."""
     from rotor.classical.integrators._attitude_kernels import seen_from_body
 
-    return np.asarray(seen_from_body(_rows(attitude), np.asarray(vector)).reshape(*attitude.shape[:-1], 3))
+    return np.asarray(seen_from_body(_rows(attitude), writable(vector)).reshape(*attitude.shape[:-1], 3))
 
 
 def lever_torque(arm: ArrayLike, force: ArrayLike, attitude: Floats) -> Floats:
     """arm x force in body axes, (..., 3), for an arm (3,) of the body and a force (3,) of space."""
     from rotor.classical.integrators._attitude_kernels import lever
 
-    return np.asarray(lever(_rows(attitude), np.asarray(arm), np.asarray(force)).reshape(*attitude.shape[:-1], 3))
+    return np.asarray(lever(_rows(attitude), writable(arm), writable(force)).reshape(*attitude.shape[:-1], 3))
 
 
 def in_body(vector: ArrayLike, frame: str, attitude: Floats) -> Floats:
@@ -119,4 +119,4 @@ class TimedTorque(Torque):
 
 
 def _rows(attitude: Floats) -> Floats:
-    return np.ascontiguousarray(attitude, dtype=np.float64).reshape(-1, 4)
+    return writable(attitude).reshape(-1, 4)

@@ -309,7 +309,8 @@ def kick_body(row: Any, lost: Any, torque: Any, time: float) -> None:
 def kick(state: Floats, carry: Floats, torque: Floats, time: float) -> None:
     """L of each body gains its torque (n, 3) times time."""
     for body in range(state.shape[0]):
-        kick_body(state[body], carry[body], torque[body], time)
+        # components, as in `_driven_kernels`: one signature of `kick_body`
+        kick_body(state[body], carry[body], (torque[body, 0], torque[body, 1], torque[body, 2]), time)
 
 
 def rows(momentum: Floats, attitude: Floats) -> Floats:

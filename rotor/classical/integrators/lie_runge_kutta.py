@@ -14,7 +14,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, writable
 from rotor.classical.integrators.method import Method
 from rotor.classical.system import System
 from rotor.classical.torque_form import kernels_are_compiled
@@ -185,7 +185,7 @@ def _rates(system: System, time: float, momentum: Floats, q: Floats, change: Flo
     omega = system.stepping_omega(time, momentum, q)
     turning(change, omega, out)
     if system.torques:
-        to_space(q, system.torque(time, q, omega), out)
+        to_space(q, writable(system.torque(time, q, omega)), out)
 
 
 def _error(slopes: Floats, h: float, third: Floats, fifth: Floats) -> float:

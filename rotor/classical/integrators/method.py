@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, writable
 from rotor.classical.effect import ClassicalEffect
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.compositions import fractions
@@ -301,7 +301,7 @@ class _Kicker:
         if not self.system.torques:
             return None
         torque = self.system.torque(time, self.state[:, 3:], self.no_omega)
-        return np.ascontiguousarray(np.broadcast_to(torque, self.no_omega.shape))
+        return writable(np.broadcast_to(torque, self.no_omega.shape))
 
     def kick(self, torque: Floats | None, time: float) -> None:
         """L gains torque times time."""

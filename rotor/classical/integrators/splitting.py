@@ -160,4 +160,6 @@ def turned_axes(inverse: Floats) -> NDArray[np.int64]:
     order = np.argsort(inverse, axis=-1, kind="stable")  # stable: equal moments keep the order of the axes
     low, middle, high = np.take_along_axis(inverse, order, axis=-1).T
     # the axis of the unlike moment first: about it the other two nearly form a symmetric top
-    return np.where((high - middle < middle - low)[:, None], order[:, [0, 2, 1]], order[:, [2, 0, 1]])
+    unlike = (high - middle < middle - low)[:, None]
+    # where follows its arguments, which are in the order of columns
+    return np.ascontiguousarray(np.where(unlike, order[:, [0, 2, 1]], order[:, [2, 0, 1]]))
