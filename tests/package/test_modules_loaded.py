@@ -57,6 +57,7 @@ KIND_MODULES = {
     "fit": '[molecule]\nconstants = "B=57600 D=0.18 MHz"\n[lines]\nsource = "l.csv"\n[parameters]\nfree = ["B", "D"]\n',
     "fluid": '[conditions]\nmolecules = 8\nsteps = 1\n[numerics]\ncutoff = "3 Å"\n',
 }  # fmt: skip
+QUICK = ("spectrum", "tumble", "fit")  # from Python in the usual run: a kind of lines, of motions and of fits
 LINES_OF_CO = (
     "frequency_mhz,error_mhz,j_upper,j_lower\n115271.2018,0.0005,1,0\n230538.0,0.0005,2,1\n345795.9899,0.0005,3,2\n"
 )
@@ -74,12 +75,20 @@ def loaded_families(way: str) -> set[str]:
     return {family for family in FAMILIES for name in modules if name == family or name.startswith(family + ".")}
 
 
-@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=pytest.mark.slow) if kind in ("fluid", "assign") else kind for kind in LOADED]
+    ("kind", "way"),
+    [
+        pytest.param(
+            kind,
+            way,
+            marks=[pytest.mark.slow] if kind in ("fluid", "assign") or (way == "Python" and kind not in QUICK) else [],
+        )
+        for kind in LOADED
+        for way in WAYS
+    ],
 )
 def test_modules_of_absent_effects_are_not_imported(kind, way, folder):
-    """Each kind of scene loads what it calls for and nothing else."""
+    """Each kind of scene loads what it calls for and nothing else; the command runs what Python runs, and loads its report too."""
     (folder / "l.csv").write_text(LINES_OF_CO)
     if kind == "assign":
         columns = spectrum().columns
