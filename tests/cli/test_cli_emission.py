@@ -215,7 +215,7 @@ def test_the_report_ends_with_what_is_left_out_of_each_molecule(call):
     last = " ".join(out.partition("left out")[2].split())
     assert "structure of the source in the beam" in last
     assert "inversion" not in last  # both states of ammonia are in the list
-    assert "CH3OH: vibration-rotation difference: about " in last  # the largest of what is known
+    assert "CH3OH: internal rotation: about " in last  # the largest of what is known
 
 
 def test_components_of_one_species_have_names_of_their_own_in_the_legend():
