@@ -78,24 +78,24 @@ def _best(peaks: PeakList, rows: Ints) -> Progression | None:
     """The progression that is least probable by chance, with peaks numbered by rows; None if chance may have made it."""
     order = np.argsort(-peaks.intensity, kind="stable")[:STRONGEST]
     best: tuple[float, Floats] = (np.log(MOST_CHANCE), np.zeros(2))
-    trials = 0
+    trials, filled = 0, _filled(peaks)
     for reference in order.tolist():
-        for m in range(1, min(LARGEST_M, int(peaks.frequency_mhz[reference] / (2 * LEAST_B_MHZ))) + 1):
-            pairs = _constants(peaks, order, reference, m)
-            trials += len(pairs)
-            for constants in pairs:
-                log_chance = _log_chance(peaks, constants)
-                if log_chance < best[0]:
-                    best = log_chance, constants
+        pairs = _constants(peaks, order, reference)
+        trials += len(pairs)
+        for constants in pairs:
+            log_chance = _log_chance(peaks, constants, filled)
+            if log_chance < best[0]:
+                best = log_chance, constants
     if not best[1].any() or best[0] + np.log(trials) > np.log(MOST_CHANCE):
         return None
     return _fitted(peaks, rows, best[1], float(np.exp(best[0] + np.log(trials))))
 
 
-def _constants(peaks: PeakList, order: Ints, reference: int, m: int) -> Floats:
-    """B and D (n, 2) of pairs: the reference peak as line m, and each other strong peak as the line nearest to it, with possible D."""
-    frequency, error = peaks.frequency_mhz[order], peaks.uncertainty_mhz[order]
-    step = peaks.frequency_mhz[reference] / m
+def _constants(peaks: PeakList, order: Ints, reference: int) -> Floats:
+    """B and D (n, 2) of pairs with possible D: the reference peak as line m, by rising m, and other peaks as the lines nearest to them."""
+    frequency, error, first = peaks.frequency_mhz[order], peaks.uncertainty_mhz[order], peaks.frequency_mhz[reference]
+    m = np.arange(1, min(LARGEST_M, int(first / (2 * LEAST_B_MHZ))) + 1)[:, None]
+    step = first / m
     largest = 4 * (step / 2) ** 3 / LOWEST_VIBRATION_MHZ**2
     numbers = np.rint(frequency / step)
     cubic = 4 * numbers * (numbers**2 - m * m)
@@ -103,8 +103,13 @@ def _constants(peaks: PeakList, order: Ints, reference: int, m: int) -> Floats:
         d = (numbers * step - frequency) / cubic
         spread = WITHIN * (error + peaks.uncertainty_mhz[reference] * numbers / m) / np.abs(cubic)
     possible = (numbers > 0) & (numbers <= LARGEST_M) & (cubic != 0) & (d > -spread) & (d < largest + spread)
-    d = d[possible]
-    return np.column_stack([step / 2 + 2 * d * m * m, d])
+    return np.column_stack([(step / 2 + 2 * d * m * m)[possible], d[possible]])
+
+
+def _filled(peaks: PeakList) -> float:
+    """Share of the recorded band that lies within the errors of a peak."""
+    width = 2 * WITHIN * float(np.median(peaks.uncertainty_mhz))
+    return min(1.0, len(peaks) * width / float((peaks.windows[:, 1] - peaks.windows[:, 0]).sum()))
 
 
 def _matches(peaks: PeakList, constants: Floats) -> tuple[Ints, Ints, Floats]:
@@ -120,8 +125,8 @@ def _matches(peaks: PeakList, constants: Floats) -> tuple[Ints, Ints, Floats]:
     return m[recorded], peak[recorded], distance[recorded]
 
 
-def _log_chance(peaks: PeakList, constants: Floats) -> float:
-    """ln of the probability that random peaks fit so many lines; 0 for too few lines or too many gaps."""
+def _log_chance(peaks: PeakList, constants: Floats, filled: float) -> float:
+    """ln of the probability that random peaks fit so many lines; 0 for too few or too many gaps. filled: see `_filled`."""
     *_, distance = _matches(peaks, constants)
     hits = np.flatnonzero(distance < WITHIN)
     if len(hits) < FEWEST_LINES:
@@ -129,9 +134,6 @@ def _log_chance(peaks: PeakList, constants: Floats) -> float:
     lines = hits[-1] - hits[0] + 1
     if len(hits) < LEAST_SHARE * lines:
         return 0.0
-    width = 2 * WITHIN * float(np.median(peaks.uncertainty_mhz))
-    windows = peaks.windows
-    filled = min(1.0, len(peaks) * width / float((windows[:, 1] - windows[:, 0]).sum()))
     free, most = len(hits) - 2, lines - 2  # two lines gave B and D
     # binomial distribution: the probability of so many lines or more
     tail = sum(math.comb(most, n) * filled**n * (1 - filled) ** (most - n) for n in range(free, most + 1))
