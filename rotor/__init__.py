@@ -111,11 +111,9 @@ def _moved(name: str) -> Any:
         raise AttributeError(
             f"module 'rotor' has no attribute {name!r}{inside or did_you_mean(name, [*__all__, *api.MOVED])}"
         )
-    import warnings
+    from rotor.checks import warn_renamed
 
-    warnings.warn(
-        f"rotor.{name} is rotor.api.{name} from version 0.3 on; see docs/migration.md", DeprecationWarning, stacklevel=3
-    )
+    warn_renamed(f"rotor.{name}", f"rotor.api.{name}", stacklevel=4)
     return getattr(api, name)
 
 

@@ -121,6 +121,14 @@ def _stamp(path: str | os.PathLike[str]) -> tuple[int, int, int] | None:
     return state.st_ino, state.st_mtime_ns, state.st_size
 
 
+def warn_renamed(old: str, new: str, stacklevel: int = 3) -> None:
+    """Warn of a former name; stacklevel: 3 where the caller of this function is called by the user's code."""
+    import warnings
+
+    text = f"{old} is {new} from version 0.3 on; see docs/migration.md"
+    warnings.warn(text, DeprecationWarning, stacklevel=stacklevel)
+
+
 class Renamed:
     """The former name of a method, which works for one minor release with a DeprecationWarning."""
 
@@ -131,10 +139,7 @@ class Renamed:
         self.old = name
 
     def __get__(self, instance: object, owner: type) -> Any:
-        import warnings
-
-        text = f"{owner.__name__}.{self.old} is {self.new} from version 0.3 on; see docs/migration.md"
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        warn_renamed(f"{owner.__name__}.{self.old}", self.new)
         return getattr(owner if instance is None else instance, self.new)
 
 

@@ -60,11 +60,9 @@ __all__ = [*sorted((*_MODULES, "classical_limit", "level_sums"))]
 
 def __getattr__(name: str) -> Any:
     if name == "partition_functions":
-        import warnings
+        from rotor.checks import warn_renamed
 
-        text = "partition_functions is partition_function from version 0.3 on; see docs/migration.md"
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
-        name = "partition_function"
+        warn_renamed(name, name := "partition_function")
     if name not in _MODULES:
         raise AttributeError(f"module 'rotor.thermodynamics' has no attribute {name!r}")
     return getattr(import_module(f"rotor.thermodynamics.{_MODULES[name]}"), name)
