@@ -235,6 +235,24 @@ def _turning_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> str:
     """
     from rotor.molecules.symmetry.point_group import NEAR, NEAR_UP_TO, find_symmetry
 
+    symbols, turned = molecule.symbols, _single_hydrogens(molecule, bonds)
+    if not turned or len(symbols) > NEAR_UP_TO:
+        return ""
+    bearers = {atom for _, atom in turned.values()}
+    kinds = [(symbol, i in bearers) for i, symbol in enumerate(symbols)]
+    whole, skeleton = (
+        find_symmetry([kinds[i] for i in rows], molecule.masses_u[rows], molecule.positions_angstrom[rows], NEAR)
+        for rows in ([*range(len(symbols))], [i for i in range(len(symbols)) if i not in turned])
+    )
+    orders = [len(group.rotations) + len(group.improper) for group in (whole, skeleton)]
+    # a linear skeleton has all operations about its axis: only mirror images differ
+    equal = not whole.improper if skeleton.linear else orders[1] > orders[0]
+    pairs = sorted({(min(pair), max(pair)) for pair in turned.values()}) if equal else []
+    return ", ".join("-".join(f"{symbols[i]}{i + 1}" for i in pair) for pair in pairs)
+
+
+def _single_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> dict[int, tuple[int, int]]:
+    """The hydrogens of O-H and S-H beside no methyl group: the neighbour of O or S, and O or S itself, by hydrogen."""
     symbols, turned = molecule.symbols, dict[int, tuple[int, int]]()
     attached = [sum(symbols[i] == "H" for i in near.tolist()) for near in bonds]
     for atom, near in enumerate(bonds):
@@ -242,23 +260,7 @@ def _turning_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> str:
             hydrogen, other = sorted(near.tolist(), key=lambda i: symbols[i] != "H")
             if attached[other] < 3:
                 turned[hydrogen] = (other, atom)
-    if not turned or len(symbols) > NEAR_UP_TO:
-        return ""
-    bearers = {atom for _, atom in turned.values()}
-    kinds = [(symbol, i in bearers) for i, symbol in enumerate(symbols)]
-    rest = [i for i in range(len(symbols)) if i not in turned]
-    whole, skeleton = (
-        find_symmetry([kinds[i] for i in rows], molecule.masses_u[rows], molecule.positions_angstrom[rows], NEAR)
-        for rows in (list(range(len(symbols))), rest)
-    )
-    orders = [len(group.rotations) + len(group.improper) for group in (whole, skeleton)]
-    # a linear skeleton has all operations about its axis: only mirror images differ
-    equal = not whole.improper if skeleton.linear else orders[1] > orders[0]
-    names = [
-        "-".join(f"{symbols[i]}{i + 1}" for i in pair)
-        for pair in sorted({(min(pair), max(pair)) for pair in turned.values()})
-    ]
-    return ", ".join(names) if equal else ""
+    return turned
 
 
 def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit:
