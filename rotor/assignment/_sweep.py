@@ -164,9 +164,8 @@ def sweep(
     `tolerance` and `softness` B. bounds (6,) : of A, B, C. stride : grid points of κ between tests for a crossing.
     out (m, 5) : hits, misses, A, B, C
     """
-    nowhere: Any = np.int64(
-        0
-    )  # a literal 0 has a type of its own, for which the functions called are compiled once more
+    # a literal 0 has a type of its own, for which the functions called are compiled once more
+    nowhere: Any = np.int64(0)
     n, points, roots, per_mhz, fifths = len(seeds), len(kappa), 0, 1 / bin_width, 5 / bin_width
     linear = _linear(difference, jj, kappa)
     coarse = np.minimum(np.arange((points + stride - 2) // stride + 1) * stride, points - 1)

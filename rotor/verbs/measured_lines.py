@@ -202,13 +202,13 @@ def _refuse_start(entries: Entries, verb: Verb) -> None:
 def _instead_of_var(path: Path) -> str:
     """What is missing if a .var file is given in place of lines, and what would do."""
     par, lin = path.with_suffix(".par"), path.with_suffix(".lin")
-    given = "the constants of a fit, not measured lines; "
+    constants = "the constants of a fit, not measured lines; "
     if par.is_file():
-        return f"{given}give {par.name}, which says what is free" + (
+        return f"{constants}give {par.name}, which says what is free" + (
             "" if lin.is_file() else f", and lines in {lin.name}"
         )
     lines = lin.name if lin.is_file() else "measured lines (.lin, .csv, .cat)"
-    return f"{given}there is no {par.name} beside it, which would say what is free; give {lines} with {{start}} {path.name}"
+    return f"{constants}there is no {par.name} beside it, which would say what is free; give {lines} with {{start}} {path.name}"
 
 
 def _start(entries: Entries, source: Path | None) -> MoleculeInput:

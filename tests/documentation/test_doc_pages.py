@@ -136,7 +136,7 @@ def test_the_sizes_of_dependencies_are_those_of_the_installed_files():
 
 
 def installed(name: str, version: str) -> float | None:
-    """MB of the files of a distribution with their bytecode, whoever compiled it; None where it is not there or is another release."""
+    """MB of the files of a distribution with the bytecode beside them; None where it is not there or is another release."""
     try:
         computed = importlib.metadata.distribution(name)
     except importlib.metadata.PackageNotFoundError:

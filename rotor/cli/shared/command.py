@@ -13,7 +13,7 @@ from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 import typer.core
@@ -30,9 +30,6 @@ from rotor.verbs.calculation import Calculation, Outcome, answering
 from rotor.verbs.molecule import is_file
 from rotor.verbs.outputs import Files, Report
 from rotor.verbs.verb import Verb, Work
-
-if TYPE_CHECKING:
-    pass
 
 JSON_HELP = "Everything printed, as JSON; - is standard output"
 FILE, COUNT = Text(metavar="FILE"), Text(metavar="N")

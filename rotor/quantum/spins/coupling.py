@@ -93,18 +93,18 @@ def _passed_on(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     (-1)^(j'+S+J+K) √((2J'+1)(2J+1)) {j' J' S; J j K}
     """
     a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
-    symbol = _of_distinct(lambda a, b, c, d: six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank), a, b, c, d)
+    symbol = _symbols_once(lambda a, b, c, d: six_j(a / 2, b / 2, spin / 2, d / 2, c / 2, rank), a, b, c, d)
     return _sign(a + spin + d + 2 * rank) * np.sqrt((b + 1.0) * (d + 1.0)) * symbol
 
 
 def _closed(bra: Ints, ket: Ints, spin: int, rank: int) -> Floats:
     """⟨(j' S)J'|T^K · W^K(S)|(j S)J⟩ over ⟨j'‖T‖j⟩⟨S‖W‖S⟩: (-1)^(j+S+J) {J S j'; K j S}, zero where J' ≠ J."""
     a, b, c, d = bra[..., 0], bra[..., 1], ket[..., 0], ket[..., 1]
-    symbol = _of_distinct(lambda a, c, d: six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2), a, c, d)
+    symbol = _symbols_once(lambda a, c, d: six_j(d / 2, spin / 2, a / 2, rank, c / 2, spin / 2), a, c, d)
     return np.where(b == d, _sign(c + spin + d) * symbol, 0.0)
 
 
-def _of_distinct(symbol: Callable[..., Floats], *arguments: Ints) -> Floats:
+def _symbols_once(symbol: Callable[..., Floats], *arguments: Ints) -> Floats:
     """A symbol of doubled arguments, computed for distinct ones only, since patterns share steps."""
     whole = np.broadcast_arrays(*arguments)
     code, scale = whole[0], 1 + max((int(argument.max(initial=0)) for argument in whole), default=0)
