@@ -25,7 +25,7 @@ from rotor.alignment.acting import guessed_jmax, window_contractions
 from rotor.alignment.carry import EDGE, Outcome, Plan, Problem, Task, block_tasks, run
 from rotor.alignment.ensemble import Ensemble, ground_level, single_level, thermal
 from rotor.alignment.observables import Harmonics
-from rotor.alignment.pulse import RAD_PER_PS_MHZ, Pulse
+from rotor.alignment.pulse import DEFAULT_TOLERANCE, RAD_PER_PS_MHZ, Pulse
 from rotor.alignment.steps import Pilot, lowest_jmax, run_pilot
 from rotor.alignment.timeline import timeline
 from rotor.arrays import Floats
@@ -35,7 +35,6 @@ from rotor.table import Table
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-DEFAULT_TOLERANCE = 1e-6
 HIGHEST_J = 600
 
 

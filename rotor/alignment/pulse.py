@@ -41,6 +41,7 @@ RAD_PER_PS_ANGSTROM3_W_PER_CM2 = (
     2 * math.pi * 1e-30 * 1e4 / (units.SPEED_OF_LIGHT_M_PER_S * units.PLANCK_J_S / (2 * math.pi)) * 1e-12
 )
 RAD_PER_PS_MHZ = 2 * math.pi * 1e-6
+DEFAULT_TOLERANCE = 1e-6  # of cosines
 GAUSSIAN_REACH = 3.5  # widths on either side of the middle; the intensity there is 2e-15 of the peak
 FIELD_REACH = 3.0  # widths of a field envelope: exp(-4 ln2 · 9) = 1.5e-11
 

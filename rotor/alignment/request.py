@@ -10,12 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.alignment.acting import acted_on, revival_period_ps
-from rotor.alignment.align import DEFAULT_TOLERANCE, AlignmentTrace, align
-from rotor.alignment.pulse import SHAPES, Pulse
+from rotor.alignment.pulse import DEFAULT_TOLERANCE, SHAPES, Pulse
 from rotor.arrays import Floats
-from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.estimates.limits import all_limits, limit_facts
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, check_fields, declared
@@ -27,6 +23,7 @@ from rotor.tops.facts import top_facts
 from rotor.units import MOST_POINTS
 
 if TYPE_CHECKING:
+    from rotor.alignment.align import AlignmentTrace
     from rotor.tops.top import Top
 
 LONGEST_PS = 100.0  # default time after the pulses for a top without revivals
@@ -134,6 +131,8 @@ class AlignRequest:
     seed: int = declared(1, Whole(0), "Of the classical gas", "numerics.seed")
 
     def __post_init__(self) -> None:
+        from rotor.alignment.acting import acted_on
+
         if not self.pulses:
             raise ValueError("pulses: there is no pulse; give at least one, in a scene a table [[pulses]]")
         check_fields(self)
@@ -155,6 +154,8 @@ class AlignRequest:
     @property
     def ends_ps(self) -> tuple[float, float]:
         """The first and the last time."""
+        from rotor.alignment.acting import revival_period_ps
+
         begins = min(pulse.window_ps[0] for pulse in self.pulses)
         ends = max(pulse.window_ps[1] for pulse in self.pulses)
         long = LONGEST_PS if self.top.kind == "asymmetric" else revival_period_ps(self.top)
@@ -204,6 +205,8 @@ class AlignAnswer(TextOf):
     def errors(self) -> ErrorBudget:
         """Error budget of the cosines."""
         from rotor.alignment.budgets import cosines_budget
+        from rotor.quantum.effects.of_top import effects_of
+        from rotor.quantum.estimates.limits import all_limits
 
         trace = self.trace
         effects = effects_of(trace.top, hyperfine=False)
@@ -211,6 +214,9 @@ class AlignAnswer(TextOf):
 
     def facts(self) -> dict[str, Any]:
         """Facts of the answer except its table, by the keys of docs/verbs."""
+        from rotor.quantum.effects.of_top import effects_of
+        from rotor.quantum.estimates.limits import limit_facts
+
         trace, cosines = self.trace, {name: values for name, values in self.table.columns.items() if name != "t_ps"}
         return {
             **top_facts(trace.top),
@@ -248,6 +254,8 @@ def answer_align(request: AlignRequest, executor: Executor | None = None) -> Ali
     >>> round(float(answer.table.columns["cos2theta"].max()), 2)
     0.88
     """
+    from rotor.alignment.align import align
+
     trace = align(
         request.top,
         request.pulses,

@@ -14,7 +14,7 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.checks import require_between
 from rotor.classical.bodies import NamedBody
-from rotor.classical.effect import ClassicalEffect, named_effects
+from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE, ClassicalEffect
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import Method, Motion, integrate
@@ -23,13 +23,10 @@ from rotor.classical.system import flatten_system, total_momentum
 from rotor.classical.tumble import COHERENT, Three, Units
 from rotor.geometry.rotations import continuous
 from rotor.requests.budget import ErrorBudget
-from rotor.requests.choices import Choices
 from rotor.table import Table
 
 Four = tuple[float, float, float, float]
 METHODS = ("lie-runge-kutta", "splitting")
-DEFAULT_TOLERANCE = 1e-10
-BODY_EFFECTS = Choices("effect", named_effects, "EFFECT")
 
 
 @dataclass(frozen=True)

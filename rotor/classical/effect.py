@@ -14,8 +14,11 @@ from typing import Any, ClassVar
 
 from rotor.arrays import Floats
 from rotor.classical.torque_form import TorqueForm
+from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, declared
 from rotor.requests.readers import Array, Quantity, Text
+
+DEFAULT_TOLERANCE = 1e-10  # of an adaptive step
 
 
 class ClassicalEffect:
@@ -130,3 +133,6 @@ def _subclasses(base: type[ClassicalEffect]) -> Iterator[type[ClassicalEffect]]:
     for subclass in base.__subclasses__():
         yield subclass
         yield from _subclasses(subclass)
+
+
+BODY_EFFECTS = Choices("effect", named_effects, "EFFECT")

@@ -5,23 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rotor.formats.family_file import FamilyFile
-from rotor.molecules.molecule import Molecule
-from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OBSERVABLES, check_fields, declared
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.readers import Flag, NameList, Text
-from rotor.structures.budgets import lengths_budget
-from rotor.structures.consistency import PlanarMoment, Without, doubts, gains, moments_across_planes, without_each
-from rotor.structures.family import Family
-from rotor.structures.least_squares import FittedStructure, TooFewMomentsError, fit_structure
-from rotor.structures.substitution import SubstitutionStructure, Value, substitution_structure
 from rotor.table import Table
+
+if TYPE_CHECKING:
+    from rotor.formats.family_file import FamilyFile
+    from rotor.molecules.molecule import Molecule
+    from rotor.requests.budget import ErrorBudget
+    from rotor.structures.consistency import PlanarMoment, Without
+    from rotor.structures.family import Family
+    from rotor.structures.least_squares import FittedStructure
+    from rotor.structures.substitution import SubstitutionStructure, Value
 
 METHODS = ("rs", "r0", "rm1", "rm2", "re")
 
@@ -112,6 +113,8 @@ class StructureAnswer:
     @property
     def errors(self) -> ErrorBudget:
         """Error budget of the bond lengths of the last method."""
+        from rotor.structures.budgets import lengths_budget
+
         weights = self.request.weights
         if self.fitted:
             last = self.fitted[-1]
@@ -125,6 +128,8 @@ class StructureAnswer:
 
         Raises ValueError where rs alone was made and does not have every atom.
         """
+        from rotor.molecules.molecule import Molecule
+
         if self.fitted:
             last = self.fitted[-1]
             return last.molecule, tuple(last.values), last.method
@@ -174,6 +179,10 @@ class StructureAnswer:
 
 def answer_structure(request: StructureRequest) -> StructureAnswer:
     """The structures of the methods, in their order; with check, fitted again without each isotopologue."""
+    from rotor.structures.consistency import doubts, gains, moments_across_planes, without_each
+    from rotor.structures.least_squares import TooFewMomentsError, fit_structure
+    from rotor.structures.substitution import substitution_structure
+
     file = request.file
     substitution = None
     if "rs" in request.methods:
@@ -190,7 +199,8 @@ def answer_structure(request: StructureRequest) -> StructureAnswer:
             leave_out=tuple(request.leave_out),
         )
 
-    fits, refused = list[FittedStructure](), dict[str, str]()
+    fits: list[FittedStructure] = []
+    refused: dict[str, str] = {}
     for name in request.methods:
         if name != "rs":
             try:

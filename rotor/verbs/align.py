@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rotor.alignment.align import AlignmentTrace
 from rotor.alignment.pulse import SHAPES, Axis, Pulse, TabulatedPulse, read_axis
 from rotor.alignment.request import AlignAnswer, AlignRequest, answer_align
 from rotor.arrays import Floats
@@ -17,11 +16,14 @@ from rotor.requests.field import CONDITIONS, REQUIRED, all_fields, declared_fiel
 from rotor.requests.fill import Entries, NamedError, read_fields, within
 from rotor.requests.readers import Quantity
 from rotor.table import counted
-from rotor.tops.top import Top
 from rotor.verbs.molecule import NUCLEI, REFINEMENT, STATES, Reading, with_known_polarizability, with_some_dipole
 from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
 from rotor.verbs.verb import Extra, Subject, Verb
+
+if TYPE_CHECKING:
+    from rotor.alignment.align import AlignmentTrace
+    from rotor.tops.top import Top
 
 FIELDS = all_fields(AlignRequest)
 _TEXTS = {

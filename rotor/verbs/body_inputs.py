@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rotor.classical.bodies import NamedBody, named_body
-from rotor.classical.driven import BODY_EFFECTS, DEFAULT_TOLERANCE
-from rotor.classical.euler import checked_moments
-from rotor.classical.tumble import Three
+from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, NUMERICS, all_fields, declared
 from rotor.requests.readers import Custom, Quantity, Reader, Whole
 from rotor.units import parse_grid
+
+if TYPE_CHECKING:
+    from rotor.classical.bodies import NamedBody
+    from rotor.classical.tumble import Three
 
 _UNIT_AT_END = re.compile(r"[A-Za-z][\w ²*^/]*$")
 MOST_TIMES = 10_000_000
@@ -39,6 +40,8 @@ def _numbers(raw: Any, count: int, expected: str, unit: str = "") -> list[float]
 
 
 def _moments(raw: Any) -> Three:
+    from rotor.classical.euler import checked_moments
+
     moments = three(raw, "kg*m2" if in_si(raw) else "")
     try:
         checked_moments(moments)
@@ -46,6 +49,12 @@ def _moments(raw: Any) -> Three:
         text = str(error)
         raise ValueError(f"{raw!r}: {text}" if isinstance(raw, str) else text) from None
     return moments
+
+
+def _named_body(raw: Any) -> NamedBody:
+    from rotor.classical.bodies import named_body
+
+    return named_body(raw)
 
 
 def in_si(moments: Any) -> bool:
@@ -76,7 +85,7 @@ class BodyInput:
     """A rigid body instead of a molecule, in any coherent units."""
 
     body: NamedBody | None = declared(
-        None, Custom(named_body, lambda body: body.name, "NAME"), "Everyday body instead of a molecule: book, phone, racket or wing-nut",
+        None, Custom(_named_body, lambda body: body.name, "NAME"), "Everyday body instead of a molecule: book, phone, racket or wing-nut",
         "body.name", option="--body", panel=MOLECULE, common=True, example="book",
     )  # fmt: skip
     moments: Three | None = declared(

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rotor.checks import NoAnswerError
-from rotor.formats.family_file import FamilyFile, read_family
 from rotor.formats.structure_request import StructureAnswer, StructureRequest, answer_structure
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
@@ -16,12 +15,13 @@ from rotor.reports.top_facts import error_facts
 from rotor.requests.field import MOLECULE, all_fields, declared
 from rotor.requests.fill import Entries, read_instance
 from rotor.requests.readers import Custom
-from rotor.structures.family import Family
-from rotor.structures.substitution import SubstitutionStructure, Value
 from rotor.table import counted
 from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.subjects import file_name, saved_inputs
 from rotor.verbs.verb import ErrorsShown, Place, Subject, SubjectKind, Verb
+
+if TYPE_CHECKING:
+    from rotor.structures.substitution import SubstitutionStructure, Value
 
 EXAMPLES = """\
   rotor structure ocs.toml
@@ -53,6 +53,9 @@ class Isotopologues(SubjectKind):
 
     def read(self, entries: Entries, place: Place, verb: Verb) -> Subject:
         """Read the family."""
+        from rotor.formats.family_file import FamilyFile, read_family
+        from rotor.structures.family import Family
+
         inputs: FamilyInput = read_instance(FamilyInput, entries)
         if inputs.source is None:
             raise ValueError("FAMILY is missing; expected a family of isotopologues (.toml)")

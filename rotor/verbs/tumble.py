@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rotor.arrays import Floats
-from rotor.classical.driven import DrivenAnswer, DrivenRequest, answer_driven
-from rotor.classical.tumble import TumbleAnswer, TumbleRequest, answer_tumble
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import Rule
@@ -18,7 +15,12 @@ from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Output, Report, drawing, picture, tables
 from rotor.verbs.turning_body import TurningBody, build
-from rotor.verbs.verb import Verb, facts_named
+from rotor.verbs.verb import Verb, Work, facts_named
+
+if TYPE_CHECKING:
+    from rotor.arrays import Floats
+    from rotor.classical.driven import DrivenAnswer, DrivenRequest
+    from rotor.classical.tumble import TumbleAnswer, TumbleRequest
 
 SHOWN = 11  # rows of the motion in the report
 SMALL = 1e-4  # largest component of a column below which numbers are printed with digits instead of decimals
@@ -37,7 +39,17 @@ EXAMPLES = """\
 
 def is_short(request: TumbleRequest | DrivenRequest) -> bool:
     """Whether plain Python computes the motion faster than the compiler for the kernels can be loaded."""
+    from rotor.classical.tumble import TumbleRequest
+
     return isinstance(request, TumbleRequest) and (request.times is None or len(request.times) <= FEW_TIMES)
+
+
+def answer(request: TumbleRequest | DrivenRequest, _: Work) -> TumbleAnswer | DrivenAnswer:
+    """Compute the exact free motion, or that under effects by steps."""
+    from rotor.classical.driven import answer_driven
+    from rotor.classical.tumble import TumbleRequest, answer_tumble
+
+    return answer_tumble(request) if isinstance(request, TumbleRequest) else answer_driven(request)
 
 
 def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Path, ...]], shown: Any) -> None:
@@ -57,6 +69,7 @@ def check(request: TumbleRequest | DrivenRequest, outputs: Mapping[str, tuple[Pa
 
 def film(answer: TumbleAnswer | DrivenAnswer, path: Path, report: Report) -> None:
     """Write the animation."""
+    from rotor.classical.tumble import TumbleAnswer
     from rotor.plots.animation import animate
 
     assert isinstance(answer, TumbleAnswer)
@@ -81,6 +94,8 @@ def _heading(request: TumbleRequest | DrivenRequest) -> str:
     top = getattr(request, "top", None)
     if top is not None:
         return top_facts.heading(top)
+    from rotor.classical.tumble import TumbleRequest
+
     still = TumbleRequest(request.moments, request.moments)
     name = top_facts.KINDS[still.kind].replace("linear molecule", "linear body")
     return f"{request.named.name if request.named else 'moments ' + _numbers(request.moments)}: {name}"
@@ -95,6 +110,8 @@ def _picture_title(request: TumbleRequest) -> str:
 
 def show(answer: TumbleAnswer | DrivenAnswer, report: Report) -> Iterable[Part | None]:
     """How the body rotates, and rows of the motion."""
+    from rotor.classical.driven import DrivenAnswer
+
     content = report.content
     if isinstance(answer, DrivenAnswer):
         return _driven_parts(answer, content)
@@ -242,7 +259,7 @@ VERB = Verb(
     about="Rotation of a molecule or a rigid body: exact free motion, conserved quantities, stable axes; motion under effects.",
     examples=EXAMPLES,
     request=MotionInput,
-    answer=lambda request, work: (answer_tumble if isinstance(request, TumbleRequest) else answer_driven)(request),
+    answer=answer,
     results=lambda answer: facts_named(
         answer.facts(), "energy", "period", "turning_rate", "energy_first", "energy_last", "energy_drift"
     ),

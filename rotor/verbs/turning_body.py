@@ -5,14 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from rotor.classical.bodies import BODIES, NamedBody
-from rotor.classical.driven import DrivenRequest
-from rotor.classical.euler import checked_momentum
-from rotor.classical.tumble import COHERENT, SI, Three, TumbleRequest, Units
 from rotor.frozen import dataclass
 from rotor.requests.field import Field
 from rotor.requests.fill import Entries, NamedError, naming, read_instance, written_fields
@@ -21,6 +17,11 @@ from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL
 from rotor.verbs.body_inputs import BODY, MOTION, BodyInput, MotionInput, in_si, three
 from rotor.verbs.subjects import MOLECULE, OneMolecule, saved_molecule
 from rotor.verbs.verb import Place, Subject, Verb
+
+if TYPE_CHECKING:
+    from rotor.classical.bodies import NamedBody
+    from rotor.classical.driven import DrivenRequest
+    from rotor.classical.tumble import Three, TumbleRequest, Units
 
 _HBAR_PER_U_ANGSTROM2_RAD_PER_PS = ASE_TIME_PS / HBAR_CLASSICAL  # angular momentum in ħ of 1 u Å² at 1 rad/ps
 AT_REST = (1.0, 0.0, 0.0, 0.0)  # attitude: body and space axes coincide
@@ -115,10 +116,14 @@ def read_body(entries: Entries) -> Body | None:
 
 def _named_source(source: Any) -> NamedBody | None:
     """The everyday body that a source names, unless it is a file."""
+    from rotor.classical.bodies import BODIES
+
     return BODIES.get(source.replace("-", " ")) if isinstance(source, str) and not Path(source).exists() else None
 
 
 def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
+    from rotor.classical.tumble import COHERENT, SI
+
     assert inputs.moments is not None
     typed = entries.of(BODY["moments"])
     text = typed if isinstance(typed, str) else ",".join(f"{moment:g}" for moment in inputs.moments)
@@ -128,6 +133,7 @@ def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
 def _everyday_body(body: NamedBody) -> Body:
     """An everyday body in SI units; its default motion is one turn a second about the intermediate, unstable axis."""
     from rotor.classical.gas.thermal_momentum import off_intermediate_axis
+    from rotor.classical.tumble import SI
     from rotor.thermodynamics.thermal_tumble import TILT_DEGREES
 
     moments = np.array(body.moments_kg_m2)
@@ -170,6 +176,8 @@ def _times(entries: Entries, motion: MotionInput, unit: str) -> tuple[float, ...
 
 
 def _motion_of_body(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
+    from rotor.classical.tumble import TumbleRequest
+
     body: Body = subject.values["body"]
     chosen = _start(entries, start, motion, np.array(body.moments), (body.rate_unit, "")) or body.start
     if chosen is None:
@@ -209,6 +217,8 @@ def _start(
 
     units: of the angular velocity and of the angular momentum.
     """
+    from rotor.classical.euler import checked_momentum
+
     by_velocity = start.angular_velocity is not None
     in_body = BODY if start.angular_momentum is not None else MOTION  # the key of a scene's body
     field = BODY["angular_velocity"] if by_velocity else in_body["angular_momentum"]
@@ -230,6 +240,8 @@ def _start(
 
 
 def _driven(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> DrivenRequest:
+    from rotor.classical.driven import DrivenRequest
+
     if "body" not in subject.values:
         raise NamedError("{effects}: acts on a body; give {moments} or {body} instead of a molecule")
     body: Body = subject.values["body"]
