@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, rows_of_keys
 from rotor.fitting.top_constants import TopConstants
-from rotor.quantum.basis.elements import Elements
 from rotor.quantum.internal_rotation.chain_rule import ANGLE, ChainRule, chain_rule, further_operators
 from rotor.quantum.internal_rotation.hyperfine import (
     coupled_blocks,
@@ -126,7 +125,9 @@ class TorsionLevels(LevelModel):
         elements = levels.functions.elements(list(further.values())) if further else None
         if self.spins is None:
             rows = _label_rows(levels.quanta, ("j", "vt", "ka", "kc"), part, part.keys)
-            values, direct = levels.energies[rows], _rotational_slopes(levels, levels.rows[rows], elements)
+            values, direct = levels.energies[rows], levels.slopes(rows)
+            if elements is not None:
+                direct = np.hstack([direct, levels.slopes(rows, elements)])
             spin_slopes: dict[str, Floats] = {}
         else:
             moments = TorsionMoments(levels, model, elements)
@@ -189,12 +190,6 @@ def _states_at(blocks: Sequence[SolvedBlock], rows: Ints) -> Iterator[SolvedBloc
     for block in blocks:
         here = rows[(rows >= block.start) & (rows < block.start + len(block.energies_mhz))] - block.start
         yield replace(block, energies_mhz=block.energies_mhz[here], vectors=block.vectors[:, here])
-
-
-def _rotational_slopes(levels: SpeciesLevels, rows: Ints, further: Elements | None) -> Floats:
-    """∂E/∂c (levels, terms and further operators) of levels without spins."""
-    terms = levels.slopes(rows)
-    return terms if further is None else np.hstack([terms, levels.solved.slopes_of(further, rows)])
 
 
 def torsion_levels(constants: TopConstants, labels: Ints) -> LevelModel:

@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 
+from rotor.quantum.blocks import elements_by_blocks
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.spins.coupling import reduced_spin
 from rotor.quantum.wigner import nine_j
@@ -90,20 +91,18 @@ def _moved(entries, part_of, vectors):
     return out
 
 
-def contracted_elements(linear, tensors):
-    """The eigenfunctions of solved linear blocks of one J each as a space; tensors: rank and reduced elements by name."""
-    present = list(linear.members)
-    states = [(linear.members[block], linear.states[block][1]) for block in present]
-    sectors = [Sector(2 * int(linear.labels["J"][rows[0]]), linear.energies_mhz[rows]) for rows, _ in states]
-    number = {block: i for i, block in enumerate(present)}
+def contracted_elements(states, j, tensors):
+    """States (rows, energies, vectors) of linear blocks of one J each as a space; tensors: rank and reduced elements by name."""
+    sectors = [Sector(2 * int(j[rows[0]]), energies) for rows, energies, _ in states]
     reduced = {}
     for name, (rank, elements) in tensors.items():
         blocks = {}
-        for (up, low), (rows, columns, values) in linear.between_blocks(elements).items():
-            left, right = states[number[up]][1], states[number[low]][1]
+        members = [rows for rows, _, _ in states]
+        for (up, low), (rows, columns, values) in elements_by_blocks(elements, members).items():
+            left, right = states[up][2], states[low][2]
             matrix = np.zeros((len(left), len(right)), dtype=values.dtype)
             matrix[rows, columns] = values[0]
-            blocks[number[up], number[low]] = left.conj().T @ (matrix @ right)
+            blocks[up, low] = left.conj().T @ (matrix @ right)
         reduced[name] = rank, blocks
     return Space(sectors, reduced)
 

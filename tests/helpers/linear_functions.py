@@ -6,7 +6,7 @@ import numpy as np
 from coupled_spaces import Space, contracted_elements
 
 from rotor.quantum.basis.elements import Elements, merged
-from rotor.quantum.blocks import blocks_of_elements
+from rotor.quantum.blocks import connected_blocks, elements_by_blocks, expectations
 from rotor.quantum.connected import part_numbers
 from rotor.quantum.operators.algebra import shift
 
@@ -94,10 +94,32 @@ def with_real_phases(elements):
     return Elements(n, rows, columns, np.ascontiguousarray(turned.real))
 
 
-def contracted(solved, functions, tensors):
+def energies_of(blocks, count, values):
+    """Energies of linear blocks at values of their terms, at the rows of so many functions; nan for those of no block."""
+    energies = np.full(count, np.nan)
+    for rows, block in blocks:
+        energies[rows] = np.linalg.eigvalsh(block.lower(np.array(values)))
+    return energies
+
+
+def states_of(blocks, values):
+    """The rows of the functions of each linear block, its energies and vectors at values of its terms."""
+    return [(rows, *np.linalg.eigh(block.lower(np.array(values)))) for rows, block in blocks]
+
+
+def slopes_of(states, elements):
+    """⟨ψ|O|ψ⟩ (functions, operators) of the states of linear blocks."""
+    slopes = np.zeros((elements.count, len(elements.values)))
+    entries = elements_by_blocks(elements, [rows for rows, _, _ in states])
+    for number, (rows, _, vectors) in enumerate(states):
+        slopes[rows] = expectations(entries, {number: vectors[:, None]}, len(elements.values))
+    return slopes
+
+
+def contracted(states, functions, tensors):
     """The eigenfunctions of linear blocks as a space; tensors: rank and operator by name."""
     elements = {name: (rank, functions.elements([operator])) for name, (rank, operator) in tensors.items()}
-    return contracted_elements(solved, elements)
+    return contracted_elements(states, functions.labels["J"], elements)
 
 
 def flat_elements(count, terms, pieces):
@@ -123,4 +145,4 @@ def linear_blocks_of_coupled(coupled):
             pieces.append((start[a] + r, start[b] + c, i, entry[r, c]))
             if a != b:
                 pieces.append((start[b] + c, start[a] + r, i, entry[r, c].conj()))
-    return blocks_of_elements(space.labels(), with_real_phases(flat_elements(count, len(names), pieces)))
+    return connected_blocks(space.labels(), with_real_phases(flat_elements(count, len(names), pieces)))

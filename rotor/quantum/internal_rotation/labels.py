@@ -22,25 +22,24 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.one_to_one import match_names
 
 
-def torsional_numbers(vectors: NDArray[np.generic], t: Ints) -> Ints:
-    """v_t (states,) of the states of one block from vectors (functions, states), in order of energy, and t (functions,).
+def torsional_numbers(vectors: NDArray[np.generic], t: Ints, vt_max: int) -> Ints:
+    """v_t up to `vt_max` of the states of one block, -1 of others, from vectors (functions, states) and t (functions,).
 
     A block may be solved for its lowest states only.
     """
-    members = (np.arange(int(t.max()) + 1)[:, None] == t).astype(float)
+    members = (np.arange(vt_max + 1)[:, None] == t).astype(float)
     shares = members @ np.abs(vectors) ** 2
     numbers = np.full(vectors.shape[1], -1)
-    for v, share in enumerate(shares):
+    for v, (share, count) in enumerate(zip(shares, members.sum(axis=1).astype(int).tolist(), strict=True)):
         free = np.flatnonzero(numbers < 0)
-        count = min(int(np.count_nonzero(t == v)), len(free))
         numbers[free[np.argsort(-share[free], kind="stable")[:count]]] = v
     return numbers
 
 
 def named_by_energy(numbers: Ints, t: Ints, zeroth_order: Floats) -> Ints:
-    """The function (number in its block) that labels each state: equal ranks by energy inside v_t = t."""
+    """The function (number in its block) that labels each state, -1 without v_t: equal ranks by energy inside v_t = t."""
     names = np.full(len(numbers), -1)
-    for v in np.unique(numbers).tolist():
+    for v in np.unique(numbers[numbers >= 0]).tolist():
         states, functions = np.flatnonzero(numbers == v), np.flatnonzero(t == v)
         by_energy = functions[np.argsort(zeroth_order[functions], kind="stable")]
         names[states] = by_energy[: len(states)]
@@ -48,9 +47,9 @@ def named_by_energy(numbers: Ints, t: Ints, zeroth_order: Floats) -> Ints:
 
 
 def named_by_overlap(numbers: Ints, t: Ints, vectors: NDArray[np.generic]) -> Ints:
-    """The function (number in its block) that labels each state: largest overlap, one to one inside v_t = t."""
+    """The function (number in its block) that labels each state, -1 without v_t: largest overlap, one to one inside v_t = t."""
     names = np.full(len(numbers), -1)
-    for v in np.unique(numbers).tolist():
+    for v in np.unique(numbers[numbers >= 0]).tolist():
         states, functions = np.flatnonzero(numbers == v), np.flatnonzero(t == v)
         overlaps = np.abs(vectors[np.ix_(functions, states)]) ** 2
         if len(states) < len(functions):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.elements import Elements
-from rotor.quantum.blocks import Entries, expectations
+from rotor.quantum.blocks import ByBlocks, Entries, elements_by_blocks, expectations
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.exchange import SpinCounts
 from rotor.quantum.internal_rotation.functions import TorsionRotation
@@ -25,10 +25,11 @@ from rotor.quantum.internal_rotation.rho_axis_tensors import (
     turned_components,
 )
 from rotor.quantum.internal_rotation.several_tops import SeveralTops, several_tops
-from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesLevels
+from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesLevels, states_of
 from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
+from rotor.quantum.solvers.hermitian import eigenvalues
 from rotor.quantum.spins.operators import Rotor
 from rotor.quantum.tensors import BodyTensor, Tensors
 from rotor.quantum.wang.basis import Part
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
 
 TurningTops = RamModel | SeveralTops
 Columns = dict[str, NDArray[Any]]
-ByBlocks = dict[tuple[int, int], Entries]  # elements by the numbers of two blocks
 FEW = 1 << 14  # up to so many elements a dense matrix is faster than a sparse one
 MOST_POPULATED = 2  # products of three tops below the limit of a sum, of which blocks of any size are solved
 MOST_SUMMED = 1500  # functions of a block of three tops that is solved as a whole for a sum
@@ -84,14 +84,6 @@ class TorsionMoments(SpeciesMoments):
 
         return between
 
-    @cached_property
-    def states(self) -> dict[int, tuple[Ints, NDArray[Any]]]:
-        """Rows of the levels of each block, and their vectors over its functions."""
-        species, solved = self.levels, self.levels.solved
-        number_of = solved.block[species.rows]
-        rows = {number: species.rows[number_of == number] for number in species.blocks}
-        return {number: (r, solved.states[number][1][:, solved.rank[r]]) for number, r in rows.items() if len(r)}
-
     def slopes(self, mixtures: Mixtures, names: Sequence[str]) -> Floats:
         """∂E/∂c (n, names) of mixtures of states, by the constants of the top and of the internal rotor."""
         constants = list(self.model.values)
@@ -108,7 +100,7 @@ class TorsionMoments(SpeciesMoments):
     def _terms(self) -> list[tuple[ByBlocks, int]]:
         """Elements of the terms, and of further operators, by pairs of blocks, and the number of operators."""
         operators = [self.levels.source.elements, *([] if self.further is None else [self.further])]
-        return [(self.levels.solved.between_blocks(each), len(each.values)) for each in operators]
+        return [(elements_by_blocks(each, self.levels.members), len(each.values)) for each in operators]
 
     def _between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
         """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
@@ -127,7 +119,7 @@ class TorsionMoments(SpeciesMoments):
     def _entries(self, operator: Operator, rank: int, time_odd: bool = False) -> ByBlocks:
         """Reduced elements of a tensor of the rotation from J to J' ≥ J by pairs of blocks."""
         elements = self.levels.functions.elements([[Product(operator)]], rank, time_odd, half=True)
-        return self.levels.solved.between_blocks(elements)
+        return elements_by_blocks(elements, self.levels.members)
 
 
 def _contracted(entries: Entries, bra: NDArray[Any], ket: NDArray[Any]) -> NDArray[Any]:
@@ -160,7 +152,7 @@ def torsion_rotation_levels(
         )
         blocks += species_rotors(TorsionMoments(species, model), degeneracies.components(name))
         quanta = {key: species.quanta[key] for key in ("vt", "j", "ka", "kc")}
-        pieces.append(degeneracies.columns(name, species.functions, species.rows) | quanta)
+        pieces.append(degeneracies.columns(name, species.functions, species.names) | quanta)
     energies = np.concatenate([block.energies_mhz for block in blocks])
     return joined_levels(top, effects, jmax, pieces, energies, tuple(placed(blocks)))
 
@@ -185,19 +177,20 @@ def energies_alone(
         # low levels need all torsional functions, so the highest one of K = 0 is the least limit
         highest = float(blocks.functions.torsion.energies[jmax].max())
         linear = blocks.summed(model.coefficients, max(below_mhz, highest))
+        labels, unit = blocks.functions.labels, np.ones(1)
         if constants.tops == 1:  # a few functions for each K: whole blocks, energies alone
-            solved, each = linear.block >= 0, linear.energies([1.0])
+            solved = [eigenvalues(block.lower(unit)) for _, block in linear]
         else:
             populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
             if constants.tops > 2 and populated > MOST_POPULATED:
                 _refuse_long_sums((2 * jmax + 1) * constants.functions)
-            each = linear.solve([1.0], linear.labels["t"] < populated).energies_mhz
-            solved = ~np.isnan(each)
-        energies.append(each[solved])
-        labels = {key: column[solved] for key, column in linear.labels.items()}
+            solved = [states_of(block, unit, labels["t"][rows] < populated)[0] for rows, block in linear]
+        energies += solved
+        rows = np.concatenate([of_block[: len(e)] for (of_block, _), e in zip(linear, solved, strict=True)])
+        labels = {key: column[rows] for key, column in labels.items()}
         j, ka = labels["J"], np.abs(labels["K"])
         kc = j - ka + np.where((labels["K"] > 0) & (labels["s"] >= 0), 1, 0)
-        columns = degeneracies.columns(name, blocks.functions, np.flatnonzero(solved))
+        columns = degeneracies.columns(name, blocks.functions, rows)
         pieces.append(columns | {"vt": labels["t"], "j": j, "ka": ka, "kc": kc})
     return joined_levels(top, effects, jmax, pieces, np.concatenate(energies))
 
@@ -335,13 +328,15 @@ class Degeneracies:
 
 
 def species_rotors(moments: TorsionMoments, components: int) -> list[SolvedBlock]:
-    """Blocks of one species with the states that are levels, in the order of its rows."""
-    solved, blocks, places = moments.levels.solved, list[SolvedBlock](), Counter[int]()
-    for number, (rows, vectors) in moments.states.items():
-        j = int(solved.labels["J"][rows[0]])
-        parts = (Part(0, SpeciesFunctions(j, number, places[j]), 0),)
-        places[j] += 1
-        blocks.append(SolvedBlock(parts, solved.energies_mhz[rows], vectors, moments=moments, components=components))
+    """Blocks of one species with the states that are levels, in their order."""
+    levels, blocks, places = moments.levels, list[SolvedBlock](), Counter[int]()
+    energies = np.split(levels.energies, levels.starts[1:-1])
+    for number, (rows, vectors) in enumerate(zip(levels.members, levels.vectors, strict=True)):
+        if vectors.size:
+            j = int(levels.functions.labels["J"][rows[0]])
+            parts = (Part(0, SpeciesFunctions(j, number, places[j]), 0),)
+            places[j] += 1
+            blocks.append(SolvedBlock(parts, energies[number], vectors, moments=moments, components=components))
     return blocks
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.elements import Elements
-from rotor.quantum.blocks import LinearBlocks, blocks_of_elements
+from rotor.quantum.blocks import FunctionBlocks, connected_blocks, elements_by_blocks, expectations
 from rotor.quantum.internal_rotation.contracted import Product, Terms
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.labels import (
@@ -22,7 +23,10 @@ from rotor.quantum.internal_rotation.labels import (
     named_by_overlap,
     torsional_numbers,
 )
+from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import Operator
+from rotor.quantum.solvers.dominated import dominated_states, is_dominated
+from rotor.quantum.solvers.hermitian import eigenstates
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,9 +47,9 @@ class SpeciesHamiltonian:
         return self.functions.elements(list(self.terms.values()))
 
     @cached_property
-    def linear(self) -> LinearBlocks:
+    def linear(self) -> FunctionBlocks:
         """The connected blocks of all terms."""
-        return blocks_of_elements(self.functions.labels, self.elements, self.needed)
+        return connected_blocks(self.functions.labels, self.elements, self.needed)
 
     def solve(self, coefficients: ArrayLike, vt_max: int, by_energy: bool = False) -> SpeciesLevels:
         """Levels with v_t up to `vt_max`; `by_energy` counts Ka and Kc by energy inside v_t."""
@@ -55,7 +59,7 @@ class SpeciesHamiltonian:
         """Levels as from `solve`, faster where no other values follow."""
         return self._solved(self.summed(coefficients), [1.0], vt_max, by_energy)
 
-    def summed(self, coefficients: ArrayLike, below_mhz: float = math.inf) -> LinearBlocks:
+    def summed(self, coefficients: ArrayLike, below_mhz: float = math.inf) -> FunctionBlocks:
         """Blocks of the single term H at these coefficients, over functions whose Gershgorin discs reach below `below_mhz`."""
         merged = _merged(self.terms, np.asarray(coefficients, dtype=float))
         elements = self.functions.symmetry_allowed(self.functions.elements([merged], half=below_mhz == math.inf))
@@ -65,12 +69,47 @@ class SpeciesHamiltonian:
             low = np.bincount(elements.rows, value, elements.count) <= below_mhz
             elements = elements.between(low)
             needed = low if needed is None else low & needed
-        return blocks_of_elements(self.functions.labels, elements, needed)
+        return connected_blocks(self.functions.labels, elements, needed)
 
-    def _solved(self, linear: LinearBlocks, coefficients: ArrayLike, vt_max: int, by_energy: bool) -> SpeciesLevels:
+    def _solved(self, linear: FunctionBlocks, coefficients: ArrayLike, vt_max: int, by_energy: bool) -> SpeciesLevels:
         values = np.asarray(coefficients, dtype=float)
-        solved = linear.solve(values, linear.labels["t"] <= vt_max)
-        return SpeciesLevels(self, solved, _zeroth_order(linear, values), vt_max, by_energy)
+        zeroth_order, torsion = self._zeroth_order(linear, values), self.functions.torsion
+        labels = self.functions.labels["t"]
+        solved = [states_of(block, values, labels[rows] <= vt_max) for rows, block in linear]
+        levels, states, highest = [], [], []
+        for (rows, _), (energies, vectors) in zip(linear, solved, strict=True):
+            t = labels[rows]
+            vt = torsional_numbers(vectors, t, vt_max)
+            if torsion.sigma and torsion.is_near_free:
+                name = named_by_overlap(vt, t, vectors)
+            else:
+                name = named_by_energy(vt, t, zeroth_order[rows])
+            retained = np.flatnonzero(vt >= 0)
+            levels.append((energies[retained], vt[retained], rows[name[retained]]))
+            states.append(vectors[:, retained])
+            highest.append(float(energies[-1]))
+        each, numbers, names = (np.concatenate(column) for column in zip(*levels, strict=True))
+        members = [rows for rows, _ in linear]
+        return SpeciesLevels(self, members, states, each, numbers, names, max(highest), by_energy)
+
+    def _zeroth_order(self, linear: FunctionBlocks, coefficients: Floats) -> Floats:
+        """⟨J K t|H|J K t⟩ of the functions; s = ±1 share their mean, which leaves out the coupling of K and -K."""
+        labels = self.functions.labels
+        diagonal = np.zeros(len(labels["t"]))
+        for rows, block in linear:
+            diagonal[rows] = block.diagonal(coefficients)
+        minus = np.flatnonzero((labels["s"] < 0) & (labels["K"] > 0))
+        plus = np.flatnonzero((labels["s"] > 0) & (labels["K"] > 0))
+        if len(minus) == len(plus) > 0:  # both lists have the same order of J, K, t
+            diagonal[plus] = diagonal[minus] = (diagonal[plus] + diagonal[minus]) / 2
+        return diagonal
+
+
+def states_of(block: LinearBlock, values: Floats, mostly_in: NDArray[np.bool_]) -> tuple[Floats, NDArray[Any]]:
+    """Energies and vectors of a block, of as many states with the largest shares in the functions `mostly_in` where this is faster."""
+    chosen = np.flatnonzero(mostly_in)
+    few = dominated_states(block.sparse(values), chosen) if is_dominated(block.size, len(chosen)) else None
+    return few or eigenstates(block.lower(values))
 
 
 def _merged(terms: Terms, coefficients: Floats) -> list[Product]:
@@ -83,28 +122,22 @@ def _merged(terms: Terms, coefficients: Floats) -> list[Product]:
     return [Product(rotation, torsion) for torsion, rotation in rotations.items()]
 
 
-def _zeroth_order(linear: LinearBlocks, coefficients: Floats) -> Floats:
-    """⟨J K t|H|J K t⟩ of the functions; s = ±1 share their mean, which leaves out the coupling of K and -K."""
-    diagonal = np.zeros(len(linear.block))
-    for number, block in linear.blocks.items():
-        diagonal[linear.members[number]] = block.diagonal(coefficients)
-    labels = linear.labels
-    minus = np.flatnonzero((labels["s"] < 0) & (labels["K"] > 0))
-    plus = np.flatnonzero((labels["s"] > 0) & (labels["K"] > 0))
-    if len(minus) == len(plus) > 0:  # both lists have the same order of J, K, t
-        diagonal[plus] = diagonal[minus] = (diagonal[plus] + diagonal[minus]) / 2
-    return diagonal
-
-
 @dataclass(frozen=True, eq=False)
 class SpeciesLevels:
-    """Labelled levels of one species with v_t ≤ vt_max, by block in order of energy; `rows` are their places in the arrays of `solved`."""
+    """Labelled levels of one species, by block in order of energy.
+
+    members, vectors: of each block the rows of its functions, and its levels over them (functions, levels). energies: MHz above the minimum
+    of the torsional potential. names: row of the function that labels each level. highest_mhz: of all states of the blocks.
+    """
 
     source: SpeciesHamiltonian
-    solved: LinearBlocks
-    zeroth_order: Floats
-    vt_max: int
-    by_energy: bool = False
+    members: list[Ints]
+    vectors: list[NDArray[Any]]
+    energies: Floats
+    vt: Ints
+    names: Ints
+    highest_mhz: float
+    by_energy: bool
 
     @property
     def functions(self) -> TorsionRotation:
@@ -112,43 +145,14 @@ class SpeciesLevels:
         return self.source.functions
 
     @cached_property
-    def _named(self) -> tuple[Ints, Ints, Ints]:
-        """Rows, v_t, and the function that labels each level."""
-        t = self.functions.labels["t"]
-        rows, numbers, names = [], [], []
-        for block in self.blocks:
-            members, (_, vectors) = self.solved.members[block], self.solved.states[block]
-            v = torsional_numbers(vectors, t[members])
-            if self.functions.torsion.sigma and self.functions.torsion.is_near_free:
-                name = named_by_overlap(v, t[members], vectors)
-            else:
-                name = named_by_energy(v, t[members], self.zeroth_order[members])
-            retained = np.flatnonzero((v >= 0) & (v <= self.vt_max))
-            rows.append(members[retained])
-            numbers.append(v[retained])
-            names.append(members[name[retained]])
-        return np.concatenate(rows), np.concatenate(numbers), np.concatenate(names)
-
-    @property
-    def blocks(self) -> list[int]:
-        """Numbers of the blocks."""
-        return list(self.solved.members)
-
-    @property
-    def rows(self) -> Ints:
-        """Rows of the levels in the arrays of `solved`."""
-        return self._named[0]
-
-    @property
-    def energies(self) -> Floats:
-        """Energies in MHz above the minimum of the torsional potential."""
-        return np.asarray(self.solved.energies_mhz[self.rows])
+    def starts(self) -> Ints:
+        """The first level of each block, and the number of all levels."""
+        return np.cumsum([0, *(vectors.shape[1] for vectors in self.vectors)])
 
     @cached_property
     def quanta(self) -> dict[str, Ints]:
         """J, v_t, K (signed; not negative for σ = 0), Ka and Kc."""
-        _, v, name = self._named
-        labels = self.functions.labels
+        v, name, labels = self.vt, self.names, self.functions.labels
         j, k = labels["J"][name], labels["K"][name]
         if self.by_energy:
             k, kc = counted_ka_kc(j, v, self.energies)
@@ -163,6 +167,16 @@ class SpeciesLevels:
         s = self.functions.labels["s"][name]
         return np.asarray(s * self.functions.torsion.parity[v] if self.functions.folded else s)
 
-    def slopes(self, rows: Ints | None = None) -> Floats:
-        """∂E/∂c (levels, terms) of the levels at `rows` of `solved`; by default of all levels."""
-        return self.solved.slopes_of(self.source.elements, self.rows if rows is None else rows)
+    def slopes(self, levels: Ints | None = None, elements: Elements | None = None) -> Floats:
+        """⟨ψ|O|ψ⟩ (levels, operators) of some levels, by default of all, and Hermitian operators, by default ∂E/∂c of the terms."""
+        operators = self.source.elements if elements is None else elements
+        levels = np.arange(len(self.energies)) if levels is None else levels
+        used, place = np.unique(np.searchsorted(self.starts, levels, side="right") - 1, return_inverse=True)
+        slopes = np.zeros((len(levels), len(operators.values)))
+        entries = elements_by_blocks(operators, [self.members[number] for number in used])
+        for i, number in enumerate(used.tolist()):
+            if (i, i) in entries:  # blocks of H may be finer than those of O
+                chosen = np.flatnonzero(place == i)
+                vectors = self.vectors[number][:, None, levels[chosen] - self.starts[number]]
+                slopes[chosen] = expectations(entries, {i: vectors}, len(operators.values))
+        return slopes

@@ -35,6 +35,6 @@ def truncation_mhz(model: RamModel | SeveralTops, jmax: int, vt_max: int, count:
             levels = blocks.solve_once(model.coefficients, vt_max)
             order = np.lexsort([levels.quanta[name] for name in ("kc", "ka", "vt")])
             energies.append(levels.energies[order])
-            scale = max(scale, float(np.nanmax(levels.solved.energies_mhz)))
+            scale = max(scale, levels.highest_mhz)
         largest = max(largest, float(np.abs(energies[0] - energies[1]).max()))
     return MARGIN * largest + ROUNDING * scale

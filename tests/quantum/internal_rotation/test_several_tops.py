@@ -5,6 +5,7 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
+from linear_functions import energies_of
 
 import rotor
 from rotor import units
@@ -62,7 +63,7 @@ def test_all_products_give_the_levels_of_the_direct_product(species, plane):
     second = SECOND if plane else InternalTop(SECOND.f_mhz, SECOND.v3_mhz, (0.05, -0.03, 0.04))
     model = SeveralTops(ABC, (FIRST, second), COUPLED)
     blocks = model.blocks(species, 3, count=49, each=7, waves=3)
-    energies = blocks.linear.energies(model.coefficients)
+    energies = energies_of(blocks.linear, blocks.elements.count, model.coefficients)
     for j in range(4):
         expected = np.linalg.eigvalsh(direct_product(model, j, species, 3))
         found = np.sort(energies[blocks.functions.labels["J"] == j])
@@ -88,7 +89,7 @@ def test_all_products_of_three_tops_give_the_levels_of_the_direct_product(specie
     third = THIRD if plane else InternalTop(THIRD.f_mhz, THIRD.v3_mhz, (0.01, 0.055, 0.02), THIRD.v6_mhz)
     model = SeveralTops(ABC, (FIRST, SECOND, third), COUPLED_THREE)
     blocks = model.blocks(species, 2, count=(2 * waves + 1) ** 3, each=2 * waves + 1, waves=waves)
-    energies = blocks.summed(model.coefficients).energies([1.0])
+    energies = energies_of(blocks.summed(model.coefficients), len(blocks.functions.labels["J"]), [1.0])
     for j in range(3):
         expected = np.linalg.eigvalsh(direct_product(model, j, species, waves))
         found = np.sort(energies[blocks.functions.labels["J"] == j])
@@ -101,7 +102,10 @@ def test_opposite_species_of_three_tops_have_equal_energies():
     model = SeveralTops(ABC, (FIRST, SECOND, THIRD), COUPLED_THREE)
     for species in ((1, -1, 0), (1, 1, -1)):
         pair = [model.blocks(s, 2, count=20) for s in (species, tuple(-x for x in species))]
-        first, second = (np.sort(blocks.summed(model.coefficients).energies([1.0])) for blocks in pair)
+        first, second = (
+            np.sort(energies_of(blocks.summed(model.coefficients), len(blocks.functions.labels["J"]), [1.0]))
+            for blocks in pair
+        )
         assert np.abs(first - second).max() < 1e-5  # MHz, of up to 1e8
     assert len(model.species) == len(SPECIES_OF_THREE) == 14
 
