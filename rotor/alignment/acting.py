@@ -89,7 +89,7 @@ def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: flo
     smallest = RAD_PER_PS_MHZ * min(x for x in top.rotational_constants_mhz if math.isfinite(x))
     reached = float(highest)
     for pulse in pulses:
-        size = _spread(acted_on(top, pulse.acts_on))
+        size = spread(acted_on(top, pulse.acts_on))
         if isinstance(pulse, Kick):
             reached += size * pulse.area
             continue
@@ -99,7 +99,7 @@ def guessed_jmax(top: Top, pulses: Sequence[Pulse], highest: int, tolerance: flo
     return int(reached + max(6.0, 6 - 1.5 * math.log10(tolerance) - highest / 5))
 
 
-def _spread(body: Floats) -> float:
+def spread(body: Floats) -> float:
     """Largest change of the energy with orientation, for strength 1."""
     if body.ndim == 1:
         return 2 * float(np.linalg.norm(body))

@@ -109,6 +109,13 @@ class AlignmentTrace(Table):
         return {name: harmonics_of_cosine.constant for name, harmonics_of_cosine in self.harmonics.items()}
 
     @property
+    def reached_jmax(self) -> int:
+        """The highest J of the gas before or after the pulses: levels above it hold less than the tolerance."""
+        by_j = np.bincount(self.levels.j, self.populations)
+        above = np.cumsum(by_j[::-1])[::-1]
+        return max(self.ensemble.jmax, int(np.flatnonzero(above > self.tolerance).max(initial=0)))
+
+    @property
     def moved(self) -> float:
         """The largest deviation of a cosine from that of an isotropic gas."""
         apart = (

@@ -27,7 +27,7 @@ def cosines_budget(trace: AlignmentTrace, limits: Sequence[Limit]) -> ErrorBudge
     ----------
     trace : AlignmentTrace
     limits : sequence of Limit
-        Neglected contributions to frequencies, at the highest populated J before the pulses.
+        Neglected contributions to frequencies, at the highest J that the gas reaches.
 
     Returns
     -------

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rotor import units
-from rotor.alignment.acting import acted_on
+from rotor.alignment.acting import acted_on, spread
 from rotor.alignment.observables import figure_axis
 from rotor.alignment.pulse import RAD_PER_PS_MHZ, Kick, Pulse
 from rotor.alignment.timeline import Channel, Window, timeline
@@ -31,7 +31,8 @@ from rotor.geometry.rotations import rotate, uniform
 if TYPE_CHECKING:
     from rotor.tops.top import Top
 
-STEPS_PER_WINDOW = 400
+STEPS_PER_WINDOW = 400  # at least
+STEP_RAD = 0.25  # of the fastest libration or rotation in a step
 PIECE = 5000  # bodies propagated together
 
 
@@ -183,11 +184,25 @@ def _through(
     inside = np.flatnonzero((times > window.start_ps) & (times < window.stop_ps))
     listed = np.concatenate([[window.start_ps], times[inside], [window.stop_ps]])
     effects = [_torque(top, channel, _history(channel)) for channel in window.channels]
-    method = SymmetricTopSplitting((window.stop_ps - window.start_ps) / STEPS_PER_WINDOW)
+    method = SymmetricTopSplitting(_step_ps(top, window, moments, momentum))
     motion = integrate(method, moments, momentum, listed, attitude, effects)
     for place, turned in zip(inside.tolist(), np.moveaxis(motion.attitude, 1, 0)[1:-1], strict=True):
         out[:, place] = [measure(turned).sum() for measure in measures]
     return motion.momentum[:, -1], motion.attitude[:, -1]
+
+
+def _step_ps(top: Top, window: Window, moments: Floats, momentum: Floats) -> float:
+    """Step of a window: a part of it that is also short for libration in the field, ω² = 2 U0/I, and for rotation in the gas.
+
+    Rotation about the figure axis of an axial top changes no energy and is not counted.
+    """
+    moving = np.delete(np.arange(3), figure_axis(top)) if top.kind != "asymmetric" else np.arange(3)
+    times = np.linspace(window.start_ps, window.stop_ps, STEPS_PER_WINDOW + 1)
+    depth = sum(spread(acted_on(top, channel.acts_on)) * np.abs(channel.strength(times)) for channel in window.channels)
+    libration = 2.0 * np.max(depth) / moments[moving].min()
+    rotation = np.mean((momentum[:, moving] / moments[moving]) ** 2, axis=0).max()
+    length: float = window.stop_ps - window.start_ps
+    return min(length / STEPS_PER_WINDOW, STEP_RAD / math.sqrt(libration + rotation)) if libration else length
 
 
 def _history(channel: Channel) -> Callable[[float], float]:

@@ -201,6 +201,11 @@ class AlignAnswer(TextOf):
         """All cosines as a table."""
         return AlignmentTable(self.trace, self.classical)
 
+    @property
+    def _compared_j(self) -> int:
+        """The J at which effects and neglected effects are compared; at J = 0 all of them vanish."""
+        return max(self.trace.reached_jmax, 1)
+
     @cached_property
     def errors(self) -> ErrorBudget:
         """Error budget of the cosines."""
@@ -210,7 +215,7 @@ class AlignAnswer(TextOf):
 
         trace = self.trace
         effects = effects_of(trace.top, hyperfine=False)
-        return cosines_budget(trace, all_limits(trace.top, max(trace.ensemble.jmax, 1), effects))
+        return cosines_budget(trace, all_limits(trace.top, self._compared_j, effects))
 
     def facts(self) -> dict[str, Any]:
         """Facts of the answer except its table, by the keys of docs/verbs."""
@@ -228,7 +233,8 @@ class AlignAnswer(TextOf):
             "extremes": [_extremes(name, trace.t_ps, values) for name, values in cosines.items()],
             "classical_molecules": self.request.classical_molecules,
             "times": len(trace.t_ps),
-            **limit_facts(trace.top, max(trace.ensemble.jmax, 1), effects_of(trace.top, hyperfine=False)),
+            "revival_ps": None if trace.top.kind == "asymmetric" else revival_period_ps(trace.top),
+            **limit_facts(trace.top, self._compared_j, effects_of(trace.top, hyperfine=False)),
             "errors": self.errors.as_json(),
         }
 

@@ -169,11 +169,18 @@ def _facts(answer: AlignAnswer, content: Mapping[str, Any]) -> list[tuple[str, s
         *facts,
         ("pulses", "; ".join(_pulse_text(pulse) for pulse in trace.pulses)),
         ("gas", trace.gas_text),
-        ("J max", str(trace.jmax)),
+        ("revivals", _revival_text(content["revival_ps"])),
+        ("J max", f"{trace.jmax}; after the pulses the gas has J up to {trace.reached_jmax}"),
         ("method", f"{trace.method}, {counted(sum(trace.steps), 'step')}"),
         ("numerical error", accuracy),
         ("samples", _samples_text(trace)),
     ]
+
+
+def _revival_text(period: float | None) -> str:
+    if period is None:
+        return "none that are exact: an asymmetric top"
+    return f"every {period:.7g} ps, 1/(2Bc) of the rigid top; partial ones at its halves and quarters"
 
 
 def _samples_text(trace: AlignmentTrace) -> str:

@@ -16,6 +16,7 @@ from rotor.alignment import propagate
 from rotor.alignment.acting import acted_on, guessed_jmax, revival_period_ps
 from rotor.alignment.align import align
 from rotor.alignment.carry import GradientOf
+from rotor.alignment.classical import classical_trace
 from rotor.alignment.ensemble import thermal
 from rotor.alignment.observables import Harmonics, harmonic_sum, observable
 from rotor.alignment.pulse import (
@@ -27,7 +28,9 @@ from rotor.alignment.pulse import (
     TabulatedPulse,
     elliptical,
 )
+from rotor.alignment.request import AlignRequest, answer_align
 from rotor.alignment.timeline import timeline
+from rotor.quantum.estimates.limits import all_limits
 from rotor.quantum.fields.operators import Contraction
 from rotor.quantum.fields.space import field_space
 from rotor.tops.top import Top
@@ -499,3 +502,27 @@ def test_progress_counts_blocks():
     align(OCS, GaussianPulse(1e12, 0.1), [1.0, 2.0], temperature_k=1.0, progress=lambda *counts: seen.append(counts))
     assert [done for done, _ in seen] == list(range(1, len(seen) + 1))
     assert seen[-1][0] == seen[-1][1] > 1
+
+
+def test_neglected_effects_are_those_at_the_j_that_the_pulse_reaches():
+    """A kick of area P takes J = 0 to J near P: the rigid rotor is compared there, not at the J of the gas before."""
+    kick = Kick.from_strength(10.0, 4.04)
+    answer = answer_align(AlignRequest(OCS, (kick,), state=GROUND, points=11))
+    facts = answer.facts()
+    by_j = np.bincount(answer.trace.levels.j, answer.trace.populations)
+    assert by_j[facts["sizes_at_j"] + 1 :].sum() <= answer.trace.tolerance < by_j[facts["sizes_at_j"] :].sum()
+    assert facts["sizes_at_j"] > 10
+    d = next(limit["size_mhz"] for limit in facts["limits"] if limit["name"] == "centrifugal distortion")
+    assert d > 100 * next(limit.size_mhz for limit in all_limits(OCS, 1, ()) if limit.name == "centrifugal distortion")
+    assert facts["revival_ps"] == pytest.approx(1e6 / (2 * 6081.492), rel=1e-14)
+
+
+def test_a_classical_gas_follows_a_slow_pulse_and_comes_back():
+    """Turned on and off over 60 librations' periods, the gas is aligned at the peak and isotropic after it."""
+    pulse = GaussianPulse(1e13, 40.0)
+    cosines = classical_trace(
+        OCS, [pulse], [0.0, 150.0], temperature_k=10.0, molecules=400, rng=np.random.default_rng(3)
+    )
+    peak, after = cosines["cos2theta"]
+    assert peak > 0.84
+    assert after == pytest.approx(1 / 3, abs=4 * 0.298 / math.sqrt(400))  # 0.298: spread of cos² over the sphere
