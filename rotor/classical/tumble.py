@@ -24,7 +24,7 @@ from rotor.classical.motion import InvariantDrift, MotionTable, invariant_drift,
 from rotor.requests.budget import ErrorBudget
 from rotor.table import TextOf
 
-PERIODS, TURNS, POINTS = 2, 10, 201
+PERIODS, STEADY_TURNS, SEPARATRIX_TURNS, POINTS = 2, 2, 10, 201
 LARGEST = 1e100  # limit of moments, their inverses and angular momenta; avoids overflow of L²/I
 Three = tuple[float, float, float]
 
@@ -229,8 +229,9 @@ def _chosen_times(motion: FreeMotion, units: Units) -> tuple[Floats, str]:
     if math.isfinite(motion.period):
         span, source = PERIODS * float(motion.period), f"{PERIODS} periods, {POINTS} points"
     else:
-        span = TURNS * 2.0 * math.pi / float(motion.turning_rate)
-        source = f"{TURNS} turns about L, {POINTS} points, as the motion in the body has no period"
+        turns = STEADY_TURNS if motion.steady else SEPARATRIX_TURNS
+        span = turns * 2.0 * math.pi / float(motion.turning_rate)
+        source = f"{turns} turns about L, {POINTS} points, as the motion in the body has no period"
     return np.linspace(0.0, span * units.time_factor, POINTS), source
 
 

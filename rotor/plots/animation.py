@@ -23,7 +23,9 @@ Names = tuple[str, str, str]
 
 FRAMES = 150
 FRAMES_PER_SECOND = 25
+LARGEST_TURN_RAD = 0.8  # between frames; turns near π look slow or reversed
 DOTS_PER_INCH = 80
+PATH_POINTS = 1001  # of the path of L on the sphere
 LIMIT = 1.45  # half the width of each panel; the body fits into a sphere of radius 1.15
 # rows: right, up, towards the viewer; L points up
 _EYE = np.array([[0.0, 1.0, 0.0], [-0.3, 0.0, 0.954], [0.954, 0.0, 0.3]])
@@ -90,7 +92,9 @@ def animate(
     frames: int = FRAMES,
     provenance: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write a film of a free rotation from the first to the last of `times`, in even steps of the exact motion.
+    """Write a film of a free rotation from the first of `times`, in even steps of the exact motion.
+
+    It ends at the last of `times`, or where its steps would turn the body by more than `LARGEST_TURN_RAD`.
 
     Left: the body in space, with L upright, drawn as its atoms or, without them, as the uniform box with its moments. Right: the
     path of L on the momentum sphere in the body.
@@ -105,14 +109,15 @@ def animate(
     times = np.asarray(times, dtype=np.float64)
     if not times.size or np.ptp(times) == 0.0:
         raise ValueError("a film needs at least two different times")
-    when = np.linspace(times.min(), times.max(), frames)
+    when = frame_times(motion, times, frames)
     momentum, attitude = motion.at(when)
-    path_of_l = momentum / np.linalg.norm(motion.momentum0)
+    size = np.linalg.norm(motion.momentum0)
+    path_of_l, whole_path = momentum / size, motion.at(np.linspace(times.min(), times.max(), PATH_POINTS))[0] / size
     to_view = _EYE @ _upright(rotate(motion.attitude0, motion.momentum0)) @ to_matrix(attitude)
 
     figure, (left, right) = _empty_stage()
     view = clear_view(motion.moments, path_of_l[0])
-    _draw_still_parts(right, view, motion.moments, path_of_l, axis_names)
+    _draw_still_parts(right, view, motion.moments, whole_path, axis_names)
     figure, (left, right) = _with_backdrop(figure)
     (trail,) = right.plot([], [], color=MOTION, linewidth=2.2, alpha=0.55)
     (dot,) = right.plot([], [], "o", ms=8, mfc=MOTION, mec="white")
@@ -130,6 +135,15 @@ def animate(
             dot.set_data(*view.flat(path_of_l[i : i + 1]).T)
             trail.set_data(*view.flat(path_of_l[: i + 1]).T)
             add_frame()
+
+
+def frame_times(motion: FreeMotion, times: Floats, frames: int = FRAMES) -> Floats:
+    """Times (frames,) of a film from the first of `times` on, with steps that turn the body by `LARGEST_TURN_RAD` at most."""
+    momentum, _ = motion.at(np.linspace(times.min(), times.max(), PATH_POINTS))
+    omega = np.divide(momentum, motion.moments, out=np.zeros_like(momentum), where=motion.moments > 0.0)
+    fastest = float(np.linalg.norm(omega, axis=-1).max())
+    shown = min(float(np.ptp(times)), LARGEST_TURN_RAD * (frames - 1) / fastest)
+    return np.asarray(times.min() + np.linspace(0.0, shown, frames))
 
 
 @contextmanager

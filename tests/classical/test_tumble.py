@@ -176,6 +176,15 @@ def test_the_separatrix_is_told(call):
     assert "periodic, not chaotic" in out
 
 
+@pytest.mark.parametrize("source", ["OCS", "CH4"])
+def test_rows_of_a_steady_spin_show_its_turn(call, source):
+    """Rows a whole turn apart repeat one attitude, as if the molecule stood still."""
+    code, out, err = call("tumble", source)
+    assert code == 0, err
+    rows = [line.split() for line in out.split("the motion, ")[1].splitlines()[2:13]]
+    assert len({row[4] for row in rows}) > 5
+
+
 def test_files_are_written(call, tmp_path):
     code, out, err = call("tumble", "water", "--plot", "w.png", "--csv", "w.csv", "--json", "w.json")
     assert code == 0, err

@@ -18,8 +18,8 @@ from rotor.classical.gas.thermal_momentum import mean_thermal_momentum, off_inte
 from rotor.classical.integrators.method import integrate
 from rotor.classical.integrators.splitting import RotationSplitting
 from rotor.classical.motion import MotionTable, invariant_drift, sampled
-from rotor.geometry.rotations import IDENTITY
-from rotor.plots.animation import Atoms, animate, box_edges
+from rotor.geometry.rotations import IDENTITY, distance
+from rotor.plots.animation import Atoms, animate, box_edges, frame_times
 from rotor.plots.polhodes import polhode_figure
 from rotor.plots.show import write_picture
 from rotor.plots.sphere import clear_view
@@ -219,6 +219,19 @@ def test_the_same_picture_is_the_same_file_and_has_provenance(tmp_path):
         write_picture(motion, tmp_path / "a.jpg")
     with pytest.raises(ValueError, match="one body"):
         polhode_figure(free_motion([0.6, 0.8, 1.0], [0.0, 0.0, 0.0]), [0, 10])
+
+
+@pytest.mark.parametrize(
+    ("moments", "momentum"), [((1, 1, 2), (0, 1, 0.01)), ((0, 1, 1), (0, 1, 0)), ((1, 2, 3), (1, 1, 1))]
+)
+def test_frames_of_a_film_are_less_than_half_a_turn_apart(moments, momentum):
+    """A disc spun across its axis turns 200 times while L goes round once; 150 even frames of it show turns that it does not make."""
+    motion = free_motion(moments, momentum)
+    when = frame_times(motion, np.array([3.0, 1003.0]))
+    assert (when[0], len(when)) == (3.0, 150)
+    assert when[-1] < 1003.0
+    assert float(distance(*(motion.at(part)[1] for part in (when[1:], when[:-1]))).max()) < 0.9
+    assert frame_times(motion, np.array([3.0, 4.0]))[-1] == 4.0
 
 
 def test_a_film_has_its_frames(tmp_path):
