@@ -219,6 +219,7 @@ class AlignAnswer(TextOf):
 
     def facts(self) -> dict[str, Any]:
         """Facts of the answer except its table, by the keys of docs/verbs."""
+        from rotor.alignment.acting import revival_period_ps
         from rotor.quantum.effects.of_top import effects_of
         from rotor.quantum.estimates.limits import limit_facts
 
