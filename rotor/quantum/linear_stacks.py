@@ -24,7 +24,7 @@ from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size, symmetri
 from rotor.frozen import dataclass
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
-_LIKE = 1.5  # sizes of blocks that stand side by side
+_LIKE, _SMALL = 1.5, 8  # largest ratio of sizes of blocks that stand side by side, and sizes that all do
 
 
 class LinearBlock(NamedTuple):
@@ -188,12 +188,15 @@ class LinearStack:
         out[np.arange(self.size) < self.sizes[:, None]] = matrices[self._diagonal]
         return out
 
-    def slopes(self, vectors: Floats, states: Ints, space: Workspace) -> Floats:
-        """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states)."""
-        (count, most), size, elements = states.shape, self.size, self.rows.shape[1]
-        places = (size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]) + states[:, None, :]
-        chosen = vectors.ravel().take(places, out=space.array("chosen", count, size, most), mode="clip")
-        by_function = chosen.reshape(count * size, most)
+    def slopes(self, vectors: Floats, states: Ints | None, space: Workspace) -> Floats:
+        """⟨n|O_i|n⟩ (blocks, states, parameters of the blocks) of some states (blocks, states), or of all."""
+        (count, elements), size = self.rows.shape, self.size
+        if states is not None:
+            places = size * size * np.arange(count)[:, None, None] + size * np.arange(size)[:, None]
+            chosen = space.array("chosen", count, size, states.shape[1])
+            vectors = vectors.ravel().take(places + states[:, None, :], out=chosen, mode="clip")
+        most = vectors.shape[2]
+        by_function = vectors.reshape(count * size, most)
         weights = by_function.take(self.rows, axis=0, out=space.array("weights", count, elements, most), mode="clip")
         weights *= by_function.take(self.columns, axis=0, out=space.array("others", count, elements, most), mode="clip")
         return np.asarray(weights.transpose(0, 2, 1) @ self.factors @ self.mix)
@@ -203,7 +206,8 @@ def stack_numbers(shapes: Sequence[tuple[int, int, int]]) -> list[Ints]:
     """Positions of the blocks that are worked on together, from size, elements and units of each: of like size, of bounded memory."""
     order = sorted(range(len(shapes)), key=lambda i: shapes[i])
     costs = [elements * max(units, size) for size, elements, units in shapes]
-    runs = runs_of_similar_size([shapes[i][0] for i in order], _LIKE, most=_AT_ONCE, costs=[costs[i] for i in order])
+    sizes = [shapes[i][0] for i in order]
+    runs = runs_of_similar_size(sizes, _LIKE, _SMALL, _AT_ONCE, [costs[i] for i in order])
     return [np.array(order[run]) for run in runs]
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotor.arrays import distinct, numbers_in_runs
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
 from rotor.quantum.estimates.derivatives import term_expectations
@@ -162,11 +163,10 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
     along_and_across = {
         powers: value for powers, value in rigid_operators(top.constants).items() if powers[1:] != (0, 0)
     }
-    rows = np.concatenate([block.start + np.arange(len(block.energies_mhz)) for block in blocks])
+    number, rows = numbers_in_runs(
+        np.array([len(block.energies_mhz) for block in blocks]), np.array([block.start for block in blocks])
+    )
     rigid = term_expectations(levels, list(along_and_across), rows) @ list(along_and_across.values())
-    parts = np.split(rigid, np.cumsum([len(block.energies_mhz) for block in blocks])[:-1])
-    return [
-        (block.j, block.basis.species)
-        for block, part in zip(blocks, parts, strict=True)
-        if (np.diff(part) < -1e-9 * np.abs(part).max()).any()
-    ]
+    largest = np.maximum.reduceat(np.abs(rigid), np.searchsorted(number, np.arange(len(blocks))))
+    falls = (np.diff(rigid) < -1e-9 * largest[number[1:]]) & (np.diff(number) == 0)
+    return [(blocks[i].j, blocks[i].basis.species) for i in distinct(number[1:][falls]).tolist()]

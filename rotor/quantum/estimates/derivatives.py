@@ -154,8 +154,7 @@ def _expectations_in_blocks(levels: Levels, terms: Sequence[Powers], rows: Rows)
         vectors = np.zeros((len(alike), stack.size, stack.size))
         for place, block in enumerate(alike):
             vectors[place, : block.basis.size, : block.basis.size] = block.vectors
-        states = np.broadcast_to(np.arange(stack.size), vectors.shape[:2])
-        total = stack.slopes(vectors, states, space)
+        total = stack.slopes(vectors, None, space)
         for place, block in enumerate(alike):
             out[block.start : block.start + block.basis.size] = total[place, : block.basis.size]
     return out[rows]
