@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.basis.wang_functions import BetweenStates, WangFunctions
@@ -152,33 +153,42 @@ def _elements_with_n(
     terms = [(factor, _tensor_elements(tensor, up, low, pairs)) for factor, tensor in parts if tensor is not None]
     acting = [factor * matrix for factor, matrix in terms if matrix is not None]
     scalar = float(np.trace(np.array(rotor.components))) / 3
-    if scalar and not pairs.rise and _alike(up, low, pairs):
-        acting.append(scalar * length * np.eye(up.size, low.size))
+    if scalar and not pairs.rise and (same := _same_functions(up, low, pairs)).any():
+        acting.append(scalar * length * same)
     return np.asarray(sum(acting)) if acting else None
 
 
-def _alike(up: WangBlock, low: WangBlock, pairs: Pairs) -> bool:
-    """Whether both kinds of functions are the same at one N."""
+def _same_functions(up: WangBlock, low: WangBlock, pairs: Pairs) -> NDArray[np.bool_]:
+    """Whether a function' is a function, (functions', functions), for one N; states may differ in their range of K."""
     if pairs.k is not None:
-        return bool((pairs.k[0] == pairs.k[1]).all())
-    return (up.first_k, up.sign) == (low.first_k, low.sign)
+        return np.array([[(pairs.k[0] == pairs.k[1]).all()]])
+    return np.asarray(np.equal.outer(up.k, low.k) & (up.sign == low.sign))
 
 
 def _scalar_elements(rotor: Scalar, left: Section, right: Section, pairs: Pairs) -> Floats | None:
-    """Elements of powers of N, which act between equal Wang functions."""
-    bases = zip(pairs.up.tolist(), pairs.low.tolist(), strict=True)
-    alike = np.array([left.parts[a].basis == right.parts[b].basis for a, b in bases])
-    if not alike.any():
+    """Elements of powers of N, which act between Wang functions of one kind, in states that may differ in their range of K."""
+    up, low = left.basis, right.basis
+    if pairs.rise or up.sign != low.sign or (up.first_k - low.first_k) % 2:
         return None
     units = sorted({(q, n) for (_, q, n), _ in rotor.operators})
-    x, factors = pairs.n[:, 0] * (pairs.n[:, 0] + 1.0), np.zeros((len(alike), len(units)))
+    x, factors = pairs.n[:, 0] * (pairs.n[:, 0] + 1.0), np.zeros((len(pairs.n), len(units)))
     for (p, q, n), factor in rotor.operators:
-        factors[:, units.index((q, n))] += np.where(alike, factor * x**p, 0.0)
-    matrices = power_matrices(left, units)[pairs.up]
-    elements = np.zeros((len(alike), left.basis.size, right.basis.size))
-    size = min(elements.shape[1:])
-    elements[:, :size, :size] = np.einsum("bu,buij->bij", factors, matrices[:, :, :size, :size])
-    return elements
+        factors[:, units.index((q, n))] += factor * x**p
+    whole = _with_k_of_both(left, right)
+    matrices = np.einsum("bu,buij->bij", factors, power_matrices(whole, units)[pairs.up])
+    first, other = ((basis.first_k - whole.basis.first_k) // 2 for basis in (up, low))
+    return np.asarray(matrices[:, first : first + up.size, other : other + low.size])
+
+
+def _with_k_of_both(left: Section, right: Section) -> Section:
+    """The section `left` with the K of `right` beside its own."""
+    first, last = min(left.basis.first_k, right.basis.first_k), max(left.basis.k[-1], right.basis.k[-1])
+
+    def widened(basis: WangBlock) -> WangBlock:
+        return basis._replace(first_k=first, size=(min(basis.j, last) - first) // 2 + 1)
+
+    parts = tuple(part._replace(basis=widened(part.basis)) for part in left.parts)
+    return left._replace(basis=left.basis._replace(first_k=first, size=(last - first) // 2 + 1), parts=parts)
 
 
 def _tensor_elements(tensor: BodyTensor, up: WangBlock, low: WangBlock, pairs: Pairs) -> Floats | None:

@@ -33,8 +33,8 @@ from rotor.formats.spcat.hamiltonian.operators import as_matrix
 from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.operators.algebra import Operator
-from rotor.quantum.operators.rotation import weighted
-from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor
+from rotor.quantum.operators.rotation import sum_of_powers, weighted
+from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN, Rotor, Scalar
 
 
 class Pair(NamedTuple):
@@ -126,14 +126,18 @@ def turned_operator(operator: Operator) -> Operator:
 
 
 def turned_rotor(rotor: Rotor, axes: str) -> Rotor | None:
-    """i(O↑ - O↓) of a tensor; None if it is zero.
+    """i(O↑ - O↓) of a tensor or of powers of N; None if it is zero.
 
     >>> turned_rotor(Cosines(((0, 0, 0), (0, 1.0, 0), (0, 0, -1.0))), "bca").components  # bb - cc becomes bc + cb
     ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
     """
+    if isinstance(rotor, Scalar):
+        changes_k = any(n for (_, _, n), _ in rotor.operators)
+        return ByElements(0, turned_operator(sum_of_powers(dict(rotor.operators)))) if changes_k else None
     if not isinstance(rotor, Cosines | CosinesWithN) or (rotor.rank == 1 and isinstance(rotor, Cosines)):
         return None
-    x, y = ("abc".index(axis) for axis in axes[:2])
+    # O↑ raises k about z, for which x and y of an oblate basis, a left-handed frame, change places
+    x, y = ("abc".index(axis) for axis in (axes[:2] if axes[2] == "a" else axes[1::-1]))
     c, turn = np.array(rotor.components, dtype=float), np.zeros((3, 3))
     turn[x, y], turn[y, x] = -1.0, 1.0  # by a small angle about z
     turned = turn @ c - c @ turn
