@@ -32,12 +32,13 @@ throws = {
 }
 
 figure, panels = plt.subplots(1, 3, figsize=(10, 3), sharey=True, layout="constrained")
-for panel, (name, throw) in zip(panels, throws.items(), strict=True):
+for panel, (title, throw) in zip(panels, throws.items(), strict=True):
     motion = throw.to_pandas()
-    size = np.sqrt(motion.m1**2 + motion.m2**2 + motion.m3**2)
-    for component, colour in zip(("m1", "m2", "m3"), ("C0", "C1", "C2"), strict=True):
-        panel.plot(motion.t, motion[component] / size, color=colour, label=f"axis {component[1]}")
-    panel.set(title=f"Axis of {name}", xlabel="Time (s)")
+    momentum = motion.filter(like="kg_m2_per_s")  # columns m1, m2, m3 with their unit
+    size = np.linalg.norm(momentum, axis=1)
+    for (name, component), colour in zip(momentum.items(), ("C0", "C1", "C2"), strict=True):
+        panel.plot(motion.t_s, component / size, color=colour, label=f"axis {name[1]}")
+    panel.set(title=f"Axis of {title}", xlabel="Time (s)")
 panels[0].set_ylabel("Angular momentum in the book / size")
 panels[0].legend()
 
@@ -62,7 +63,7 @@ errors = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5]
 flips = []
 for error in errors:
     motion = rotor.tumble(body="book", angular_velocity=f"{error},10,{error}", times="0:6:6001").to_pandas()
-    flips.append(motion.t[np.argmax(motion.m2 < 0)])
+    flips.append(motion.t_s[np.argmax(motion.m2_kg_m2_per_s < 0)])
 
 figure, panel = plt.subplots(figsize=(5.5, 3.2), layout="constrained")
 panel.semilogx(errors, flips, "o", color="C1", label="first flip")

@@ -18,12 +18,11 @@ from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE, ClassicalEff
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import Method, Motion, integrate
+from rotor.classical.motion import COHERENT, MotionTable, Units
 from rotor.classical.step_errors import driven_budget, step_truncation
 from rotor.classical.system import flatten_system, total_momentum
-from rotor.classical.tumble import COHERENT, Three, Units
-from rotor.geometry.rotations import continuous
+from rotor.classical.tumble import Three
 from rotor.requests.budget import ErrorBudget
-from rotor.table import Table
 
 Four = tuple[float, float, float, float]
 METHODS = ("lie-runge-kutta", "splitting")
@@ -96,21 +95,6 @@ class DrivenRequest:
         return np.asarray(total_momentum(self.angular_velocity, self.moments, self.effects, self.attitude))
 
 
-@dataclass(frozen=True, repr=False)
-class DrivenTable(Table):
-    """Columns of the motion: t, L, attitude, energy, ω; all vectors in body axes."""
-
-    motion: Motion
-
-    @cached_property
-    def columns(self) -> dict[str, Floats]:
-        """t, m1, m2, m3, qw, qx, qy, qz, energy, w1, w2, w3."""
-        motion = self.motion
-        names = ("t", "m1", "m2", "m3", "qw", "qx", "qy", "qz", "energy", "w1", "w2", "w3")
-        values = (motion.times, *motion.momentum.T, *continuous(motion.attitude).T, motion.energy, *motion.omega.T)
-        return dict(zip(names, values, strict=True))
-
-
 @dataclass(frozen=True)
 class DrivenAnswer:
     """The motion that a request asked for."""
@@ -119,9 +103,9 @@ class DrivenAnswer:
     motion: Motion
 
     @property
-    def table(self) -> DrivenTable:
+    def table(self) -> MotionTable:
         """The motion as a table."""
-        return DrivenTable(self.motion)
+        return MotionTable.from_motion(self.motion, self.request.units, rates=True)
 
     @cached_property
     def errors(self) -> ErrorBudget:

@@ -20,33 +20,13 @@ from rotor.classical.bodies import NamedBody
 from rotor.classical.euler import checked_moments, checked_momentum, energy
 from rotor.classical.free.free_motion import FreeMotion, free_motion
 from rotor.classical.free.stability import Stability, stability
-from rotor.classical.motion import InvariantDrift, MotionTable, invariant_drift, sampled
+from rotor.classical.motion import COHERENT, InvariantDrift, MotionTable, Units, invariant_drift, sampled
 from rotor.requests.budget import ErrorBudget
 from rotor.table import TextOf
 
 PERIODS, STEADY_TURNS, SEPARATRIX_TURNS, POINTS = 2, 2, 10, 201
 LARGEST = 1e100  # limit of moments, their inverses and angular momenta; avoids overflow of L²/I
 Three = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Units:
-    """Names of the units of an answer, and factors from the units of the motion.
-
-    Without names all numbers are in one coherent set. moment: the unit of the moments, which are not converted.
-    """
-
-    time: str = ""
-    angular_momentum: str = ""
-    energy: str = ""
-    time_factor: float = 1.0
-    momentum_factor: float = 1.0
-    energy_factor: float = 1.0
-    moment: str = ""
-
-
-COHERENT = Units()
-SI = Units("s", "kg m²/s", "J", moment="kg m²")
 
 
 @dataclass(frozen=True)
@@ -219,7 +199,7 @@ def answer_tumble(request: TumbleRequest) -> TumbleAnswer:
     times, source = (np.array(request.times), "given") if request.times is not None else _chosen_times(motion, units)
     inner = sampled(motion, times / units.time_factor)
     table = MotionTable(
-        times, inner.momentum * units.momentum_factor, inner.attitude, inner.energy * units.energy_factor
+        times, inner.momentum * units.momentum_factor, inner.attitude, inner.energy * units.energy_factor, units=units
     )
     return TumbleAnswer(request, motion, table, invariant_drift(inner, motion), source)
 

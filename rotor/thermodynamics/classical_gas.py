@@ -221,7 +221,7 @@ def _correlations(
         executor=executor,
         progress=progress,
     )
-    return replace(curves, times=times)
+    return replace(curves, times=times, time_unit="ps")
 
 
 def top_probes(top: Top) -> Probes:

@@ -12,7 +12,8 @@ import numpy as np
 from rotor import units
 from rotor.checks import require_positive
 from rotor.classical.gas.thermal_momentum import mean_thermal_momentum, off_intermediate_axis
-from rotor.classical.tumble import Three, TumbleRequest, Units
+from rotor.classical.motion import Units
+from rotor.classical.tumble import Three, TumbleRequest
 from rotor.tops.facts import top_facts
 from rotor.tops.top import Top
 

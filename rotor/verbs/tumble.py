@@ -10,7 +10,6 @@ from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import Rule
 from rotor.requests.fill import NamedError, within
-from rotor.table import Table as Columns
 from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Output, Report, drawing, picture, tables
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
 
 SHOWN = 11  # rows of the motion in the report
 SMALL = 1e-4  # largest component of a column below which numbers are printed with digits instead of decimals
-_ATTITUDE = "qw", "qx", "qy", "qz"
 FEW_TIMES = 10_000  # plain Python takes half a second for them, as long as loading the compiler
 FREE = Rule(excludes=("effects",), why="needs a free motion (a table shows any)")  # of pictures
 EXAMPLES = """\
@@ -207,12 +205,11 @@ def _axes_table(answer: TumbleAnswer, report: Report) -> Table:
 
 
 def _motion_table(answer: TumbleAnswer, _: Report) -> Table:
-    units, columns = answer.request.units, answer.table.columns
-    names = {
-        f"m{number}": f"L{axis}{_bracket(units.angular_momentum)}" for number, axis in enumerate(answer.request.axes, 1)
-    }
-    forms = {name: f"{{{name}:{_form(columns[name])}}}" for name in (*names, *_ATTITUDE)}
-    return _rows(answer.table, units.time, {names.get(name, name): form for name, form in forms.items()})
+    columns, unit = answer.table.columns, _bracket(answer.request.units.angular_momentum)
+    momentum, attitude = [*columns][1:4], [*columns][4:8]
+    texts = [*(f"L{axis}{unit}" for axis in answer.request.axes), *attitude]
+    forms = [f"{{{name}:{_form(columns[name])}}}" for name in (*momentum, *attitude)]
+    return _rows(answer, dict(zip(texts, forms, strict=True)))
 
 
 _show_top = top_facts.report_on_top(_facts, _axes_table, _motion_table, title=_title)
@@ -220,17 +217,18 @@ _show_top = top_facts.report_on_top(_facts, _axes_table, _motion_table, title=_t
 
 def _driven_table(answer: DrivenAnswer) -> Table:
     units = answer.request.units
-    rate = _bracket("rad/" + units.time if units.time else "")
-    names = {"energy": "energy" + _bracket(units.energy)}
-    names |= {f"w{number}": f"ω{axis}{rate}" for number, axis in enumerate(answer.request.axes, 1)}
-    columns = {names.get(name, name): f"{{{name}:.6f}}" for name in (*names, *_ATTITUDE)}
-    return _rows(answer.table, units.time, columns)
+    names = [*answer.table.columns]
+    attitude, energy_and_rates = names[4:8], names[8:]
+    rates = (f"ω{axis}{_bracket(units.rate)}" for axis in answer.request.axes)
+    texts = [f"energy{_bracket(units.energy)}", *rates, *attitude]
+    return _rows(answer, {text: f"{{{n}:.6f}}" for text, n in zip(texts, (*energy_and_rates, *attitude), strict=True)})
 
 
-def _rows(motion: Columns, time: str, columns: Mapping[str, str]) -> Table:
+def _rows(answer: TumbleAnswer | DrivenAnswer, columns: Mapping[str, str]) -> Table:
     """Evenly spaced rows of a motion."""
-    records, few = sampled(motion, SHOWN, "times")
-    return record_table(f"the motion{few}", {f"t{_bracket(time)}": "{t:.6g}", **columns}, records)
+    records, few = sampled(answer.table, SHOWN, "times")
+    time = {f"t{_bracket(answer.request.units.time)}": f"{{{next(iter(answer.table.columns))}:.6g}}"}
+    return record_table(f"the motion{few}", time | dict(columns), records)
 
 
 def _numbers(values: Any) -> str:

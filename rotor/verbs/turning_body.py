@@ -21,7 +21,8 @@ from rotor.verbs.verb import Place, Subject, Verb
 if TYPE_CHECKING:
     from rotor.classical.bodies import NamedBody
     from rotor.classical.driven import DrivenRequest
-    from rotor.classical.tumble import Three, TumbleRequest, Units
+    from rotor.classical.motion import Units
+    from rotor.classical.tumble import Three, TumbleRequest
 
 _HBAR_PER_U_ANGSTROM2_RAD_PER_PS = ASE_TIME_PS / HBAR_CLASSICAL  # angular momentum in ħ of 1 u Å² at 1 rad/ps
 AT_REST = (1.0, 0.0, 0.0, 0.0)  # attitude: body and space axes coincide
@@ -41,11 +42,6 @@ class Body:
     axes: tuple[str, str, str] = ("1", "2", "3")
     named: NamedBody | None = None
     start: tuple[Three, str] | None = None
-
-    @property
-    def rate_unit(self) -> str:
-        """Unit of angular velocities; empty for coherent units without names."""
-        return f"rad/{self.units.time}" if self.units.time else ""
 
 
 @dataclass(frozen=True)
@@ -122,7 +118,7 @@ def _named_source(source: Any) -> NamedBody | None:
 
 
 def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
-    from rotor.classical.tumble import COHERENT, SI
+    from rotor.classical.motion import COHERENT, SI
 
     assert inputs.moments is not None
     typed = entries.of(BODY["moments"])
@@ -133,7 +129,7 @@ def _body_of_moments(entries: Entries, inputs: BodyInput) -> Body:
 def _everyday_body(body: NamedBody) -> Body:
     """An everyday body in SI units; its default motion is one turn a second about the intermediate, unstable axis."""
     from rotor.classical.gas.thermal_momentum import off_intermediate_axis
-    from rotor.classical.tumble import SI
+    from rotor.classical.motion import SI
     from rotor.thermodynamics.thermal_tumble import TILT_DEGREES
 
     moments = np.array(body.moments_kg_m2)
@@ -179,7 +175,7 @@ def _motion_of_body(entries: Entries, subject: Subject, start: BodyInput, motion
     from rotor.classical.tumble import TumbleRequest
 
     body: Body = subject.values["body"]
-    chosen = _start(entries, start, motion, np.array(body.moments), (body.rate_unit, "")) or body.start
+    chosen = _start(entries, start, motion, np.array(body.moments), (body.units.rate, "")) or body.start
     if chosen is None:
         raise NamedError(
             "body: give either {body.angular_momentum} or {angular_velocity}"
@@ -264,7 +260,7 @@ def _spin_or_momentum(
 ) -> tuple[Three | None, Three | None]:
     """Initial ω or L; a named body has the default of its free motion."""
     if start.angular_velocity is not None:
-        reader = Custom(lambda typed: three(typed, body.rate_unit))
+        reader = Custom(lambda typed: three(typed, body.units.rate))
         return replace(BODY["angular_velocity"], reader=reader).read(start.angular_velocity, entries.style), None
     if motion.angular_momentum is not None:
         field = replace(MOTION["angular_momentum"], reader=Custom(three))

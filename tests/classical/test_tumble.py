@@ -127,17 +127,26 @@ def test_a_molecule_spins_as_heat_does_half_a_degree_off(call):
     assert cold["angular_momentum_size"] == pytest.approx(mean / 2, rel=1e-14)  # √T
 
 
+def test_columns_have_their_unit_and_the_former_bare_name_warns():
+    table = rotor.tumble("water", times=(0.0, 1.0)).table
+    assert [*table.columns][:4] == ["t_ps", "m1_hbar", "m2_hbar", "m3_hbar"]
+    with pytest.warns(DeprecationWarning, match='the column "energy" is "energy_cm" from version 0.3 on'):
+        assert table.columns["energy"] is table.columns["energy_cm"]
+    with pytest.raises(KeyError, match="energy_mhz"):
+        table.columns["energy_mhz"]
+
+
 def test_units_of_a_molecule_are_ps_hbar_and_wavenumbers(call):
     code, out, _ = call("tumble", "water", "--angular-momentum", "1,10,2", "--times", "0,0.5,1ps", "--json", "-")
     assert code == 0
     content = json.loads(out)
     a, b, c = content["rotational_constants_cm"]
     assert content["energy"] == pytest.approx(a + 100 * b + 4 * c, rel=1e-9)  # CODATA: ħ²/2I and h/8π²cI are one
-    assert [row["t"] for row in content["motion"]] == [0.0, 0.5, 1.0]
+    assert [row["t_ps"] for row in content["motion"]] == [0.0, 0.5, 1.0]
     moments = np.array(content["moments"])
     inside = free_motion(moments, np.array([1.0, 10.0, 2.0]) * HBAR_CLASSICAL)
     momentum, _ = inside.at(1.0 / ASE_TIME_PS)
-    assert np.allclose([content["motion"][2][f"m{i}"] for i in (1, 2, 3)], momentum / HBAR_CLASSICAL, rtol=1e-13)
+    assert np.allclose([content["motion"][2][f"m{i}_hbar"] for i in (1, 2, 3)], momentum / HBAR_CLASSICAL, rtol=1e-13)
     per_cm = 4 * math.pi * 2.99792458e-2 * math.sqrt(105)  # |L|/I in rad/ps is 4π c B |L|/ħ
     assert c * per_cm < content["turning_rate"] < a * per_cm  # a mean of angular velocities along L
 

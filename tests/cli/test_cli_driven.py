@@ -67,7 +67,7 @@ def test_drag_slows_a_sphere_as_the_closed_form_says(call):
     assert code == 0, err
     rows = json.loads(out)["motion"]
     for row in rows:  # ω = ω0 exp(-c t/I); the tolerance of a step is 1e-10
-        assert row["w3"] == pytest.approx(2 * math.pi * math.exp(-0.25 * row["t"]), rel=1e-8)
+        assert row["w3_rad_per_s"] == pytest.approx(2 * math.pi * math.exp(-0.25 * row["t_s"]), rel=1e-8)
 
 
 def test_a_pendulum_swings_with_its_period_and_keeps_its_energy(call):
@@ -105,7 +105,7 @@ def test_a_named_body_that_is_given_no_motion_turns_once_a_second(call):
     )
     assert code == 0, err
     first = json.loads(out)["motion"][0]
-    assert first["w2"] == pytest.approx(2 * math.pi, rel=1e-4)  # half a degree off the axis: 1 - cos = 4e-5
+    assert first["w2_rad_per_s"] == pytest.approx(2 * math.pi, rel=1e-4)  # half a degree off the axis: 1 - cos = 4e-5
 
 
 DRAG = ("--effect", "linear drag coefficients=1,1,1")

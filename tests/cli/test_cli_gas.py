@@ -69,8 +69,8 @@ def test_correlation_functions_in_the_file_and_in_json(call, folder):
     with open(folder / "ocs.csv", newline="") as handle:
         rows = [{key: float(text) for key, text in row.items()} for row in csv.DictReader(handle)]
     assert rows == printed["correlation"]
-    assert list(rows[0]) == ["t", "c1", "c1_error", "c2", "c2_error"]
-    assert [row["t"] for row in rows] == np.linspace(0, 4, 9).tolist()
+    assert list(rows[0]) == ["t_ps", "c1", "c1_error", "c2", "c2_error"]
+    assert [row["t_ps"] for row in rows] == np.linspace(0, 4, 9).tolist()
     ocs = rotor.read("OCS")
     kt, moment = EV_PER_K * 300, ocs.moments_u_angstrom2[1]
     closed = linear_curves(np.linspace(0, 4, 9) / ASE_TIME_PS, moment, kt)
@@ -105,7 +105,7 @@ def test_constants_alone_and_times_chosen(call, folder):
     assert len(printed["correlation"]) == 101
     assert printed["correlation"][0]["c1"] == pytest.approx(1.0, abs=1e-12)  # nothing has moved
     assert abs(printed["correlation"][-1]["c1"] - printed["c1_plateau"]) < 0.1  # it has settled
-    assert printed["tested_at_ps"] == printed["correlation"][-1]["t"]
+    assert printed["tested_at_ps"] == printed["correlation"][-1]["t_ps"]
 
 
 def test_the_report_of_a_gas_has_its_numbers(call):

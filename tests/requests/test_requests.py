@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import rotor
-from rotor.classical.tumble import SI, TumbleRequest, answer_tumble
+from rotor.classical.motion import SI
+from rotor.classical.tumble import TumbleRequest, answer_tumble
 from rotor.fluids.request import FluidRequest, NewBox, answer_fluid
 from rotor.fluids.settings import Settings
 from rotor.quantum.request import LevelsRequest, answer_levels

@@ -24,6 +24,7 @@ from rotor.arrays import Floats
 from rotor.classical.euler import checked_moments
 from rotor.classical.free.free_motion import free_motion
 from rotor.classical.integrators.batch import check_turn, rates_and_axes
+from rotor.classical.motion import ColumnsInUnits
 from rotor.geometry.rotations import rotate, uniform
 from rotor.statistics.degrees_of_freedom import rotating_axes
 from rotor.statistics.equipartition import KineticDegrees, kinetic_degrees
@@ -88,6 +89,7 @@ class Correlations(Table):
     c2: Floats | None
     c2_error: Floats | None
     molecules: int
+    time_unit: str = ""
 
     def __len__(self) -> int:
         return len(self.times)
@@ -99,9 +101,10 @@ class Correlations(Table):
 
     @property
     def columns(self) -> dict[str, Floats]:
-        """t, c1, c1_error, c2, c2_error, as far as computed."""
-        named = {"t": self.times, "c1": self.c1, "c1_error": self.c1_error, "c2": self.c2, "c2_error": self.c2_error}
-        return {name: column for name, column in named.items() if column is not None}
+        """t with its unit, c1, c1_error, c2, c2_error, as far as computed."""
+        named = {"c1": self.c1, "c1_error": self.c1_error, "c2": self.c2, "c2_error": self.c2_error}
+        computed = [(name, "", column) for name, column in named.items() if column is not None]
+        return ColumnsInUnits([("t", self.time_unit, self.times), *computed])
 
 
 @dataclass(frozen=True)
