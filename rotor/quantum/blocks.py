@@ -86,7 +86,7 @@ def linear_blocks(functions: Basis, terms: Mapping[str, Operator]) -> FunctionBl
     >>> from rotor.quantum.basis.labelled import rotation_labels
     >>> from rotor.quantum.operators.rotation import j_x, j_y, j_z
     >>> top = linear_blocks(Basis(rotation_labels(1)), {"A": j_z(2), "B": j_x() @ j_x(), "C": j_y() @ j_y()})
-    >>> [np.linalg.eigvalsh(block.lower(np.array([10.0, 6.0, 4.0]))).round(9).tolist() for _, block in top]
+    >>> [block.energies(np.array([10.0, 6.0, 4.0])).round(9).tolist() for _, block in top]
     [[0.0], [14.0, 16.0], [10.0]]
     """
     return connected_blocks(functions.labels, functions.elements(list(terms.values())))

@@ -24,6 +24,7 @@ from rotor.arrays import Floats, Ints, Workspace, runs_of_similar_size, symmetri
 from rotor.frozen import dataclass
 
 _AT_ONCE = 1 << 18  # numbers of the largest array of blocks side by side: 2 MB, which stays in the cache of a core
+_LARGE, _NARROW = 600, 15  # size, and bandwidths in it, from which the banded solver is faster
 _LIKE, _SMALL = 1.5, 8  # largest ratio of sizes of blocks that stand side by side, and sizes that all do
 
 
@@ -58,6 +59,18 @@ class LinearBlock(NamedTuple):
         lower = np.zeros((self.size, self.size), dtype=self.factors.dtype)
         lower[self.rows, self.columns] = self.elements(values_mhz)
         return lower
+
+    def energies(self, values_mhz: Floats) -> Floats:
+        """Energies (size,), rising, at values (parameters,); of a large block with elements near the diagonal as a banded matrix."""
+        distance = self.rows - self.columns
+        width = int(distance.max(initial=0))
+        if self.size < _LARGE or _NARROW * width > self.size:
+            return np.asarray(np.linalg.eigvalsh(self.lower(values_mhz)))
+        from scipy.linalg import eigvals_banded
+
+        bands = np.zeros((width + 1, self.size), dtype=self.factors.dtype)
+        bands[distance, self.columns] = self.elements(values_mhz)
+        return np.asarray(eigvals_banded(bands, lower=True, check_finite=False))
 
     def diagonal(self, values_mhz: Floats) -> Floats:
         """The diagonal of H at values (parameters,)."""

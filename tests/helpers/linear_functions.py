@@ -98,7 +98,7 @@ def energies_of(blocks, count, values):
     """Energies of linear blocks at values of their terms, at the rows of so many functions; nan for those of no block."""
     energies = np.full(count, np.nan)
     for rows, block in blocks:
-        energies[rows] = np.linalg.eigvalsh(block.lower(np.array(values)))
+        energies[rows] = block.energies(np.array(values))
     return energies
 
 

@@ -29,6 +29,7 @@ from rotor.quantum.basis.labelled import Basis, rotation_labels
 from rotor.quantum.blocks import connected_blocks, linear_blocks
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.in_field import space_factor
+from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import UNIT, Operator, diagonal, half_anticommutator, shift
 from rotor.quantum.operators.rotation import body_tensor, j_squared, j_x, j_y, j_z, ladder, sum_of_powers
 from rotor.quantum.operators.torsion import cosine, p_alpha, sine
@@ -129,6 +130,17 @@ def test_reduced_elements_of_tensors_are_the_plain_ones(rank):
 
 
 # The rotation
+
+
+@pytest.mark.parametrize("phase", [1.0, 1j])
+def test_energies_of_a_large_narrow_block_are_those_of_its_matrix(phase):
+    size = 650
+    diagonal, beside = np.arange(size), np.arange(size - 2)
+    rows, columns = np.append(diagonal, beside + 2), np.append(diagonal, beside)
+    factors = np.append(diagonal**2.0, phase * np.full(size - 2, 40.0))[:, None]
+    block = LinearBlock(size, rows, columns, factors, np.eye(1), np.zeros(1, dtype=np.int64))
+    exact = np.linalg.eigvalsh(block.lower(np.array([0.5])))
+    assert np.abs(block.energies(np.array([0.5])) - exact).max() <= ROUNDING * exact.max()
 
 
 @pytest.mark.parametrize("real", [False, True])

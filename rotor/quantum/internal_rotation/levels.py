@@ -29,7 +29,6 @@ from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesL
 from rotor.quantum.levels import Levels, Mixtures, SolvedBlock, SpeciesFunctions, SpeciesMoments, placed
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.operators.rotation import body_tensor
-from rotor.quantum.solvers.hermitian import eigenvalues
 from rotor.quantum.spins.operators import Rotor
 from rotor.quantum.tensors import BodyTensor, Tensors
 from rotor.quantum.wang.basis import Part
@@ -179,7 +178,7 @@ def energies_alone(
         linear = blocks.summed(model.coefficients, max(below_mhz, highest))
         labels, unit = blocks.functions.labels, np.ones(1)
         if constants.tops == 1:  # a few functions for each K: whole blocks, energies alone
-            solved = [eigenvalues(block.lower(unit)) for _, block in linear]
+            solved = [block.energies(unit) for _, block in linear]
         else:
             populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
             if constants.tops > 2 and populated > MOST_POPULATED:

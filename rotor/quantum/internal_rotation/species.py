@@ -26,7 +26,6 @@ from rotor.quantum.internal_rotation.labels import (
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import Operator
 from rotor.quantum.solvers.dominated import dominated_states, is_dominated
-from rotor.quantum.solvers.hermitian import eigenstates
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +108,7 @@ def states_of(block: LinearBlock, values: Floats, mostly_in: NDArray[np.bool_]) 
     """Energies and vectors of a block, of as many states with the largest shares in the functions `mostly_in` where this is faster."""
     chosen = np.flatnonzero(mostly_in)
     few = dominated_states(block.sparse(values), chosen) if is_dominated(block.size, len(chosen)) else None
-    return few or eigenstates(block.lower(values))
+    return few or np.linalg.eigh(block.lower(values))
 
 
 def _merged(terms: Terms, coefficients: Floats) -> list[Product]:

@@ -36,7 +36,7 @@ _REACH = 2  # largest difference of N that the operators of a Hamiltonian connec
 Kinds = tuple[int, int, int]  # kinds of both blocks and the distance of their rows
 
 
-class UnitElements(NamedTuple):
+class DerivativeElements(NamedTuple):
     """Elements of ∂H/∂c between functions of two kinds of rotational blocks.
 
     rows, columns: (elements,) functions, as those of the largest block of a kind are counted. values: (table rows, elements, parameters).
@@ -48,7 +48,7 @@ class UnitElements(NamedTuple):
     parameters: Ints
 
 
-class Acting(NamedTuple):
+class ColumnElements(NamedTuple):
     """Elements between two columns of a group, by their places among its rotations.
 
     twice: 2 where the elements in the other order are left out, else 1. coefficients: (blocks, patterns', patterns). values: (blocks,
@@ -59,7 +59,7 @@ class Acting(NamedTuple):
     right: int
     twice: float
     coefficients: Floats
-    unit: UnitElements
+    of_kinds: DerivativeElements
     values: Floats
 
 
@@ -74,9 +74,9 @@ class FunctionTables:
     frame: Frame
     functions: list[Ints]
     vectors: dict[int, Floats]
-    channels: list[tuple[Floats, dict[Kinds, UnitElements]]]
+    channels: list[tuple[Floats, dict[Kinds, DerivativeElements]]]
 
-    def acting(self, group: Group, at: Ints) -> Iterator[Acting]:
+    def column_elements(self, group: Group, at: Ints) -> Iterator[ColumnElements]:
         """Elements between the columns of blocks of a group; of columns of different kinds or N in one order only."""
         rows_of_f = self.frame.rows_of_f(group.twice_f[at])
         rows = [self.frame.rows_of(group.twice_rows[at], rotation) for rotation in group.rotations]
@@ -85,12 +85,12 @@ class FunctionTables:
             places.setdefault((rotation.kind, rotation.rise), []).append(place)
         for coefficients, by_kinds in self.channels:
             coefficients_of_f = coefficients[rows_of_f]
-            for (up, low, step), unit in by_kinds.items():
+            for (up, low, step), of_kinds in by_kinds.items():
                 twice = 1.0 if up == low and not step else 2.0
                 for k, right in enumerate(group.rotations):
                     for i in places.get((up, right.rise + 2 * step), ()) if right.kind == low else ():
                         between = coefficients_of_f[:, group.rotations[i].patterns, right.patterns]
-                        yield Acting(i, k, twice, between, unit, unit.values[rows[k]])
+                        yield ColumnElements(i, k, twice, between, of_kinds, of_kinds.values[rows[k]])
 
     def over_functions(self, group: Group, at: Ints, vectors: Floats) -> list[Floats]:
         """Vectors (blocks, columns, states, n) over functions, (blocks, patterns, functions, n) for each rotation of a group."""
@@ -179,20 +179,22 @@ def _powers_of_axial(terms: StateTerms, count: int, v: Ints | int, n: Ints, k: I
     return out
 
 
-def _axial_elements(terms: StateTerms, count: int, stacks: Sequence[Stack], frame: Frame) -> dict[Kinds, UnitElements]:
+def _axial_elements(
+    terms: StateTerms, count: int, stacks: Sequence[Stack], frame: Frame
+) -> dict[Kinds, DerivativeElements]:
     """Elements of the rotation alone within functions |N K⟩."""
-    out, first, parameters = dict[Kinds, UnitElements](), np.zeros(1, dtype=np.int64), np.arange(count)
+    out, first, parameters = dict[Kinds, DerivativeElements](), np.zeros(1, dtype=np.int64), np.arange(count)
     for stack in stacks:
         assert stack.k is not None
         values = np.zeros((len(frame.n_of_rows), 1, count))
         values[frame.rows[stack.numbers], 0] = _powers_of_axial(terms, count, stack.sections[0].v, stack.n, stack.k)
-        out[stack.kind, stack.kind, 0] = UnitElements(first, first, values, parameters)
+        out[stack.kind, stack.kind, 0] = DerivativeElements(first, first, values, parameters)
     return out
 
 
 def _rotation_elements(
     terms: StateTerms, count: int, blocks: Sequence[SolvedBlock], functions: Sequence[Ints], shared: Shared
-) -> dict[Kinds, UnitElements]:
+) -> dict[Kinds, DerivativeElements]:
     """Elements of the rotation alone between Wang functions, with both triangles."""
     frame = shared.frame
     of_kind: dict[int, list[tuple[int, Ints, Ints, LinearBlock]]] = {}
@@ -212,13 +214,13 @@ def _rotation_elements(
         off = np.flatnonzero(rows != columns)
         values = np.concatenate([values, values[:, off]], axis=1)[:, :, parameters]
         places = np.append(rows, columns[off]), np.append(columns, rows[off])
-        out[kind, kind, 0] = UnitElements(*places, values, parameters)
+        out[kind, kind, 0] = DerivativeElements(*places, values, parameters)
     return out
 
 
 def _spin_elements(
     pieces: Sequence[Sequence[Piece]], by_unit: Mapping[Piece, Sequence[Contracted]], frame: Frame
-) -> dict[Kinds, UnitElements]:
+) -> dict[Kinds, DerivativeElements]:
     """Elements of a channel by kinds: those of each operator of N, times ½(N'^2p + N^2p) and the value of each parameter."""
     units = list(dict.fromkeys(_unit(piece) for pieces_of_parameter in pieces for piece in pieces_of_parameter))
     parameters = np.array([column for column, pieces_of_parameter in enumerate(pieces) if pieces_of_parameter])
@@ -239,7 +241,7 @@ def _spin_elements(
             for piece in pieces[column]:
                 powers = ((m * (m + 1)) ** piece.n2 + (n * (n + 1)) ** piece.n2) / 2
                 mix[:, units.index(_unit(piece)), at] += piece.value * powers
-        out[kinds] = UnitElements(left, right, elements @ mix, parameters)
+        out[kinds] = DerivativeElements(left, right, elements @ mix, parameters)
     return out
 
 
@@ -262,21 +264,21 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
         for at, vectors, places in states.runs():
             over_functions = tables.over_functions(states.group, at, vectors)
             total = np.zeros((len(at), vectors.shape[3], len(names)))
-            for acting in tables.acting(states.group, at):
-                total[:, :, acting.unit.parameters] += acting.twice * _slopes(acting, over_functions)
+            for each in tables.column_elements(states.group, at):
+                total[:, :, each.of_kinds.parameters] += each.twice * _slopes(each, over_functions)
             out[places] = total
     return np.asarray(out[:-1][rows])
 
 
-def _slopes(acting: Acting, vectors: Sequence[Floats]) -> Floats:
-    """Σ_p'r'pr V_p'r' c(p', p) X_c(r', r) V_pr of acting elements, (blocks, n, parameters)."""
-    bra, ket = vectors[acting.left], vectors[acting.right]
+def _slopes(each: ColumnElements, vectors: Sequence[Floats]) -> Floats:
+    """Σ_p'r'pr V_p'r' c(p', p) X_c(r', r) V_pr, (blocks, n, parameters)."""
+    bra, ket = vectors[each.left], vectors[each.right]
     blocks, _, functions, n = ket.shape
-    moved = np.matmul(acting.coefficients, ket.reshape(blocks, -1, functions * n)).reshape(blocks, -1, functions, n)
-    weights = bra[:, :, acting.unit.rows]
-    weights *= moved[:, :, acting.unit.columns]
+    moved = np.matmul(each.coefficients, ket.reshape(blocks, -1, functions * n)).reshape(blocks, -1, functions, n)
+    weights = bra[:, :, each.of_kinds.rows]
+    weights *= moved[:, :, each.of_kinds.columns]
     total = weights[:, 0] if weights.shape[1] == 1 else weights.sum(axis=1)
-    return np.asarray(np.matmul(total.transpose(0, 2, 1), acting.values))
+    return np.asarray(np.matmul(total.transpose(0, 2, 1), each.values))
 
 
 def linear_blocks_of_spins(
@@ -298,13 +300,13 @@ def _elements(block: SpinFunctions, tables: FunctionTables) -> Iterator[Weighted
     functions = np.concatenate([np.tile(tables.functions[part.number], part.repeats) for part in block.parts])
     place = np.full((group.columns, 1 + int(functions.max())), -1)
     place[group.functions[int(group.shapes[at])][0], functions] = np.arange(size)
-    for acting in tables.acting(group, np.array([at])):
-        up, low = np.nonzero(acting.coefficients[0])
-        last = np.maximum(acting.unit.rows, acting.unit.columns)
-        inside = np.flatnonzero(acting.values[0].any(axis=1) & (last < place.shape[1]))
-        rows = place[group.rotations[acting.left].columns.start + up[:, None], acting.unit.rows[inside]]
-        columns = place[group.rotations[acting.right].columns.start + low[:, None], acting.unit.columns[inside]]
-        factors = acting.coefficients[0][up, low][:, None, None] * acting.values[0][inside]
-        present = (rows >= 0) & (columns >= 0) & ((rows >= columns) | (acting.twice > 1))
+    for each in tables.column_elements(group, np.array([at])):
+        up, low = np.nonzero(each.coefficients[0])
+        last = np.maximum(each.of_kinds.rows, each.of_kinds.columns)
+        inside = np.flatnonzero(each.values[0].any(axis=1) & (last < place.shape[1]))
+        rows = place[group.rotations[each.left].columns.start + up[:, None], each.of_kinds.rows[inside]]
+        columns = place[group.rotations[each.right].columns.start + low[:, None], each.of_kinds.columns[inside]]
+        factors = each.coefficients[0][up, low][:, None, None] * each.values[0][inside]
+        present = (rows >= 0) & (columns >= 0) & ((rows >= columns) | (each.twice > 1))
         places = np.maximum(rows, columns) * size + np.minimum(rows, columns)
-        yield WeightedElements(places[present], factors[present], acting.unit.parameters)
+        yield WeightedElements(places[present], factors[present], each.of_kinds.parameters)

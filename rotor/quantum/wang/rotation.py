@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.coupled_levels import Model, coupled_levels, model_of
 from rotor.quantum.effect import QuantumEffect, couplings_of, k_limits_of
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.quantum.levels import Levels, SolvedBlock, levels_table, single_block
+from rotor.quantum.levels import Levels, levels_table, single_block
 from rotor.quantum.wang.basis import WangBlock, blocks_within, names_of_blocks
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
 from rotor.quantum.wang.wang_matrix import (
@@ -166,21 +167,13 @@ def _in_wang_blocks(
         for js in ([[j] for j in all_j] if executor else [all_j])
     ]
     solved = executor.map(_solve, *zip(*pieces, strict=True)) if executor else (_solve(*piece) for piece in pieces)
-    blocks = tuple(_placed(block for solutions in solved for block in solutions))
-
-    functions, sizes = [b.basis for b in blocks], [len(b.energies_mhz) for b in blocks]
+    whole = [block for solutions in solved for block in solutions]
+    functions, sizes = [basis for basis, _, _ in whole], [len(energies) for _, energies, _ in whole]
+    blocks = tuple(map(single_block, *zip(*whole, strict=True), accumulate(sizes, initial=0)))
     j = np.repeat([block.j for block in functions], sizes)
     ka, kc = names_of_blocks(functions, sizes, representation)
     energies, quanta = np.concatenate([b.energies_mhz for b in blocks]), {"j": j, "ka": ka, "kc": kc}
     return levels_table(top, effects, jmax, energies, quanta, representation, blocks=blocks if vectors else ())
-
-
-def _placed(solved: Iterator[tuple[WangBlock, Floats, Floats]]) -> Iterator[SolvedBlock]:
-    """Solved blocks with the row of the first level of each."""
-    start = 0
-    for basis, energies, vectors in solved:
-        yield single_block(basis, energies, vectors, start)
-        start += len(energies)
 
 
 def _solve(

@@ -25,7 +25,6 @@ AT_ONCE = 32  # matrices of one size with at most so many rows are solved togeth
 AT_ONCE_BLOCKS = 128  # blocks whose matrix elements are computed together: those of 32 J
 _NONE: Floats = np.zeros((0, 0))
 _ROOT_2 = float(np.sqrt(2))
-_OVERFLOW = "a block of the Hamiltonian overflows: J max is too high for these distortion constants"
 SMALL = 100  # tridiagonal blocks with at most so many rows do not justify loading scipy.linalg (0.2 s)
 
 
@@ -121,57 +120,67 @@ def block_bands(operators: Operators, blocks: Sequence[WangBlock]) -> Iterator[l
 
 
 def diagonalise(bands: list[Floats], vectors: bool = True) -> tuple[Floats, Floats]:
-    """Eigenvalues (rising) and eigenvectors (columns) of a symmetric matrix from its diagonals.
-
-    LAPACK's divide and conquer solves tridiagonal matrices (dstevd), its dense form wider ones (dsyevd, numpy's eigh). The dense form also
-    solves tridiagonal matrices of up to `SMALL` rows if scipy.linalg is not loaded yet, as loading takes longer; both give identical bits.
-
-    Raises ValueError if LAPACK does not converge or the matrix is not finite.
-    """
-    size = len(bands[0])
-    if size == 1:
-        return bands[0], np.ones((1, 1))
-    if not _are_finite(bands):
-        raise ValueError(_OVERFLOW)
-    if len(bands) == 1:
-        return _diagonal(bands[0], vectors)
-    if len(bands) > 2 or (size <= SMALL and "scipy.linalg" not in sys.modules):
-        return _dense(bands, vectors)
-
-    from scipy.linalg.lapack import dstevd
-
-    energies, states, info = dstevd(bands[0], bands[1], compute_v=int(vectors))
-    if info:
-        raise ValueError(f"LAPACK dstevd did not converge on a block of size {size} (info = {info})")
-    return energies, states
+    """`diagonalise_all` for one matrix."""
+    return diagonalise_all([bands], vectors)[0]
 
 
 def diagonalise_all(matrices: Sequence[list[Floats]], vectors: bool = True) -> list[tuple[Floats, Floats]]:
-    """`diagonalise` for many matrices; with vectors, small ones of equal size and band width are solved in one call."""
+    """Eigenvalues (rising) and eigenvectors (columns) of symmetric matrices from their diagonals.
+
+    LAPACK's divide and conquer solves tridiagonal matrices (dstevd), its dense form (dsyevd, numpy's eigh) wider ones and small ones, those
+    of equal size and width in one call. If scipy.linalg is not loaded yet, which takes longer than that, the dense form solves tridiagonal
+    matrices of up to `SMALL` rows; both give identical bits.
+
+    Raises ValueError if LAPACK does not converge or a matrix is not finite.
+    """
     alike: dict[tuple[int, int], list[int]] = {}
-    out: list[tuple[Floats, Floats]] = []
+    out: list[tuple[Floats, Floats]] = [(_NONE, _NONE)] * len(matrices)
+    small = SMALL if "scipy.linalg" not in sys.modules else AT_ONCE if vectors else 0
     for number, bands in enumerate(matrices):
-        small = vectors and len(bands) > 1 and len(bands[0]) <= AT_ONCE
-        out.append((bands[0], _NONE) if small else diagonalise(bands, vectors))
-        if small:
-            alike.setdefault((len(bands[0]), len(bands)), []).append(number)
+        size, width = len(bands[0]), len(bands)
+        if width > 2 or (width == 2 and size <= small):
+            alike.setdefault((size, width), []).append(number)
+        else:
+            out[number] = (_diagonal if width == 1 else _tridiagonal)(bands, vectors)
     for (size, width), numbers in alike.items():
         stacked = np.zeros((len(numbers), size * size))
         for n in range(width):
-            stacked[:, n * size :: size + 1] = [
-                matrices[number][n] for number in numbers
-            ]  # eigh reads the lower triangle
-        if not _are_finite([stacked]):
-            raise ValueError(_OVERFLOW)
-        energies, states = np.linalg.eigh(stacked.reshape(-1, size, size))
-        states = np.ascontiguousarray(states.transpose(0, 2, 1)).transpose(0, 2, 1)  # a state's components side by side
+            stacked[:, n * size :: size + 1] = [matrices[number][n] for number in numbers]  # the lower triangle
+        _refuse_infinite(stacked)
+        whole = stacked.reshape(-1, size, size)
+        if vectors:
+            energies, states = np.linalg.eigh(whole)
+            states = np.ascontiguousarray(states.transpose(0, 2, 1)).transpose(0, 2, 1)  # components side by side
+        else:
+            energies, states = np.linalg.eigvalsh(whole), np.broadcast_to(_NONE, (len(numbers), 0, 0))
         for place, number in enumerate(numbers):
             out[number] = energies[place], states[place]
     return out
 
 
-def _are_finite(bands: list[Floats]) -> bool:
-    return all(np.isfinite(band).all() for band in bands)
+def _refuse_infinite(*arrays: Floats) -> None:
+    if not all(np.isfinite(array).all() for array in arrays):
+        raise ValueError("a block of the Hamiltonian overflows: J max is too high for these distortion constants")
+
+
+def _diagonal(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
+    """Sorted energies and vectors of a diagonal matrix."""
+    if len(bands[0]) == 1:
+        return bands[0], np.ones((1, 1))
+    _refuse_infinite(*bands)
+    order = np.argsort(bands[0], kind="stable")
+    return bands[0][order], np.eye(len(order))[:, order] if vectors else _NONE
+
+
+def _tridiagonal(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
+    """Energies and vectors of a tridiagonal matrix."""
+    from scipy.linalg.lapack import dstevd
+
+    _refuse_infinite(*bands)
+    energies, states, info = dstevd(*bands, compute_v=int(vectors))
+    if info:
+        raise ValueError(f"LAPACK dstevd did not converge on a block of size {len(energies)} (info = {info})")
+    return energies, states
 
 
 def lowest_energies(bands: list[Floats], below: float) -> Floats:
@@ -180,8 +189,9 @@ def lowest_energies(bands: list[Floats], below: float) -> Floats:
     A few eigenvalues of a large tridiagonal matrix are computed by bisection (LAPACK's dstebz).
     """
     size = len(bands[0])
-    if size <= SMALL or len(bands) != 2 or not _are_finite(bands):
+    if size <= SMALL or len(bands) != 2:
         return diagonalise(bands, vectors=False)[0]
+    _refuse_infinite(*bands)
     from scipy.linalg.lapack import dstebz
 
     # below all Gershgorin discs, which extend 2|e| to each side
@@ -195,21 +205,3 @@ def lowest_energies(bands: list[Floats], below: float) -> Floats:
     if info:
         raise ValueError(f"LAPACK dstebz did not converge on a block of size {size} (info = {info})")
     return np.sort(energies[:count])
-
-
-def _diagonal(band: Floats, vectors: bool) -> tuple[Floats, Floats]:
-    """Sorted energies and vectors of a diagonal matrix."""
-    order = np.argsort(band, kind="stable")
-    return band[order], np.eye(len(band))[:, order] if vectors else np.zeros((0, 0))
-
-
-def _dense(bands: list[Floats], vectors: bool) -> tuple[Floats, Floats]:
-    """Energies and vectors by the dense solver."""
-    size = len(bands[0])
-    matrix = np.zeros((size, size))
-    for n, band in enumerate(bands):
-        matrix.flat[n * size :: size + 1] = band  # eigh reads the lower triangle
-    if not vectors:
-        return np.asarray(np.linalg.eigvalsh(matrix), dtype=np.float64), np.zeros((0, 0))
-    solved = np.linalg.eigh(matrix)
-    return np.asarray(solved.eigenvalues), np.asfortranarray(solved.eigenvectors)  # a state's components side by side
