@@ -21,21 +21,35 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--sample", default="1/1", metavar="K/N", help="Of the slow tests the K-th of N parts.")
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Leave out slow tests that are not in the sample; which part a test is in follows from its name alone.
+def _seconds(item: pytest.Item) -> float:
+    """About how long a slow test takes, from its mark; most of them some seconds."""
+    return float(item.get_closest_marker("slow").kwargs.get("seconds", 4.0))
 
-    The slow ones come first, so that at the end no worker waits for a long one of another.
+
+def _parts_of_slow(slow: list[pytest.Item], parts: int) -> list[list[pytest.Item]]:
+    """Parts of about the same length: the longest first, each test to the part that is the shortest so far."""
+    shared_out: list[list[pytest.Item]] = [[] for _ in range(parts)]
+    lengths = [0.0] * parts
+    for item in sorted(slow, key=lambda item: (-_seconds(item), zlib.crc32(item.nodeid.encode()))):
+        shortest = lengths.index(min(lengths))
+        shared_out[shortest].append(item)
+        lengths[shortest] += _seconds(item)
+    return shared_out
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Leave out slow tests that are not in the sample.
+
+    The slow ones come first, the longest before the others, so that at the end no worker waits for a long one of another.
     """
     part, parts = (int(number) for number in config.getoption("--sample").split("/"))
     if not 1 <= part <= parts:
         raise pytest.UsageError(f"--sample {part}/{parts}: expected K/N with K from 1 to N")
-    outside: list[pytest.Item] = []
-    inside: list[pytest.Item] = []
-    for item in items:
-        other_part = item.get_closest_marker("slow") and zlib.crc32(item.nodeid.encode()) % parts != part - 1
-        (outside if other_part else inside).append(item)
-    config.hook.pytest_deselected(items=outside)
-    items[:] = sorted(inside, key=lambda item: item.get_closest_marker("slow") is None)
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    chosen = _parts_of_slow(slow, parts)[part - 1]
+    inside = set(chosen)
+    config.hook.pytest_deselected(items=[item for item in slow if item not in inside])
+    items[:] = [*chosen, *(item for item in items if not item.get_closest_marker("slow"))]
 
 
 def pytest_collection_finish() -> None:

@@ -94,16 +94,16 @@ def gridded(noise: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
     return grid, x
 
 
-@pytest.mark.parametrize("suffix", [".npy", ".csv"])
-def test_a_spectrum_on_a_grid(suffix: str, tmp_path: Path) -> None:
-    """Peaks are found within four of their errors, and the species from them."""
+def test_a_spectrum_on_a_grid(tmp_path: Path) -> None:
+    """Peaks are found within four of their errors, and the species from them; the same from text to its four decimals."""
     grid, x = gridded()
-    path = tmp_path / f"spectrum{suffix}"
-    if suffix == ".npy":
-        np.save(path, np.column_stack([grid, x]))
-    else:
-        np.savetxt(path, np.column_stack([grid, x]), delimiter=",", fmt="%.4f")
-    peaks = read_peaks(path)
+    np.save(tmp_path / "spectrum.npy", np.column_stack([grid, x]))
+    part = slice(0, 40_000)
+    np.savetxt(tmp_path / "part.csv", np.column_stack([grid[part], x[part]]), delimiter=",", fmt="%.4f")
+    peaks, written = (read_peaks(tmp_path / name) for name in ("spectrum.npy", "part.csv"))
+    assert len(written) > 2
+    near = np.abs(peaks.frequency_mhz - written.frequency_mhz[:, None]).min(axis=1)
+    assert (near < written.uncertainty_mhz).all()
     f, _ = lines_of(TRUTH, (0.0, 1.0, 0.6), 100.0)
     apart = np.array([np.abs(f - peak).min() for peak in peaks.frequency_mhz])
     alone = np.array([np.sort(np.abs(f - peak))[1] > 0.3 for peak in peaks.frequency_mhz])

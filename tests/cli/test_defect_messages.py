@@ -83,7 +83,9 @@ def test_a_cut_that_no_intensity_has(cut, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("momentum", [(1.0, 1.0, 1.0), (0.0, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    "momentum", [pytest.param((1.0, 1.0, 1.0), marks=pytest.mark.slow(seconds=14)), (0.0, 0.0, 0.0)]
+)
 def test_a_plan_of_a_body_that_turns_1e13_times_is_short(call, folder, momentum):
     """ω = L/I is 1.7e12 about the first axis; at rest, the torque about that axis brings it there."""
     text = tumble(momentum=momentum).replace("[0.0, 0.0, 1.0]", "[1.0, 0.0, 0.0]")

@@ -110,14 +110,14 @@ def test_breaking_a_piece_changes_exactly_its_users(piece, plain, tmp_path):
 GROWING = "scene rattleback"  # its reversals make 1e-9 of round-off between the compiled and the plain rolling
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=60)
 def test_compiled_and_plain_forms_give_the_same_numbers(plain, tmp_path):
     compiled = answers(copied(tmp_path), compiled=True)
     # fused multiply-adds of blocks, 1e-16 each; and thousands of adaptive steps whose sums are in another order
     assert not {name for name in plain if differs(plain[name], compiled[name], 1e-7 if name == GROWING else 1e-11)}
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=60)
 def test_compiled_kernels_follow_the_plain_source(plain, tmp_path):
     broken = answers(copied(tmp_path, BREAKS["splitting step"]), compiled=True)
     used, _ = table()

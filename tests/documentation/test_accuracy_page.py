@@ -82,7 +82,7 @@ def test_no_curve_folds_back(program):
 CHEAP = ["levels", "cut", "partition", "stark", "fluid_step", "ewald", "fit"]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=20)
 @pytest.mark.parametrize("name", CHEAP)
 def test_the_errors_come_out_again(program, name):
     """Within a factor of 1.5 where they are no round-off, since another LAPACK takes other steps."""

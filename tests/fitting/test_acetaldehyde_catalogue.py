@@ -93,7 +93,7 @@ def test_constants_of_the_fit_give_lines_of_the_catalogue_with_its_labels():
 
 
 @pytest.mark.oracle
-@pytest.mark.slow
+@pytest.mark.slow(seconds=147)
 def test_lines_of_two_torsional_states_have_their_labels_and_frequencies(shared):
     path = shared / "reference" / "internal_rotation" / "c044003.cat.gz"
     values = {name: value * CM for name, value in PUBLISHED.items()} | {"rho": 0.328632673}

@@ -163,7 +163,7 @@ def hyperfine_lines(top, nmax, error_mhz=0.002, noise=None, vt=(0, 1)):
 def test_derivatives_with_spins_are_those_of_finite_differences(frame, second):
     top = turning_top(frame, 0, SPINS.replace("MHz", second + "MHz"))
     constants = TopConstants(top, hyperfine=True)
-    levels = rotor.api.solve_levels(top, 3, effects=rotor.api.effects_of(top, True))
+    levels = rotor.api.solve_levels(top, 2, effects=rotor.api.effects_of(top, True))
     few = np.random.default_rng(3).permutation(len(levels))[:60]
     quanta = {n: np.where(c == "E", 1, 0) if n == "species" else c for n, c in levels.quanta.items()}
     labels = np.column_stack([quanta[name][few] for name in constants.quanta])

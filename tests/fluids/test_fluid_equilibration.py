@@ -38,6 +38,7 @@ def test_stationary_rows_are_told_from_drifting_and_from_cold_ones():
     assert np.mean([is_stationary(rows, 300.0) for rows in atoms]) > 0.85
 
 
+@pytest.mark.slow(seconds=10)
 def test_water_from_a_lattice_has_its_temperature_and_equipartition():
     settings = Settings(steps=4000, cutoff_angstrom=6.0, seed=4)
     cold = answer_fluid(FluidRequest(NewBox(64, equilibration_ps=0.0), settings), progress=lambda *_: None)

@@ -6,12 +6,16 @@ published names of the constants.
 
 from __future__ import annotations
 
+import contextlib
+import importlib.util
+import io
 import json
-import subprocess
-import sys
+import warnings
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from places import ORACLES
@@ -72,42 +76,67 @@ def lines_of_case(case: dict[str, Any]) -> Lines:
     return lines.where(lines.intensity_nm2_mhz / lines.levels.components[lines.lower] > least)
 
 
-@cache
+_PREDICTIONS: dict[tuple[bytes, ...], Prediction] = {}
+
+
 def prediction(folder: Path) -> Prediction:
-    """What the case's .int and .var predict."""
-    return predict_file(folder / f"{folder.name}.int")
+    """What the case's .int and .var predict; samples and whole files of a case have the same ones."""
+    path = folder / f"{folder.name}.int"
+    texts = tuple(path.with_suffix(suffix).read_bytes() for suffix in (".int", ".var"))
+    if texts not in _PREDICTIONS:
+        _PREDICTIONS[texts] = predict_file(path)
+    return _PREDICTIONS[texts]
 
 
 def read_case(folder: Path) -> dict[str, Any]:
     return dict(json.loads((folder / "case.json").read_text(encoding="utf-8")))
 
 
+@cache
+def _comparison_tool(path: Path) -> ModuleType:
+    """The comparison script; a file of the reference, which it never changes, is read once."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    read, read_once = module.read, cache(module.read)
+    module.read = lambda name: (read_once if name.endswith(".gz") else read)(name)
+    return module
+
+
 def compare_with_tool(shared: Path, case: str, ours: Path) -> tuple[bool, str]:
     """What the comparison script of the reference folder says of our file: equal, and its words."""
-    folder = shared / "reference" / "spcat" / case
-    command = [sys.executable, str(shared / "tools" / "compare_cat.py"), str(folder / f"{case}.cat.gz"), str(ours)]
-    done = subprocess.run([*command, "--int", str(folder / f"{case}.int")], capture_output=True, text=True, check=False)
-    return done.returncode == 0, done.stdout + done.stderr
+    folder, tool = shared / "reference" / "spcat" / case, shared / "tools" / "compare_cat.py"
+    words = [str(tool), str(folder / f"{case}.cat.gz"), str(ours), "--int", str(folder / f"{case}.int")]
+    with mock.patch("sys.argv", words), contextlib.redirect_stdout(io.StringIO()) as said, warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # the script leaves the closing of a file to Python
+        status = _comparison_tool(tool).main()
+    return status == 0, said.getvalue()
+
+
+def _labels(catalogue: Catalogue) -> list[list[int]]:
+    """Quantum numbers of each line, signs of K dropped."""
+    return np.abs(np.hstack([catalogue.quanta_upper, catalogue.quanta_lower])).tolist()
 
 
 def _merged(catalogue: Catalogue) -> dict[tuple[Any, ...], list[list[float]]]:
     """Lines by label, signs of K dropped, K components of one frequency added."""
     out: dict[tuple[Any, ...], list[list[float]]] = {}
     columns = (catalogue.frequency_mhz, catalogue.lgint, catalogue.energy_lower_cm, catalogue.g_upper)
-    for i, (f, strength, energy, g) in enumerate(zip(*(c.tolist() for c in columns), strict=True)):
-        label = (*np.abs(catalogue.quanta_upper[i]).tolist(), *np.abs(catalogue.quanta_lower[i]).tolist())
-        twin = next((row for row in out.setdefault(label, []) if abs(row[0] - f) < 2e-4), None)
+    for label, f, strength, energy, g in zip(_labels(catalogue), *(c.tolist() for c in columns), strict=True):
+        rows = out.setdefault(tuple(label), [])
+        twin = next((row for row in rows if abs(row[0] - f) < 2e-4), None)
         if twin:
             twin[1], twin[3] = float(np.log10(10 ** twin[1] + 10**strength)), twin[3] + g
         else:
-            out[label].append([f, strength, energy, g])
+            rows.append([f, strength, energy, g])
     return out
 
 
 def disagreements(reference: Catalogue, ours: Catalogue) -> list[str]:
     """What of a sample is missing from our list or differs: 1.1e-4 MHz, 2e-4 in LGINT and E″, degeneracy, label."""
-    index, out = _merged(ours), []
-    for label, rows in _merged(reference).items():
+    expected, out = _merged(reference), []
+    index = _merged(ours.take(np.array([tuple(label) in expected for label in _labels(ours)])))
+    for label, rows in expected.items():
         for f, strength, energy, g in rows:
             near = min(index.get(label, []), key=lambda row: abs(row[0] - f), default=None)
             if near is None:

@@ -300,16 +300,19 @@ def test_a_toy_knob_is_chosen_without_further_code():
         read_accuracy(0.05, unknown).chosen(Terms(), Entries(), answer_terms)
 
 
-def test_a_toy_knob_is_planned_without_further_code():
-    calls = []
+def test_a_toy_knob_is_planned_without_further_code(monkeypatch):
+    """By a clock on which a sum takes 10 ms and 1 μs a term."""
+    calls, clock = [], [0.0]
+    monkeypatch.setattr(time, "process_time", lambda: clock[0])
 
     def counted(request: Terms) -> float:
         calls.append(request.count)
+        clock[0] += 0.01 + 1e-6 * request.count
         return answer_terms(request)
 
     few, many = (NUMERICS.cost(Terms(count), Run(counted, counted)) for count in (2_000_000, 4_000_000))
     assert max(calls) < 2_000_000  # from short sums
-    assert 1.5 < many.seconds / few.seconds < 2.7  # 2, of an idle clock
+    assert (few.seconds, many.seconds) == pytest.approx((2.01, 4.01))
     assert many.amount == 4_000_000
 
 

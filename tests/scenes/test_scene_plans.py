@@ -223,10 +223,10 @@ def test_a_plan_of_a_map_leaves_out_what_its_run_does():
 
 MEMORY = {
     "levels": 'molecule = "SO2"\n[observables]\njmax = 60\n',
-    "thermo": 'molecule = "SO2"\n[conditions]\ntemperature = "100:1000K:400"\n',
+    "thermo": 'molecule = "SO2"\n[conditions]\ntemperature = "100:1000K:100"\n',
     "stark": 'molecule = "OCS"\n[conditions]\nfield = "0:100kV/cm:101"\n[observables]\njmax = 6\n',
     "align": 'molecule = "OCS"\n[[pulses]]\nshape = "kick"\nfluence = 0.5\n[conditions]\ntemperature = "1 K"\npoints = 20000\n',
-    "gas": 'molecule = "water"\n[numerics]\nmolecules = 50000\n',
+    "gas": 'molecule = "water"\n[numerics]\nmolecules = 20000\n',
     "tumble": 'molecule = "water"\n[conditions]\ntimes = "0:100ps:50001"\n',
     "fit": 'molecule = { constants = "B=6081" }\n[lines]\nsource = "ocs.lin"\n[parameters]\nfree = ["B"]\n',
 }

@@ -71,7 +71,7 @@ def test_plans_of_all_scenes_and_of_longer_ones():
         assert plans.within(record.planned_mb, record.taken_mb, 1.0), record.case
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=25)
 @pytest.mark.parametrize("name", ["hydrogen_heat_capacity", "driven_chaos", "rigid_water", "water_gas"])
 def test_a_scene_measured_again(program, name):
     """The same settings, the accuracy met, and missed one step coarser."""

@@ -13,7 +13,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="processes end by SIG
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
-@pytest.mark.parametrize("moments", [5, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("moments", [5, pytest.param(50, marks=pytest.mark.slow(seconds=45))])
 def test_a_killed_server_leaves_the_whole_session(tmp_path, moments):
     outcome = kill_servers(tmp_path, moments, seed=20261124)
     print(outcome)
@@ -23,7 +23,7 @@ def test_a_killed_server_leaves_the_whole_session(tmp_path, moments):
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
-@pytest.mark.parametrize("moments", [2, pytest.param(50, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("moments", [2, pytest.param(50, marks=pytest.mark.slow(seconds=105))])
 def test_a_closed_or_crashed_page_loses_nothing(tmp_path, moments):
     playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright (extra test)")
     with playwright.sync_playwright() as started:
