@@ -44,6 +44,7 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.classical.effects.ideal_fluid import added_masses as added_masses
     from rotor.classical.effects.ideal_fluid import added_moments as added_moments
     from rotor.classical.effects.ideal_fluid import shape_integrals as shape_integrals
+    from rotor.classical.effects.optical_centrifuge import OpticalCentrifuge as OpticalCentrifuge
     from rotor.classical.effects.rolling import RollingEllipsoid as RollingEllipsoid
     from rotor.classical.effects.torques import ConstantTorque as ConstantTorque
     from rotor.classical.euler import angular_velocity as angular_velocity

@@ -46,6 +46,12 @@ class System:
         """Whether a torque or an added inertia depends on the attitude; else dL/dt follows from L and time alone."""
         return any(torque.needs_attitude for torque in self.torques) or any(a.needs_attitude for a in self.added)
 
+    @property
+    def potential_depends_on_time(self) -> bool:
+        """Whether a potential energy changes in time at a fixed attitude; a drive has none."""
+        with_potential = (t for t in self.torques if type(t).potential_energy is not Torque.potential_energy)
+        return any(effect.depends_on_time for effect in with_potential)
+
     @cached_property
     def compiled(self) -> SystemForm | None:
         """All effects except added inertia, for compiled integrators; None if an effect has no compiled form."""

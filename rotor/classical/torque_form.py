@@ -6,6 +6,7 @@
 | `SPACE_FIXED` | Rᵀ v cos(Ω t + φ) | v, Ω, φ |
 | `LEVER` | a x Rᵀ f | a of the body, f of space |
 | `INDUCED` | (M e) x e, e = Rᵀ f | M by rows, f of space |
+| `TURNING` | (M e) x e, e = Rᵀ (cos φ, sin φ, 0), φ = φ0 + Ω t + β t²/2 | M by rows, φ0, Ω, β |
 | `LINEAR` | -C ω | C by rows |
 | `QUADRATIC` | -c \\|ω\\| ω | c |
 | `ROLLING` | that of `effects/rolling.py`, with its inertia | m, m g, μ of space, c, S² by rows |
@@ -25,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 
-BODY_FIXED, SPACE_FIXED, LEVER, INDUCED, LINEAR, QUADRATIC, ROLLING = range(7)
+BODY_FIXED, SPACE_FIXED, LEVER, INDUCED, LINEAR, QUADRATIC, ROLLING, TURNING = range(8)
 WIDTH = 12  # parameters of the longest form, except rolling, which has separate arrays
 
 

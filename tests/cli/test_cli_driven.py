@@ -23,6 +23,7 @@ LINES = {  # each effect once, as it stands on the command line
     "gravity about pivot": "mass=2 centre=0,0,-0.5 gravity=0,0,-9.81",
     "permanent dipole": "dipole=1,0,0 field=0,0,2",
     "induced dipole": "polarizability=1,1,3 field=0,0,2",
+    "optical centrifuge": "polarizability=3,1,1 field=2 acceleration=0.3 phase=0.1",
     "rolling ellipsoid": "mass=1 semiaxes=0.5,0.6,0.7 gravity=0,0,-1",
     "fluid impulse": "impulse=1,1,0 masses=1,2,2",
     "changing inertia": "times=0,2 moments=1,2,3;1,2,4",

@@ -16,6 +16,10 @@ import numpy as np
 MOMENTS, MOMENTUM = [0.6, 0.8, 1.0], [1.8, 0.4, -0.9]
 # scenes that take seconds are shortened: here only the numbers count, not the published figures
 SHORTER = {
+    "optical_centrifuge": [
+        ("np.linspace(0.0, 100.0, 201)", "np.linspace(0.0, 2.0, 21)"),
+        ("count, end, kt = 1000, 20.0", "count, end, kt = 20, 1.0"),
+    ],
     "strange_attractor": [("time=20_000.0, transient=500.0", "time=60.0, transient=1.0, segments=2")],
     "rattleback": [("np.arange(0.0, seconds, 0.02)", "np.arange(0.0, 0.1, 0.02)")],
 }

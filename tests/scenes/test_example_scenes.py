@@ -212,6 +212,18 @@ def space_station(result):
     )  # steady: 13 rad, round-off
 
 
+def optical_centrifuge(result):
+    """The rod stays behind the field by half of asin(I β/U0), so that L is I β t: 116 ħ at 10 THz."""
+    times, inertia, rate = column(result, "t"), result.request.moments[1], 2 * np.pi * 0.1
+    depth = 1.1 * 1.98739 * 10
+    turned = (column(result, "qw") + 1j * column(result, "qz")) ** 2
+    assert np.allclose(
+        np.angle(np.exp(0.5j * rate * times**2) / turned), np.arcsin(inertia * rate / depth) / 2, atol=1e-7
+    )
+    assert np.allclose(column(result, "m3"), inertia * rate * times, atol=1e-3)
+    assert abs(column(result, "m3")[-1] - 116.0) < 0.1
+
+
 def unbalanced_wheel(result):
     from rotor.geometry.rotations import rotate
 

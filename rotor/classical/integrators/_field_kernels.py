@@ -17,8 +17,8 @@ from numba import njit
 from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
 from rotor.classical.integrators._kernels import FINITE, LANES, WHOLE_STEP, sine_cosine, sine_series
-from rotor.classical.integrators._torque_kernels import swing, times_matrix
-from rotor.classical.torque_form import BODY_FIXED, LEVER, SPACE_FIXED
+from rotor.classical.integrators._torque_kernels import swing, times_matrix, turning_axis
+from rotor.classical.torque_form import BODY_FIXED, LEVER, SPACE_FIXED, TURNING
 from rotor.geometry._kernels import conjugate, cross, exponential, product, quaternion_at, turned, vector_at
 
 RUNS = 14
@@ -113,7 +113,7 @@ def _torque(codes: Any, p: Floats, time: float, row: Floats) -> None:
             for i in range(LANES):
                 _gain(row, i, turned(conjugate(_quaternion(row, i)), vector))
         else:
-            vector = (p[k, 9], p[k, 10], p[k, 11])
+            vector = turning_axis(p, k, time) if code == TURNING else (p[k, 9], p[k, 10], p[k, 11])
             for i in range(LANES):
                 field = turned(conjugate(_quaternion(row, i)), vector)
                 _gain(row, i, cross(times_matrix(p, k, field), field))

@@ -8,7 +8,7 @@ from typing import Any
 from numba import njit
 
 from rotor.arrays import Floats
-from rotor.classical.torque_form import BODY_FIXED, INDUCED, LEVER, LINEAR, SPACE_FIXED
+from rotor.classical.torque_form import BODY_FIXED, INDUCED, LEVER, LINEAR, SPACE_FIXED, TURNING
 from rotor.geometry._kernels import conjugate, cross, turned
 
 
@@ -41,6 +41,13 @@ def swing(p: Any, k: int, time: float) -> Any:
 
 
 @njit(cache=True, inline="always")
+def turning_axis(p: Any, k: int, time: float) -> Any:
+    """(cos φ, sin φ, 0) of torque k with φ = φ0 + Ω t + β t²/2."""
+    angle = p[k, 9] + (p[k, 10] + 0.5 * p[k, 11] * time) * time
+    return math.cos(angle), math.sin(angle), 0.0
+
+
+@njit(cache=True, inline="always")
 def torque_at(codes: Any, p: Floats, time: float, q: Any, omega: Any) -> Any:
     """Sum of the torques in body axes on a body with attitude q and angular velocity omega (used by drag only).
 
@@ -57,6 +64,9 @@ def torque_at(codes: Any, p: Floats, time: float, q: Any, omega: Any) -> Any:
             t = scaled(swing(p, k, time), _seen(q, p[k, 0], p[k, 1], p[k, 2]))
         elif code == INDUCED:
             field = _seen(q, p[k, 9], p[k, 10], p[k, 11])
+            t = cross(times_matrix(p, k, field), field)
+        elif code == TURNING:
+            field = _seen(q, *turning_axis(p, k, time))
             t = cross(times_matrix(p, k, field), field)
         elif code == LINEAR:
             t = scaled(-1.0, times_matrix(p, k, omega))

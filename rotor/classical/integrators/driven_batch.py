@@ -19,7 +19,7 @@ from rotor.classical.effect import ClassicalEffect
 from rotor.classical.euler import checked_moments, checked_momentum
 from rotor.classical.integrators.batch import over_blocks, rates_and_axes
 from rotor.classical.system import System, flatten_system
-from rotor.classical.torque_form import BODY_FIXED, INDUCED, LEVER, SystemForm
+from rotor.classical.torque_form import BODY_FIXED, INDUCED, LEVER, TURNING, SystemForm
 from rotor.geometry.rotations import normalised, to_matrix
 
 
@@ -125,7 +125,7 @@ def _in_frame(form: SystemForm, frame: Floats) -> Floats:
     for code, row in zip(form.codes, parameters, strict=True):
         if code in (BODY_FIXED, LEVER):
             row[:3] = turn @ row[:3]
-        elif code == INDUCED:
+        elif code in (INDUCED, TURNING):
             row[:9] = (turn @ row[:9].reshape(3, 3) @ turn.T).ravel()
     return parameters
 

@@ -320,8 +320,8 @@ class _Kicker:
 
 
 def _omega_and_energy(system: System, times: Floats, momentum: Floats, attitude: Floats) -> tuple[Floats, Floats]:
-    """ω (t, n, 3) and energy (t, n); at once where neither depends on time itself, as in all effects that are compiled."""
-    if system.compiled is not None:
+    """ω (t, n, 3) and energy (t, n); at once where neither depends on time itself."""
+    if system.compiled is not None and not system.potential_depends_on_time:
         row = float(times[0]), momentum, attitude
         return system.omega(*row), system.energy(*row)
     rows = [(float(t), m, q) for t, m, q in zip(times, momentum, attitude, strict=True)]

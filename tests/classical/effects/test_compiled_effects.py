@@ -12,6 +12,7 @@ from rotor.classical.effects.drive import PeriodicDrive
 from rotor.classical.effects.gravity import GravityAboutPivot
 from rotor.classical.effects.gyrostat import SpinningRotor
 from rotor.classical.effects.ideal_fluid import FluidImpulse
+from rotor.classical.effects.optical_centrifuge import OpticalCentrifuge
 from rotor.classical.effects.rolling import RollingEllipsoid
 from rotor.classical.effects.torques import ConstantTorque, TimedTorque
 from rotor.classical.integrators import lie_runge_kutta, splitting
@@ -32,6 +33,7 @@ PLACE_EFFECTS = {
     "drive, space": PeriodicDrive([0.2, 0.0, 0.1], 1.3, 0.4, "space"),
     "dipole": PermanentDipole([0.5, 0.2, 0.1], [0.0, 0.3, 0.8]),
     "induced": InducedDipole([[1.0, 0.2, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, 0.3]], [0.9, 0.0, 0.8]),
+    "centrifuge": OpticalCentrifuge([[1.0, 0.2, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, 0.3]], 1.1, 0.6, 0.9, 0.3),
     "pivot": GravityAboutPivot(1.2, [0.1, 0.0, 0.6], [0.0, 0.0, -1.0]),
     "impulse": FluidImpulse([1.0, -0.5, 0.3], [1.0, 2.0, 3.0]),
 }

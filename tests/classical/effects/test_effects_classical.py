@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import cumulative_simpson, solve_ivp
 from scipy.special import ellipj, ellipk
 
 from rotor.classical.effects.changing_inertia import ChangingInertia
@@ -12,6 +12,7 @@ from rotor.classical.effects.drive import PeriodicDrive
 from rotor.classical.effects.gravity import GravityAboutPivot
 from rotor.classical.effects.gyrostat import SpinningRotor
 from rotor.classical.effects.ideal_fluid import FluidImpulse, shape_integrals
+from rotor.classical.effects.optical_centrifuge import OpticalCentrifuge
 from rotor.classical.effects.rolling import RollingEllipsoid
 from rotor.classical.effects.torques import ConstantTorque, TimedTorque
 from rotor.classical.integrators.exact_drift import ExactDrift
@@ -46,6 +47,7 @@ EVERY = {
     "inertia": ChangingInertia(lambda t: MOMENTS * (1.0 + 0.3 * np.sin(t) ** 2)),
     "dipole": PermanentDipole([0.5, 0.2, 0.1], [0.0, 0.3, 0.8]),
     "induced": InducedDipole([[1.0, 0.2, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, 0.3]], [0.9, 0.0, 0.8]),
+    "centrifuge": OpticalCentrifuge([[1.0, 0.2, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, 0.3]], 1.1, 0.6, 0.9, 0.3),
     "pivot": GravityAboutPivot(1.2, [0.1, 0.0, 0.6], [0.0, 0.0, -1.0]),
     "impulse": FluidImpulse([1.0, -0.5, 0.3], [1.0, 2.0, 3.0]),
     "rolling": RollingEllipsoid(1.0, [0.6, 0.8, 0.7], [0.0, 0.0, -1.0], [0.1, 0.0, 0.05]),
@@ -93,6 +95,10 @@ def test_against_plain_equations_with_a_rotation_matrix(name):
         x, y, z = omega
         return (matrix @ np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])).reshape(-1)
 
+    def light(t):
+        angle = 0.3 + 0.9 * t + 0.6 * t**2 / 2
+        return 1.1 * np.array([np.cos(angle), np.sin(angle), 0.0])
+
     def space_torque(t, matrix, omega):
         down = {
             "constant, body": lambda: np.array([0.1, 0.2, -0.1]),
@@ -105,6 +111,9 @@ def test_against_plain_equations_with_a_rotation_matrix(name):
             "induced": lambda: np.cross(
                 np.array([[1.0, 0.2, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, 0.3]]) @ matrix.T @ [0.9, 0.0, 0.8],
                 matrix.T @ [0.9, 0.0, 0.8],
+            ),
+            "centrifuge": lambda: np.cross(
+                np.array([[1.0, 0.2, 0.0], [0.2, 0.5, 0.0], [0.0, 0.0, 0.3]]) @ matrix.T @ light(t), matrix.T @ light(t)
             ),
             "pivot": lambda: np.cross([0.1, 0.0, 0.6], matrix.T @ [0.0, 0.0, -1.2]),
             "impulse": lambda: np.cross(matrix.T @ [1.0, -0.5, 0.3], matrix.T @ [1.0, -0.5, 0.3] / [1.0, 2.0, 3.0]),
@@ -310,3 +319,15 @@ def test_added_mass_of_an_ellipsoid_by_quadrature():
 
     slow = [quad(integrand, 0.0, np.inf, args=(first,), epsabs=1e-12)[0] for first in (a, b, c)]
     assert np.allclose(shape_integrals([a, b, c]), slow, rtol=1e-8)  # quad's own estimate
+
+
+def test_a_centrifuge_changes_the_energy_in_its_turning_frame_by_its_acceleration_alone():
+    """d(E - Ω L_Z)/dt = -β L_Z for any body: energy in the frame of the field, which turns at Ω = Ω0 + β t."""
+    light = EVERY["centrifuge"]
+    times = np.linspace(0.0, 8.0, 801)
+    motion = integrate(TIGHT, MOMENTS, MOMENTUM, times, effects=[light])
+    along = rotate(motion.attitude, motion.momentum)[:, 2]
+    turning = motion.energy - (0.9 + 0.6 * times) * along
+    expected = turning[0] - 0.6 * cumulative_simpson(along, x=times, initial=0)
+    assert np.allclose(turning, expected, atol=1e-6)  # Simpson's rule over 0.01
+    assert np.ptp(turning) > 1.0
