@@ -179,9 +179,9 @@ def _intensity(group: Group, levels: Levels, transitions: Transitions, request: 
         out /= np.maximum(levels.components[transitions.upper], levels.components[transitions.lower])
     out *= line_weights(group, levels, transitions)
     below = np.expm1(-transitions.frequency_mhz / kt)  # 1 - exp(-hν/kT), exact for small hν/kT
-    with np.errstate(over="ignore"):  # far below zero and cold, where no line may start
+    with np.errstate(over="ignore", invalid="ignore"):  # far below zero and cold, where no line may start
         below *= -np.exp(-levels.energy_mhz / kt)[transitions.lower]
-    out *= below
+        out *= below
     return out
 
 

@@ -15,6 +15,7 @@ from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW
 from rotor.formats.spcat.text.par import Parameter, ParameterFile
 
 FREE_ABOVE = 1e15  # MHz; a larger a-priori error counts as none, as in SPFIT
+NO_LEADER = "the first one has none before it to keep a ratio to"
 _WIDTH = 10
 
 
@@ -41,7 +42,9 @@ def variance_factor(file: ParameterFile) -> Floats | None:
     factor[named] = errors[named, None] * correlations
     for i, parameter in enumerate(file.parameters):
         if parameter.constrained:
-            leader = max(j for j in leaders if j < i)
+            leader = max((j for j in leaders if j < i), default=None)
+            if leader is None:
+                raise parameter.refusal(NO_LEADER)
             value = file.parameters[leader].value
             factor[i] = factor[leader] * (parameter.value / value) if value else 0.0
     return factor

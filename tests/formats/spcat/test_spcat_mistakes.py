@@ -35,6 +35,17 @@ def _files(par: str = PAR, request: str = INT, lin: str = LIN, suffix: str = ".p
             "leave it out, or correct the code, which reads NS = 6, TYP = 60, V1 = 1",
         ),
         (PAR.replace("60 0 1 1 1", "60 0 12 1 1"), INT, "case.int with case.var: IAX = 12 of state 0"),
+        (
+            PAR.replace("  10099", " -10099").replace("3100.0 1E36", "3100.0 0.1"),
+            INT,
+            "case.int with case.var: parameter -10099 /A: the first one has none before it to keep a ratio to",
+        ),
+        (
+            PAR.replace("a 1 2", "a 4444444444 2"),
+            INT,
+            "SPIND = 4444444444 of state 0 names 10 spins: expected at most 9",
+        ),
+        (PAR.replace("     11   900.0", "     11 -1.0e30"), INT, "the lowest level lies at -3.34e+25 cm-1"),
         (PAR, INT.replace("111 1.2", "114 1.2"), "case.int with case.var: dipole 114: SYM = 4"),
         (PAR, INT.replace("1000.0", "0.0"), "case.int with case.var: QROT = 0.0"),
         (

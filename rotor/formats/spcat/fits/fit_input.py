@@ -25,7 +25,7 @@ from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, i
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.lin import LineList, default_note, read_lin, remark_notes, with_defaults
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, npar_notes, read_par
-from rotor.formats.spcat.variances import FREE_ABOVE
+from rotor.formats.spcat.variances import FREE_ABOVE, NO_LEADER
 from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
 from rotor.tops.constants import AxisOrderError, Constants
@@ -205,7 +205,7 @@ def _columns(parameters: Sequence[Parameter]) -> tuple[tuple[int, ...], tuple[fl
             leader = parameter
             free += [] if is_held(parameter) else [i]
         elif not i:
-            raise parameter.refusal("the first one has none before it to keep a ratio to")
+            raise parameter.refusal(NO_LEADER)
         elif not leader.value:
             raise parameter.refusal(f"no ratio to {leader.code}, which is 0")
         columns.append(-1 if is_held(leader) else len(free) - 1)

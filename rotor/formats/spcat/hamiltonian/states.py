@@ -38,6 +38,7 @@ FOLDS = {
 
 
 ALL_K = 10**6  # a KNMAX without effect
+MOST_SPINS = 9
 
 
 def odd_under(iax: int, ka: Ints | int, kc: Ints | int) -> Ints | int:
@@ -199,6 +200,8 @@ def _state(v: int, line: Options, first: Options) -> StateOptions:
     iax, spins = abs(line.iax), doubled_spins(line.spind)
     if iax not in (0, 1, 2, 3, *FOLDS):
         raise ValueError(f"IAX = {line.iax} of state {v}: expected an axis or fold of weights, 1 to 11")
+    if len(spins) > MOST_SPINS:
+        raise ValueError(f"SPIND = {line.spind} of state {v} names {len(spins)} spins: expected at most {MOST_SPINS}")
     if line.iax < 0:
         _check_total(v, line, spins, (code % 10, weight))
     kmax = line.knmax if 0 <= line.knmax <= 359 else 359  # 359 is SPCAT's largest K

@@ -129,6 +129,8 @@ class ParameterFile:
 
 
 MOST_STATES = 999
+_BEYOND = 1_000_000  # so that degeneracies, of weights times 2F + 1, stay whole numbers of 32 bits
+_BY_DIGITS = ("spind", "vsym")  # each digit stands for a spin or a state
 _HEADER, _OPTIONS = freeform.default_values(Header), freeform.default_values(Options)
 
 
@@ -187,6 +189,9 @@ def _options(line: Line, defaults: Options) -> Options:
     words = spins + freeform.read_words(line, rest, len(_OPTIONS) - 1)[0]
     defaults = replace(defaults, vsym=0)
     values = freeform.numbers(line, words, {name: getattr(defaults, name) for name in _OPTIONS})
+    large = next((name for name, value in values.items() if name not in _BY_DIGITS and abs(value) >= _BEYOND), None)
+    if large:
+        raise line.error(0, f"{large.upper()} is {values[large]}; expected at most six digits")
     if abs(values["nvib"]) > MOST_STATES:
         raise line.error(
             0,

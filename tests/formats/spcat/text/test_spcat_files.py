@@ -144,6 +144,8 @@ def test_options_left_out_have_defaults():
         (b"t\n-1\na 1\n", r"line 2, column 1: NPAR is -1"),
         (b"t\n1\na 1 1000\n", r"line 3, column 1: NVIB is 1000; expected at most 999 states"),
         (b"t\n1.5\na 1\n", r"NPAR = 1.5: expected a whole number"),
+        (b"t\n1\na 1 1 0 20 0 1 1000000 1\n", r"line 3, .* WTPL is 1000000; expected at most six digits"),
+        (b"t\n1\na 1 1 0 20 99999999999999999999\n", r"IXX is 9+; expected at most six digits"),
         (b"t\n1\na 1 1 0 20 0 1 one\n", r"line 3, column 16: 'one' is no number"),
         (b"t\n1\na 1 1 0 20 0 1 1 1 -1\n", "line 3, .*another option line"),
         (b"t\n1\na 1\n100 5..5\n", r"line 4, column 5: '5..5' is no number"),
@@ -216,6 +218,7 @@ def test_a_new_intensity_file_reads_back(tmp_path):
         (b"t\n0 1.5\n", "TAG = 1.5: expected a whole number"),
         (b"t\n0 1\n1\n", r"line 3, column 2: the dipole's value is missing"),
         (b"t\n0 1\n1 mu\n", r"line 3, column 3: 'mu' is no number"),
+        (b"t\n0 1\n1 -1e200\n", r"line 3, column 3: the dipole's value = -1e200: the square of a moment overflows"),
     ],
 )
 def test_an_unreadable_intensity_file_is_refused(text, words):
