@@ -156,3 +156,10 @@ def with_both_of_pairs(file: RandomFile) -> RandomFile:
     doubled = l_values(file.case)
     seconds = [replace(m, states=(m.states[0] + 1,) * 2) for m in file.moments if m.states[0] in doubled]
     return replace(file, moments=(*file.moments, *seconds))
+
+
+def with_value(file: RandomFile, place: int, number: float) -> RandomFile:
+    """The file with another value of one parameter line."""
+    parameters = list(file.par.parameters)
+    parameters[place] = replace(parameters[place], value=number)
+    return replace(file, par=replace(file.par, parameters=tuple(parameters)))

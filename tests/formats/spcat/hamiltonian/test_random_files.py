@@ -93,13 +93,13 @@ def _add_lines(ours, group: Group, levels: Levels, solved, close) -> None:
 
 @pytest.mark.parametrize(("states", "spins", "limits"), STATES)
 def test_levels_and_strengths_are_those_of_full_matrices(states, spins, limits):
-    count = 2 if states * spins > 2 else 4
+    count = 1 if states * spins > 2 else 2 if states > 1 else 4
     assert sum(_compare(file_of_states(seed, states, spins, limits)) for seed in range(count)) > 50
 
 
 @pytest.mark.parametrize(("pairs", "spins"), PAIRS)
 def test_levels_and_strengths_of_l_doubled_states_are_those_of_full_matrices(pairs, spins):
-    count = 1 if pairs * spins > 1 else 3
+    count = 1 if pairs * spins > 1 else 2
     assert sum(_compare(file_of_l(seed, pairs, spins), l_doubled_solution) for seed in range(count)) > 50
 
 
@@ -130,7 +130,7 @@ def test_spin_terms_that_change_l(parallel, beside, nvib):
 @pytest.mark.slow
 @pytest.mark.parametrize(("states", "spins", "limits"), STATES)
 def test_levels_and_strengths_of_more_files(states, spins, limits):
-    assert sum(_compare(file_of_states(seed, states, spins, limits)) for seed in range(4, 54)) > 1000
+    assert sum(_compare(file_of_states(seed, states, spins, limits)) for seed in range(1, 51)) > 1000
 
 
 @pytest.mark.slow
