@@ -251,7 +251,7 @@ def _top_as_written(file: MoleculeFile) -> Top:
         weights_source=file.cited("spin_weights"),
         polarizability_abc_angstrom3=file.polarizability_abc_angstrom3,
         polarizability_source=file.cited("polarizability"),
-        independent_errors=len(file.constants.uncertainties) < 2,
+        independent_errors=_uncertain_constants(file) < 2,
         level_table=file.levels,
         states=file.states,
         covariance=file.covariance,
@@ -259,6 +259,12 @@ def _top_as_written(file: MoleculeFile) -> Top:
         magnetic=_magnetic(file),
         internal_rotation=file.internal_rotation,
     )
+
+
+def _uncertain_constants(file: MoleculeFile) -> int:
+    """Number of uncertain constants of the rotation and of internal rotors, whose correlations a file does not have."""
+    turning = file.internal_rotation.uncertainties if file.internal_rotation else {}
+    return len(file.constants.uncertainties if file.constants else ()) + len(turning)
 
 
 def _magnetic(file: MoleculeFile) -> MagneticTensors | None:

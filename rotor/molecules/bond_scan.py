@@ -20,6 +20,10 @@ MOST_FORCE_EV_PER_ANGSTROM = 5e-4
 MOST_STEPS = 500
 EV_PER_KCAL_MOL = 4184.0 / AVOGADRO_PER_MOL / ELEMENTARY_CHARGE_C  # exact
 MMFF = "mmff"
+MMFF_ERROR = 0.20  # median relative error for 13 measured barriers of methyl groups (tests/quantum/estimates/test_scanned_barriers.py)
+MMFF_DOUBT = (
+    f"half of 13 barriers of methyl groups by MMFF94 were off by more than {MMFF_ERROR:.0%}, the worst by a factor of 7"
+)
 POINTS = 36  # of a whole turn
 LEAST_POINTS = 6  # of one period: two harmonics of it
 
@@ -33,6 +37,7 @@ class BondScan:
     positions_angstrom : (n, atoms, 3)
     closure_cm : energy after a whole period minus that at its start; not 0 if the path has left its valley
     source : the calculator
+    relative_error : of barriers of this calculator; 0 if it is not known
     """
 
     angles: Floats
@@ -40,6 +45,12 @@ class BondScan:
     positions_angstrom: Floats
     closure_cm: float
     source: str
+    relative_error: float = 0.0
+
+    @property
+    def doubt(self) -> str:
+        """How far barriers of this calculator can be trusted; "" if that is not known."""
+        return MMFF_DOUBT if self.relative_error else ""
 
 
 def relaxed_scan(
@@ -93,6 +104,7 @@ def relaxed_scan(
         np.array(geometries[:-1]),
         float(levels[-1] - levels[0]),
         f"relaxed scan with {name}, {points} angles in a period",
+        MMFF_ERROR if calculator == MMFF else 0.0,
     )
 
 

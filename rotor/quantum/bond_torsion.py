@@ -15,11 +15,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
+from rotor.units import MHZ_PER_CM
+
+if TYPE_CHECKING:
+    from rotor.molecules.bond_rotation import BondRotation
+    from rotor.molecules.bond_scan import BondScan
 
 SAMPLES = 512  # angles of a turn at which V and F are sampled: exact for terms up to n = 255
 MOST_WAVES = 2500  # largest |m|: some seconds for a torsion without symmetry
@@ -79,6 +85,22 @@ class FourierSeries:
             here = here - np.clip(step, -angles[1], angles[1])
         turned = here % (2 * np.pi)
         return np.sort(np.where(turned > 2 * np.pi - 1e-9, 0.0, turned))
+
+
+def potential_of_scan(scan: BondScan, rotation: BondRotation) -> FourierSeries:
+    """V(α) in MHz by least squares from a scan about a bond, whose angles are not equidistant."""
+    period = rotation.symmetry_number(isotopes=False)
+    harmonics = most_harmonics(scan.angles, period)
+    return FourierSeries.fitted(
+        scan.angles, scan.energies_cm * MHZ_PER_CM, period, harmonics, rotation.mirror_angle(False)
+    )
+
+
+def most_harmonics(angles: Floats, period: int) -> int:
+    """Number of Fourier terms for angles in a period: a third of the points, limited by the widest gap."""
+    rising = np.sort(angles)
+    gaps = np.diff(rising, append=rising[0] + 2 * math.pi / period)
+    return max(1, min(len(angles) // 3, int(math.pi / (period * float(gaps.max())))))
 
 
 @dataclass(frozen=True)

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from rotor import units
-from rotor.arrays import Floats
 from rotor.molecules.bond_rotation import BondRotation
 from rotor.molecules.bond_scan import BondScan, relaxed_scan
 from rotor.molecules.bonds import bonded_atoms
-from rotor.quantum.bond_torsion import FourierSeries
+from rotor.quantum.bond_torsion import FourierSeries, most_harmonics, potential_of_scan
 from rotor.quantum.torsion import TorsionalPotential
 from rotor.requests.fill import within
+
+if TYPE_CHECKING:
+    from rotor.quantum.estimates.methyl_groups import Barrier
 
 TABLE = "table"
 _TERM = re.compile(r"([VW])(\d+)\s*=\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-zµ][^\s,=]*)?(?=[\s,]|$)")
@@ -46,10 +48,8 @@ def potential_and_kinetic(
     with within("potential"):
         scan = relaxed_scan(rotation, stated, points=points, progress=progress)
     period = rotation.symmetry_number(isotopes=False)
-    harmonics = _harmonics(scan.angles, period)
-    potential = FourierSeries.fitted(
-        scan.angles, scan.energies_cm * units.MHZ_PER_CM, period, harmonics, rotation.mirror_angle(False)
-    )
+    harmonics = most_harmonics(scan.angles, period)
+    potential = potential_of_scan(scan, rotation)
     misfit = np.sqrt(np.mean((potential.values(scan.angles) / units.MHZ_PER_CM - scan.energies_cm) ** 2))
     moments = np.array([rotation.reduced_moment(x) for x in scan.positions_angstrom])
     symmetry = rotation.symmetry_number()
@@ -60,13 +60,6 @@ def potential_and_kinetic(
         scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics, rotation.mirror_angle()
     )
     return potential, kinetic, scan.source, scan, float(misfit)
-
-
-def _harmonics(angles: Floats, period: int) -> int:
-    """Number of Fourier terms for angles in a period: a third of the points, limited by the widest gap."""
-    rising = np.sort(angles)
-    gaps = np.diff(rising, append=rising[0] + 2 * math.pi / period)
-    return max(1, min(len(angles) // 3, int(math.pi / (period * float(gaps.max())))))
 
 
 def _named_terms(potential: TorsionalPotential | str, rotation: BondRotation) -> tuple[TorsionalPotential, str]:
@@ -132,6 +125,16 @@ def _energy_mhz(number: str, unit: str) -> float:
 
 def table_barrier(rotation: BondRotation) -> tuple[TorsionalPotential, str]:
     """V3 of a similar molecule and its name; ValueError if the bond has no methyl group or the table no similar molecule."""
+    barrier = similar_barrier(rotation)
+    if barrier is None:
+        raise ValueError(
+            "potential: the table only has methyl groups, and none like that of this bond; give V_n or a scan (mmff, a calculator)"
+        )
+    return TorsionalPotential({3: barrier.v3_cm * units.MHZ_PER_CM}), f"V3, {barrier.text(rotation.molecule)}"
+
+
+def similar_barrier(rotation: BondRotation) -> Barrier | None:
+    """The measured barrier of a similar molecule; None without a methyl group at the bond, and for kinds that the table does not have."""
     from rotor.quantum.estimates.methyl_groups import barrier_beside
 
     molecule = rotation.molecule
@@ -141,8 +144,5 @@ def table_barrier(rotation: BondRotation) -> tuple[TorsionalPotential, str]:
         if molecule.symbols[carbon] == "C" and len(hydrogens) == 3 and len(bonds[carbon]) == 4:
             barrier = barrier_beside(molecule, bonds, carbon)
             if barrier is not None:
-                doubt = "" if barrier.safe else ", within a factor of about 2"
-                return TorsionalPotential({3: barrier.v3_cm * units.MHZ_PER_CM}), f"V3 of {barrier.molecule}{doubt}"
-    raise ValueError(
-        "potential: the table only has methyl groups, and none like that of this bond; give V_n or a scan (mmff, a calculator)"
-    )
+                return barrier
+    return None

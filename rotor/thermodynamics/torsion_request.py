@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -31,17 +31,20 @@ from rotor.thermodynamics.torsion_potential import (
     is_scan,
     parse_potential,
     potential_and_kinetic,
+    similar_barrier,
     table_barrier,
 )
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
+    from rotor.molecules.molecule import Molecule
     from rotor.thermodynamics.classical_torsion import ClassicalTorsion
     from rotor.tops.top import Top
 
 MOST_BONDS = 6  # in an error
 TEMPERATURES_K = (50.0, 100.0, 200.0, 298.15, 400.0, 600.0, 800.0, 1000.0)
 SAME_WELLS = 0.05  # largest difference between the well probabilities of the two components of a tunnelling doublet
+FAR = 0.2  # relative difference of a scanned barrier from a measured one that is named
 SHARED = 0.75  # largest probability in one well for a component of a tunnelling doublet
 
 
@@ -107,9 +110,7 @@ class TorsionRequest:
         if self.top.molecule is None:
             raise ValueError("bond: constants alone have no bonds; give a molecule with its geometry")
         if not self.bond:
-            bonds = ", ".join(islice(turning_bonds(self.top.molecule), MOST_BONDS))
-            turn = f"groups turn about {bonds}" if bonds else "nothing turns about any bond of this molecule"
-            raise ValueError(f"bond: none is named; give two atom numbers, such as 1-2; {turn}")
+            object.__setattr__(self, "bond", _only_bond(self.top.molecule))
         if not len(self.temperatures_k):
             raise ValueError("temperatures_k: expected at least one temperature")
         for temperature in self.temperatures_k:
@@ -130,6 +131,15 @@ class TorsionRequest:
         assert self.top.molecule is not None
         with within("bond"):
             return bond_rotation(self.top.molecule, self.bond)
+
+
+def _only_bond(molecule: Molecule) -> str:
+    """The bond about which groups turn, "1-2"; ValueError unless it is the only one."""
+    bonds = list(islice(turning_bonds(molecule), MOST_BONDS))
+    if len(bonds) != 1:
+        turn = f"groups turn about {', '.join(bonds)}" if bonds else "nothing turns about any bond of this molecule"
+        raise ValueError(f"bond: none is named; give two atom numbers, such as 1-2; {turn}")
+    return bonds[0].split()[0]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -249,11 +259,6 @@ class TorsionAnswer(TextOf):
         size = min(map(len, smaller))
         change = max(float(np.abs(a[:size] - b[:size]).max()) for a, b in zip(smaller, larger, strict=True))
         largest = float(self.torsion.kinetic.values(np.zeros(1))[0]) * self.waves**2 + self.torsion.barrier_mhz
-        unknown = (
-            "the error of the scanned energies is not known"
-            if self.scan is not None
-            else "the potential has no stated error"
-        )
         rest = self.misfit_cm * units.MHZ_PER_CM if self.scan is not None else 0.0
         return ErrorBudget(
             "torsional levels",
@@ -264,9 +269,30 @@ class TorsionAnswer(TextOf):
                 f"functions up to m = {self.waves}, from three quarters of them, and terms of the Fourier series",
             ),
             ErrorTerm(None, "coupling with other vibrations and with the rotation of the whole"),
-            ErrorTerm(None, unknown, "measured levels or a better calculator" if self.scan is not None else ""),
+            self._error_of_potential(),
             ErrorTerm(0.0, "nothing is sampled"),
         )
+
+    def _error_of_potential(self) -> ErrorTerm:
+        """The shift of levels above the lowest one by one standard deviation of the potential, where that is known."""
+        if self.scan is not None:
+            relative, why, hint = self.scan.relative_error, self.scan.doubt, "measured levels or a better calculator"
+            unknown = "the error of the scanned energies is not known"
+        else:
+            barrier = similar_barrier(self.rotation) if self.request.potential == TABLE else None
+            relative, why, hint = barrier.relative_error(self.rotation.molecule) if barrier else 0.0, self.source, ""
+            unknown = "the potential has no stated error"
+        if not relative:
+            return ErrorTerm(None, unknown, hint)
+        potential = self.torsion.potential
+        changed = replace(potential, cosines=potential.cosines * (1 + relative), sines=potential.sines * (1 + relative))
+        shift = self._above_lowest(replace(self.torsion, potential=changed)) - self._above_lowest(self.torsion)
+        return ErrorTerm(float(np.abs(shift).max()), f"levels above the lowest, {why}", hint)
+
+    def _above_lowest(self, torsion: BondTorsion) -> Floats:
+        """Levels up to vmax of each species above the lowest one, MHz."""
+        levels = [torsion.states(species, self.waves)[0][: self.request.vmax + 1] for species in range(torsion.fold)]
+        return np.asarray(np.concatenate(levels) - levels[0][0])
 
     def facts(self) -> dict[str, Any]:
         """Facts of the answer except its tables, by the keys of docs/verbs."""
@@ -300,15 +326,22 @@ class TorsionAnswer(TextOf):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings about the scan."""
-        if self.scan is None or abs(self.scan.closure_cm) < max(
-            1.0, 0.01 * self.torsion.barrier_mhz / units.MHZ_PER_CM
-        ):
+        """Warnings about the scan: a barrier far from the measured one, and a path that does not close."""
+        if self.scan is None:
             return ()
-        return (
-            f"the scan does not close: after a whole period the energy differs by {self.scan.closure_cm:.3g} cm⁻¹, so that another part "
-            "of the molecule has moved into another valley; start from its lowest conformer",
-        )
+        barrier, molecule = self.torsion.barrier_mhz / units.MHZ_PER_CM, self.rotation.molecule
+        measured, texts = similar_barrier(self.rotation), list[str]()
+        if measured is not None and abs(measured.v3_cm - barrier) > max(FAR * measured.v3_cm, 1.0):
+            texts.append(
+                f"the scanned barrier is {barrier:.4g} cm⁻¹, the measured V3 {measured.v3_cm:g} cm⁻¹, {measured.text(molecule)}: the "
+                f"potential '{TABLE}' takes that"
+            )
+        if abs(self.scan.closure_cm) >= max(1.0, 0.01 * barrier):
+            texts.append(
+                f"the scan does not close: after a whole period the energy differs by {self.scan.closure_cm:.3g} cm⁻¹, so that another "
+                "part of the molecule has moved into another valley; start from its lowest conformer"
+            )
+        return tuple(texts)
 
 
 def answer_torsion(request: TorsionRequest, progress: Progress | None = None) -> TorsionAnswer:

@@ -10,18 +10,21 @@ from rotor.geometry.inertia import PrincipalFrame
 
 Vector = tuple[float, float, float]
 Tensor = tuple[Vector, Vector, Vector]
+FRAME_NOISE = 1e-5  # of a norm; the axes of a relaxed geometry are off those of its symmetry by some 1e-6 radian
 
 
 def in_frame(frame: PrincipalFrame, dipole: Floats) -> Vector | None:
-    """Components along a, b, c; those below 1e-6 of the norm are rounding of the frame and set to 0."""
+    """Components along a, b, c; those below 1e-5 of the norm are rounding of the frame and set to 0."""
     components = frame.axes @ dipole
-    return dipole_vector(np.where(np.abs(components) < 1e-6 * np.linalg.norm(components), 0.0, components))
+    return dipole_vector(np.where(np.abs(components) < FRAME_NOISE * np.linalg.norm(components), 0.0, components))
 
 
 def tensor_in_frame(frame: PrincipalFrame, tensor: Floats) -> Tensor:
-    """The tensor along a, b, c; elements below 1e-6 of the norm are rounding of the frame and set to 0."""
+    """The tensor along a, b, c; elements below 1e-5 of the norm are rounding of the frame and set to 0."""
     rotated = frame.axes @ tensor @ frame.axes.T
-    return symmetric_tensor(np.where(np.abs(rotated) < 1e-6 * np.linalg.norm(rotated), 0.0, (rotated + rotated.T) / 2))
+    return symmetric_tensor(
+        np.where(np.abs(rotated) < FRAME_NOISE * np.linalg.norm(rotated), 0.0, (rotated + rotated.T) / 2)
+    )
 
 
 def symmetric_tensor(tensor: ArrayLike) -> Tensor:

@@ -14,7 +14,7 @@ Constants without a stated frame are refused.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import field
 from itertools import product
 from types import MappingProxyType
@@ -80,6 +80,26 @@ def is_torsional(name: str) -> bool:
         return True
     match = SPELLED.fullmatch(name)
     return bool(name) and match is not None and (match["p"] is not None or match["wave"] is not None)
+
+
+def values_and_settings(items: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Constants and settings (vt_max, functions ...) from items NAME=VALUE; ValueError for other items.
+
+    >>> values_and_settings(["V3=408cm-1", "vt_max=2"])
+    ({'V3': '408cm-1'}, {'vt_max': 2})
+    """
+    values: dict[str, Any] = {}
+    for item in items:
+        name, equals, value = item.partition("=")
+        if not (name and equals and value):
+            raise ValueError(f"internal rotation: {item!r}: expected NAME=VALUE, such as V3=407.6cm-1, without spaces")
+        values[name] = value
+    settings: dict[str, Any] = {k: int(values.pop(k)) for k in ("vt_max", "functions", "spin_states") if k in values}
+    if names := values.pop("names", ""):
+        settings["names"] = names
+    if exchanged := values.pop("exchanged", ""):
+        settings["exchanged"] = tuple(int(number) for number in exchanged.split(",") if number)
+    return values, settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,20 +209,8 @@ class InternalRotationConstants:
         0
         """
         frame, *items = text.split()
-        values: dict[str, Any] = {}
-        for item in items:
-            name, equals, value = item.partition("=")
-            if not (name and equals and value):
-                raise ValueError(
-                    f"internal rotation: {item!r}: expected NAME=VALUE, such as V3=407.6cm-1, without spaces"
-                )
-            values[name] = value
-        settings: dict[str, Any] = {
-            k: int(values.pop(k)) for k in ("vt_max", "functions", "spin_states") if k in values
-        }
-        names = values.pop("names", "K")
-        exchanged = tuple(int(number) for number in str(values.pop("exchanged", "")).split(",") if number)
-        return cls(values, frame, **settings, names=names, exchanged=exchanged)
+        values, settings = values_and_settings(items)
+        return cls(values, frame, **settings)
 
     @property
     def weights(self) -> tuple[int, int]:

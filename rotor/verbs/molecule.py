@@ -120,8 +120,8 @@ class MoleculeInput:
     )
     internal_rotation: str | None = declared(
         None, Text(),
-        'Internal rotation of a methyl group: "geometry" (barrier of a similar molecule), "scan" (--calculator, or MMFF94), or '
-        '"RAM F=7.57cm-1 rho=0.33 V3=408cm-1"',
+        'Internal rotation of methyl groups: "geometry" (barriers of similar molecules), "geometry V3=408cm-1", "scan" '
+        '(--calculator, or MMFF94), or "RAM F=7.57cm-1 rho=0.33 V3=408cm-1"',
         "molecule.internal_rotation", panel=SPINS, example="RAM F=7.57cm-1 rho=0.3286 V3=407.6cm-1 Dab=0.1227cm-1",
     )  # fmt: skip
     calculator: str | None = declared(
@@ -361,19 +361,21 @@ def _checked_spins(top: Top, text: str, reading: Reading) -> Top:
 
 
 def _with_internal_rotation(top: Top, text: str, reading: Reading) -> Top:
-    """The top with internal rotation of a methyl group, from its geometry or from constants."""
-    if text.strip() in ("geometry", "scan"):
+    """The top with internal rotation of its methyl groups, from its geometry or from constants."""
+    origin, *given = text.split()
+    if origin in ("geometry", "scan"):
         from rotor.quantum.internal_rotation.from_geometry import with_internal_rotation
 
-        return with_internal_rotation(top, (reading.inputs.calculator or "mmff") if text.strip() == "scan" else None)
-    from rotor.tops.internal_rotation import InternalRotationConstants
+        calculator = (reading.inputs.calculator or "mmff") if origin == "scan" else None
+        return with_internal_rotation(top, calculator, " ".join(given))
+    from rotor.tops.internal_rotation import FRAMES, InternalRotationConstants
 
     try:
         return replace(top, internal_rotation=InternalRotationConstants.parse(text))
     except ValueError as error:
-        if "=" in text:
+        if origin in FRAMES:
             raise
-        raise ValueError(f"{error}; or one of the words geometry and scan") from None
+        raise ValueError(f"{error}; or the word geometry or scan, with values behind it such as V3=407.6cm-1") from None
 
 
 _STEPS: Mapping[str, Callable[[Top, Any, Reading], Top]] = {

@@ -62,7 +62,7 @@ def test_a_scene_says_the_same(call):
 @pytest.mark.parametrize(
     ("words", "error"),
     [
-        (("C2H6",), "error: --bond: none is named; give two atom numbers, such as 1-2; groups turn about 1-2 (C-C)"),
+        (("C3H8",), "error: --bond: none is named; give two atom numbers, such as 1-2; groups turn about 1-2 (C-C), 1-3 (C-C)"),
         (("water",), "error: --bond: none is named; give two atom numbers, such as 1-2; nothing turns about any bond of this molecule"),
         (("C2H6", "--bond", "3-6"), "error: --bond: atoms 3 (H) and 6 (H) are not bonded"),
         (("C2H6", "--bond", "1-3"), "error: --bond: atoms 1 (C) and 3 (H): atom 3 (H) is bonded to no other atom"),

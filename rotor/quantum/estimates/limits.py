@@ -291,13 +291,13 @@ def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: 
     if dipole @ dipole > 2 * along**2:
         sizes.reverse()
     assert barrier is not None  # without a barrier the caller states a bound
-    source = f"{barrier.v3_cm:g} cm-1, that of a similar molecule ({barrier.molecule})"
-    unsafe = "" if barrier.safe else ", unsafe: it varies much among such molecules"
+    assert top.molecule is not None
+    source = f"{barrier.v3_cm:g} cm-1, {barrier.text(top.molecule)}"
     low = ", so low that no line of the E species fits a rigid top" if rotor.reduced_barrier < LOW_BARRIER else ""
     (first, size), (second, other) = sizes
     return size, (
         f"{what} against the rest: half of the A and E lines of J = {j} {first} are farther apart, {second} than "
-        f"{_rounded(other, 1)} MHz; barrier {source}{unsafe}{low}"
+        f"{_rounded(other, 1)} MHz; barrier {source}{low}"
     )
 
 

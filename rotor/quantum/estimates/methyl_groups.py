@@ -27,6 +27,7 @@ upper bound.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -41,13 +42,33 @@ OFF_AXIS = 0.05  # sine of the angle above which an atom counts as off the axis 
 FLAT_DEGREES = 355.0  # sum of three angles above which a nitrogen counts as flat, here and for inversion
 
 
+SIMILAR_ERROR = 0.35  # relative, half of ln 2: other molecules agree within a factor of about 2
+UNSAFE_ERROR = 0.7  # of kinds whose barriers vary more
+
+
 @dataclass(frozen=True)
 class Barrier:
-    """V3 (cm⁻¹) of a kind of group, and the molecule of this value. safe: whether V3 varies little among such molecules."""
+    """V3 (cm⁻¹) of a kind of group, and the molecule of this value. safe: whether other molecules have it within a factor of about 2."""
 
     v3_cm: float
     molecule: str
+    formula: str
     safe: bool = True
+
+    def is_of(self, molecule: Molecule) -> bool:
+        """Whether the value is that of this molecule: its formula without isotopes is the same."""
+        return self.formula == _formula(molecule.symbols)
+
+    def relative_error(self, molecule: Molecule) -> float:
+        """One standard deviation for a molecule, relative to V3: 0 for that of the value, whose error is small beside all others."""
+        return 0.0 if self.is_of(molecule) else SIMILAR_ERROR if self.safe else UNSAFE_ERROR
+
+    def text(self, molecule: Molecule) -> str:
+        """What the value is for a molecule, behind "V3 = ... is"."""
+        if self.is_of(molecule):
+            return f"that of {self.molecule}"
+        spread = "within a factor of about 2" if self.safe else "unsafe: it varies much among such molecules"
+        return f"that of a similar molecule ({self.molecule}), {spread}"
 
 
 @dataclass(frozen=True)
@@ -108,7 +129,7 @@ def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Ba
     if symbols[bearer] in "OS" and len(others) == 1:
         return _beside_chalcogen(symbols, bonds, bearer, others[0])
     if symbols[bearer] == "N" and len(others) == 2 and not is_flat(molecule.positions_angstrom, bearer, bonds[bearer]):
-        return Barrier(691.0, "methylamine")
+        return Barrier(691.0, "methylamine", "CH5N")
     return None
 
 
@@ -117,40 +138,51 @@ def _beside_chalcogen(symbols: Sequence[str], bonds: Sequence[Ints], bearer: int
     acyl = symbols[other] == "C" and _doubly_bonded_oxygen(symbols, bonds, other)
     if symbols[bearer] == "S":
         if symbols[other] != "C":
-            return Barrier(445.0, "methanethiol") if symbols[other] == "H" else None
-        return Barrier(127.5, "S-methyl thioformate") if acyl else Barrier(753.0, "dimethyl sulfide")
+            return Barrier(445.0, "methanethiol", "CH4S") if symbols[other] == "H" else None
+        return Barrier(127.5, "S-methyl thioformate", "C2H4OS") if acyl else Barrier(753.0, "dimethyl sulfide", "C2H6S")
     if symbols[other] == "H":
-        return Barrier(373.9, "methanol")
+        return Barrier(373.9, "methanol", "CH4O")
     if symbols[other] != "C":
         return None
-    return Barrier(370.9, "methyl formate") if acyl else Barrier(879.0, "methyl propargyl ether")
+    return Barrier(370.9, "methyl formate", "C2H4O2") if acyl else Barrier(879.0, "methyl propargyl ether", "C4H6O")
 
 
 def _beside_carbon(molecule: Molecule, bonds: Sequence[Ints], bearer: int, others: list[int]) -> Barrier | None:
     """Barriers beside a carbon, by its other neighbours."""
     symbols = molecule.symbols
     if len(others) == 3:
-        return Barrier(1108.0, "propane")
+        return Barrier(1108.0, "propane", "C3H8")
     if len(others) == 1:
-        return Barrier(1.0, "2-butynoic acid")
+        return Barrier(1.0, "2-butynoic acid", "C4H4O2")
     if len(others) != 2:
         return None
     if _doubly_bonded_oxygen(symbols, bonds, bearer):
         return _beside_acyl([symbols[i] for i in others if not (symbols[i] == "O" and len(bonds[i]) == 1)])
     size = _ring(bonds, bearer, others)
     if size in (5, 6):
-        return Barrier(0.0, "toluene", False) if size == 6 else Barrier(248.0, "2,5-dimethylthiophene", False)
+        return (
+            Barrier(0.0, "toluene", "C7H8", False)
+            if size == 6
+            else Barrier(248.0, "2,5-dimethylthiophene", "C6H8S", False)
+        )
     if sorted(symbols[i] for i in others) not in (["C", "H"], ["C", "C"]):
         return None
     cumulated = any(symbols[i] == "C" and len(bonds[i]) == 2 for i in others)
-    return Barrier(429.0, "methyl ketene") if cumulated else Barrier(688.0, "propene")
+    return Barrier(429.0, "methyl ketene", "C3H4O") if cumulated else Barrier(688.0, "propene", "C3H6")
 
 
 def _beside_acyl(others: list[str]) -> Barrier | None:
     """Barriers beside C=O, by the third neighbour of the carbon."""
-    kinds = {"H": Barrier(407.6, "acetaldehyde"), "O": Barrier(170.0, "acetic acid"),
-             "C": Barrier(302.0, "2-acetyl-5-methylthiophene", False)}  # fmt: skip
+    kinds = {"H": Barrier(407.6, "acetaldehyde", "C2H4O"), "O": Barrier(170.0, "acetic acid", "C2H4O2"),
+             "C": Barrier(302.0, "2-acetyl-5-methylthiophene", "C7H8OS", False)}  # fmt: skip
     return kinds.get(others[0]) if len(others) == 1 else None
+
+
+def _formula(symbols: Sequence[str]) -> str:
+    """Formula without isotopes: C, H, and the others by the alphabet."""
+    counts = Counter(symbols)
+    order = sorted(counts, key=lambda symbol: ("CH".find(symbol) % 3, symbol))
+    return "".join(f"{symbol}{counts[symbol] if counts[symbol] > 1 else ''}" for symbol in order)
 
 
 def _doubly_bonded_oxygen(symbols: Sequence[str], bonds: Sequence[Ints], carbon: int) -> bool:

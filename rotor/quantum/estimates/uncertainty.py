@@ -59,9 +59,9 @@ def line_errors(spread: Floats, upper: NDArray[np.integer], lower: NDArray[np.in
 def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None:
     """Covariance of these parameters: that of the top, else its uncertainties if they count as uncorrelated.
 
-    Estimated errors of A, B, C (`Top.estimated_errors_mhz`), and uncertainties of spin constants that the covariance does not contain,
-    enter as uncorrelated. None for a top with a table of energies, which do not follow from its constants, and if correlations are not
-    known.
+    Estimated errors of A, B, C (`Top.estimated_errors_mhz`), and uncertainties of spin constants and internal rotors that the covariance
+    does not contain, enter as uncorrelated; those of internal rotors only where correlations are known to be absent. None for a top with a
+    table of energies, which do not follow from its constants, and if correlations are not known.
     """
     if top.level_table is not None:
         return None
@@ -74,6 +74,8 @@ def known_covariance(top: Top, parameters: Collection[str]) -> Covariance | None
         return None
     covariance = covariance or Covariance((), np.zeros((0, 0)))
     further = {**estimates, **(top.spin_constants.uncertainties if top.spin_constants else {})}
+    if top.internal_rotation is not None and top.independent_errors:
+        further |= top.internal_rotation.uncertainties
     alone = {
         name: error for name, error in further.items() if error and name in parameters and name not in covariance.names
     }

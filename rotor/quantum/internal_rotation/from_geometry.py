@@ -1,91 +1,201 @@
-"""Constants of an internal rotor from a geometry and the barrier of a similar molecule."""
+"""Constants of internal rotors from a geometry and the barriers of similar molecules."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from rotor import units
-from rotor.arrays import Ints
+from rotor.arrays import Floats, Ints
 from rotor.molecules.bond_rotation import bond_rotation
-from rotor.molecules.bond_scan import relaxed_scan
+from rotor.molecules.bond_scan import BondScan, relaxed_scan
 from rotor.molecules.bonds import bonded_atoms
 from rotor.molecules.molecule import Molecule
+from rotor.molecules.symmetry.operations import Operation
+from rotor.quantum.bond_torsion import potential_of_scan
 from rotor.quantum.estimates.methyl_groups import MethylGroup, methyl_groups
-from rotor.tops.internal_rotation import InternalRotationConstants
+from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION
+from rotor.quantum.reductions import to_representation
+from rotor.tops.internal_rotation import COUNTED, MOST_TOPS, PAIRS, InternalRotationConstants, values_and_settings
 from rotor.tops.top import Top
 
+F0_ERROR = 0.02  # of F0 from a geometry, relative
 IN_PLANE = 1e-3  # share of the top's axis along c up to which a molecule counts as symmetric about its plane ab
 
 
-def with_internal_rotation(top: Top, calculator: Any = None) -> Top:
-    """Add the internal rotation of the methyl group: F0 and the angle of its axis from the geometry, V3 from a similar molecule.
+def with_internal_rotation(top: Top, calculator: Any = None, given: str = "") -> Top:
+    """Add the internal rotation of one to three methyl groups: F0 and axes from the geometry, V3 from similar molecules.
 
     Parameters
     ----------
     top : Top
         Top with a geometry. Its constants, dipole and distortion remain in principal axes.
     calculator : optional
-        ASE calculator, its name, or "mmff" for MMFF94. V3 and V6 then come from a relaxed scan instead of the table.
+        ASE calculator, its name, or "mmff" for MMFF94. V3 and V6 of each group then come from a relaxed scan instead of the table.
+    given : str, optional
+        Values and settings in place of these, such as "V3=400cm-1 vt_max=0". Of several groups V3 is that of each, V3_2 that of the second.
 
     Returns
     -------
     Top
-        Top with constants of the internal rotor in the frame PAM, and notes on source and uncertainty of the barrier.
+        Top with constants of the internal rotors in the frame PAM, and notes on source and uncertainty of the barriers.
 
     Raises
     ------
     ValueError
-        If there is no geometry, not exactly one methyl group, no known barrier, or an axis out of the plane ab.
+        If there is no geometry, no methyl group or more than three, no known barrier, or the axis of a single group out of the plane ab.
 
     Notes
     -----
-    F0 from a geometry is good to about 2 %; the note states the uncertainty of V3. Splittings scale about as exp(-1.3 √(V3/F)).
+    F0 from a geometry is good to about 2 %, which its uncertainty states; V3 has one unless it is that of the molecule itself. Splittings
+    scale about as exp(-1.3 √(V3/F)). The coupling of the potentials of several groups (V12) is neglected unless it is given.
     """
-    group = _group_of(top, with_barrier=calculator is None)
-    cosines = np.array(group.rotor.rho) * np.array(top.moments_u_angstrom2)  # λ_g I_α
-    norm = float(np.linalg.norm(cosines))
-    direction = cosines / norm
-    if abs(direction[2]) > IN_PLANE:
-        raise ValueError(
-            f"internal rotation of {top.name or 'this top'}: the axis of the methyl group is {direction[2]:.3g} out of the plane ab; give "
-            "constants in the rho-axis frame (RAM)"
-        )
-    values = {
-        "F0": units.ROTATIONAL_MHZ_U_ANGSTROM2 / norm,
-        "delta": float(np.arctan2(direction[1], direction[0])),
-    }
-    if calculator is None:
-        assert group.barrier is not None
-        values["V3"] = group.rotor.barrier_mhz
-        spread = "within some 10 %" if group.barrier.safe else "within a factor of about 2"
-        origin = f"is that of {group.barrier.molecule}, {spread} here"
-    else:
-        barriers, scan = _scanned(top, group, calculator)
-        values |= barriers
-        origin = f"of a {scan}, whose error is not known"
-    source = f"F0 and delta from the geometry; V3 = {values['V3'] / units.MHZ_PER_CM:.4g} cm-1 {origin}"
-    internal = InternalRotationConstants(values, "PAM", spin_states=_spin_states(top, group), source=source)
+    groups, top = _groups_of(top), _in_prolate_axes(top)
+    numbers = [""] if len(groups) == 1 else [f"_{number}" for number in range(1, len(groups) + 1)]
+    values, settings = values_and_settings(given.split())
+    values = _for_each(values, numbers)
+    exchange = _exchange(top, groups)
+    constants: dict[str, Any] = {}
+    constants |= _kinetic_constants(top, groups, numbers, exchange)
+    errors = {name: F0_ERROR * value for name, value in constants.items() if name.startswith("F0")}
+    origins: dict[str, list[str]] = {}
+    alike = exchange is not None and values.get("V3_1") == values.get("V3_2")
+    for number, group in zip(numbers, groups, strict=True):
+        if not (alike and origins):
+            barriers, error, origin = _barriers(top, group, calculator, values.get(f"V3{number}"))
+        constants |= {f"{name}{number}": value for name, value in barriers.items()}
+        errors |= {f"{name}{number}": error * abs(value) for name, value in barriers.items() if error}
+        origins.setdefault(origin, []).append(f"V3{number}")
+    texts = [f"F0 and {'the axes' if numbers[0] else 'delta'} from the geometry"]
+    texts += [f"{', '.join(names)} = {origin}" for origin, names in origins.items()]
+    texts += ["coupling of the potentials (V12) left out"] if numbers[0] and not PAIRS.keys() & values else []
+    source = "; ".join(texts)
+    settings |= {name: value for name, value in _nuclei(top, groups, exchange).items() if name not in settings}
+    uncertain = {name: error for name, error in errors.items() if name not in values}
+    internal = InternalRotationConstants(constants | values, "PAM", uncertainties=uncertain, source=source, **settings)
     return replace(top, internal_rotation=internal, notes=(*top.notes, f"internal rotation: {source}"))
 
 
-def _scanned(top: Top, group: MethylGroup, calculator: Any) -> tuple[dict[str, float], str]:
-    """V3 and V6 (MHz) of a relaxed scan about the bond of the group, α = 0 at the minimum of the threefold term; and its source."""
+def _for_each(values: Mapping[str, str], numbers: Sequence[str]) -> dict[str, str]:
+    """Values with V3 and V6 as those of each of several groups that has none of its own."""
+    common = {name: value for name, value in values.items() if name in ("V3", "V6")}
+    each = {f"{name}{number}": value for name, value in common.items() for number in numbers}
+    return each | {name: value for name, value in values.items() if name not in common}
+
+
+def _nuclei(top: Top, groups: Sequence[MethylGroup], exchange: Operation | None) -> dict[str, Any]:
+    """The settings that describe the nuclei: those that turn, and those that an exchange of the groups exchanges."""
+    return {"spin_states": _spin_states(top, groups), "exchanged": _exchanged_pairs(top, groups, exchange)}
+
+
+def _in_prolate_axes(top: Top) -> Top:
+    """The top with its constants in the representation Iʳ, in which internal rotation is computed."""
+    if top.kind != "asymmetric" or top.constants.representation == REPRESENTATION:
+        return top
+    conversion = to_representation(top.constants, REPRESENTATION, top.covariance)
+    notes = (conversion.note,) if top.constants.distortion_count else ()
+    covariance = top.covariance and conversion.covariance
+    return replace(top, constants=conversion.constants, covariance=covariance, notes=(*top.notes, *notes))
+
+
+def _kinetic_constants(
+    top: Top, groups: Sequence[MethylGroup], numbers: Sequence[str], exchange: Operation | None
+) -> dict[str, float]:
+    """F0 (MHz), delta and, of several groups, epsilon (radians) of each; equal constants of groups that a rotation exchanges."""
+    cosines = np.array([group.rotor.rho for group in groups]) * np.array(top.moments_u_angstrom2)  # λ_g I_α
+    if exchange is not None:
+        turn = _turn_in_principal_axes(top, exchange)
+        first = 0.5 * (cosines[0] + turn @ cosines[1])
+        cosines = np.array([first, turn @ first])
+    constants: dict[str, float] = {}
+    for number, vector in zip(numbers, cosines, strict=True):
+        norm = float(np.linalg.norm(vector))
+        direction = vector / norm
+        constants |= {
+            f"F0{number}": units.ROTATIONAL_MHZ_U_ANGSTROM2 / norm,
+            f"delta{number}": float(np.arctan2(np.linalg.norm(direction[1:]), direction[0])),
+        }
+        if number:
+            constants[f"epsilon{number}"] = float(np.arctan2(direction[2], direction[1]))
+        elif abs(direction[2]) > IN_PLANE:
+            raise ValueError(
+                f"internal rotation of {top.name or 'this top'}: the axis of the methyl group is {direction[2]:.3g} out of the plane ab; "
+                "give constants in the rho-axis frame (RAM)"
+            )
+        else:
+            constants["delta"] = float(np.arctan2(direction[1], direction[0]))
+    return constants
+
+
+def _exchange(top: Top, groups: Sequence[MethylGroup]) -> Operation | None:
+    """The twofold rotation that exchanges two groups; None if there is none."""
+    if len(groups) != 2 or top.symmetry is None:
+        return None
+    first, second = (set(group.hydrogens) for group in groups)
+    for operation in top.symmetry.rotations:
+        if set(operation.permutation[list(first)].tolist()) == second and operation.order == 2:
+            return operation
+    return None
+
+
+def _turn_in_principal_axes(top: Top, exchange: Operation) -> Floats:
+    """The twofold rotation on components along a, b, c: the one about the principal axis nearest to its axis."""
+    assert top.frame is not None
+    nearest = int(np.argmax(np.abs(top.frame.axes @ exchange.axis)))
+    return np.diag(np.where(np.arange(3) == nearest, 1.0, -1.0))
+
+
+def _exchanged_pairs(top: Top, groups: Sequence[MethylGroup], exchange: Operation | None) -> tuple[int, ...]:
+    """2I + 1 of each pair of nuclei with spin, outside the groups, that the exchange of the groups exchanges too."""
+    if exchange is None:
+        return ()
+    assert top.molecule is not None
+    turning = {i for group in groups for i in group.hydrogens}
+    states = [round(2 * nucleus.spin) + 1 for nucleus in top.molecule.nuclei]
+    images = exchange.permutation.tolist()
+    return tuple(states[i] for i, image in enumerate(images) if i < image and i not in turning and states[i] > 1)
+
+
+def _barriers(top: Top, group: MethylGroup, calculator: Any, given: str | None) -> tuple[dict[str, float], float, str]:
+    """V3 and, of a scan, V6 (MHz) of a group, their relative error (0 if unknown), and text on both; ValueError for an unknown barrier."""
+    assert top.molecule is not None
+    if given is not None:
+        return {}, 0.0, f"{given}, given"
+    if calculator is not None:
+        barriers, scan = _scanned(top, group, calculator)
+        error, origin = scan.relative_error, f"of a {scan.source}, {scan.doubt or 'whose error is not known'}"
+    elif group.barrier is None or not group.rotor.barrier_mhz:
+        raise ValueError(
+            f"internal rotation of {top.name or 'this top'}: no similar molecule with a threefold barrier is known; give V3 (geometry "
+            "V3=400cm-1), or scan it"
+        )
+    else:
+        barriers, error = {"V3": group.rotor.barrier_mhz}, group.barrier.relative_error(top.molecule)
+        origin = group.barrier.text(top.molecule)
+    return barriers, error, f"{barriers['V3'] / units.MHZ_PER_CM:.4g} cm-1, {origin}"
+
+
+def _scanned(top: Top, group: MethylGroup, calculator: Any) -> tuple[dict[str, float], BondScan]:
+    """V3 and V6 (MHz) of a relaxed scan about the bond of the group, α = 0 at the minimum of the lowest term; and the scan."""
     assert top.molecule is not None
     carbon = next(i for i in bonded_atoms(top.molecule)[group.hydrogens[0]].tolist())
     bearer = next(i for i in bonded_atoms(top.molecule)[carbon].tolist() if i not in group.hydrogens)
-    scan = relaxed_scan(bond_rotation(top.molecule, f"{bearer + 1}-{carbon + 1}"), calculator, points=36)
-    terms = np.array([np.mean(scan.energies_cm * np.exp(-1j * n * scan.angles)) for n in (3, 6)]) * 2 * units.MHZ_PER_CM
-    start = np.angle(-terms[0]) / -3  # angle of the minimum: the threefold term is -|t| cos 3(α - start)
-    turned = terms * np.exp(1j * np.array([3, 6]) * start)
-    return {"V3": float(-2 * turned[0].real), "V6": float(-2 * turned[1].real)}, scan.source
+    rotation = bond_rotation(top.molecule, f"{bearer + 1}-{carbon + 1}")
+    scan = relaxed_scan(rotation, calculator, points=36)
+    series = potential_of_scan(scan, rotation)
+    terms = dict(
+        zip(series.n.tolist(), series.cosines - 1j * series.sines, strict=True)
+    )  # of exp(inα), from n = 3 or 6 up
+    lowest = min(terms)
+    start = np.angle(-terms[lowest]) / -lowest  # angle of its minimum: the lowest term is -|t| cos n(α - start)
+    return {f"V{n}": float(-2 * (terms.get(n, 0.0) * np.exp(1j * n * start)).real) for n in (3, 6)}, scan
 
 
-def _group_of(top: Top, with_barrier: bool) -> MethylGroup:
-    """The only methyl group; ValueError for none, several, or an unknown barrier that is needed."""
+def _groups_of(top: Top) -> list[MethylGroup]:
+    """The methyl groups; ValueError for none, more than three, or groups of different isotopes."""
     name = top.name or "this top"
     if top.molecule is None:
         raise ValueError(
@@ -98,14 +208,14 @@ def _group_of(top: Top, with_barrier: bool) -> MethylGroup:
             f"internal rotation of {name}: the hydrogens of carbon {carbon} are not all alike (CH2D, CHD2); their potential is threefold, "
             "their moments of inertia are not, so that there are no species A and E: such a group is not computed"
         )
-    if len(groups) != 1:
-        several = f"{len(groups)} methyl groups turn; a geometry gives constants of a single one: write those of all, F0_1=... V3_1=..."
-        raise ValueError(f"internal rotation of {name}: {several if groups else 'no methyl group turns'}")
-    if with_barrier and (groups[0].barrier is None or not groups[0].rotor.barrier_mhz):
+    if not groups:
+        raise ValueError(f"internal rotation of {name}: no methyl group turns")
+    if len(groups) > MOST_TOPS:
         raise ValueError(
-            f"internal rotation of {name}: no similar molecule with a threefold barrier is known; give V3, or scan it"
+            f"internal rotation of {name}: {len(groups)} methyl groups turn; up to {COUNTED[MOST_TOPS]} are computed: write the constants "
+            "of those that matter, PAM F0_1=... delta_1=... V3_1=..."
         )
-    return groups[0]
+    return groups
 
 
 def _carbon_of_unlike_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> int:
@@ -121,7 +231,12 @@ def _carbon_of_unlike_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> in
     return 0
 
 
-def _spin_states(top: Top, group: MethylGroup) -> int:
-    """2I + 1 of the nuclei that turn: 3 of CD3, else 2."""
+def _spin_states(top: Top, groups: Sequence[MethylGroup]) -> int:
+    """2I + 1 of the nuclei that turn: 3 of CD3, else 2; ValueError for groups of both kinds."""
     assert top.molecule is not None
-    return 3 if all(top.molecule.mass_numbers[i] == 2 for i in group.hydrogens) else 2
+    deuterated = {top.molecule.mass_numbers[group.hydrogens[0]] == 2 for group in groups}
+    if len(deuterated) > 1:
+        raise ValueError(
+            f"internal rotation of {top.name or 'this top'}: CH3 and CD3 turn; spin weights are those of groups of one isotope"
+        )
+    return 3 if deuterated == {True} else 2
