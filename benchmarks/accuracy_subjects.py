@@ -14,16 +14,7 @@ from rotor.classical.integrators import splitting
 from rotor.plots.work_precision import Panel, Point
 from rotor.requests.knob import Knob, Measure, Setting, Sweep
 from rotor.scenes.accuracy_sweep import in_rounds, points_of, sweep, sweeps_of, timed, without_scatter
-from rotor.scenes.scene import (
-    FluidScene,
-    GasScene,
-    LevelsScene,
-    Scene,
-    SpectrumScene,
-    StarkScene,
-    ThermoScene,
-    read_scene,
-)
+from rotor.scenes.scene import Scene, make_scene, read_scene
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -58,13 +49,15 @@ def curves(scene: Scene, knob: str) -> list[tuple[str, str, list[Point]]]:
     return [(m.of, m.unit, points_of([row for row in rows if row.error_of == m.of])) for m in computed.knob.measures]
 
 
-def spectra() -> dict[str, SpectrumScene]:
+def spectra() -> dict[str, Scene]:
     """Lists of lines: a light linear molecule, a heavy asymmetric one, a cold one."""
     complete = {"min_lgint": -12.0}
     return {
-        "CO, 300 K": SpectrumScene(molecule="CO", observables=complete),
-        "SO₂, 300 K": SpectrumScene(molecule="SO2", observables={"min_lgint": -8.0}),
-        "CH₂OHCHO, 10 K": SpectrumScene(molecule="CH2OHCHO", conditions={"temperature": "10 K"}, observables=complete),
+        "CO, 300 K": make_scene("spectrum", molecule="CO", observables=complete),
+        "SO₂, 300 K": make_scene("spectrum", molecule="SO2", observables={"min_lgint": -8.0}),
+        "CH₂OHCHO, 10 K": make_scene(
+            "spectrum", molecule="CH2OHCHO", conditions={"temperature": "10 K"}, observables=complete
+        ),
     }
 
 
@@ -131,7 +124,7 @@ def evened(points: list[Point]) -> list[Point]:
 def partition(_: Path | None) -> list[Panel]:
     results = {}
     for name in ("CO", "water", "CH2OHCHO"):
-        scene = ThermoScene(molecule=name, conditions={"temperature": [10.0, 100.0, 300.0]})
+        scene = make_scene("thermo", molecule=name, conditions={"temperature": [10.0, 100.0, 300.0]})
         results[name] = curve(scene, "numerics.relative_error", "Q")
     return [Panel("relative error asked for, at 10, 100 and 300 K", "Q (%)", results)]
 
@@ -144,7 +137,7 @@ def hyperfine(_: Path | None) -> list[Panel]:
         for name, solver in methods(3).items()
     }
     formamide = read_scene(SCENES / "formamide_hyperfine.toml")
-    scene = LevelsScene(molecule=formamide.molecule, effects=formamide.effects, observables={"jmax": 20})
+    scene = make_scene("levels", molecule=formamide.molecule, effects=formamide.effects, observables={"jmax": 20})
     computed["formamide, N ≤ 20"] = curve(scene, "effects.hyperfine_method")
     return [Panel("method of hyperfine structure", "energy of a level (MHz)", computed, joined=False)]
 
@@ -152,7 +145,7 @@ def hyperfine(_: Path | None) -> list[Panel]:
 def stark(_: Path | None) -> list[Panel]:
     results = {}
     for name, molecule in (("OCS", "OCS"), ("indole", INDOLE)):
-        scene = StarkScene(molecule=molecule, conditions={"field": "0:200kV/cm:21"})
+        scene = make_scene("stark", molecule=molecule, conditions={"field": "0:200kV/cm:21"})
         results[f"{name}, 200 kV/cm"] = curve(scene, "numerics.jmax")
     return [Panel("highest J of the basis, states of J ≤ 2", "energy (MHz)", results)]
 
@@ -214,9 +207,10 @@ def replace_times(scene: Scene, points: int) -> Scene:
     return scene.replaced(conditions=when)
 
 
-def liquid(electrostatics: str) -> FluidScene:
+def liquid(electrostatics: str) -> Scene:
     """A small box of water."""
-    return FluidScene(
+    return make_scene(
+        "fluid",
         conditions={"model": "spce", "molecules": 216, "steps": 100},
         numerics={"electrostatics": electrostatics},
     )
@@ -243,7 +237,7 @@ def ewald(_: Path | None) -> list[Panel]:
 
 def samples(_: Path | None) -> list[Panel]:
     times = {"times": "0:0.5:51"}
-    scene = GasScene(molecule="water", observables=times, numerics={"molecules": 10_000})
+    scene = make_scene("gas", molecule="water", observables=times, numerics={"molecules": 10_000})
     knobs = [knob for knob in sweeps_of(scene)[0] if knob.name == "numerics.molecules"]
     panels = []
     for knob in knobs:

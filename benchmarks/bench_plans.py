@@ -23,17 +23,7 @@ from pathlib import Path
 from rotor.requests.plan import traced
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import (
-    GasScene,
-    LevelsScene,
-    RamanScene,
-    Scene,
-    SpectrumScene,
-    StarkScene,
-    ThermoScene,
-    ZeemanScene,
-    read_scene,
-)
+from rotor.scenes.scene import Scene, make_scene, read_scene
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER, RESULTS = ROOT / "examples" / "scenes", ROOT / "benchmarks" / "results" / "plans.json"
@@ -55,22 +45,19 @@ COARSER = {
     "unbalanced_wheel": "1e-7 rad",
 }  # accuracies that so long a motion allows
 OTHERS: dict[str, Scene] = {
-    "SO2, every line": SpectrumScene(
-        molecule="SO2",
+    "SO2, every line": make_scene("spectrum", molecule="SO2",
         conditions={"temperature": "300 K"},
         observables={"min_lgint": "none"},
     ),
-    "CH3OH, lines to 300 K": SpectrumScene(molecule="CH3OH", conditions={"temperature": "300 K"}),
-    "SO2, levels to 400": LevelsScene(molecule="SO2", observables={"jmax": 400}),
-    "OCS, levels to 100000": LevelsScene(molecule="OCS", observables={"jmax": 100_000}),
-    "formaldehyde, Stark map": StarkScene(molecule="H2CO", conditions={"field": "0:100kV/cm:2001"}),
-    "a top in magnetic fields": ZeemanScene(
-        molecule="H2CO", magnetic={"g": [0.6, -0.2, 0.3]}, conditions={"field": "0:20T:1001"}
+    "CH3OH, lines to 300 K": make_scene("spectrum", molecule="CH3OH", conditions={"temperature": "300 K"}),
+    "SO2, levels to 400": make_scene("levels", molecule="SO2", observables={"jmax": 400}),
+    "OCS, levels to 100000": make_scene("levels", molecule="OCS", observables={"jmax": 100_000}),
+    "formaldehyde, Stark map": make_scene("stark", molecule="H2CO", conditions={"field": "0:100kV/cm:2001"}),
+    "a top in magnetic fields": make_scene("zeeman", molecule="H2CO", magnetic={"g": [0.6, -0.2, 0.3]}, conditions={"field": "0:20T:1001"}
     ),
-    "water, 400 temperatures": ThermoScene(molecule="water", conditions={"temperature": "10:1000K:400"}),
-    "CO2, Raman lines": RamanScene(molecule="CO2"),
-    "C1 and C2 of 50000 molecules": GasScene(
-        molecule="water", observables={"times": "0:1ps:101"}, numerics={"molecules": 50_000}
+    "water, 400 temperatures": make_scene("thermo", molecule="water", conditions={"temperature": "10:1000K:400"}),
+    "CO2, Raman lines": make_scene("raman", molecule="CO2"),
+    "C1 and C2 of 50000 molecules": make_scene("gas", molecule="water", observables={"times": "0:1ps:101"}, numerics={"molecules": 50_000}
     ),
 }  # fmt: skip
 

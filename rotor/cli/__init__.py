@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
-from rotor.checks import NoAnswerError, RunStopped
+from rotor.checks import NoAnswerError, RunStopped, require_file
 from rotor.cli.shared import process
 from rotor.cli.shared.output import release_files
 from rotor.verbs.names import declared_verbs, has_small_blocks
@@ -270,6 +270,11 @@ def _message(error: ValueError | OSError) -> str:
     if error.filename is None and _exit_code(error) == NO_ANSWER:
         _close_output()
         return f"standard output: {error.strerror}"
+    if isinstance(error, FileNotFoundError | IsADirectoryError) and error.filename:  # the texts of files checked before
+        try:
+            require_file(error.filename)
+        except ValueError as plain:
+            return str(plain)
     return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
 
 

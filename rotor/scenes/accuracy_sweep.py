@@ -101,8 +101,8 @@ class WorkPrecision(Table):
 def panels_of(table: WorkPrecision) -> list[Panel]:
     """One panel of a picture for each knob and error, titled in words; orders of one splitting share a panel.
 
-    >>> from rotor.scenes.scene import LevelsScene
-    >>> [(panel.title, panel.of) for panel in panels_of(work_precision(LevelsScene(molecule="CO")))]
+    >>> from rotor.scenes.scene import make_scene
+    >>> [(panel.title, panel.of) for panel in panels_of(work_precision(make_scene("levels", molecule="CO")))]
     [('order of centrifugal distortion', 'energy of a level (MHz)')]
     """
     from rotor.plots.work_precision import Panel
@@ -162,8 +162,8 @@ def work_precision(
     Returns: without rows if nothing can be swept; the remarks say why.
     Raises ValueError as a run of the scene.
 
-    >>> from rotor.scenes.scene import LevelsScene
-    >>> table = work_precision(LevelsScene(molecule="CO"))
+    >>> from rotor.scenes.scene import make_scene
+    >>> table = work_precision(make_scene("levels", molecule="CO"))
     >>> [row.setting for row in table.rows], table.rows[0].error > table.rows[-1].error == 0.0
     (['order J^2', 'order J^4', 'order J^6', 'order J^8'], True)
     """

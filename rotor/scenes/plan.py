@@ -44,8 +44,8 @@ def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
 
     Examples
     --------
-    >>> from rotor.scenes.scene import LevelsScene
-    >>> plan_of(LevelsScene(molecule="CO")).counts
+    >>> from rotor.scenes.scene import make_scene
+    >>> plan_of(make_scene("levels", molecule="CO")).counts
     {'levels': 11}
     """
     checked_scene(scene)

@@ -49,8 +49,8 @@ def run_scene(
 
     Examples
     --------
-    >>> from rotor.scenes.scene import LevelsScene
-    >>> len(run_scene(LevelsScene(molecule="CO")).table)
+    >>> from rotor.scenes.scene import make_scene
+    >>> len(run_scene(make_scene("levels", molecule="CO")).table)
     11
     """
     checked_scene(scene)
@@ -134,8 +134,8 @@ def files_of(scene: Scene, out: Where) -> Files:
 def refuse_outside(scene: Scene, out: Where) -> None:
     """Refuse outputs outside the folder `out`, so that a scene from elsewhere cannot replace other files.
 
-    >>> from rotor.scenes.scene import LevelsScene
-    >>> refuse_outside(LevelsScene(molecule="CO", outputs={"csv": "../a.csv"}), "results")
+    >>> from rotor.scenes.scene import make_scene
+    >>> refuse_outside(make_scene("levels", molecule="CO", outputs={"csv": "../a.csv"}), "results")
     Traceback (most recent call last):
         ...
     ValueError: outputs.csv: ../a.csv: lies outside the folder results; name a file inside it, or give another folder as --out

@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable, Mapping
 from concurrent.futures import Executor
 from dataclasses import is_dataclass
-from functools import cache, partial
+from functools import cache
 from importlib import import_module
 from pathlib import Path
 from types import UnionType
@@ -213,8 +213,7 @@ def parse_scene(text: str, where: str = "scene") -> Scene:
 def scene_text(scene: Scene) -> str:
     """The scene as TOML. Defaults are left out; numbers read back as the same doubles.
 
-    >>> from rotor.scenes.scene import LevelsScene
-    >>> print(scene_text(LevelsScene(molecule="CO")), end="")
+    >>> print(scene_text(make_scene("levels", molecule="CO")), end="")
     schema = 1
     kind = "levels"
     molecule = "CO"
@@ -415,15 +414,6 @@ def _wrong_type(place: str, value: Any, kinds: tuple[Any, ...]) -> ValueError:
     decimal = isinstance(value, float) and float not in kinds
     actual = "a number with a decimal point" if decimal else _WORDS.get(type(value), type(value).__name__)
     return ValueError(f"{place}: expected {' or '.join(allowed)}, found {actual}")
-
-
-def __getattr__(name: str) -> Any:
-    """Functions that make a scene of a kind from its keys and tables, such as `RamanScene(molecule="N2")`."""
-    kind = name.removesuffix("Scene").lower()
-    if kind not in SCENE_VERBS or name != f"{kind.capitalize()}Scene":
-        raise AttributeError(f"module 'rotor.scenes.scene' has no attribute {name!r}")
-
-    return partial(make_scene, kind)
 
 
 def within(folder: str | os.PathLike[str], name: str) -> str:

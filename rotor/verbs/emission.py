@@ -132,25 +132,14 @@ class SeveralMolecules(SubjectKind):
         """The tables of the molecules."""
         first = request.sources[0]
         tables = []
-        for molecule, source, values_of_molecule in zip(
-            subject.molecules, request.sources, subject.departures, strict=True
-        ):
+        for molecule, source, stated in zip(subject.molecules, request.sources, subject.departures, strict=True):
             flat = saved_molecule(molecule, folder)
-            content = (
-                {"source": flat["molecule"]}
-                if "molecule" in flat
-                else {name.partition(".")[2]: value for name, value in flat.items()}
-            )
-            departures = {
-                name: getattr(source, name)
-                for name in ("excitation_k", "velocity_km_s", "fwhm_km_s")
-                if getattr(source, name) != getattr(first, name)
-            }
-            partition = values_of_molecule.get("partition")
-            emitter = EmitterInput(
-                source.column_per_cm2, **departures, partition=None if partition is None else beside(partition, folder)
-            )
-            tables.append({**content, **written_fields(emitter)})
+            content = {name.partition(".")[2] or "source": value for name, value in flat.items()}
+            gas = ("excitation_k", "velocity_km_s", "fwhm_km_s")
+            departures = {name: getattr(source, name) for name in gas if getattr(source, name) != getattr(first, name)}
+            if partition := stated.get("partition"):
+                departures["partition"] = beside(partition, folder)
+            tables.append({**content, **written_fields(EmitterInput(source.column_per_cm2, **departures))})
         return {"molecules": tables}
 
 

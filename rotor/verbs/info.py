@@ -72,13 +72,14 @@ def _kind_text(kind: str, decision: Mapping[str, Any]) -> str:
 def _constants_table(answer: InfoAnswer, report: Report) -> Table:
     top = answer.request.top
     stated, estimated = top.constants.uncertainties, top.estimated_errors_mhz
-    rows = []
+    records = []
     for name, mhz in top.constants.values.items():
         guess = estimated.get(name)
         error = f"{stated[name]:.2g}" if name in stated else f"about {known_digits(guess, guess)}" if guess else ""
         wavenumber = known_digits(mhz / MHZ_PER_CM, guess and guess / MHZ_PER_CM, wavenumber_digits(mhz))
-        rows.append((name, known_digits(mhz, guess), error, wavenumber))
-    return Table("", ("constant", "MHz", "± MHz", "cm-1"), rows, frozenset({"constant"}))
+        records.append({"name": name, "mhz": known_digits(mhz, guess), "error": error, "cm": wavenumber})
+    columns = {"constant": "{name}", "MHz": "{mhz}", "± MHz": "{error}", "cm-1": "{cm}"}
+    return record_table("", columns, records, {"constant"})
 
 
 def wavenumber_digits(mhz: float) -> int:
@@ -94,50 +95,52 @@ def wavenumber_digits(mhz: float) -> int:
 def _states_table(answer: InfoAnswer, report: Report) -> Table | None:
     """Constants of further vibrational states and their couplings."""
     states = answer.request.top.states
-    if states is None:
-        return None
-    values = states.values.items()
-    rows = [(name, f"{mhz:.12g}", f"{mhz / MHZ_PER_CM:.{wavenumber_digits(mhz)}g}") for name, mhz in values]
-    return Table("", ("of states", "MHz", "cm-1"), rows, frozenset({"of states"}))
+    columns = {
+        "of states": "{0[0]}",
+        "MHz": "{0[1]:.12g}",
+        "cm-1": lambda constant: f"{constant[1] / MHZ_PER_CM:.{wavenumber_digits(constant[1])}g}",
+    }
+    return None if states is None else record_table("", columns, states.values.items(), {"of states"})
 
 
 def _axes_table(answer: InfoAnswer, report: Report) -> Table:
     """Moments and planar moments; axes and centre of mass in the frame of the input."""
     moments, planar, frame = (report.content[k] for k in ("moments_u_angstrom2", "planar_moments_u_angstrom2", "frame"))
-    columns = ["axis", "I (u Å²)", "P (u Å²)"] + (["x", "y", "z"] if frame else [])
-    rows = []
-    for i, axis in enumerate("abc"):
-        vector = frame["axes"][i] if frame else ()
-        rows.append([axis, f"{moments[i]:.6f}", f"{planar[i]:z.6f}", *(f"{x:z.6f}" for x in vector)])
+    columns, vectors = {"axis": "{0[0]}", "I (u Å²)": "{0[1]:.6f}", "P (u Å²)": "{0[2]:z.6f}"}, [()] * 3
     if frame:
-        rows.append(["centre of mass (Å)", "", "", *(f"{x:z.6f}" for x in frame["centre_angstrom"])])
-    return Table("", columns, rows, frozenset({"axis"}))
+        columns |= {axis: f"{{0[3][{number}]:z.6f}}" for number, axis in enumerate("xyz")}
+        vectors = frame["axes"]
+    records = [*zip("abc", moments, planar, vectors, strict=True)]
+    centre = [("centre of mass (Å)", None, None, frame["centre_angstrom"])] if frame else []
+    return record_table("", columns, [*records, *centre], {"axis"})
 
 
-def _nuclei_table(answer: InfoAnswer, report: Report) -> Table | None:
+def _nuclei_table(answer: InfoAnswer, report: Report) -> Table:
     """Nuclei that split lines, the size of the splitting, and their constants if known."""
-    top, rows = answer.request.top, []
+    spins, records = answer.request.top.spin_constants, []
     for nucleus in report.content["splitting_nuclei"]:
-        constants_of_spin = top.spin_constants.of(nucleus["nucleus"]) if nucleus["known"] and top.spin_constants else {}
-        constants = ", ".join(f"{name} {value:.6g}" for name, value in constants_of_spin.items())
+        constants = _constants_text(spins.of(nucleus["nucleus"]) if nucleus["known"] and spins else {})
         text = constants or "not known; the size is that of covalent bonds of this element"
-        about = "" if nucleus["known"] else "about "
-        rows.append([nucleus["nucleus"], f"{nucleus['spin']:g}", f"{about}{nucleus['splitting_mhz']:.3g}", text])
-    listed = [row[0] for row in rows]
-    values = top.spin_constants.values if top.spin_constants else {}
-    for spins in dict.fromkeys(re.findall(r"\(([^()]*)\)", " ".join(values))):  # electrons, spins of 1/2, pairs
-        if spins not in listed:
-            constants_of_spin = {
-                name.replace(f"({spins})", ""): value for name, value in values.items() if f"({spins})" in name
-            }
-            size = "" if "," in spins or not top.spin_constants else f"{top.spin_constants.twice[spins] / 2:g}"
-            rows.append(
-                [spins, size, "", ", ".join(f"{name} {value:.6g}" for name, value in constants_of_spin.items())]
-            )
-    if not rows:
-        return None
-    columns = ("nucleus", "spin", "splits J = 1 by (MHz)", "constants (MHz)")
-    return Table("", columns, rows, frozenset({"nucleus", "constants (MHz)"}))
+        size = f"{'' if nucleus['known'] else 'about '}{nucleus['splitting_mhz']:.3g}"
+        records.append({"nucleus": nucleus["nucleus"], "spin": nucleus["spin"], "size": size, "constants": text})
+    values, listed = spins.values if spins else {}, [record["nucleus"] for record in records]
+    for name in dict.fromkeys(re.findall(r"\(([^()]*)\)", " ".join(values))):  # electrons, spins of 1/2, pairs
+        if spins and name not in listed:
+            inside = f"({name})"
+            text = _constants_text({key.replace(inside, ""): value for key, value in values.items() if inside in key})
+            spin = None if "," in name else spins.twice[name] / 2
+            records.append({"nucleus": name, "spin": spin, "size": "", "constants": text})
+    columns = {
+        "nucleus": "{nucleus}",
+        "spin": "{spin:g}",
+        "splits J = 1 by (MHz)": "{size}",
+        "constants (MHz)": "{constants}",
+    }
+    return record_table("", columns, records, {"nucleus", "constants (MHz)"})
+
+
+def _constants_text(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {value:.6g}" for name, value in values.items())
 
 
 def _reason(source: str) -> str:
@@ -162,16 +165,17 @@ def _q_table(answer: InfoAnswer, report: Report) -> Table:
 
 def _conformers_table(answer: InfoAnswer, report: Report) -> Table:
     """Energies, constants (to the digits that the error of the geometry leaves) and dipoles of the conformers, if requested."""
-    columns = ("conformer", "E (kJ/mol)", "A (MHz)", "B (MHz)", "C (MHz)", "μa (D)", "μb (D)", "μc (D)")
-    rows, molecule = [], answer.request.top.molecule
+    molecule, records = answer.request.top.molecule, []
     relative = (molecule.uncertainty or 0.0) if molecule is not None else 0.0
-    for number, conformer in enumerate(report.content.get("conformers", ()), start=1):
-        constants = [
-            known_digits(x, relative * x) if x < float("inf") else "-" for x in conformer["rotational_constants_mhz"]
-        ]
-        dipole = [f"{round(mu, 2) + 0.0:.2f}" for mu in conformer["dipole_abc_debye"] or ()] or ["-"] * 3
-        rows.append([str(number), f"{conformer['energy_kj_per_mol']:.2f}", *constants, *dipole])
-    return Table("", columns, rows)
+    for conformer in report.content.get("conformers", ()):
+        constants = conformer["rotational_constants_mhz"]
+        texts = [known_digits(mhz, relative * mhz) if mhz < float("inf") else "-" for mhz in constants]
+        dipole = conformer["dipole_abc_debye"] or (float("nan"),) * 3
+        records.append((len(records) + 1, conformer["energy_kj_per_mol"], texts, dipole))
+    columns = {"conformer": "{0[0]}", "E (kJ/mol)": "{0[1]:.2f}"}
+    columns |= {f"{name} (MHz)": f"{{0[2][{number}]}}" for number, name in enumerate("ABC")}
+    columns |= {f"μ{axis} (D)": f"{{0[3][{number}]:z.2f}}" for number, axis in enumerate("abc")}
+    return record_table("", columns, records)
 
 
 VERB = Verb(

@@ -235,3 +235,23 @@ def test_constants_in_wavenumbers_become_mhz(call, folder):
     assert top.rotational_constants_mhz == pytest.approx([29979.2458 * x for x in (0.75, 0.13, 0.11)], rel=1e-14)
     assert top.states.values["G_a[0,1]"] == pytest.approx(299.792458, rel=1e-14)
     assert top.spin_constants.values["chi_aa(I1)"] == pytest.approx(-1.4e-4 * 29979.2458 / 1.5, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["structure", "none.toml"],
+        ["accuracy", "none.toml"],
+        ["run", "none.toml"],
+        ["plan", "none.toml"],
+        ["cat", "none.cat"],
+        ["info", "none.xyz"],
+        ["fit", "none.par"],
+        ["align", "OCS", "--pulse-table", "none.csv"],
+        ["info", "water", "--hessian", "none.txt"],
+    ],
+    ids=" ".join,
+)
+def test_a_missing_file_is_named_in_the_same_words_by_every_verb(call, words):
+    code, _, err = call(*words)
+    assert (code, err.strip()) == (2, f"error: {words[-1]}: no such file")

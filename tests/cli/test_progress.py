@@ -14,7 +14,7 @@ import pytest
 from rotor.cli.shared.workers import working
 from rotor.reports import progress
 from rotor.reports.progress import elapsed_time, progress_bar
-from rotor.scenes.scene import LevelsScene, write_scene
+from rotor.scenes.scene import make_scene, write_scene
 
 
 class Terminal(io.StringIO):
@@ -84,7 +84,7 @@ def test_a_sweep_shows_points_and_the_time_left_on_a_terminal(folder):
     import pty
 
     write_scene(
-        LevelsScene(molecule="CO", observables={"jmax": 2}, sweep={"observables.jmax": [*range(60)]}),
+        make_scene("levels", molecule="CO", observables={"jmax": 2}, sweep={"observables.jmax": [*range(60)]}),
         "s.toml",
     )
     reading, writing = pty.openpty()

@@ -23,20 +23,7 @@ from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Growth, Run
 from rotor.scenes import accuracy_sweep
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, panels_of, sweep, sweeps_of, work_precision
-from rotor.scenes.scene import (
-    AlignScene,
-    EmissionScene,
-    FitScene,
-    FluidScene,
-    GasScene,
-    LevelsScene,
-    RamanScene,
-    SpectrumScene,
-    StarkScene,
-    ThermoScene,
-    TumbleScene,
-    write_scene,
-)
+from rotor.scenes.scene import make_scene, write_scene
 from rotor.verbs.names import SCENE_VERBS
 from rotor.verbs.verb import verb_of
 
@@ -48,7 +35,7 @@ def errors(table: WorkPrecision, knob: str, of: str | None = None) -> dict[str, 
 def test_orders_of_distortion_of_a_linear_molecule():
     """Without D the highest level is off by D (J(J+1))² - H (J(J+1))³, without H by that last term."""
     rod = {"constants": "B=6000 D=1e-3 H=1e-10 MHz"}
-    table = work_precision(LevelsScene(molecule=rod, observables={"jmax": 20}))
+    table = work_precision(make_scene("levels", molecule=rod, observables={"jmax": 20}))
     deviations, x = errors(table, "effects.distortion"), 20 * 21
     assert deviations["order J^2"] == pytest.approx(1e-3 * x**2 - 1e-10 * x**3, rel=1e-9)  # round-off of 2.5e6 MHz
     assert deviations["order J^4"] == pytest.approx(1e-10 * x**3, rel=1e-4)  # likewise, of 7e-3 MHz
@@ -83,7 +70,9 @@ JET = {"temperature": "2 K"}
 def test_lines_lose_intensity_by_a_cut_and_by_j_max():
     rod = {"constants": "B=6000 D=0.001 MHz", "dipole_abc": [1, 0, 0]}
     seen = {"min_lgint": "none"}
-    table = work_precision(SpectrumScene(molecule=rod, conditions=JET, observables=seen, numerics={"jmax": 12}))
+    table = work_precision(
+        make_scene("spectrum", molecule=rod, conditions=JET, observables=seen, numerics={"jmax": 12})
+    )
     for knob in ("numerics.jmax", "observables.min_lgint"):
         lost = list(errors(table, knob).values())
         assert lost == sorted(lost, reverse=True)
@@ -98,7 +87,7 @@ def test_methods_of_hyperfine_structure():
         "dipole_abc": [1, 0, 0],
         "spin_constants": "chi_aa(35Cl)=-57 chi_bc(35Cl)=20 MHz",
     }
-    scene = LevelsScene(molecule=spins, observables={"jmax": 3})
+    scene = make_scene("levels", molecule=spins, observables={"jmax": 3})
     deviations = errors(work_precision(scene), "effects.hyperfine_method")
     assert deviations["exact"] == 0.0 < deviations["N-diagonal"] <= deviations["first-order"] < deviations["left out"]
     assert deviations["left out"] == pytest.approx(
@@ -107,7 +96,7 @@ def test_methods_of_hyperfine_structure():
 
 
 def test_a_stark_map_converges_with_j_max():
-    table = work_precision(StarkScene(molecule="OCS", conditions={"field": [0.0, 100.0]}))
+    table = work_precision(make_scene("stark", molecule="OCS", conditions={"field": [0.0, 100.0]}))
     by_j = list(errors(table, "numerics.jmax").values())
     assert by_j[:4] == sorted(by_j[:4], reverse=True)
     assert by_j[0] > 10.0  # MHz, with the least J max
@@ -117,7 +106,7 @@ def test_a_stark_map_converges_with_j_max():
 
 
 def test_a_partition_function_reaches_each_error():
-    table = work_precision(ThermoScene(molecule="CO", conditions={"temperature": [20.0, 100.0]}))
+    table = work_precision(make_scene("thermo", molecule="CO", conditions={"temperature": [20.0, 100.0]}))
     for name in ("Q", "U", "C_v"):
         for goal, error in errors(table, "numerics.relative_error", name).items():
             assert error <= 100 * float(goal)  # percent
@@ -128,7 +117,7 @@ def test_the_step_of_a_splitting_has_its_order():
     rod = {"moments": [2.0, 2.0, 0.1], "angular_velocity": [0.0, 0.0, 1.0], "attitude": [0.8, 0.6, 0.0, 0.0]}
     weight = {"effect": "gravity about pivot", "mass": 1.0, "centre": [0.0, 0.0, 1.0], "gravity": [0.0, 0.0, -9.8]}
     table = work_precision(
-        TumbleScene(body=rod, effects=[weight], conditions={"times": [0.0, 1.0, 2.0]}), limit_seconds=20
+        make_scene("tumble", body=rod, effects=[weight], conditions={"times": [0.0, 1.0, 2.0]}), limit_seconds=20
     )
     for order in (2, 4):
         deviations = errors(table, f"numerics.step, order {order}")
@@ -141,18 +130,18 @@ def test_the_step_of_a_splitting_has_its_order():
 
 def test_kinds_without_a_knob_say_so():
     racket = {"moments": [1.0, 2.0, 3.0], "angular_velocity": [0.1, 1.0, 0.1]}
-    table = work_precision(TumbleScene(body=racket))
+    table = work_precision(make_scene("tumble", body=racket))
     assert len(table) == 0
     assert "exact: nothing cheaper" in table.remarks[0]
     drag = [{"effect": "linear drag", "coefficients": [0.1, 0.1, 0.1]}]
-    driven, remarks = sweeps_of(TumbleScene(body=racket, effects=drag, conditions={"times": [0.0, 1.0]}))
+    driven, remarks = sweeps_of(make_scene("tumble", body=racket, effects=drag, conditions={"times": [0.0, 1.0]}))
     assert [knob.name for knob in driven] == ["numerics.tolerance"]
     assert "a splitting holds no torque of the angular velocity" in remarks[0]
 
 
 @pytest.mark.slow
 def test_the_error_of_a_gas_falls_with_the_root_of_its_molecules():
-    table = work_precision(GasScene(molecule="water", numerics={"molecules": 3000}))
+    table = work_precision(make_scene("gas", molecule="water", numerics={"molecules": 3000}))
     deviations = errors(table, "numerics.molecules", "temperature")
     for count, error in deviations.items():
         expected = 300 * math.sqrt(2 / (6 * int(count)))  # of 2E/6k, E a sum of 6 halves of χ²
@@ -162,7 +151,7 @@ def test_the_error_of_a_gas_falls_with_the_root_of_its_molecules():
 @pytest.mark.slow
 def test_the_step_of_a_fluid_is_of_second_order():
     box = {"model": "spce", "molecules": 27, "steps": 10}
-    table = work_precision(FluidScene(conditions=box, numerics={"cutoff": "4.5 Å", "electrostatics": "ewald"}))
+    table = work_precision(make_scene("fluid", conditions=box, numerics={"cutoff": "4.5 Å", "electrostatics": "ewald"}))
     for of in ("conserved energy per degree", "positions after 48 fs"):
         deviations = errors(table, "numerics.step", of)
         assert deviations["2"] / deviations["1"] == pytest.approx(4.0, rel=0.15)  # leading term alone
@@ -174,14 +163,14 @@ def test_the_step_of_a_fluid_is_of_second_order():
 @pytest.mark.slow
 def test_alignment_reaches_each_tolerance():
     pulse = [{"shape": "gaussian", "peak": 1e12, "fwhm": 0.3}]
-    table = work_precision(AlignScene(molecule="OCS", pulses=pulse))
+    table = work_precision(make_scene("align", molecule="OCS", pulses=pulse))
     deviations = errors(table, "numerics.tolerance")
     assert all(error <= float(goal) for goal, error in deviations.items())
     assert deviations["0.01"] > 100 * deviations["1e-06"]
 
 
 def test_raman_lines():
-    deviations = errors(work_precision(RamanScene(molecule="N2")), "observables.min_relative")
+    deviations = errors(work_precision(make_scene("raman", molecule="N2")), "observables.min_relative")
     assert list(deviations.values()) == sorted(deviations.values(), reverse=True)
     assert deviations["1e-06"] < 1e-3 < deviations["0.1"]  # percent of all cross sections
 
@@ -196,14 +185,14 @@ def test_the_numerics_of_every_kind_can_be_loaded(kind):
 
 def test_a_fit_and_a_source():
     spectrum = [{"source": "CO", "column": 1e18}, {"source": "CH3CN", "column": 1e14}]
-    source = EmissionScene(molecules=spectrum, conditions={"excitation": "20 K", "range": "110:116GHz"})
+    source = make_scene("emission", molecules=spectrum, conditions={"excitation": "20 K", "range": "110:116GHz"})
     computed = list(errors(work_precision(source), "observables.least_depth").values())
     assert computed == sorted(computed, reverse=True)
     assert computed[-1] < 1e-3 < computed[0]  # K
 
     lines = PROJECT / "tests" / "oracles" / "fits"
     par = next(iter(sorted(lines.rglob("*.par"))))
-    table = work_precision(FitScene(lines={"source": str(par)}))
+    table = work_precision(make_scene("fit", lines={"source": str(par)}))
     by_tolerance = errors(table, "tolerance of the search")
     assert by_tolerance["1e-08"] <= by_tolerance["0.0001"] < 0.1  # standard errors
 
@@ -243,7 +232,7 @@ def test_a_panel_a_knob():
 
 
 def test_settings_of_highest_j_rise_and_hold_that_of_the_scene():
-    scene = SpectrumScene(molecule="CO", conditions=JET, numerics={"jmax": 56})
+    scene = make_scene("spectrum", molecule="CO", conditions=JET, numerics={"jmax": 56})
     (reach,) = (knob for knob in sweeps_of(scene)[0] if knob.name == "numerics.jmax")
     assert [setting.label for setting in reach.settings] == ["14", "22", "31", "39", "48", "56"]
     assert [setting.request.jmax for setting in reach.settings] == [14, 22, 31, 39, 48, 56]
@@ -335,7 +324,7 @@ def test_a_kind_has_knobs_and_no_code_of_its_own_that_chooses_sweeps_or_plans(ki
 
 
 def test_the_command_accuracy_sweeps_a_scene(call, folder):
-    write_scene(ThermoScene(molecule="CO", conditions={"temperature": [20.0]}), "s.toml")
+    write_scene(make_scene("thermo", molecule="CO", conditions={"temperature": [20.0]}), "s.toml")
     code, out, _ = call("accuracy", "s.toml", "--plot", "a.png", "--csv", "a.csv")
     assert code == 0
     assert "numerics.relative_error: Q" in out
@@ -348,7 +337,7 @@ def test_the_command_accuracy_sweeps_a_scene(call, folder):
 
 
 def test_the_command_where_nothing_can_be_swept(call, folder):
-    write_scene(TumbleScene(body={"moments": [1.0, 2.0, 3.0], "angular_velocity": [0.1, 1.0, 0.1]}), "s.toml")
+    write_scene(make_scene("tumble", body={"moments": [1.0, 2.0, 3.0], "angular_velocity": [0.1, 1.0, 0.1]}), "s.toml")
     assert "exact: nothing cheaper" in call("accuracy", "s.toml")[1]
     code, _, said = call("accuracy", "s.toml", "--plot", "a.png")
     assert code == 2
@@ -357,13 +346,13 @@ def test_the_command_where_nothing_can_be_swept(call, folder):
 
 
 def test_a_sweep_over_values_is_refused():
-    scene = ThermoScene(molecule="CO", sweep={"observables.species": ["equilibrium"]})
+    scene = make_scene("thermo", molecule="CO", sweep={"observables.species": ["equilibrium"]})
     with pytest.raises(ValueError, match="the knobs of one point are swept"):
         work_precision(scene)
 
 
 def test_an_interrupt_prints_what_there_is(call, folder, monkeypatch):
-    write_scene(SpectrumScene(molecule="HC3N", conditions=JET, numerics={"jmax": 5}), "s.toml")
+    write_scene(make_scene("spectrum", molecule="HC3N", conditions=JET, numerics={"jmax": 5}), "s.toml")
     true, count = accuracy_sweep.sweep, []
 
     def second_time(*arguments):

@@ -26,7 +26,7 @@ from rotor.quantum.estimates.left_out import stray_field
 from rotor.quantum.solve import solve_levels
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import scene_calculation
-from rotor.scenes.scene import FluidScene, LevelsScene, SpectrumScene, read_scene
+from rotor.scenes.scene import make_scene, read_scene
 from rotor.spectra.widths import pressure_width
 
 SCENES = PROJECT / "examples" / "scenes"
@@ -52,7 +52,7 @@ def test_widths_are_those_of_the_conditions_of_the_scene():
     alone = pressure_width(rotor.read("OCS"), 2.0, None)
     assert alone.size is None
     assert f"{pressure_width(rotor.read('OCS'), 2.0, 1e-3).size:.2g} MHz for each mbar" in alone.basis
-    scene = SpectrumScene(molecule="H2CO", conditions={"temperature": "30 K", "range": "100:105GHz"})
+    scene = make_scene("spectrum", molecule="H2CO", conditions={"temperature": "30 K", "range": "100:105GHz"})
     widths = {neglected.name: neglected for neglected in plan_of(scene).left_out}
     assert "at 105000 MHz" in widths["Doppler width"].basis
     assert widths["pressure width"].size is None
@@ -61,7 +61,7 @@ def test_widths_are_those_of_the_conditions_of_the_scene():
 def test_a_spectrum_without_widths_says_both_and_one_of_them_with_doppler():
     def names(**observables) -> set[str]:
         gas = {"range": "115.2:115.4GHz"}
-        scene = SpectrumScene(molecule="CO", conditions=gas, observables=dict(**observables))
+        scene = make_scene("spectrum", molecule="CO", conditions=gas, observables=dict(**observables))
         return {neglected.name for neglected in plan_of(scene).left_out}
 
     assert {"Doppler width", "pressure width"} <= names()
@@ -70,11 +70,11 @@ def test_a_spectrum_without_widths_says_both_and_one_of_them_with_doppler():
 
 
 def test_a_plan_says_where_the_distortion_series_ends():
-    plan, top = plan_of(LevelsScene(molecule="HCONH2", observables={"jmax": 80})), rotor.read("HCONH2")
+    plan, top = plan_of(make_scene("levels", molecule="HCONH2", observables={"jmax": 80})), rotor.read("HCONH2")
     assert "converges to J = 68;" in dict(plan.parts)["warning"]
     said = warnings_of(top, solve_levels(top, 80, jmin=80, vectors=False))
     assert "energies above J = 68 at the highest K" in said[0]  # what the run itself says
-    short = plan_of(LevelsScene(molecule="HCONH2", observables={"jmax": 68}))
+    short = plan_of(make_scene("levels", molecule="HCONH2", observables={"jmax": 68}))
     assert "warning" not in dict(short.parts)
 
 
@@ -149,7 +149,7 @@ def test_the_box_slows_diffusion_as_yeh_and_hummer_have_it(count):
 def test_a_plan_of_atoms_on_a_perfect_lattice():
     """64 atoms of argon: forces are round-off at the start, which is no net force; atoms have no step error of rotation."""
     box = {"model": "argon", "molecules": 64, "density": 1.0, "steps": 10, "every": 5}
-    plan = plan_of(FluidScene(conditions=box, numerics={"cutoff": "7 Å"}))
+    plan = plan_of(make_scene("fluid", conditions=box, numerics={"cutoff": "7 Å"}))
     sizes = {neglected.name: neglected.size for neglected in plan.left_out}
     assert sizes["finite box"] == pytest.approx(25.0)  # 64^(-1/3)
     assert "finite step" not in sizes
@@ -164,7 +164,7 @@ def test_the_sizes_of_a_plan_are_those_of_the_equilibrated_fluid():
     from rotor.scenes.run import scene_calculation
 
     box = {"molecules": 64, "ensemble": "langevin", "friction": 5.0, "steps": 100}
-    scene = FluidScene(conditions=box, numerics={"cutoff": "6 Å"})
+    scene = make_scene("fluid", conditions=box, numerics={"cutoff": "6 Å"})
     planned = {neglected.name: neglected.size for neglected in plan_of(scene).left_out}
     request = scene_calculation(scene).request
     atoms, kelvin, step_fs = make_box(request), 298.15, 2.0

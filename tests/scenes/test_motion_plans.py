@@ -14,14 +14,14 @@ from rotor.classical.driven import answer_driven
 from rotor.geometry.rotations import distance
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene, scene_calculation
-from rotor.scenes.scene import TumbleScene
+from rotor.scenes.scene import make_scene
 
 BODY = {"moments": [1.0, 2.0, 3.0], "angular_velocity": [0.2, 1.0, 0.1]}
 DRIVEN = [
     {"effect": "periodic drive", "amplitude": [0.1, 0.0, 0.2], "angular_frequency": 1.3},
     {"effect": "linear drag", "coefficients": [0.1, 0.1, 0.1]},
 ]
-REGULAR = TumbleScene(body=BODY, effects=DRIVEN, conditions={"times": "0:60:13"}, accuracy="1e-7 rad")
+REGULAR = make_scene("tumble", body=BODY, effects=DRIVEN, conditions={"times": "0:60:13"}, accuracy="1e-7 rad")
 
 
 def found_error(result) -> float:
@@ -55,8 +55,12 @@ def test_a_wobble_below_the_tolerance_is_in_the_error_that_is_stated():
     """All tolerances from 1e-5 to 1e-8 do not see it and agree among themselves; their error is its size, 1e-5 rad."""
     body = {"moments": [1.0, 1.2, 1.5], "angular_velocity": [1e-5, 0.0, 0.3]}
     when = {"times": "0:40000:101"}
-    scene = TumbleScene(
-        body=body, effects=[{"effect": "spinning rotor", "momentum": [0, 0, 0.7]}], conditions=when, accuracy="1e-5 rad"
+    scene = make_scene(
+        "tumble",
+        body=body,
+        effects=[{"effect": "spinning rotor", "momentum": [0, 0, 0.7]}],
+        conditions=when,
+        accuracy="1e-5 rad",
     )
     result = run_scene(scene)
     assert found_error(result) <= result.reached.error <= 1e-5
@@ -66,7 +70,9 @@ def test_steps_of_a_body_that_is_spun_up_are_expected_to_grow(monkeypatch):
     """Its rate grows with the time, so that the first twentieth of the time has a four hundredth of the steps."""
     body = {"moments": [100.0, 100.0, 180.0], "angular_velocity": [0.0, 0.0, 0.0]}
     when = {"times": "0:3000:3"}
-    scene = TumbleScene(body=body, effects=[{"effect": "constant torque", "vector": [0.05, 0.0, 2.0]}], conditions=when)
+    scene = make_scene(
+        "tumble", body=body, effects=[{"effect": "constant torque", "vector": [0.05, 0.0, 2.0]}], conditions=when
+    )
     request = scene_calculation(scene).request
     monkeypatch.setattr(motion_steps, "MORE_COMPILED", 0)
     monkeypatch.setattr(motion_steps, "ENOUGH_STEPS", 10)

@@ -21,18 +21,7 @@ from rotor.fluids.request import answer_fluid
 from rotor.geometry.rotations import distance
 from rotor.quantum.hyperfine_method import used_method
 from rotor.scenes.run import run_scene, scene_calculation
-from rotor.scenes.scene import (
-    AlignScene,
-    FluidScene,
-    GasScene,
-    LevelsScene,
-    RamanScene,
-    SpectrumScene,
-    StarkScene,
-    ThermoScene,
-    TumbleScene,
-    write_scene,
-)
+from rotor.scenes.scene import make_scene, write_scene
 from rotor.spectra.numerics import line_error
 from rotor.thermodynamics.classical_gas import answer_gas
 from rotor.tops.top import Top
@@ -41,8 +30,10 @@ from rotor.tops.top import Top
 @pytest.mark.parametrize("goal", ["1 MHz", "1 kHz"])
 def test_a_stark_map(goal):
     field = {"field": [0.0, 100.0]}
-    result = run_scene(StarkScene(molecule="OCS", conditions=field, accuracy=goal))
-    fine = run_scene(StarkScene(molecule="OCS", conditions=field, numerics={"tolerance": result.reached.asked / 100}))
+    result = run_scene(make_scene("stark", molecule="OCS", conditions=field, accuracy=goal))
+    fine = run_scene(
+        make_scene("stark", molecule="OCS", conditions=field, numerics={"tolerance": result.reached.asked / 100})
+    )
     error = np.abs(result.table.columns["energy_mhz"] - fine.table.columns["energy_mhz"]).max()
     assert result.reached.error <= result.reached.asked
     assert error <= 1.1 * result.reached.error  # what is left after the next J max is a tenth at most
@@ -50,8 +41,8 @@ def test_a_stark_map(goal):
 
 def test_cosines_of_a_pulse():
     pulse, when = [{"shape": "gaussian", "peak": 1e12, "fwhm": 0.3}], {"temperature": 0, "points": 51}
-    result = run_scene(AlignScene(molecule="OCS", pulses=pulse, conditions=when, accuracy=1e-4))
-    fine = run_scene(AlignScene(molecule="OCS", pulses=pulse, conditions=when, numerics={"tolerance": 1e-6}))
+    result = run_scene(make_scene("align", molecule="OCS", pulses=pulse, conditions=when, accuracy=1e-4))
+    fine = run_scene(make_scene("align", molecule="OCS", pulses=pulse, conditions=when, numerics={"tolerance": 1e-6}))
     error = np.abs(result.table.columns["cos2theta"] - fine.table.columns["cos2theta"]).max()
     assert error <= result.reached.error <= 1e-4 == result.reached.asked
 
@@ -59,7 +50,7 @@ def test_cosines_of_a_pulse():
 def test_the_loosest_tolerance_of_cosines_is_taken():
     """A gas at 1 K, whose populations left out decide: stated covers found, and ten times the tolerance would miss."""
     pulse, when = [{"shape": "gaussian", "peak": 1e12, "fwhm": 1.0}], {"temperature": 1.0, "points": 1001}
-    scene = AlignScene(molecule="OCS", pulses=pulse, conditions=when, accuracy=1e-5)
+    scene = make_scene("align", molecule="OCS", pulses=pulse, conditions=when, accuracy=1e-5)
     result = run_scene(scene)
     request = replace(result.request, tolerance=1e-8, jmax=None)
     true = answer_align(request).trace.cosines["cos2theta"]
@@ -72,7 +63,7 @@ def test_the_loosest_tolerance_of_cosines_is_taken():
 def test_the_smallest_j_max_of_cosines_is_taken():
     """With one J less the truncation alone, of a run without the search, is more than what was asked for."""
     pulse, when = [{"shape": "gaussian", "peak": 1e12, "fwhm": 1.0}], {"temperature": 0, "points": 201}
-    result = run_scene(AlignScene(molecule="OCS", pulses=pulse, conditions=when, accuracy=1e-5))
+    result = run_scene(make_scene("align", molecule="OCS", pulses=pulse, conditions=when, accuracy=1e-5))
     request, trace = result.request, result.answer.trace
     free = answer_align(replace(request, jmax=None)).trace
     assert request.jmax == trace.jmax < free.jmax
@@ -99,8 +90,8 @@ def test_the_truncation_that_is_estimated_covers_the_true_one(allowed):
 
 def test_a_partition_function():
     when = {"temperature": [20.0, 100.0]}
-    result = run_scene(ThermoScene(molecule="CO", conditions=when, accuracy="0.1 %"))
-    fine = run_scene(ThermoScene(molecule="CO", conditions=when, numerics={"relative_error": 1e-10}))
+    result = run_scene(make_scene("thermo", molecule="CO", conditions=when, accuracy="0.1 %"))
+    fine = run_scene(make_scene("thermo", molecule="CO", conditions=when, numerics={"relative_error": 1e-10}))
     error = np.abs(result.table.columns["q_rot"] / fine.table.columns["q_rot"] - 1).max()
     assert max(error, result.reached.error) <= 1e-3 == result.reached.asked
 
@@ -115,8 +106,8 @@ TIMES = {"times": [0.0, 5.0, 10.0]}
 
 @pytest.mark.parametrize("goal", [1e-3, 1e-8])
 def test_a_driven_motion(goal):
-    result = run_scene(TumbleScene(body=BODY, effects=DRIVEN, conditions=TIMES, accuracy=f"{goal} rad"))
-    fine = run_scene(TumbleScene(body=BODY, effects=DRIVEN, conditions=TIMES, numerics={"tolerance": 1e-13}))
+    result = run_scene(make_scene("tumble", body=BODY, effects=DRIVEN, conditions=TIMES, accuracy=f"{goal} rad"))
+    fine = run_scene(make_scene("tumble", body=BODY, effects=DRIVEN, conditions=TIMES, numerics={"tolerance": 1e-13}))
     error = distance(result.answer.motion.attitude, fine.answer.motion.attitude).max()
     assert error <= result.reached.error <= goal
     assert result.answer.motion.steps < fine.answer.motion.steps  # cheaper than the finest
@@ -127,13 +118,13 @@ def test_a_driven_motion(goal):
 def test_steps_that_end_at_dense_times_are_no_reference():
     """At 0.02 s apart a tolerance and one a hundred times finer take the same steps, whose difference of 0 is not an error."""
     dense = {"times": "0:2:101"}
-    result = run_scene(TumbleScene(body=BODY, effects=DRIVEN[:1], conditions=dense, accuracy="1e-9 rad"))
+    result = run_scene(make_scene("tumble", body=BODY, effects=DRIVEN[:1], conditions=dense, accuracy="1e-9 rad"))
     assert result.reached.how == "tolerance 0.001 of a step, nothing cheaper: the loosest there is"
     assert 1e-13 < result.reached.error <= 1e-9  # a hundred steps of 1e-14 at the least
 
 
 def test_a_free_motion_is_exact():
-    result = run_scene(TumbleScene(body=BODY, conditions=TIMES, accuracy="1e-9 rad"))
+    result = run_scene(make_scene("tumble", body=BODY, conditions=TIMES, accuracy="1e-9 rad"))
     assert result.reached.how == "exact: nothing cheaper"
     assert result.reached.error < 1e-13
     assert float(result.answer.drift.momentum) < 1e-13  # round-off
@@ -145,11 +136,11 @@ NITROGEN = {"constants": "A=9.2 B=3 C=2.5 GHz", "dipole_abc": [1, 0, 0], "spin_c
 
 def test_spins_are_taken_where_they_are_larger_than_what_is_asked_for():
     few = {"jmax": 2}
-    known = run_scene(SpectrumScene(molecule=NITROGEN, conditions=JET, numerics=few, accuracy="1 kHz"))
+    known = run_scene(make_scene("spectrum", molecule=NITROGEN, conditions=JET, numerics=few, accuracy="1 kHz"))
     assert "f" in known.table.quanta_names
     assert "with spins" in known.reached.how
     plain = {"constants": NITROGEN["constants"], "dipole_abc": [1, 0, 0]}
-    exact = run_scene(SpectrumScene(molecule=plain, conditions=JET, numerics=few, accuracy="1 kHz"))
+    exact = run_scene(make_scene("spectrum", molecule=plain, conditions=JET, numerics=few, accuracy="1 kHz"))
     assert exact.reached.how == "exact: nothing cheaper"
     assert exact.reached.error < 1e-9
 
@@ -165,9 +156,9 @@ TWO = {
 def test_several_spins_by_the_cheapest_method(goal, method):
     """What is stated covers the difference from exact lines; what is too much to be left out stays."""
     few = {"jmax": 2}
-    scene = SpectrumScene(molecule=TWO, conditions=JET, numerics=few, accuracy=goal)
+    scene = make_scene("spectrum", molecule=TWO, conditions=JET, numerics=few, accuracy=goal)
     result = run_scene(scene)
-    exact = run_scene(SpectrumScene(molecule=TWO, conditions=JET, numerics=few))
+    exact = run_scene(make_scene("spectrum", molecule=TWO, conditions=JET, numerics=few))
     assert used_method(result.table.levels).method == method
     assert line_error(result.answer.lines, exact.answer.lines) <= result.reached.error <= result.reached.asked
     assert "orders of distortion" in dict(scene.plan().parts)
@@ -176,14 +167,16 @@ def test_several_spins_by_the_cheapest_method(goal, method):
 def test_two_percent_of_a_correlation_function():
     """C1 and C2 are 1 at first: 2 % of them is 0.02; without times a percentage is of the heat capacity."""
     seen = {"times": [0.0, 0.1]}
-    curves, plain = (GasScene(molecule="water", accuracy="2 %", **more) for more in ({"observables": seen}, {}))
+    curves, plain = (
+        make_scene("gas", molecule="water", accuracy="2 %", **more) for more in ({"observables": seen}, {})
+    )
     assert value_and_unit(curves) == (0.02, "")
     assert value_and_unit(plain) == (2.0, "%")
 
 
 def test_the_rounding_that_is_stated_bounds_the_true_one():
     """Levels of a heavy top at J = 150 beside the same in extended precision, for a linear molecule in closed form."""
-    scene = SpectrumScene(molecule="HC3N", conditions={"temperature": "300 K"}, accuracy="1 Hz")
+    scene = make_scene("spectrum", molecule="HC3N", conditions={"temperature": "300 K"}, accuracy="1 Hz")
     result = run_scene(scene)
     levels, top = result.table.levels, result.request.top
     j = levels.quanta["j"].astype(np.longdouble)
@@ -198,29 +191,32 @@ def value_and_unit(scene):
 
 
 REFUSED = [
-    (GasScene(molecule="water", accuracy="0.01 K"), "cannot be given: the error here is 0.14 (10000000 molecules"),
-    (GasScene(molecule="water", accuracy=0.02), "give observables.times"),
-    (GasScene(molecule="water", accuracy="1 K", numerics={"molecules": 10}), "give one of them"),
-    (GasScene(molecule="water", accuracy="1 kHz"), "unit 'kHz' does not measure the same thing"),
-    (FluidScene(conditions={"molecules": 27}, accuracy=1.0), "expected a unit"),
+    (make_scene("gas", molecule="water", accuracy="0.01 K"), "cannot be given: the error here is 0.14 (10000000 molecules"),
+    (make_scene("gas", molecule="water", accuracy=0.02), "give observables.times"),
+    (make_scene("gas", molecule="water", accuracy="1 K", numerics={"molecules": 10}), "give one of them"),
+    (make_scene("gas", molecule="water", accuracy="1 kHz"), "unit 'kHz' does not measure the same thing"),
+    (make_scene("fluid", conditions={"molecules": 27}, accuracy=1.0), "expected a unit"),
     (
-        FluidScene(conditions={"molecules": 27}, numerics={"cutoff": "4 Å"}, accuracy="1 %"),
+        make_scene("fluid", conditions={"molecules": 27}, numerics={"cutoff": "4 Å"}, accuracy="1 %"),
         "reaction-field is another model",
     ),
     (
-        FluidScene(conditions={"molecules": 27}, numerics={"engine": "openmm"}, accuracy="1 K"),
+        make_scene("fluid", conditions={"molecules": 27}, numerics={"engine": "openmm"}, accuracy="1 K"),
         "not available for the engine openmm",
     ),
-    (StarkScene(molecule="OCS", accuracy="1e-12 MHz"), "accuracy: 1e-12 MHz cannot be given: the error here is 1e-09 (tolerance 1e-09)"),
-    (StarkScene(molecule="OCS", accuracy="1 D"), "accuracy: '1 D': unit 'D' does not measure the same thing"),
-    (StarkScene(molecule="OCS", accuracy="1 %"), "expected MHz, not a percentage"),
-    (StarkScene(molecule="OCS", accuracy="-1 kHz"), "expected more than 0"),
     (
-        StarkScene(molecule="OCS", accuracy="1 kHz", numerics={"tolerance": "1 MHz"}),
+        make_scene("stark", molecule="OCS", accuracy="1e-12 MHz"),
+        "accuracy: 1e-12 MHz cannot be given: the error here is 1e-09 (tolerance 1e-09)",
+    ),
+    (make_scene("stark", molecule="OCS", accuracy="1 D"), "accuracy: '1 D': unit 'D' does not measure the same thing"),
+    (make_scene("stark", molecule="OCS", accuracy="1 %"), "expected MHz, not a percentage"),
+    (make_scene("stark", molecule="OCS", accuracy="-1 kHz"), "expected more than 0"),
+    (
+        make_scene("stark", molecule="OCS", accuracy="1 kHz", numerics={"tolerance": "1 MHz"}),
         "accuracy and numerics.tolerance: give one of them",
     ),
-    (SpectrumScene(molecule="SO2", accuracy="1e-15 MHz", numerics={"jmax": 20}), "cannot be given: the error here is"),
-    (TumbleScene(body=BODY, effects=DRIVEN, conditions=TIMES, accuracy="1e-17 rad"), "cannot be given"),
+    (make_scene("spectrum", molecule="SO2", accuracy="1e-15 MHz", numerics={"jmax": 20}), "cannot be given: the error here is"),
+    (make_scene("tumble", body=BODY, effects=DRIVEN, conditions=TIMES, accuracy="1e-17 rad"), "cannot be given"),
 ]  # fmt: skip
 
 
@@ -231,26 +227,28 @@ def test_what_cannot_be_given_is_refused(folder, scene, said):
     assert said in str(caught.value)
 
 
-@pytest.mark.parametrize("scene", [LevelsScene, RamanScene])
-def test_levels_and_raman_lines_are_exact(scene):
-    result = run_scene(scene(molecule="N2", accuracy="1 kHz"))
-    assert scene_calculation(scene(molecule="N2")).accuracy is None
+@pytest.mark.parametrize("kind", ["levels", "raman"])
+def test_levels_and_raman_lines_are_exact(kind):
+    result = run_scene(make_scene(kind, molecule="N2", accuracy="1 kHz"))
+    assert scene_calculation(make_scene(kind, molecule="N2")).accuracy is None
     assert result.reached.how == "exact: nothing cheaper"
     assert result.reached.error < 1e-6  # MHz: 8 ε of the 1.4e8 MHz of J = 48
 
 
 def test_levels_with_spins_that_are_known():
     few = {"jmax": 2}
-    fine = run_scene(LevelsScene(molecule=NITROGEN, observables=few, accuracy="1 kHz"))
+    fine = run_scene(make_scene("levels", molecule=NITROGEN, observables=few, accuracy="1 kHz"))
     assert "f" in fine.table.columns
-    coarse = run_scene(LevelsScene(molecule=NITROGEN, observables=few, effects={"hyperfine": False}, accuracy="10 MHz"))
+    coarse = run_scene(
+        make_scene("levels", molecule=NITROGEN, observables=few, effects={"hyperfine": False}, accuracy="10 MHz")
+    )
     assert coarse.reached.error > 1.0  # MHz: the spins are left out
 
 
 @pytest.mark.parametrize(("goal", "unit"), [("3 K", "K"), ("3 %", "%")])
 def test_a_gas_has_the_molecules_that_its_accuracy_needs(goal, unit):
     """Errors of 40 gases beside what is stated at 99 %: two of them may be outside, by chance 0.7 % of all times three are."""
-    scene = GasScene(molecule="water", accuracy=goal)
+    scene = make_scene("gas", molecule="water", accuracy=goal)
     result = run_scene(scene)
     count, degrees = result.request.molecules, 6
     expected = 2.5758**2 * ((300 / 3) ** 2 * 2 / degrees if unit == "K" else (100 / 3) ** 2 * (2 + 12 / degrees))
@@ -274,7 +272,7 @@ def test_a_gas_has_the_molecules_that_its_accuracy_needs(goal, unit):
 @pytest.mark.slow
 def test_correlation_functions_of_a_gas():
     seen = {"times": [0.0, 0.1, 0.2, 0.3]}
-    result = run_scene(GasScene(molecule="water", observables=seen, accuracy=0.05))
+    result = run_scene(make_scene("gas", molecule="water", observables=seen, accuracy=0.05))
     fine = answer_gas(replace(result.request, molecules=300_000, seed=7))
     for name in ("c1", "c2"):
         single, true = (getattr(answer.correlations, name) for answer in (result.answer, fine))
@@ -287,7 +285,7 @@ BOX = {"model": "spce", "molecules": 27, "steps": 40, "every": 1}
 
 def test_the_bound_of_a_fluid_covers_other_boxes():
     """Root mean squares of the conserved energy with other velocities are below the bound."""
-    scene = FluidScene(conditions=BOX, numerics={"cutoff": "4 Å"}, accuracy="1 K")
+    scene = make_scene("fluid", conditions=BOX, numerics={"cutoff": "4 Å"}, accuracy="1 K")
     request = with_box(scene_calculation(scene).request)
     bound, computed = conserved_bound_k(request, 2.0), []
     for seed in range(50, 62):
@@ -300,7 +298,7 @@ def test_the_bound_of_a_fluid_covers_other_boxes():
 
 
 def test_the_step_of_a_fluid():
-    scene = FluidScene(conditions=BOX, numerics={"cutoff": "4 Å"}, accuracy="1 K")
+    scene = make_scene("fluid", conditions=BOX, numerics={"cutoff": "4 Å"}, accuracy="1 K")
     result = run_scene(scene)
     assert result.reached.error <= 1.0 == result.reached.asked
     assert 1.0 < result.request.settings.step_fs < 4.0
@@ -313,7 +311,7 @@ def test_the_step_of_a_fluid():
 
 def test_the_tolerance_of_ewalds_sum():
     ewald = {"cutoff": "4 Å", "electrostatics": "ewald"}
-    result = run_scene(FluidScene(conditions=replace_steps(2), numerics=ewald, accuracy="0.1 %"))
+    result = run_scene(make_scene("fluid", conditions=replace_steps(2), numerics=ewald, accuracy="0.1 %"))
     assert result.reached.error <= 0.1
     assert result.request.settings.ewald_tolerance < 1e-3
     coarser = replace(result.request.settings, ewald_tolerance=10 * result.request.settings.ewald_tolerance)
@@ -325,7 +323,7 @@ def replace_steps(steps):
 
 
 def test_the_command_states_the_error(call):
-    write_scene(StarkScene(molecule="OCS", conditions={"field": [0, 10]}, accuracy="1 kHz"), "s.toml")
+    write_scene(make_scene("stark", molecule="OCS", conditions={"field": [0, 10]}, accuracy="1 kHz"), "s.toml")
     line = [line for line in call("run", "s.toml")[1].splitlines() if line.startswith("accuracy ")][-1]
     assert re.search(r"0\.001 MHz: numerical error at most \S+ MHz \(tolerance 0\.001\)", line)
     content = json.loads(call("run", "s.toml", "--json", "-")[1])
@@ -339,7 +337,7 @@ def test_spins_bring_no_distortion_back(accuracy):
     from rotor.scenes.accuracy_sweep import sweeps_of
 
     effects = {"distortion": False} if accuracy else {"distortion": False, "hyperfine": True}
-    scene = LevelsScene(molecule="HCN", effects=effects, accuracy=accuracy)
+    scene = make_scene("levels", molecule="HCN", effects=effects, accuracy=accuracy)
     requests = (
         [scene_calculation(scene).choice.request]
         if accuracy

@@ -12,7 +12,7 @@ from places import ORACLES
 from rotor.scenes.accuracy_sweep import work_precision
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import EmissionScene, FitScene, parse_scene, read_scene, write_scene
+from rotor.scenes.scene import make_scene, parse_scene, read_scene, write_scene
 from rotor.verbs.calculation import NoResultError
 
 DATA = ORACLES / "fits"
@@ -68,24 +68,24 @@ def test_a_choice_of_constants_is_no_scene(call, lines):
 
 START = {"constants": "B=6081 D=0.001 H=0 MHz"}
 BAD = [
-    (FitScene(lines={"source": "none.csv"}, molecule=START), "lines.source: none.csv: no such file"),
-    (FitScene(lines={"source": "ocs.csv"}), "molecule: expected the starting constants"),
-    (FitScene(lines={"source": "ocs.csv"}, molecule=START), "parameters.free: name the constants to fit"),
-    (FitScene(lines={"source": "ocs.csv", "lin": "co.lin"}, molecule=START), "lines.lin: expected with a .par file"),
-    (FitScene(lines={"source": "co.par"}, molecule=START), "a .par file states the free"),
+    (make_scene("fit", lines={"source": "none.csv"}, molecule=START), "lines.source: none.csv: no such file"),
+    (make_scene("fit", lines={"source": "ocs.csv"}), "molecule: expected the starting constants"),
+    (make_scene("fit", lines={"source": "ocs.csv"}, molecule=START), "parameters.free: name the constants to fit"),
+    (make_scene("fit", lines={"source": "ocs.csv", "lin": "co.lin"}, molecule=START), "lines.lin: expected with a .par file"),
+    (make_scene("fit", lines={"source": "co.par"}, molecule=START), "a .par file states the free"),
     (
-        FitScene(lines={"source": "ocs.csv"}, molecule=START, parameters={"free": ["B"], "priors": {"B": "1 bar"}}),
+        make_scene("fit", lines={"source": "ocs.csv"}, molecule=START, parameters={"free": ["B"], "priors": {"B": "1 bar"}}),
         "parameters.priors.B: '1 bar'",
     ),
     (
-        FitScene(lines={"source": "ocs.csv"}, molecule=START, parameters={"free": ["B"]}, numerics={"loss": "l1"}),
+        make_scene("fit", lines={"source": "ocs.csv"}, molecule=START, parameters={"free": ["B"]}, numerics={"loss": "l1"}),
         "numerics.loss 'l1'",
     ),
-    (EmissionScene(molecules=[]), "molecules: expected one molecule or more"),
-    (EmissionScene(molecules=[{"source": "nonesuch"}]), "molecules[0]: molecule.source: 'nonesuch'"),
-    (EmissionScene(molecules=[{"source": "CO"}]), "conditions.range: expected a range or a band"),
+    (make_scene("emission", molecules=[]), "molecules: expected one molecule or more"),
+    (make_scene("emission", molecules=[{"source": "nonesuch"}]), "molecules[0]: molecule.source: 'nonesuch'"),
+    (make_scene("emission", molecules=[{"source": "CO"}]), "conditions.range: expected a range or a band"),
     (
-        EmissionScene(molecules=[{"source": "CO"}], conditions={"band": "ALMA3", "filling": 2.0}),
+        make_scene("emission", molecules=[{"source": "CO"}], conditions={"band": "ALMA3", "filling": 2.0}),
         "conditions.filling: 2: expected a number above 0 and up to 1",
     ),
 ]  # fmt: skip
@@ -105,7 +105,8 @@ def test_an_unknown_key_of_a_list_of_tables_is_named():
 
 
 def test_a_fit_that_is_no_result_writes_nothing(call, lines):
-    scene = FitScene(
+    scene = make_scene(
+        "fit",
         lines={"source": "ocs.csv"},
         molecule=START,
         parameters={"free": ["B"]},
@@ -121,16 +122,18 @@ def test_a_fit_that_is_no_result_writes_nothing(call, lines):
 
 
 def test_plans_of_fits_say_what_is_free_and_count():
-    scene = FitScene(lines={"source": "ocs.csv"}, molecule=START, parameters={"free": ["B", "D"]})
+    scene = make_scene("fit", lines={"source": "ocs.csv"}, molecule=START, parameters={"free": ["B", "D"]})
     plan = plan_of(scene, DATA)
     assert plan.counts == {"lines": 61, "blended": 0, "parameters": 2}
     assert dict(plan.parts)["free"] == "B, D"
     assert plan.left_out[0].name == "centrifugal distortion of order J^6"
-    free = plan_of(FitScene(lines=scene.content["lines"], molecule=START, parameters={"free": ["B", "D", "H"]}), DATA)
+    free = plan_of(
+        make_scene("fit", lines=scene.content["lines"], molecule=START, parameters={"free": ["B", "D", "H"]}), DATA
+    )
     assert not any(
         neglected.name.startswith("centrifugal distortion") for neglected in free.left_out
     )  # H is no longer left out
-    spfit = plan_of(FitScene(lines={"source": "co.par"}), DATA)
+    spfit = plan_of(make_scene("fit", lines={"source": "co.par"}), DATA)
     assert spfit.counts["parameters"] == 4
 
 
@@ -158,7 +161,8 @@ def test_a_saved_scene_of_several_molecules_gives_the_same_bytes(call, folder):
 
 
 def test_a_plan_of_a_source_counts_lines_and_points():
-    scene = EmissionScene(
+    scene = make_scene(
+        "emission",
         molecules=[{"source": "CO"}, {"source": "HC3N", "isotopes": ["N=15N"]}],
         conditions={"range": "110:116GHz", "width": 5.0},
     )
@@ -173,12 +177,13 @@ def test_a_plan_of_a_source_counts_lines_and_points():
 def test_the_knobs_of_a_fit_and_of_a_source():
     """Lines of a linear top are linear in its constants, so that one iteration is enough; a deep cut leaves a line out."""
     table = work_precision(
-        FitScene(lines={"source": "ocs.csv"}, molecule=START, parameters={"free": ["B", "D", "H"]}),
+        make_scene("fit", lines={"source": "ocs.csv"}, molecule=START, parameters={"free": ["B", "D", "H"]}),
         folder=DATA,
     )
     assert {row.knob for row in table.rows} == {"numerics.iterations", "tolerance of the search"}
     assert max(row.error for row in table.rows) < 1e-6  # standard errors: round-off of sums over the lines
-    core = EmissionScene(
+    core = make_scene(
+        "emission",
         molecules=[{"source": "CO", "column": 1e14}],
         conditions={"excitation": "10 K", "range": "115.2:115.4GHz"},
     )

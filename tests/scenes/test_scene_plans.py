@@ -17,7 +17,7 @@ from rotor.quantum.estimates.left_out import neglected_in_levels, stray_field
 from rotor.quantum.solve import solve_levels
 from rotor.scenes.plan import plan_of
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import LevelsScene, parse_scene, read_scene
+from rotor.scenes.scene import make_scene, parse_scene, read_scene
 from rotor.spectra.numerics import allowed_lines
 from rotor.spectra.spectrum import Spectrum
 from rotor.spectra.widths import doppler
@@ -164,7 +164,7 @@ def test_a_plan_agrees_with_what_happens(folder, name):
 @pytest.mark.parametrize(("j", "kind"), [(9, "linear"), (9, "prolate"), (9, "asymmetric")])
 def test_levels_are_counted(j, kind):
     name = {"linear": "CO", "prolate": "CH3CN", "asymmetric": "water"}[kind]
-    scene = LevelsScene(molecule=name, observables={"jmin": 3, "jmax": j})
+    scene = make_scene("levels", molecule=name, observables={"jmin": 3, "jmax": j})
     assert plan_of(scene).counts["levels"] == len(run_scene(scene).table)
 
 

@@ -18,19 +18,7 @@ import pytest
 import rotor
 from rotor.quantum.effects.watson import Rigid
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import (
-    AlignScene,
-    FluidScene,
-    GasScene,
-    LevelsScene,
-    SpectrumScene,
-    StarkScene,
-    TumbleScene,
-    ZeemanScene,
-    parse_scene,
-    read_scene,
-    write_scene,
-)
+from rotor.scenes.scene import make_scene, parse_scene, read_scene, write_scene
 from rotor.scenes.sweep import points, run_sweep
 from rotor.verbs.verb import verb_of
 
@@ -124,7 +112,8 @@ def test_a_scene_that_cannot_be_saved(call, folder, monkeypatch, arguments, said
 
 
 def test_what_a_scene_asks_for_is_what_the_library_answers():
-    scene = SpectrumScene(
+    scene = make_scene(
+        "spectrum",
         molecule="OCS",
         conditions={"temperature": "150 K", "range": "10:400GHz"},
         observables={"min_lgint": -6.5},
@@ -141,34 +130,37 @@ def test_what_a_scene_asks_for_is_what_the_library_answers():
 
 def test_effects_are_those_named():
     observables = {"jmax": 4}
-    rigid = run_scene(LevelsScene(molecule="CO", effects={"distortion": False}, observables=observables))
+    rigid = run_scene(make_scene("levels", molecule="CO", effects={"distortion": False}, observables=observables))
     assert [type(effect) for effect in rigid.request.effects] == [Rigid]
     b = rotor.read("CO").constants["B"]
     j = np.arange(5)
     assert np.allclose(rigid.table.energy_mhz, b * j * (j + 1), rtol=1e-15)  # one product
-    whole = run_scene(LevelsScene(molecule="CO", observables=observables))
+    whole = run_scene(make_scene("levels", molecule="CO", observables=observables))
     assert np.all(whole.table.energy_mhz[1:] < rigid.table.energy_mhz[1:])  # distortion lowers
 
 
 SHORT = {
-    "spectrum": SpectrumScene(molecule="CO", observables={"min_lgint": -6}),
-    "levels": LevelsScene(molecule="CO"),
-    "tumble": TumbleScene(molecule="water", conditions={"times": "0:1:5"}),
-    "gas": GasScene(molecule="CO", observables={"times": [0.0, 1.0]}),
-    "stark": StarkScene(molecule="OCS", conditions={"field": [0, 10]}, observables={"jmax": 1}),
-    "zeeman": ZeemanScene(
+    "spectrum": make_scene("spectrum", molecule="CO", observables={"min_lgint": -6}),
+    "levels": make_scene("levels", molecule="CO"),
+    "tumble": make_scene("tumble", molecule="water", conditions={"times": "0:1:5"}),
+    "gas": make_scene("gas", molecule="CO", observables={"times": [0.0, 1.0]}),
+    "stark": make_scene("stark", molecule="OCS", conditions={"field": [0, 10]}, observables={"jmax": 1}),
+    "zeeman": make_scene(
+        "zeeman",
         molecule="OCS",
         magnetic={"g": [-0.03]},
         conditions={"field": [0, 1]},
         observables={"jmax": 1},
     ),
-    "align": AlignScene(
+    "align": make_scene(
+        "align",
         molecule="OCS",
         pulses=[{"shape": "gaussian", "peak": 1e12, "fwhm": 0.2}],
         conditions={"temperature": 0, "points": 11},
     ),
-    "fluid": FluidScene(
-        conditions={"model": "argon", "molecules": 8, "density": 0.01, "steps": 2, "every": 1, "equilibration": 0}
+    "fluid": make_scene(
+        "fluid",
+        conditions={"model": "argon", "molecules": 8, "density": 0.01, "steps": 2, "every": 1, "equilibration": 0},
     ),
 }
 
@@ -195,28 +187,28 @@ def test_spins_that_are_left_out_are_added_by_the_command_of_the_scene(call, fol
 
 
 def test_a_body_by_its_angular_velocity():
-    scene = TumbleScene(body={"moments": [0.3, 0.35, 0.4], "angular_velocity": [0.1, 15.0, 0.1]})
+    scene = make_scene("tumble", body={"moments": [0.3, 0.35, 0.4], "angular_velocity": [0.1, 15.0, 0.1]})
     assert run_scene(scene).answer.facts()["period"] == pytest.approx(
         12.3349458093386, abs=1e-9
     )  # its closed form, 12 digits
 
 
 BAD = [
-    (SpectrumScene(molecule={}), "molecule: give either source or constants"),
-    (SpectrumScene(molecule="CO", conditions={"temperature": "300 GHz"}), "conditions.temperature: '300 GHz'"),
-    (SpectrumScene(molecule="CO", conditions={"temperature": -1}), "conditions.temperature: -1"),
-    (SpectrumScene(molecule="CO", conditions={"pressure": 1}), "an optical depth needs both"),
-    (SpectrumScene(molecule="CO", observables={"min_lgint": "all"}), "observables.min_lgint: 'all'"),
-    (SpectrumScene(molecule="CO", outputs={"csv": "a.txt"}), "outputs.csv: a.txt: the name must end in .csv"),
-    (SpectrumScene(molecule="CO", outputs={"csv": "x/a.csv"}), "there is no folder"),
-    (SpectrumScene(molecule="CO", outputs={"csv": "a.csv", "profile_csv": "a.csv"}), "another output writes the same file"),
-    (LevelsScene(molecule="water", observables={"jmax": -1}), "observables.jmax: -1"),
-    (LevelsScene(molecule="nonesuch"), "molecule.source: 'nonesuch' is no file here"),
-    (TumbleScene(), "molecule, body: give one of them"),
-    (TumbleScene(body={"moments": [1, 2], "angular_velocity": [1, 2, 3]}), "expected three numbers"),
-    (FluidScene(conditions={}), "conditions: give either molecules"),
-    (AlignScene(molecule="OCS", pulses=[{"shape": "gaussian", "peak": "1 T", "fwhm": 1}]), "pulses[0].peak: '1 T'"),
-    (AlignScene(molecule="OCS", pulses=[{"shape": "gaussian", "peak": 1e10, "fwhm": 1, "axis": "up"}]), "pulses[0].axis: 'up'"),
+    (make_scene("spectrum", molecule={}), "molecule: give either source or constants"),
+    (make_scene("spectrum", molecule="CO", conditions={"temperature": "300 GHz"}), "conditions.temperature: '300 GHz'"),
+    (make_scene("spectrum", molecule="CO", conditions={"temperature": -1}), "conditions.temperature: -1"),
+    (make_scene("spectrum", molecule="CO", conditions={"pressure": 1}), "an optical depth needs both"),
+    (make_scene("spectrum", molecule="CO", observables={"min_lgint": "all"}), "observables.min_lgint: 'all'"),
+    (make_scene("spectrum", molecule="CO", outputs={"csv": "a.txt"}), "outputs.csv: a.txt: the name must end in .csv"),
+    (make_scene("spectrum", molecule="CO", outputs={"csv": "x/a.csv"}), "there is no folder"),
+    (make_scene("spectrum", molecule="CO", outputs={"csv": "a.csv", "profile_csv": "a.csv"}), "another output writes the same file"),
+    (make_scene("levels", molecule="water", observables={"jmax": -1}), "observables.jmax: -1"),
+    (make_scene("levels", molecule="nonesuch"), "molecule.source: 'nonesuch' is no file here"),
+    (make_scene("tumble"), "molecule, body: give one of them"),
+    (make_scene("tumble", body={"moments": [1, 2], "angular_velocity": [1, 2, 3]}), "expected three numbers"),
+    (make_scene("fluid", conditions={}), "conditions: give either molecules"),
+    (make_scene("align", molecule="OCS", pulses=[{"shape": "gaussian", "peak": "1 T", "fwhm": 1}]), "pulses[0].peak: '1 T'"),
+    (make_scene("align", molecule="OCS", pulses=[{"shape": "gaussian", "peak": 1e10, "fwhm": 1, "axis": "up"}]), "pulses[0].axis: 'up'"),
 ]  # fmt: skip
 
 
@@ -228,7 +220,8 @@ def test_what_cannot_be_is_refused_with_its_key(folder, scene, said):
     assert not list(folder.iterdir())
 
 
-SWEEP = LevelsScene(
+SWEEP = make_scene(
+    "levels",
     molecule="CO",
     sweep={"molecule": ["CO", "HCl", "OCS"], "observables.jmax": [2, 5]},
     outputs={"csv": "{molecule}_{jmax}.csv"},
@@ -241,7 +234,7 @@ def test_a_sweep_is_every_combination():
         (m, j) for m in ("CO", "HCl", "OCS") for j in (2, 5)
     ]
     assert expanded[1].scene.content["outputs"]["csv"] == "CO_5.csv"
-    result = run_sweep(LevelsScene(molecule="CO", sweep={"observables.jmax": [2, 5]}))
+    result = run_sweep(make_scene("levels", molecule="CO", sweep={"observables.jmax": [2, 5]}))
     assert result.columns["rows"].tolist() == [3, 6]
     assert result.columns["observables.jmax"].tolist() == [2, 5]
 
@@ -249,29 +242,29 @@ def test_a_sweep_is_every_combination():
 @pytest.mark.parametrize(
     ("scene", "said"),
     [
-        (LevelsScene(molecule="CO", sweep={"observables.j": [1]}), "[observables] has no key 'j'"),
-        (LevelsScene(molecule="CO", sweep={"observables.jmax": []}), "expected at least one value"),
+        (make_scene("levels", molecule="CO", sweep={"observables.j": [1]}), "[observables] has no key 'j'"),
+        (make_scene("levels", molecule="CO", sweep={"observables.jmax": []}), "expected at least one value"),
         (
-            LevelsScene(molecule="CO", sweep={"observables.jmax": [1, 2]}, outputs={"egy": "a.egy"}),
+            make_scene("levels", molecule="CO", sweep={"observables.jmax": [1, 2]}, outputs={"egy": "a.egy"}),
             "put {jmax} into its name",
         ),
         (
-            LevelsScene(molecule="CO", sweep={"observables.jmax": [1]}, outputs={"csv": "{j}.csv"}),
+            make_scene("levels", molecule="CO", sweep={"observables.jmax": [1]}, outputs={"csv": "{j}.csv"}),
             "there are {jmax}",
         ),
         (
-            LevelsScene(molecule="CO", sweep={"observables.jmax": [1]}, outputs={"csv": "o_{jmax.real}.csv"}),
+            make_scene("levels", molecule="CO", sweep={"observables.jmax": [1]}, outputs={"csv": "o_{jmax.real}.csv"}),
             "{jmax.real} is no swept name",
         ),
         (
-            LevelsScene(molecule="CO", sweep={"observables.jmax": [1]}, outputs={"csv": "{jmax:>9}.csv"}),
+            make_scene("levels", molecule="CO", sweep={"observables.jmax": [1]}, outputs={"csv": "{jmax:>9}.csv"}),
             "{jmax:>9} is no swept name",
         ),
         (
-            LevelsScene(molecule="CO", sweep={"observables.jmax": [1]}, outputs={"csv": "{jmax}}.csv"}),
+            make_scene("levels", molecule="CO", sweep={"observables.jmax": [1]}, outputs={"csv": "{jmax}}.csv"}),
             "a brace without its partner",
         ),
-        (LevelsScene(molecule="CO", sweep={"observables.jmax": [1, 1]}), "1 stands there twice"),
+        (make_scene("levels", molecule="CO", sweep={"observables.jmax": [1, 1]}), "1 stands there twice"),
     ],
 )
 def test_a_sweep_that_cannot_be(scene, said):

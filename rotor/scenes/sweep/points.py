@@ -132,8 +132,8 @@ def points(scene: Scene, folder: str | os.PathLike[str] = ".") -> Points:
     Raises ValueError for a name without values, for braces in a file name without a swept name, and for two points that would write the
     same file.
 
-    >>> from rotor.scenes.scene import LevelsScene
-    >>> [p.scene.content["molecule"] for p in points(LevelsScene(molecule="CO", sweep={"molecule": ["CO", "HCl"]}))]
+    >>> from rotor.scenes.scene import make_scene
+    >>> [p.scene.content["molecule"] for p in points(make_scene("levels", molecule="CO", sweep={"molecule": ["CO", "HCl"]}))]
     ['CO', 'HCl']
     """
     content: dict[str, Any] = {"schema": SCHEMA, "kind": scene.kind, **deepcopy(dict(scene.content))}

@@ -14,10 +14,11 @@ import pytest
 
 from rotor.scenes.cluster import dask_executor, tls_security
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import LevelsScene, StarkScene, write_scene
+from rotor.scenes.scene import make_scene, write_scene
 from rotor.scenes.sweep import run_sweep
 
-SWEEP = LevelsScene(
+SWEEP = make_scene(
+    "levels",
     molecule="CO",
     sweep={"molecule": ["CO", "HCl", "OCS"], "observables.jmax": [2, 5]},
     outputs={"csv": "{molecule}_{jmax}.csv"},
@@ -64,7 +65,7 @@ def test_a_sweep_on_a_cluster_gives_the_same_bytes(call, folder, cluster):
 
 
 def test_one_scene_is_spread_over_a_cluster(cluster):
-    scene = StarkScene(molecule="CH3CN", conditions={"field": "0:50kV/cm:6"}, observables={"jmax": 2})
+    scene = make_scene("stark", molecule="CH3CN", conditions={"field": "0:50kV/cm:6"}, observables={"jmax": 2})
     with dask_executor(cluster) as pool:
         spread = run_scene(scene, executor=pool)
     single = run_scene(scene)

@@ -20,7 +20,7 @@ import pytest
 
 import rotor
 from rotor.scenes.run import run_scene
-from rotor.scenes.scene import LevelsScene, SpectrumScene, parse_scene, write_scene
+from rotor.scenes.scene import Scene, make_scene, parse_scene, write_scene
 from rotor.scenes.sweep import points, run_sweep
 from rotor.scenes.sweep.combined import CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
@@ -31,8 +31,8 @@ from rotor.temporary import locked_file
 LINEAR = "[constants]\nB = {b}\n"
 
 
-def levels(**changes) -> LevelsScene:
-    return LevelsScene(**{"molecule": "CO", "observables": {"jmax": 2}, **changes})
+def levels(**changes) -> Scene:
+    return make_scene("levels", **{"molecule": "CO", "observables": {"jmax": 2}, **changes})
 
 
 # Keys of finished points
@@ -366,7 +366,7 @@ def test_a_stopped_sweep_keeps_the_rows_of_its_points(folder):
 
 
 def test_the_summary_shows_results(folder):
-    result = run_sweep(SpectrumScene(molecule="CO", numerics={"jmax": 3}, sweep={"molecule": ["CO", "HCl"]}))
+    result = run_sweep(make_scene("spectrum", molecule="CO", numerics={"jmax": 3}, sweep={"molecule": ["CO", "HCl"]}))
     columns = result.columns
     for row, name in enumerate(("CO", "HCl")):
         lines = rotor.api.line_list(rotor.read(name), jmax=3)
@@ -669,7 +669,7 @@ def test_points_that_wait_are_not_asked_one_by_one(folder, monkeypatch):
     monkeypatch.setattr(Future, "done", lambda self: asked.update(done=1) or ask(self))
     sweep = {"observables.jmax": list(range(1, 61))}
     with ThreadPoolExecutor(1) as pool:
-        result = run_sweep(LevelsScene(molecule="CO", sweep=sweep), record="r.jsonl", executor=pool)
+        result = run_sweep(make_scene("levels", molecule="CO", sweep=sweep), record="r.jsonl", executor=pool)
     assert [record["rows"] for record in result.records] == list(range(2, 62))
     assert asked["done"] <= 60  # each once at most; 1,830 where all that wait are asked after each point
 
@@ -745,7 +745,10 @@ def test_a_table_of_a_list_that_is_not_there_is_refused(name, rule):
 
 def test_columns_of_a_joined_file_are_in_the_order_of_the_points(tmp_path):
     """Of a bent and a linear molecule, whatever their keys: a hash of the version among other things decided it."""
-    bent, linear = run_scene(LevelsScene(molecule="water")).table, run_scene(LevelsScene(molecule="CO")).table
+    bent, linear = (
+        run_scene(make_scene("levels", molecule="water")).table,
+        run_scene(make_scene("levels", molecule="CO")).table,
+    )
     for first, second in (("0" * 16, "f" * 16), ("f" * 16, "0" * 16)):
         joined = CombinedFile.of([f"{first[0]}.csv"], tmp_path)
         joined.open_folder()
