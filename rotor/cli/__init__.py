@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any, cast
 import typer
 
 from rotor.checks import NoAnswerError, RunStopped, require_file
-from rotor.cli.shared import process
-from rotor.cli.shared.output import release_files
-from rotor.verbs.names import declared_verbs, has_small_blocks
+from rotor.cli import process
+from rotor.cli.process import release_files
+from rotor.verbs import declared_verbs, has_small_blocks
 
 if TYPE_CHECKING:
     from rotor.verbs.verb import Verb
@@ -93,7 +93,7 @@ def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer
     """The command with these verbs. listed: only their names and help lines; their modules are not loaded."""
     group: Any = None
     if not listed:
-        from rotor.cli.shared.command import PlainGroup as group
+        from rotor.cli.command import PlainGroup as group
     app = typer.Typer(
         cls=group,
         add_completion=False,
@@ -115,7 +115,7 @@ def _application(verbs: Iterable[str] = VERBS, *, listed: bool = False) -> typer
         if listed and VERBS[verb]:
             app.command(verb, short_help=VERBS[verb])(_listed)
             continue
-        from rotor.cli.shared.command import VerbCommand, command_of
+        from rotor.cli.command import VerbCommand, command_of
 
         declared = declaration(verb)
         app.command(verb, cls=VerbCommand, short_help=VERBS[verb] or declared.about, epilog=headed(declared.examples))(

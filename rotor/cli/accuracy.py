@@ -6,15 +6,14 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rotor.cli.shared.scene_file import SceneAnswer, SceneFile
+from rotor.cli.shared_options import SceneAnswer, SceneFile
 from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, listed, record_table, show_parts
 from rotor.requests.field import declared
 from rotor.requests.readers import Quantity
 from rotor.verbs.outputs import PICTURES, Output, Report
-from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Work
+from rotor.verbs.verb import Tool, Work
 
 if TYPE_CHECKING:
     from rotor.scenes.accuracy_sweep import WorkPrecision

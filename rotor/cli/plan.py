@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from rotor.cli.shared.scene_file import SceneAnswer, SceneFile
+from rotor.cli.shared_options import SceneAnswer, SceneFile
 from rotor.reports.screen import Part, listed
-from rotor.verbs.tool import Tool
-from rotor.verbs.verb import verb_of
+from rotor.verbs.verb import Tool, verb_of
 
 if TYPE_CHECKING:
     from rotor.requests.plan import Plan

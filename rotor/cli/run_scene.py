@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.checks import leaving
-from rotor.cli.shared.scene_file import SceneFile
-from rotor.cli.shared.workers import MOST_WORKERS
+from rotor.cli.shared_options import MOST_WORKERS, SceneFile
 from rotor.frozen import dataclass
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.reports.screen import Part, Table, evenly, json_with_rows
@@ -23,8 +22,7 @@ from rotor.requests.fill import within
 from rotor.requests.readers import Flag, Text, Whole
 from rotor.table import counted
 from rotor.verbs.outputs import Report
-from rotor.verbs.tool import Tool
-from rotor.verbs.verb import ErrorsShown, Work
+from rotor.verbs.verb import ErrorsShown, Tool, Work
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

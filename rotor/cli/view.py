@@ -13,8 +13,7 @@ from rotor.requests.field import CONDITIONS, OUTPUT, REQUIRED, declared
 from rotor.requests.readers import Flag, Names, Quantity, Text, Whole
 from rotor.verbs.observed_file import PANEL
 from rotor.verbs.outputs import Output, Report
-from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Work
+from rotor.verbs.verb import Tool, Work
 
 if TYPE_CHECKING:
     from rotor.viewer.service import Service

@@ -23,8 +23,9 @@ from rotor.requests.choices import Choices, nearest
 from rotor.requests.field import REQUIRED, Field, all_fields
 from rotor.requests.fill import Entries
 from rotor.requests.readers import Custom, Each, Flag, NameList, Names, Quantity, Text
+from rotor.verbs import SCENE_VERBS
 from rotor.verbs.outputs import Output
-from rotor.verbs.verb import SCENE_VERBS, Verb, verb_of
+from rotor.verbs.verb import Verb, verb_of
 
 if TYPE_CHECKING:
     from rotor.requests.plan import Plan

@@ -9,7 +9,8 @@ from typing import Any, get_args, get_origin
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, Field
 from rotor.scenes.scene import SCHEMA, Keys, about, declared_keys, kinds_in, shown_default, tables_of, value_kinds
-from rotor.verbs.verb import SCENE_VERBS, verb_of
+from rotor.verbs import SCENE_VERBS
+from rotor.verbs.verb import verb_of
 
 TITLES = {
     "body": "A rigid body instead of a molecule, in any coherent units.",

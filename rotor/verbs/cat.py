@@ -22,8 +22,7 @@ from rotor.table import counted
 from rotor.verbs.molecule import with_some_dipole
 from rotor.verbs.outputs import Output, Report, draw_answer, picture, tables
 from rotor.verbs.subjects import top_of_word
-from rotor.verbs.tool import Tool
-from rotor.verbs.verb import ErrorsShown, Note, Work
+from rotor.verbs.verb import ErrorsShown, Note, Tool, Work
 
 if TYPE_CHECKING:
     from rotor.formats.spcat.compare import Comparison

@@ -18,8 +18,7 @@ from rotor.requests.readers import INFINITE, Names, Range, Text, Whole
 from rotor.table import ColumnTable
 from rotor.table import Table as Columns
 from rotor.verbs.outputs import table_file
-from rotor.verbs.tool import Tool
-from rotor.verbs.verb import ErrorsShown, Work
+from rotor.verbs.verb import ErrorsShown, Tool, Work
 
 ADD, LIST, SHOW = ACTIONS = ("add", "list", "show")
 EXAMPLES = """\

@@ -15,8 +15,7 @@ from rotor.tops.facts import top_facts
 from rotor.verbs.molecule import refuse_weights_of_another_kind
 from rotor.verbs.outputs import Output, Report
 from rotor.verbs.subjects import top_of_word
-from rotor.verbs.tool import Tool
-from rotor.verbs.verb import ErrorsShown, Note, Work, silent
+from rotor.verbs.verb import ErrorsShown, Note, Tool, Work, silent
 
 if TYPE_CHECKING:
     from rotor.formats.molecules.molecule_file import MoleculeFile

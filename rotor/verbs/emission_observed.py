@@ -22,8 +22,7 @@ from rotor.verbs.observed_file import (
     spectrum_facts,
 )
 from rotor.verbs.outputs import PICTURES, Output, Report, table_file
-from rotor.verbs.tool import Tool
-from rotor.verbs.verb import Note, Work
+from rotor.verbs.verb import Note, Tool, Work
 
 if TYPE_CHECKING:
     from rotor.formats.spectra.cube_file import Cube

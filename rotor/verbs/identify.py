@@ -16,8 +16,7 @@ from rotor.requests.readers import INFINITE, Names, Quantity, Range, Text, Whole
 from rotor.table import counted
 from rotor.verbs.observed_file import SpectrumFile, json_of, padded, spectrum_facts
 from rotor.verbs.outputs import PICTURES, Output, Report, table_file
-from rotor.verbs.tool import Tool
-from rotor.verbs.verb import ErrorsShown, Work
+from rotor.verbs.verb import ErrorsShown, Tool, Work
 
 if TYPE_CHECKING:
     from rotor.observed.identify import Identification

@@ -117,7 +117,8 @@ def _axes_table(answer: InfoAnswer, report: Report) -> Table:
 
 def _nuclei_table(answer: InfoAnswer, report: Report) -> Table:
     """Nuclei that split lines, the size of the splitting, and their constants if known."""
-    spins, records = answer.request.top.spin_constants, []
+    spins = answer.request.top.spin_constants
+    records: list[dict[str, Any]] = []
     for nucleus in report.content["splitting_nuclei"]:
         constants = _constants_text(spins.of(nucleus["nucleus"]) if nucleus["known"] and spins else {})
         text = constants or "not known; the size is that of covalent bonds of this element"
@@ -165,7 +166,8 @@ def _q_table(answer: InfoAnswer, report: Report) -> Table:
 
 def _conformers_table(answer: InfoAnswer, report: Report) -> Table:
     """Energies, constants (to the digits that the error of the geometry leaves) and dipoles of the conformers, if requested."""
-    molecule, records = answer.request.top.molecule, []
+    molecule = answer.request.top.molecule
+    records: list[tuple[Any, ...]] = []
     relative = (molecule.uncertainty or 0.0) if molecule is not None else 0.0
     for conformer in report.content.get("conformers", ()):
         constants = conformer["rotational_constants_mhz"]

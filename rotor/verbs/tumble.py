@@ -10,10 +10,9 @@ from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
 from rotor.requests.field import Rule
 from rotor.requests.fill import NamedError, within
-from rotor.verbs.body_inputs import MotionInput
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Output, Report, drawing, picture, tables
-from rotor.verbs.turning_body import TurningBody, build
+from rotor.verbs.turning_body import MotionInput, TurningBody, build
 from rotor.verbs.verb import Verb, Work, facts_named
 
 if TYPE_CHECKING:

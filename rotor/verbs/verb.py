@@ -1,4 +1,4 @@
-"""The class Verb: inputs become a request, the request an answer, the answer tables, files and a report."""
+"""The class Verb: inputs become a request, the request an answer, the answer tables, files and a report; Tool: one without scenes."""
 
 from __future__ import annotations
 
@@ -16,8 +16,6 @@ from rotor.requests.field import OUTPUT, Field, all_fields, declared
 from rotor.requests.fill import Entries, naming, read_fields, read_instance, written_fields
 from rotor.requests.readers import Flag, Names, Text
 from rotor.table import Table
-from rotor.verbs.names import SCENE_VERBS as SCENE_VERBS
-from rotor.verbs.names import declared_verbs as declared_verbs
 from rotor.verbs.outputs import Output, Report
 
 if TYPE_CHECKING:
@@ -170,7 +168,7 @@ class Verb:
     workers: what --workers shares out. short: whether plain Python answers before the compiler would be loaded.
     numerics: "module:name" of a `rotor.requests.numerics.Numerics`. accuracy: observables of an accuracy goal in a scene.
     invariants: what a plan calls quantities that do not change.
-    small_blocks: whether its matrices are small blocks, for which threads of BLAS cost time (read by `rotor.verbs.names`).
+    small_blocks: whether its matrices are small blocks, for which threads of BLAS cost time (read by `rotor.verbs`).
     sound: whether an accepted request contains no user error.
     other: verb that takes over if one of its options is typed; instead: these options in words.
     """
@@ -337,3 +335,47 @@ def check_early(structure: type, entries: Entries) -> None:
     for declaration in all_fields(structure).values():
         if entries.has(declaration):
             declaration.read(entries.of(declaration), entries.style)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NoDisplayOptions:
+    """For verbs without display options."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Tool(Verb):
+    """A verb without scenes; its display options are fields of its request.
+
+    of: the field that names the input, for JSON and provenance. text: JSON text if it is not the facts; None: the verb has no JSON.
+    """
+
+    table: Callable[[Any], Any] = lambda answer: None
+    rows: str = ""
+    outputs: tuple[Output, ...] = ()
+    subject: SubjectKind = NOTHING
+    shown: type = NoDisplayOptions
+    drawn: str | None = None
+    scaled: bool = False
+    sound: bool = False
+    of: str = ""
+    text: Callable[[Any, Mapping[str, Any]], str] | None = lambda answer, content: json_text(content)
+    has_scenes: ClassVar[bool] = False
+
+    @property
+    def has_json(self) -> bool:
+        """Whether the verb has JSON."""
+        return self.text is not None
+
+    def read(self, entries: Entries, place: Place) -> tuple[Any, Subject]:
+        """The request; its field `of` is the subject."""
+        request = read_instance(self.request, entries)
+        source = getattr(request, self.of, "")
+        return request, Subject(text=source if isinstance(source, str) else " ".join(source), note=place.note)
+
+    def facts(self, answer: Any) -> Mapping[str, Any]:
+        """What the JSON says of an answer; nothing without JSON."""
+        return super().facts(answer) if self.has_json else {}
+
+    def json(self, answer: Any, content: Mapping[str, Any]) -> str:
+        """The JSON text."""
+        return "" if self.text is None else self.text(answer, content)

@@ -330,7 +330,7 @@ def test_interrupt_says_in_one_line_that_nothing_was_written(call, folder, monke
 
 
 def test_interrupt_of_the_report_names_the_files(call, folder, monkeypatch):
-    from rotor.cli.shared import command
+    from rotor.cli import command
 
     def interrupted(parts):
         raise KeyboardInterrupt

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import rotor
-from rotor.cli.shared import process
+from rotor.cli import process
 
 
 @pytest.fixture(scope="module")

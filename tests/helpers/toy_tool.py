@@ -10,7 +10,7 @@ from rotor.checks import NoAnswerError
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.readers import Text, Whole
 from rotor.verbs.outputs import Output
-from rotor.verbs.tool import Tool
+from rotor.verbs.verb import Tool
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from rotor import units
 from rotor.formats.spcat.catalogue_budget import catalogue_budget
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.catalogue import Layout
-from rotor.reports.error_table import error_rows
+from rotor.reports.top_facts import error_rows
 from rotor.requests.budget import ErrorBudget
-from rotor.verbs.verb import SCENE_VERBS
+from rotor.verbs import SCENE_VERBS
 
 LINES_OF_CO = (
     "frequency_mhz,error_mhz,j_upper,j_lower\n115271.2018,0.0005,1,0\n230538.0,0.0005,2,1\n345795.9899,0.0005,3,2\n"

@@ -26,7 +26,8 @@ from rotor.requests.readers import Grid, Names, Numbers, Pairs, Quantity, Range,
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import parse_scene, scene_text
 from rotor.scenes.template import template
-from rotor.verbs.verb import SCENE_VERBS, verb_of
+from rotor.verbs import SCENE_VERBS
+from rotor.verbs.verb import verb_of
 
 OTHERWISE = (
     "align",
@@ -302,7 +303,7 @@ def test_files_of_spcat_are_no_scene(call):
 )
 def test_an_error_names_fields_in_the_style_of_the_user(style, text):
     from rotor.requests.fill import NamedError, naming
-    from rotor.verbs.body_inputs import MOTION
+    from rotor.verbs.turning_body import MOTION
 
     with pytest.raises(ValueError) as error, naming(MOTION.values(), style):
         raise NamedError("{numerics.step}: expected with {effects}, not '{other}'")
@@ -323,7 +324,7 @@ def test_an_error_names_fields_in_the_style_of_the_user(style, text):
 )
 def test_plain_names_in_an_error_are_replaced(text, said):
     from rotor.requests.fill import naming
-    from rotor.verbs.body_inputs import MOTION
+    from rotor.verbs.turning_body import MOTION
 
     with pytest.raises(ValueError) as error, naming(MOTION.values(), "option"):
         raise ValueError(text)

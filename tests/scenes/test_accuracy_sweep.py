@@ -24,7 +24,7 @@ from rotor.requests.plan import Growth, Run
 from rotor.scenes import accuracy_sweep
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, panels_of, sweep, sweeps_of, work_precision
 from rotor.scenes.scene import make_scene, write_scene
-from rotor.verbs.names import SCENE_VERBS
+from rotor.verbs import SCENE_VERBS
 from rotor.verbs.verb import verb_of
 
 

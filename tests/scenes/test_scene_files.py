@@ -18,7 +18,8 @@ from rotor.scenes.scene import checked_table, make_scene, parse_scene, read_scen
 from rotor.scenes.schema import json_schema, table_schema
 from rotor.scenes.sweep.points import points
 from rotor.scenes.template import template
-from rotor.verbs.verb import SCENE_VERBS, verb_of
+from rotor.verbs import SCENE_VERBS
+from rotor.verbs.verb import verb_of
 
 HEAD = 'schema = 1\nkind = "spectrum"\nmolecule = "water"\n'
 

@@ -7,9 +7,8 @@ import sys
 
 import pytest
 
-from rotor.cli import VERBS, declaration
-from rotor.cli.shared import process
-from rotor.verbs.names import has_small_blocks
+from rotor.cli import VERBS, declaration, process
+from rotor.verbs import has_small_blocks
 
 
 @pytest.mark.parametrize(

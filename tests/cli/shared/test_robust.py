@@ -371,7 +371,7 @@ def test_sums_over_very_many_levels_take_seconds(call, words):
 
 ENDS = """
 import atexit, sys
-from rotor.cli.shared import process
+from rotor.cli import process
 atexit.register(print, "at the end")
 if "own" in sys.argv:
     process.begin()

@@ -9,7 +9,7 @@ import pytest
 from places import ORACLES
 
 from rotor.cli import folded
-from rotor.cli.shared.command import refuse_overwriting
+from rotor.cli.command import refuse_overwriting
 from rotor.verbs.outputs import Files
 
 CASE = ORACLES / "ocs"

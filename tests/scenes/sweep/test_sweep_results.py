@@ -8,7 +8,7 @@ import pytest
 
 from rotor.scenes.scene import parse_scene
 from rotor.scenes.sweep import run_sweep
-from rotor.verbs.names import SCENE_VERBS
+from rotor.verbs import SCENE_VERBS
 
 MEASURED = "j_upper,j_lower,frequency_mhz,error_mhz\n1,0,20000.0,0.01\n2,1,40000.0,0.01\n3,2,60000.0,0.01\n"
 FAMILY = """name = "carbon monoxide"

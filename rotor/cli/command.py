@@ -8,6 +8,7 @@ from __future__ import annotations
 import inspect
 import os
 import re
+import sys
 from collections.abc import Callable, Collection, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
@@ -19,13 +20,13 @@ import typer
 import typer.core
 
 from rotor.checks import NoAnswerError
-from rotor.cli.shared import process
-from rotor.cli.shared.output import HELD, at_end, deliver, note
-from rotor.cli.shared.plot_options import PLOT_NAMES, picture_fields, picture_settings, picture_style
+from rotor.cli import process
+from rotor.cli.process import HELD, at_end
+from rotor.cli.shared_options import MOST_WORKERS, PLOT_NAMES, picture_fields, picture_settings, picture_style, working
 from rotor.reports.screen import show_parts
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, Field
 from rotor.requests.fill import Entries, naming, within
-from rotor.requests.readers import Flag, Text
+from rotor.requests.readers import Flag, Text, Whole
 from rotor.verbs.calculation import Calculation, Outcome, answering
 from rotor.verbs.molecule import is_file
 from rotor.verbs.outputs import Files, Report
@@ -211,7 +212,7 @@ def _carry_out(calculation: Calculation, files: Files, places: Mapping[str, Any]
     if verb.short(calculation.request):
         process.leave_compiler_out()
     process.begin_work()
-    with picture_style(places), working(verb, places.get("workers", 1)) as executor:
+    with picture_style(places), processes(verb, places.get("workers", 1)) as executor:
         outcome = calculation.run(executor)
         answer = outcome.answer
         with answering():
@@ -237,7 +238,7 @@ def show_answer(verb: Verb, answer: Any, report: Report) -> None:
     if report.content.get("files") and not verb.lists_files:
         parts.append([("files", ", ".join(report.content["files"]))])
     if getattr(report.shown, "errors", False):
-        from rotor.reports.error_table import error_parts
+        from rotor.reports.top_facts import error_parts
 
         parts += error_parts(report.content)
     show_parts(parts)
@@ -318,16 +319,12 @@ def refuse_nothing_to_draw(verb: Verb, answer: Any, files: Files) -> None:
         raise NoAnswerError(f"{files.called[drawn[0]]}: {reason}")
 
 
-def working(verb: Verb, workers: Any) -> Any:
+def processes(verb: Verb, workers: Any) -> Any:
     """The executor of --workers; None for a verb without this option."""
     if not verb.workers:
         return nullcontext()
-    from rotor.cli.shared.workers import MOST_WORKERS
-    from rotor.cli.shared.workers import working as pool
-    from rotor.requests.readers import Whole
-
     with within("--workers"):
-        return pool(Whole(1, MOST_WORKERS).read(workers), verb.workers.split()[0])
+        return working(Whole(1, MOST_WORKERS).read(workers), verb.workers.split()[0])
 
 
 def scene_writer(outcome: Outcome, typed: Mapping[str, Any]) -> Any:
@@ -345,3 +342,47 @@ def scene_writer(outcome: Outcome, typed: Mapping[str, Any]) -> Any:
         write_scene(saved_scene(outcome, Path(typed["save_scene"]).parent, outputs), path)
 
     return write
+
+
+def note(text: str) -> None:
+    """Print a remark on standard error."""
+    print("note:", text, file=sys.stderr)
+
+
+def deliver(
+    files: Files, writers: Mapping[str, Callable[[Path], None]], json: Callable[[], str], show: Callable[[], None]
+) -> None:
+    """Write all files, the JSON among them, then print the JSON or the table that goes to standard output, else the report by `show`.
+
+    Raises NoAnswerError at the end for files whose format cannot hold the result.
+    """
+    left_out = files.write({**writers, "json": lambda path: write_text(path, json())}, leave_out=True)
+    try:
+        if not files.on_screen:
+            show()
+        elif files.on_screen == ["json"]:
+            print(json(), end="")
+        else:
+            print_table(writers[files.on_screen[0]])
+    except KeyboardInterrupt as stop:
+        written = f"; {', '.join(files.names)}: written before" if files.names else ""
+        raise KeyboardInterrupt(*stop.args or (f"interrupted while the report was printed{written}",)) from None
+    if left_out:
+        raise NoAnswerError("; ".join(left_out))
+
+
+def print_table(write: Callable[[Path], None]) -> None:
+    """Print what a function writes as CSV."""
+    from shutil import copyfileobj
+    from tempfile import TemporaryDirectory
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "table.csv")
+        write(path)
+        with path.open(encoding="utf-8", newline="") as lines:
+            copyfileobj(lines, sys.stdout)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write text as UTF-8 with line feeds."""
+    path.write_text(text, encoding="utf-8", newline="\n")

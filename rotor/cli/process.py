@@ -1,4 +1,4 @@
-"""Settings of the process, made only by the console script, not if another program calls `rotor.cli.run`."""
+"""The process of a command: its settings, made by the console script alone and not by `rotor.cli.run`, and what is released at its end."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import gc
 import os
 import sys
 import threading
-from contextlib import suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from typing import NoReturn
 
+HELD = ExitStack()  # locks of the files that the command will write
 _OWN = False  # set by the console script
 _ALLOCATIONS = 50_000  # objects between two searches for cycles; Python's 700 take 5 to 15 % of a prediction
 
@@ -75,3 +77,13 @@ def one_thread_of_blas(jmax: int | None = None) -> None:
     """
     if _OWN and "numpy" not in sys.modules and (jmax is None or jmax <= _ONE_THREAD_TO):
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def release_files() -> None:
+    """Release the locks of the files at the end of a command."""
+    HELD.close()
+
+
+def at_end(done: Callable[[], object]) -> None:
+    """Call a function at the end of the command."""
+    HELD.callback(done)

@@ -1,1 +1,0 @@
-"""Parts of all commands: options, files, reports."""
