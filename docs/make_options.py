@@ -14,7 +14,8 @@ import typer
 
 from rotor import cli
 from rotor.requests.field import PANELS, Field
-from rotor.verbs.verb import declared_verbs, verb_of
+from rotor.verbs import declared_verbs
+from rotor.verbs.verb import verb_of
 
 EVERYWHERE = {"--json", "--save-scene", "--errors", "--sources", "--help", "--help-all"}
 PAGE = Path(__file__).parent / "options.md"

@@ -48,10 +48,10 @@ def ring(monkeypatch):
     import rotor.scenes.scene
     import rotor.scenes.schema
     import rotor.scenes.template
-    import rotor.verbs.verb
+    import rotor.verbs
 
     monkeypatch.setitem(sys.modules, "rotor.verbs.ring", toy_verb)
-    for module in (rotor.verbs.verb, rotor.scenes.scene, rotor.scenes.schema, rotor.scenes.template):
+    for module in (rotor.verbs, rotor.scenes.scene, rotor.scenes.schema, rotor.scenes.template):
         monkeypatch.setattr(module, "SCENE_VERBS", (*SCENE_VERBS, "ring"))
     monkeypatch.setitem(rotor.cli.VERBS, "ring", "A particle on a ring.")
 
