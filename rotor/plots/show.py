@@ -17,6 +17,7 @@ MODULES = {
     "assign": ("AssignAnswer",),
     "catalogue": ("Catalogue",),
     "comparison": ("Comparison",),
+    "driven": ("DrivenAnswer",),
     "emission": ("EmissionAnswer",),
     "fit": ("Fit", "FitAnswer"),
     "fluid": ("FluidAnswer",),

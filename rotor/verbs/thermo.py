@@ -44,10 +44,18 @@ def _facts(answer: ThermoAnswer, content: Mapping[str, Any]) -> list[tuple[str, 
         ("Θ_rot", _theta_text(content["rotational_temperatures_k"])),
         ("classical Q", _onset_text(content["classical_tolerance"], content["classical_above_k"])),
         ("corrected", f"classical Q times exp of the logarithm of 1 {series}, to that order"),
-        ("sums", f"{sums}, Q, U and C_v to {content['relative_error']:.0e} of themselves"),
+        ("sums", f"{sums}, Q, U and C_v to {content['relative_error']:.0e} of themselves{_worst_text(functions)}"),
         *_spin_facts(content["hyperfine"]),
         ("vibration", content["vibrations"] or "left out: no states given"),
     ]
+
+
+def _worst_text(functions: ThermoFunctions) -> str:
+    """The temperature at which the sums leave out most, of several."""
+    if len(functions.temperature_k) < 2:
+        return ""
+    _, temperature = max(zip(functions.relative_error.tolist(), functions.temperature_k.tolist(), strict=True))
+    return f", worst at {temperature:g} K"
 
 
 def _spin_facts(used: dict[str, Any] | None) -> list[tuple[str, str]]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 SHOWN = 11  # rows of the motion in the report
 SMALL = 1e-4  # largest component of a column below which numbers are printed with digits instead of decimals
 FEW_TIMES = 10_000  # plain Python takes half a second for them, as long as loading the compiler
-FREE = Rule(excludes=("effects",), why="needs a free motion (a table shows any)")  # of pictures
+FREE = Rule(excludes=("effects",), why="needs a free motion (a table shows any)")  # of films
 EXAMPLES = """\
   rotor tumble water --plot water.png --gif water.gif
   rotor tumble water --times 0:20ps:401 --csv water.csv
@@ -98,7 +98,7 @@ def _heading(request: TumbleRequest | DrivenRequest) -> str:
     return f"{request.named.name if request.named else 'moments ' + _numbers(request.moments)}: {name}"
 
 
-def _picture_title(request: TumbleRequest) -> str:
+def _picture_title(request: TumbleRequest | DrivenRequest) -> str:
     from rotor.plots.picture import top_title
 
     top = getattr(request, "top", None)
@@ -264,7 +264,9 @@ VERB = Verb(
     show=show,
     outputs=(
         *tables("the motion", "tumble"),
-        picture("Draw the polhodes", "tumble.png", drawing(title=lambda answer, _: _picture_title(answer.request)), FREE),
+        picture(
+            "Draw the polhodes; with effects ω, L and energy", "tumble.png", drawing(title=lambda answer, _: _picture_title(answer.request))
+        ),
         Output("gif", (".gif", ".mp4"), "Animate the motion (.gif; .mp4 with ffmpeg)", film, "tumble.gif", rule=FREE),
     ),
     subject=TurningBody(

@@ -2,14 +2,20 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from places import PROJECT, TESTS
 
-from rotor.classical.driven import BODY_EFFECTS
+import rotor
+from rotor.classical.driven import BODY_EFFECTS, DrivenRequest, answer_driven
+from rotor.classical.effects.drag import LinearDrag
+from rotor.classical.effects.gravity import GravityAboutPivot
 from rotor.classical.effects.torques import ConstantTorque
+from rotor.classical.motion import SI
 from rotor.requests.field import all_fields
 
 CONTRACT = PROJECT / "docs" / "verbs" / "tumble.md"
@@ -127,7 +133,7 @@ DRAG = ("--effect", "linear drag coefficients=1,1,1")
         ((*BODY, *DRAG, "--times", "0:1:3", "--order", "4"), "--order: belongs to a splitting; give --step too"),
         ((*BODY, *DRAG, "--times", "0:1:3", "--tolerance", "2"), "--tolerance"),
         ((*BODY, *DRAG, "--times", "0:1:3", "--attitude", "1,1,0,0"), "--attitude: (1.0, 1.0, 0.0, 0.0): expected a unit quaternion"),
-        ((*BODY, *DRAG, "--times", "0:1:3", "--plot", "a.png"), "motion (a table shows any); expected without --effect"),
+        ((*BODY, *DRAG, "--times", "0:1:3", "--gif", "a.gif"), "motion (a table shows any); expected without --effect"),
         (("tumble", "water", *DRAG, "--times", "0:1:3"), "--effect: acts on a body; give --moments or --body"),
         (("tumble", "--moments", "1,2,3", *DRAG, "--times", "0:1:3"), "--omega: expected with --moments"),
         ((*BODY, "--step", "0.1"), "--step: belongs to a motion under effects"),
@@ -181,3 +187,21 @@ def test_an_effect_of_one_file_reaches_command_scene_and_schema(folder):
     wrong = subprocess.run([sys.executable, toy, *words[:-1], "rising torque rat=1"], capture_output=True, text=True)
     assert (wrong.returncode, len(wrong.stderr.splitlines())) == (2, 1)
     assert "the nearest is 'rate'" in wrong.stderr
+
+
+def test_a_motion_under_effects_has_a_picture(call, tmp_path):
+    """ω in the body, L in space and the energy; refused before, so that the slowing of a body could not be seen."""
+    code, _, err = call("tumble", "book", *DRAG, "--times", "0:3:31", "--plot", "slowed.png")
+    assert code == 0, err
+    with Image.open(tmp_path / "slowed.png") as image:
+        assert "book" in image.info["Description"]
+    request = DrivenRequest(
+        (1.0, 2.0, 3.0), (0.0, 1.0, 2.0), (LinearDrag([1, 1, 1]),), angular_velocity=(0.0, 0.0, 1.0), units=SI
+    )
+    above, middle, below = rotor.plot(answer_driven(request)).axes
+    assert [above.get_ylabel(), middle.get_ylabel()] == ["ω in the body\n(rad/s)", "L in space\n(kg m²/s)"]
+    assert [below.get_ylabel(), below.get_xlabel()] == ["Energy\n(J)", "Time (s)"]
+    pendulum = answer_driven(replace(request, effects=(GravityAboutPivot(1.0, [0, 0, -1.0], [0, 0, -9.81]),)))
+    low, high = rotor.plot(pendulum).axes[2].get_ylim()
+    assert high - low > 0.1 * abs(high)  # conserved: an axis of round-off would show a change
+    assert np.allclose(middle.lines[2].get_ydata(), 3 * np.exp(-np.array([0.0, 1.0, 2.0]) / 3), rtol=1e-8)

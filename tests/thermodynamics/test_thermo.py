@@ -259,3 +259,11 @@ def test_a_looser_error_costs_no_sum_that_a_tighter_one_does_without():
         sums = level_sums(top, [top.spin_weights], [10.0, 100.0], error)[0]
         assert sums.jmax[0] > 0
         assert sums.jmax[1] == NOT_SUMMED
+
+
+def test_the_error_of_sums_is_said_with_its_temperature(call):
+    """2 % of Q of water at 1000 K, beyond the levels that its constants reach, is not the error at 300 K."""
+    _, out, _ = call("thermo", "water", "--temperature", "300,1000")
+    assert "e-02 of themselves, worst at 1000 K" in out
+    _, out, _ = call("thermo", "water", "--temperature", "300")
+    assert "worst" not in out
