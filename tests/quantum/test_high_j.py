@@ -74,7 +74,7 @@ def test_trace_of_every_block(levels, number):
     assert error / trace < 2e-16  # they cancel: round-off of the sum itself
 
 
-@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("number", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in (1, 2)), 3])
 def test_levels_against_fifty_digits(levels, number):
     """Eleven levels of each block from bottom to top, doublets closer than round-off among them, within 4 spacings."""
     block = levels.blocks[number]

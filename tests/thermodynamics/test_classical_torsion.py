@@ -36,7 +36,7 @@ def test_the_flux_is_that_of_transition_state_theory(ethane):
     assert passage_rate(ethane, kt) == pytest.approx(expected, rel=2e-5)  # maxima on a grid of 4096 angles
 
 
-@pytest.mark.parametrize("temperature", [400.0, 1500.0])
+@pytest.mark.parametrize("temperature", [400.0, pytest.param(1500.0, marks=pytest.mark.slow)])
 def test_passages_and_equipartition_of_a_gas(ethane, temperature):
     gas = classical_torsion(ethane, temperature, 4.0, 600, seed=3)
     assert abs(gas.rate.value - gas.expected_rate) < 4 * gas.rate.error

@@ -176,7 +176,7 @@ TAYLOR_CASES = [
 ]
 
 
-@pytest.mark.parametrize(("name", "moments", "momentum", "t"), TAYLOR_CASES[:2])
+@pytest.mark.parametrize(("name", "moments", "momentum", "t"), TAYLOR_CASES[:1])
 def test_the_truth_is_true(name, moments, momentum, t):
     compare_with_taylor(moments, momentum, t)
 
@@ -185,7 +185,7 @@ def test_the_truth_is_true(name, moments, momentum, t):
 @pytest.mark.parametrize(
     ("name", "moments", "momentum", "t"),
     [
-        *TAYLOR_CASES[2:],
+        *TAYLOR_CASES[1:],
         ("within 1e-12 of the intermediate axis", (1.0, 1.875, 2.875), (1e-12, -1.875, 2.875e-12), 220.0),
         ("within 1e-12 of the separatrix", (1.0, 2.0, 3.0), (0.5, 0.3, 0.5 * np.sqrt(3.0) * (1 + 1e-12)), 60.0),
         ("nearly linear", (0.001, 1.0, 1.2), (0.03, 0.8, 0.9), 3.0),

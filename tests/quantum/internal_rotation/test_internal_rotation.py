@@ -256,7 +256,7 @@ def test_partition_function_counts_torsional_states():
     )  # A and E weigh alike, E lies 2 GHz above A, the axes are others
 
 
-@pytest.mark.parametrize("temperature_k", [9.375, 100.0])
+@pytest.mark.parametrize("temperature_k", [9.375, pytest.param(100.0, marks=pytest.mark.slow)])
 def test_functions_far_above_kt_do_not_count_for_the_partition_function(temperature_k, monkeypatch):
     top = acetaldehyde()
     quick = rotor.api.partition_function(top, temperature_k).q
