@@ -18,6 +18,7 @@ DIPOLE = (2.0, 1.0, 0.0)
 KELVIN = 3.0
 WIDTH = 0.06  # e-folding half width of the lines, MHz
 NOISE = 0.002
+STEP = 0.03  # MHz
 NAME = "molecule.toml"
 
 
@@ -26,7 +27,7 @@ def true_lines(band: tuple[float, float]) -> Any:
     return line_list(Top.from_constants(TRUE, dipole_abc_debye=DIPOLE), range_mhz=band, temperature_k=KELVIN)
 
 
-def spectrum_columns(band: tuple[float, float] = (8000.0, 17000.0), step: float = 0.02) -> tuple[Any, Any]:
+def spectrum_columns(band: tuple[float, float] = (8000.0, 17000.0), step: float = STEP) -> tuple[Any, Any]:
     """Frequencies and intensities: Gaussians of the lines, and noise."""
     x = np.arange(band[0], band[1], step)
     y = NOISE * np.random.default_rng(5).normal(size=len(x))

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from view_cases import DIPOLE, KELVIN, NAME, NOISE, SERIES, TRUE, WIDTH, assign_line, true_lines, write_case
+from view_cases import DIPOLE, KELVIN, NAME, NOISE, SERIES, STEP, TRUE, WIDTH, assign_line, true_lines, write_case
 
 from rotor.viewer.actions import ACTIONS
 from rotor.viewer.fits import fit_assignments
@@ -293,14 +293,21 @@ def test_peak_fit_agrees_with_another_program_and_with_the_closed_form_of_its_er
         return b0 + b1 * (x - f) + h * np.exp(-4 * np.log(2) * ((x - centre) / width) ** 2)
 
     best, covariance = curve_fit(
-        gaussian, x, y, p0=[0, 0, y.max(), f, 0.1], sigma=np.full(len(x), NOISE), absolute_sigma=True
+        gaussian,
+        x,
+        y,
+        p0=[0, 0, y.max(), f, 0.1],
+        sigma=np.full(len(x), NOISE),
+        absolute_sigma=True,
+        ftol=1e-14,
+        xtol=1e-14,
     )
     assert abs(peak.frequency_mhz - best[3]) < 1e-3 * peak.error_mhz + 1e-9
     assert abs(peak.width_mhz - best[4]) < 1e-3 * peak.width_error_mhz + 1e-8
     noise = float(np.median(spectrum.noise))
     assert abs(peak.error_mhz / (np.sqrt(covariance[3, 3]) * max(1.0, peak.rms) * noise / NOISE) - 1) < 1e-3
     s = WIDTH / np.sqrt(2)
-    closed = noise / peak.height * np.sqrt(2 * s * 0.02 / np.sqrt(np.pi))
+    closed = noise / peak.height * np.sqrt(2 * s * STEP / np.sqrt(np.pi))
     assert (
         abs(peak.error_mhz / closed - 1) < 0.35
     )  # the baseline is fitted too, and the residuals scatter a little more
@@ -654,7 +661,7 @@ def test_the_command_exports_a_page_and_refuses_what_it_must(service, call, tmp_
     service.session.release()
     code, out, err = call("view", "spectrum.view.json", "--export", "page.html")
     assert (code, err) == (0, "")
-    assert out.startswith("page.html: 450000 points, 0 assigned lines")
+    assert out.startswith("page.html: 300000 points, 0 assigned lines")
     for words, said in (
         (("nothing.csv",), "nothing.csv: no such file"),
         (("nothing.view.json",), "no such session"),
