@@ -91,14 +91,14 @@ def test_the_table_names_every_scene_and_piece():
     assert {name for name in motions if name.startswith("scene ")} == scenes
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=15)
 def test_nothing_fails_in_the_whole_package(plain):
     _, motions = table()
     assert set(plain) == motions
     assert not {name: answer for name, answer in plain.items() if isinstance(answer, str) or len(answer) < 3}
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=15)
 @pytest.mark.parametrize("piece", BREAKS)
 def test_breaking_a_piece_changes_exactly_its_users(piece, plain, tmp_path):
     broken = answers(copied(tmp_path, BREAKS[piece]))

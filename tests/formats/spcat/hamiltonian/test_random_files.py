@@ -127,7 +127,7 @@ def test_spin_terms_that_change_l(parallel, beside, nvib):
     assert _compare(with_both_of_pairs(file), l_doubled_solution) > 20
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=15)
 @pytest.mark.parametrize(("states", "spins", "limits"), STATES)
 def test_levels_and_strengths_of_more_files(states, spins, limits):
     assert sum(_compare(file_of_states(seed, states, spins, limits)) for seed in range(1, 51)) > 1000
