@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,6 +15,7 @@ from rotor.formats.packed import load
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d+(?:\.0*)?\Z", re.ASCII)
 _REMARK = re.compile(r"(?![OoIl]\.?\d)[^\d.+\-,/\s]")
+_MOST = 1e100  # squares of larger numbers may overflow
 _GAP = " \t\r\n"
 
 
@@ -159,8 +159,8 @@ def number(line: Line, words: Sequence[Word], index: int, name: str, default: fl
     if word.text is None:
         return default or 0.0
     value = float(word.text.replace("D", "E").replace("d", "e"))
-    if not math.isfinite(value):
-        raise line.error(word.column, f"{name} = {word.text} is too large for a number")
+    if not abs(value) <= _MOST:
+        raise line.error(word.column, f"{name} = {word.text} is too large: expected at most {_MOST:g}")
     return value
 
 

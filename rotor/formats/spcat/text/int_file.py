@@ -64,7 +64,6 @@ class IntensityFile:
 _REQUEST = freeform.default_values(Request)
 _NAMES = {"fqlim_ghz": "FQLIM", "temperature_k": "TEMP"}
 _LEAST_MHZ = 0.00005
-_MOST_MOMENT = 1e100
 
 
 def read_int(source: str | os.PathLike[str] | bytes) -> IntensityFile:
@@ -102,8 +101,6 @@ def _dipole(line: Line) -> Dipole:
     words += freeform.read_words(line, rest, 1)[0]
     code = freeform.whole(line, words, 0, "the dipole's code")
     value = freeform.number(line, words, 1, "the dipole's value")
-    if abs(value) > _MOST_MOMENT:
-        raise line.error(words[1].column, f"the dipole's value = {words[1].text}: the square of a moment overflows")
     return Dipole(abs(code), value, code < 0, line.text)
 
 
