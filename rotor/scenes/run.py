@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from rotor.scenes.scene import SCHEMA, Scene, checked_scene, keyed, scene_of, scene_text, within
+from rotor.scenes.scene import SCHEMA, Scene, checked_scene, keyed, scene_of, scene_text
 from rotor.verbs.calculation import Calculation, Outcome
 from rotor.verbs.outputs import Files
 from rotor.verbs.verb import Work, verb_of
@@ -116,8 +116,7 @@ def file_names(outputs: Mapping[str, Any], kind: str) -> dict[str, list[str]]:
 def paths_of(scene: Scene, out: Where) -> dict[str, tuple[Path, ...]]:
     """The files that a scene names, in the folder `out`."""
     return {
-        name: tuple(Path(within(out, text)) for text in texts)
-        for name, texts in file_names(scene.outputs, scene.kind).items()
+        name: tuple(Path(out, text) for text in texts) for name, texts in file_names(scene.outputs, scene.kind).items()
     }
 
 
@@ -143,7 +142,7 @@ def refuse_outside(scene: Scene, out: Where) -> None:
     inside = Path(os.path.abspath(out))
     for name, texts in file_names(scene.outputs, scene.kind).items():
         for text in texts:
-            if not Path(os.path.abspath(within(out, text))).is_relative_to(inside):
+            if not Path(os.path.abspath(Path(out, text))).is_relative_to(inside):
                 raise ValueError(
                     f"outputs.{name}: {text}: lies outside the folder {os.fspath(out)}; name a file inside it, or give "
                     "another folder as --out"

@@ -12,7 +12,6 @@ from concurrent.futures import Executor
 from dataclasses import is_dataclass
 from functools import cache
 from importlib import import_module
-from pathlib import Path
 from types import UnionType
 from typing import TYPE_CHECKING, Any, get_args, get_origin
 
@@ -415,8 +414,3 @@ def _wrong_type(place: str, value: Any, kinds: tuple[Any, ...]) -> ValueError:
     decimal = isinstance(value, float) and float not in kinds
     actual = "a number with a decimal point" if decimal else _WORDS.get(type(value), type(value).__name__)
     return ValueError(f"{place}: expected {' or '.join(allowed)}, found {actual}")
-
-
-def within(folder: str | os.PathLike[str], name: str) -> str:
-    """Path of a file that a scene names, relative to the scene's folder."""
-    return str(Path(folder) / name)

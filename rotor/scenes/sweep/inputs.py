@@ -15,7 +15,6 @@ from typing import Any
 
 from rotor.formats.toml import read_toml
 from rotor.molecules.readers.sdf_entries import BUILT, entry_bytes, parse_entry
-from rotor.scenes.scene import within
 from rotor.version import version
 
 _WRITTEN = ("outputs", "title", "sweep")  # parts of a scene that name no input
@@ -46,13 +45,13 @@ class InputHashes:
         return hashes
 
     def _files(self, key: str, word: str) -> Iterator[tuple[str, str]]:
-        entry = parse_entry(within(self._folder, word))
+        path = Path(self._folder, word)
+        entry = parse_entry(str(path))
         if entry is not None and entry[0].is_file():
             yield word, hashlib.sha256(entry_bytes(*entry)).hexdigest()
             return
-        path = within(self._folder, word)
-        if os.path.isfile(path):
-            for file in _read_together(Path(path)):
+        if os.path.isfile(path):  # False for words that no path can be
+            for file in _read_together(path):
                 yield (
                     str(file.relative_to(self._folder) if file.is_relative_to(self._folder) else file),
                     self._hash(file),

@@ -10,7 +10,6 @@ from pathlib import Path
 from rotor.checks import read_text
 from rotor.frozen import dataclass
 from rotor.molecules.readers.sdf_entries import LIST_SUFFIXES, SDF_SUFFIXES, entry_names
-from rotor.scenes.scene import within
 
 SMILES_COLUMNS, MOLECULE_COLUMNS, NAME_COLUMNS = ("smiles",), ("molecule", "source", "name"), ("name", "id", "title")
 
@@ -25,10 +24,10 @@ class Entry:
 
 def is_list(source: str, folder: str | os.PathLike[str]) -> bool:
     """Whether a source is a list of molecules: a CSV or SMILES file, or an SDF file of two or more."""
-    suffix, path = Path(source).suffix.lower(), within(folder, source)
+    suffix, path = Path(source).suffix.lower(), Path(folder, source)
     if suffix not in (*SDF_SUFFIXES, *LIST_SUFFIXES) or not os.path.isfile(path):
         return False
-    return suffix in LIST_SUFFIXES or len(entry_names(Path(path))) > 1
+    return suffix in LIST_SUFFIXES or len(entry_names(path)) > 1
 
 
 def list_entries(source: str, folder: str | os.PathLike[str]) -> list[Entry]:
@@ -36,7 +35,7 @@ def list_entries(source: str, folder: str | os.PathLike[str]) -> list[Entry]:
 
     Raises ValueError for a CSV file without a column of molecules, and for a list without molecules.
     """
-    path = Path(within(folder, source))
+    path = Path(folder, source)
     if path.suffix.lower() in LIST_SUFFIXES:
         return _csv_entries(path) if path.suffix.lower() == ".csv" else _smiles_entries(path)
     names = entry_names(path)

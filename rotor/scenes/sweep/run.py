@@ -20,8 +20,7 @@ from rotor.scenes.scene import Scene, checked_scene, scene_text
 from rotor.scenes.sweep.combined import KEY_LENGTH, CombinedFile
 from rotor.scenes.sweep.inputs import InputHashes
 from rotor.scenes.sweep.points import Point, check_first, points
-from rotor.scenes.sweep.record import Record, appended, read_records
-from rotor.scenes.sweep.result import SweepResult
+from rotor.scenes.sweep.record import Record, SweepResult, appended, read_records
 from rotor.temporary import locked_file
 from rotor.verbs.calculation import Outcome
 
