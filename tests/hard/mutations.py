@@ -82,10 +82,10 @@ MUTATIONS = (
     ),
     Mutation(
         4, "rotor/quantum/wang/wang_matrix.py",
-        "        energies, states = np.linalg.eigh(stacked.reshape(-1, size, size))\n",
-        "        energies, states = np.linalg.eigh(stacked.reshape(-1, size, size))\n"
-        "        turned = (np.diff(stacked[:, :: size + 1]) < 0).any(axis=1)\n"
-        "        energies[turned] = np.sort(stacked[turned][:, :: size + 1])\n",
+        "            energies, states = np.linalg.eigh(whole)\n",
+        "            energies, states = np.linalg.eigh(whole)\n"
+        "            turned = (np.diff(stacked[:, :: size + 1]) < 0).any(axis=1)\n"
+        "            energies[turned] = np.sort(stacked[turned][:, :: size + 1])\n",
         "tests/hard/test_safeguards.py::test_energies_are_eigenvalues_where_the_diagonal_turns_round",
     ),
     Mutation(
