@@ -182,34 +182,31 @@ def tables_of(contracted: Sequence[Contracted], frame: Frame) -> Tables:
     return out
 
 
-class _Shape(NamedTuple):
-    """What blocks have in common that differ only in F and K: their layout, and the patterns and number of states of each part."""
-
-    layout: Layout
-    patterns: tuple[tuple[int, ...], ...]
-    sizes: tuple[int, ...]
+Shape = tuple[tuple[NPattern, int, tuple[int, ...], int], ...]
+"""Of each part of a block 2(N - F) and class of patterns, kind, patterns and number of states: what blocks that differ in F and K share."""
 
 
 def groups_of(twice_f: Ints, parts: PartColumns, frame: Frame) -> list[tuple[Group, list[int]]]:
     """Group blocks (doubled F and parts); each group comes with the numbers of its blocks."""
     shapes, shape_of = _shapes(twice_f, parts, frame)
     twice_rows = twice_f + 2 * frame.count * np.array(frame.k, dtype=np.int64)[parts.lowest]
-    layouts = [shapes[shape].layout for shape in shape_of.tolist()]
-    columns = {layout: frozenset(layout) for layout in dict.fromkeys(layouts)}
-    grouped: list[tuple[Layout, dict[int, int]]] = []
-    falling, rows = np.argsort(-twice_f, kind="stable"), twice_rows.tolist()
+    layouts = [tuple([(n_pattern, kind) for n_pattern, kind, _, _ in shape]) for shape in shapes]
+    columns = [frozenset(layout) for layout in layouts]
+    grouped: list[tuple[int, dict[int, int]]] = []
+    falling, rows, shape_numbers = np.argsort(-twice_f, kind="stable"), twice_rows.tolist(), shape_of.tolist()
     for number in falling.tolist():
-        row, layout = rows[number], layouts[number]
-        for group_layout, by_row in grouped:
-            if row not in by_row and (layout is group_layout or columns[layout] <= columns[group_layout]):
+        row, shape = rows[number], shape_numbers[number]
+        for first, by_row in grouped:
+            if row not in by_row and columns[shape] <= columns[first]:
                 by_row[row] = number
                 break
         else:
-            grouped.append((layout, {row: number}))
+            grouped.append((shape, {row: number}))
     out = list[tuple[Group, list[int]]]()
-    for layout, by_row in grouped:
+    for first, by_row in grouped:
         numbers = [by_row[row] for row in sorted(by_row)]
-        out.append((_group(layout, twice_f[numbers], twice_rows[numbers], shapes, shape_of[numbers], frame), numbers))
+        group = _group(layouts[first], twice_f[numbers], twice_rows[numbers], shapes, shape_of[numbers], frame)
+        out.append((group, numbers))
     return out
 
 
@@ -219,38 +216,29 @@ def groups_by_number(grouped: Sequence[tuple[Group, list[int]]]) -> dict[int, tu
     return {number: (group, row) for group, numbers_and_rows in pairs for number, row in numbers_and_rows}
 
 
-def _shapes(twice_f: Ints, parts: PartColumns, frame: Frame) -> tuple[list[_Shape], Ints]:
+def _shapes(twice_f: Ints, parts: PartColumns, frame: Frame) -> tuple[list[Shape], Ints]:
     """The distinct shapes of blocks, and the number of the shape of each block."""
-    sets: dict[tuple[int, ...], int] = {}
-    set_of_f = {f: sets.setdefault(tuple(numbers), len(sets)) for f, numbers in frame.patterns.items()}
-    kinds, sizes = np.array(frame.kinds), np.array(frame.sizes)
-    codes = kinds[parts.numbers] * (1 + sizes.max()) + sizes[parts.numbers]
-    for rows in (parts.first, parts.last):
-        codes = codes * (1 + len(frame.n_patterns)) + rows
-    code_of_part, begins = codes.tolist(), parts.begins.tolist()
-    columns = [column.tolist() for column in (parts.numbers, parts.first, parts.last)]
-    known, shapes, out = dict[tuple[int, ...], int](), list[_Shape](), []
-    for f, begin, count in zip(twice_f.tolist(), begins, parts.counts.tolist(), strict=True):
-        here = slice(begin, begin + count)
-        key = (set_of_f[f], *code_of_part[here])
-        if key not in known:
-            known[key] = len(shapes)
-            shapes.append(
-                _shape(frame.patterns[f], list(zip(*(column[here] for column in columns), strict=True)), frame)
-            )
-        out.append(known[key])
-    return shapes, np.array(out, dtype=np.int64)
-
-
-def _shape(numbers: Sequence[int], parts: Sequence[tuple[int, int, int]], frame: Frame) -> _Shape:
-    """The shape of a block from the numbers of the patterns of its F, and rotational block, first and last pattern of each part."""
-    patterns = tuple(tuple(numbers[first:last]) for _, first, last in parts)
-    layout = tuple((frame.n_patterns[numbers[first]], frame.kinds[number]) for number, first, _ in parts)
-    return _Shape(layout, patterns, tuple(frame.sizes[number] for number, _, _ in parts))
+    known, shape_of = dict[Shape, int](), list[int]()
+    columns = list(zip(*(column.tolist() for column in (parts.numbers, parts.first, parts.last)), strict=True))
+    for f, begin, count in zip(twice_f.tolist(), parts.begins.tolist(), parts.counts.tolist(), strict=True):
+        patterns = frame.patterns[f]
+        shape = tuple(
+            [
+                (
+                    frame.n_patterns[patterns[first]],
+                    frame.kinds[number],
+                    tuple(patterns[first:last]),
+                    frame.sizes[number],
+                )
+                for number, first, last in columns[begin : begin + count]
+            ]
+        )
+        shape_of.append(known.setdefault(shape, len(known)))
+    return list(known), np.array(shape_of, dtype=np.int64)
 
 
 def _group(
-    layout: Layout, twice_f: Ints, twice_rows: Ints, shapes: Sequence[_Shape], shape_of: Ints, frame: Frame
+    layout: Layout, twice_f: Ints, twice_rows: Ints, shapes: Sequence[Shape], shape_of: Ints, frame: Frame
 ) -> Group:
     """The group with a layout; doubled F, doubled row (rising) and number of the shape of each block."""
     rotations, start = list[RotationColumns](), 0
@@ -261,14 +249,15 @@ def _group(
     place_of = {n_pattern_and_kind: place for place, n_pattern_and_kind in enumerate(layout)}
     functions, heights = dict[int, tuple[Ints, Ints]](), np.zeros(len(shapes), dtype=np.int64)
     for number in dict.fromkeys(shape_of.tolist()):
-        shape, columns, states = shapes[number], list[int](), list[int]()
-        for part_patterns, n_pattern_and_kind, size in zip(shape.patterns, shape.layout, shape.sizes, strict=True):
-            rotation = rotations[place_of[n_pattern_and_kind]]
+        columns, states = list[int](), list[int]()
+        for n_pattern, kind, patterns, size in shapes[number]:
+            rotation = rotations[place_of[n_pattern, kind]]
             shift = rotation.columns.start - rotation.patterns.start
-            for pattern in part_patterns:
+            for pattern in patterns:
                 columns += [pattern + shift] * size
                 states += range(size)
-        functions[number], heights[number] = (np.array(columns), np.array(states)), max(shape.sizes)
+        functions[number] = np.array(columns), np.array(states)
+        heights[number] = max(size for *_, size in shapes[number])
     places = {row: place for place, row in enumerate(twice_rows.tolist())}
     return Group(tuple(rotations), twice_f, twice_rows, heights[shape_of], shape_of, functions, places)
 
