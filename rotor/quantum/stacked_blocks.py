@@ -20,7 +20,7 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.levels import SolvedBlock
-from rotor.quantum.symmetric_top_elements import coupling_of_existing
+from rotor.quantum.symmetric_top_elements import wang_coupling
 from rotor.quantum.tensors import BodyTensor
 from rotor.quantum.wang.basis import WangBlock
 
@@ -118,7 +118,8 @@ class Vector:
     @cached_property
     def couplings(self) -> dict[tuple[int, int], Floats]:
         """c(K) of each lower J from -1 on, (J + 1, K), by rise of J and step of K."""
-        return {(rise, step): _couplings(self.jmax, rise, step) for rise in (0, 1) for step in (-1, 0, 1)}
+        j, k = np.arange(-1.0, self.jmax + 1)[:, None], np.arange(self.jmax + 2.0)
+        return {(rise, step): wang_coupling(j, rise, 1, step, k) for rise in (0, 1) for step in (-1, 0, 1)}
 
     def products(self, up: ParityStates, lows: Mapping[int, ParityStates]) -> Iterator[tuple[int, Product]]:
         """Every pair of blocks that the vector connects, by the sign of the upper one; over both parities each pair once.
@@ -167,15 +168,3 @@ def _pairs(
         there = low.sign_slice(partner * sign)
         product = Product(moved[:, :, up.sign_slice(sign)], low.columns[:, :, there], low.rows[:, there])
         yield sign, product
-
-
-def _couplings(jmax: int, rise: int, step: int) -> Floats:
-    """`tensors.wang_coupling` of all J from -1 on; 0 where K or K + step do not exist."""
-    j, k = np.arange(-1.0, jmax + 1)[:, None], np.arange(jmax + 2.0)
-    exists = (
-        (k <= j) & (k + step >= 0) & (k + step <= j + rise) & (j + rise > 0)
-    )  # a vector has no elements within J = 0
-    values = coupling_of_existing(np.maximum(j, 1 - rise), rise, 1, step, np.where(exists, k, 0.0))
-    if step:
-        values[:, (k == 0) | (k + step == 0)] *= np.sqrt(2.0)
-    return np.where(exists, values, 0.0)

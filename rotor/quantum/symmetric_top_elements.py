@@ -5,8 +5,10 @@ Phases and normalisation are those of `tensors`, which puts Wang blocks together
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 from rotor.quantum.wigner import three_j
@@ -24,21 +26,30 @@ def coupling(j_low: float, j_up: float, rank: int, q: int, k: ArrayLike) -> Floa
     >>> round(float(coupling(1, 3, 2, 0, 0)) ** 2, 6)  # (3/2) (J+1)(J+2)/(2J+3) of a linear molecule
     1.8
     """
-    k = np.asarray(k, dtype=float)
-    exists = (np.abs(k) <= j_low) & (np.abs(k + q) <= j_up)
-    if not abs(j_up - j_low) <= rank <= j_up + j_low or abs(q) > rank:
-        return np.zeros(k.shape)
-    values = coupling_of_existing(j_low, int(j_up - j_low), rank, q, np.where(exists, k, max(-j_low, -j_up - q)))
+    return coupling_to(j_low, int(j_up - j_low), rank, q, k)
+
+
+def coupling_to(j: ArrayLike, rise: int, rank: int, q: int, k: ArrayLike) -> Floats:
+    """`coupling` from J to J' = J + `rise`, arrays of J and k that broadcast."""
+    j, k = np.asarray(j, dtype=float), np.asarray(k, dtype=float)
+    exists = (np.abs(k) <= j) & (np.abs(k + q) <= j + rise) & (2 * j + rise >= rank)
+    if max(abs(rise), abs(q)) > rank:
+        return np.zeros(exists.shape)
+    low = np.maximum(j, (rank - rise + 1) // 2)  # a J and k that exist in place of others
+    inside = np.where(exists, k, np.maximum(-low, -low - rise - q))
+    if rank <= 2:
+        values = closed_coupling(low, rise, rank, q, inside)
+    else:
+        root = np.sqrt((2 * (low + rise) + 1) * (2 * low + 1))
+        sign = np.where((low + rise - inside - q) % 2, -1.0, 1.0)
+        values = sign * root * three_j(low + rise, rank, low, -inside - q, q, inside)
     return np.where(exists, values, 0.0)
 
 
-def coupling_of_existing(j: float | Floats, rise: int, rank: int, q: int, k: Floats) -> Floats:
-    """`coupling` (n,) to J' = J + `rise`, for k and k + q that exist; one J for all k or one for each."""
-    if rank <= 2:
-        return closed_coupling(j, rise, rank, q, k)
-    j_up = j + rise
-    root = np.sqrt((2.0 * j_up + 1) * (2 * j + 1))
-    return np.asarray(np.where((j_up - k - q) % 2, -root, root) * three_j(j_up, rank, j, -k - q, q, k))
+def wang_coupling(j: ArrayLike, rise: int, rank: int, step: int, k: NDArray[Any]) -> Floats:
+    """`coupling_to` between functions of K, times √2 where one of K and K + step is 0."""
+    values = coupling_to(j, rise, rank, step, k)
+    return values * np.where((k == 0) | (k + step == 0), np.sqrt(2.0), 1.0) if step else values
 
 
 def closed_coupling(j: float | Floats, rise: int, rank: int, q: int, k: Floats) -> Floats:

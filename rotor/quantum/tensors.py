@@ -34,12 +34,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats
 from rotor.frozen import dataclass
-from rotor.quantum.symmetric_top_elements import coupling, coupling_of_existing, sign_of
+from rotor.quantum.symmetric_top_elements import coupling, sign_of, wang_coupling
 from rotor.quantum.wang.basis import WangBlock
 from rotor.tops.operators import axis_order as axis_order
 
 Complexes = NDArray[np.complex128]
 
+_J_AT_ONCE = 32  # J of one table of couplings
 ROUND_OFF = 1e-9  # of the largest component: how far T_-q may be from (-1)^q T_q*
 
 
@@ -221,7 +222,9 @@ def bands_between(up: WangBlock, low: WangBlock, tensor: BodyTensor) -> list[Ban
         source, target = overlap(up, low, step)
         if source.start >= source.stop:
             continue
-        elements = wang_coupling(low.j, up.j, rank, step)[low.first_k :: 2][source] * parts[rank + step]
+        table = _coupling_table(low.j // _J_AT_ONCE, up.j - low.j, rank, step)
+        k = slice(low.first_k + 2 * source.start, low.first_k + 2 * source.stop, 2)
+        elements = table[low.j % _J_AT_ONCE, k] * parts[rank + step]
         for place, value in _folded(up, low, rank, step, parts) if rank > 1 else ():
             elements[place - source.start] += value
         out.append(Band(source, target, elements))
@@ -235,14 +238,11 @@ def overlap(up: WangBlock, low: WangBlock, step: int) -> tuple[slice, slice]:
     return slice(start, stop), slice(start - first, stop - first)
 
 
-@lru_cache(maxsize=2048)  # some 16 MB at J = 1000; a dipole needs 6 tables for every J
-def wang_coupling(j_low: int, j_up: int, rank: int, step: int) -> Floats:
-    """`coupling` for K = 0 ... J, times √2 where one of K and K + step is 0: (J + 1,), shared and read-only."""
-    first, last = max(0, -step), min(j_low, j_up - step)
-    out = np.zeros(j_low + 1)
-    if first <= last:
-        out[first : last + 1] = coupling_of_existing(j_low, j_up - j_low, rank, step, np.arange(first, last + 1.0))
-        out[first] *= np.sqrt(2.0) if step else 1.0
+@lru_cache(maxsize=256)  # some 24 MB at J = 1000; a dipole needs 6 tables for every J
+def _coupling_table(number: int, rise: int, rank: int, step: int) -> Floats:
+    """`wang_coupling` for the J of one table and K = 0, 1, ...: (J, K), shared and read-only."""
+    j = np.arange(number * _J_AT_ONCE, (number + 1) * _J_AT_ONCE)
+    out = wang_coupling(j[:, None], rise, rank, step, np.arange(j[-1] + 1))
     out.flags.writeable = False  # it is shared
     return out
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Ints
 from rotor.quantum.operators.algebra import UNIT, Factor, Labels, Operator, Shift, Values, diagonal, shift
-from rotor.quantum.symmetric_top_elements import coupling_of_existing
+from rotor.quantum.symmetric_top_elements import coupling_to
 from rotor.quantum.tensors import spherical_components
 from rotor.tops.operators import Powers, axis_order
 
@@ -136,10 +136,6 @@ def direction_cosine(axis: str, representation: str) -> Operator:
 
 def _tensor_shift(rank: int, q: int, rise: int) -> Operator:
     def factor(labels: Labels) -> Values:
-        j, k = labels["J"], labels["K"]
-        exists = (np.abs(k + q) <= j + rise) & (np.abs(rise) <= rank) & (2 * j + rise >= rank)
-        values = np.zeros(len(j))
-        values[exists] = coupling_of_existing(j[exists], rise, rank, q, k[exists].astype(float))
-        return values
+        return coupling_to(labels["J"], rise, rank, q, labels["K"])
 
     return shift(factor, J=rise, K=q)

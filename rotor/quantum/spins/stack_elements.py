@@ -24,7 +24,7 @@ from rotor.quantum.spins.operators import (
     factors_with_n,
     tensor_of,
 )
-from rotor.quantum.symmetric_top_elements import closed_coupling
+from rotor.quantum.symmetric_top_elements import coupling_to, wang_coupling
 from rotor.quantum.tensors import BodyTensor, overlap
 from rotor.quantum.wang.basis import SPECIES, Part, SpeciesFactors, WangBlock
 from rotor.quantum.wang.unit_diagonals import unit_diagonals
@@ -231,18 +231,8 @@ def _signed_parts(tensor: BodyTensor, up: WangBlock, low: WangBlock, rise: int) 
 
 @lru_cache(maxsize=512)  # about 20 MB for N up to 100
 def _couplings(all_n: tuple[int, ...], rise: int, rank: int, step: int, first_k: int, count: int) -> Floats:
-    """`tensors.coupling` from each N to N + rise, over K = first_k, first_k + 2, ..., times √2 where one of K and K + step is 0.
-
-    (N, K), zero where K exceeds N; shared and read-only.
-    """
-    n, k = np.array(all_n)[:, None], first_k + 2 * np.arange(count)
-    m = n + rise
-    exists = (np.abs(k) <= n) & (np.abs(k + step) <= m)
-    inside = np.where(exists, k, np.maximum(-n, -m - step)).astype(float)
-    values = closed_coupling(n.astype(float), rise, rank, step, inside)
-    if step:
-        values = values * np.where(k == max(0, -step), np.sqrt(2.0), 1.0)
-    out = np.where(exists, values, 0.0)
+    """`wang_coupling` from each N to N + rise, over K = first_k, first_k + 2, ...: (N, K), shared and read-only."""
+    out = wang_coupling(np.array(all_n)[:, None], rise, rank, step, first_k + 2.0 * np.arange(count))
     out.flags.writeable = False
     return out
 
@@ -285,11 +275,8 @@ def _axial_tensor_elements(tensor: BodyTensor, pairs: Pairs, k_up: Ints, k: Ints
     q = int(k_up[0] - k[0])
     if max(abs(q), abs(pairs.rise)) > tensor.rank or not (part := tensor.components[tensor.rank + q]):
         return None
-    closes = (pairs.m + pairs.n)[:, 0] >= tensor.rank
-    out = np.zeros((len(k), 1, 1))
-    values = closed_coupling(pairs.n[closes, 0].astype(float), pairs.rise, tensor.rank, q, k[closes].astype(float))
-    out[closes, 0, 0] = (abs(part) if q else part.real) * values
-    return out if closes.any() else None
+    values = (abs(part) if q else part.real) * coupling_to(pairs.n[:, 0], pairs.rise, tensor.rank, q, k)
+    return values[:, None, None] if (pairs.m + pairs.n).max() >= tensor.rank else None
 
 
 def both_signs(pairs: Pairs) -> Floats:
