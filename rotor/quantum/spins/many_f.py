@@ -304,11 +304,11 @@ def between(
     for right in low.rotations:
         places: Places | None = None
         for left in up.rotations:
-            table = tables.get((left.kind, right.kind, (step + left.rise - right.rise) // 2))
-            if table is not None:
+            key = left.kind, right.kind, (step + left.rise - right.rise) // 2
+            if key in tables:
                 places = frame.rows_of(twice_rows, right) if places is None else places
                 of_columns = coefficients_of_f(left.patterns, right.patterns)
-                yield Between(left, right, table[places, : states[0], : states[1]], of_columns)
+                yield Between(left, right, tables[key][places, : states[0], : states[1]], of_columns)
 
 
 def write_between(all_elements: Iterable[Between], out: NDArray[Any]) -> None:
