@@ -224,6 +224,7 @@ class AlignAnswer(TextOf):
         from rotor.quantum.estimates.limits import limit_facts
 
         trace, cosines = self.trace, {name: values for name, values in self.table.columns.items() if name != "t_ps"}
+        molecules = self.request.classical_molecules
         return {
             **top_facts(trace.top),
             **trace.provenance,
@@ -232,12 +233,21 @@ class AlignAnswer(TextOf):
             "error_estimate": trace.error_estimate,
             "permanent": trace.permanent,
             "extremes": [_extremes(name, trace.t_ps, values) for name, values in cosines.items()],
-            "classical_molecules": self.request.classical_molecules,
+            "classical_molecules": molecules,
+            "classical_errors": {
+                name: _sampling_error(name, means, molecules) for name, means in self.classical.items()
+            },
             "times": len(trace.t_ps),
             "revival_ps": None if trace.top.kind == "asymmetric" else revival_period_ps(trace.top),
             **limit_facts(trace.top, self._compared_j, effects_of(trace.top, hyperfine=False)),
             "errors": self.errors.as_json(),
         }
+
+
+def _sampling_error(name: str, mean: Floats, molecules: int) -> float:
+    """Bound on the standard error of a mean over molecules, √((1 - m)(m - low)/n) of numbers from `low` to 1, at the worst time."""
+    low = 0.0 if name.startswith("cos2") else -1.0
+    return float(np.sqrt(np.maximum((1.0 - mean) * (mean - low), 0.0).max() / molecules))
 
 
 def _extremes(name: str, times: Floats, values: Floats) -> dict[str, Any]:

@@ -174,7 +174,18 @@ def _facts(answer: AlignAnswer, content: Mapping[str, Any]) -> list[tuple[str, s
         ("method", f"{trace.method}, {counted(sum(trace.steps), 'step')}"),
         ("numerical error", accuracy),
         ("samples", _samples_text(trace)),
+        *_classical_facts(content),
     ]
+
+
+def _classical_facts(content: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Size of the classical gas and the errors of its means."""
+    errors = ", ".join(f"{name} ± {error:.1g}" for name, error in content["classical_errors"].items())
+    return (
+        [("classical gas", f"{content['classical_molecules']} molecules: {errors} at most, of sampling")]
+        if errors
+        else []
+    )
 
 
 def _revival_text(period: float | None) -> str:

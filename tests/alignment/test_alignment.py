@@ -526,3 +526,18 @@ def test_a_classical_gas_follows_a_slow_pulse_and_comes_back():
     peak, after = cosines["cos2theta"]
     assert peak > 0.84
     assert after == pytest.approx(1 / 3, abs=4 * 0.298 / math.sqrt(400))  # 0.298: spread of cos² over the sphere
+
+
+def test_the_scatter_of_a_classical_gas_is_said_and_bounds_it():
+    """The means of 40 gases of 50 molecules scatter by less than the stated standard error, and by more than a third of it."""
+    request = AlignRequest(
+        OCS, (Kick.from_strength(2.0, 4.04),), points=3, classical_molecules=50, observables=("cos2theta", "costheta")
+    )
+    stated = answer_align(request).facts()["classical_errors"]
+    assert stated["costheta"] == pytest.approx(1 / math.sqrt(50), rel=0.05)
+    fixed = {"temperature_k": 1.0, "molecules": 50, "observables": request.observables}
+    generators = map(np.random.default_rng, range(40))
+    gases = [classical_trace(OCS, request.pulses, request.times_ps, rng=rng, **fixed) for rng in generators]
+    for name, error in stated.items():
+        scatter = np.std([gas[name] for gas in gases], axis=0).max()
+        assert error / 3 < scatter < 1.2 * error  # 40 gases give a spread to 11 %
