@@ -127,9 +127,9 @@ def phase_between(moments: list[Moment]) -> complex:
     return 1.0 if within.count(False) > within.count(True) else 1j
 
 
-def strengths(case: Case, moments: list[Moment], up, low) -> np.ndarray:
-    """Σ |⟨F'‖M‖F⟩|² of electric and of magnetic moments; up, low: (pieces, eigenvectors) of two F."""
-    phase, total = phase_between(moments), 0.0
+def strengths(case: Case, moments: list[Moment], up, low, phase: complex | None = None) -> np.ndarray:
+    """Σ |⟨F'‖M‖F⟩|² of electric and of magnetic moments; up, low: (pieces, eigenvectors) of two F; phase: of `phase_between`."""
+    phase, total = phase_between(moments) if phase is None else phase, 0.0
     for electric in (True, False):
         chosen = [m for m in moments if bool(m.sym) == electric]
         if chosen:
