@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
@@ -15,7 +16,7 @@ from rotor.formats.packed import load
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 _WHOLE = re.compile(r"[+-]?\d+(?:\.0*)?\Z", re.ASCII)
 _REMARK = re.compile(r"(?![OoIl]\.?\d)[^\d.+\-,/\s]")
-_MOST = 1e100  # squares of larger numbers may overflow
+MOST = 1e100  # of values: squares of larger numbers may overflow
 _GAP = " \t\r\n"
 
 
@@ -150,17 +151,24 @@ def expecting(rule: str) -> Iterator[None]:
         raise ValueError(f"{error}; {rule}") from None
 
 
-def number(line: Line, words: Sequence[Word], index: int, name: str, default: float | None = None) -> float:
+def number(
+    line: Line,
+    words: Sequence[Word],
+    index: int,
+    name: str,
+    default: float | None = None,
+    most: float = sys.float_info.max,
+) -> float:
     """The number `index` of a line, called `name` in errors, with an exponent E or D; its default where it is left out.
 
-    Raises ValueError, with file, line and column, where it is missing and has no default, and where it is too large.
+    Raises ValueError, with file, line and column, where it is missing and has no default, and where it exceeds `most`.
     """
     word = _present(line, words, index, name, default is not None)
     if word.text is None:
         return default or 0.0
     value = float(word.text.replace("D", "E").replace("d", "e"))
-    if not abs(value) <= _MOST:
-        raise line.error(word.column, f"{name} = {word.text} is too large: expected at most {_MOST:g}")
+    if not abs(value) <= most:
+        raise line.error(word.column, f"{name} = {word.text} is too large: expected at most {most:.0e}")
     return value
 
 

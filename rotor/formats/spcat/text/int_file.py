@@ -100,7 +100,7 @@ def _dipole(line: Line) -> Dipole:
     words, rest = freeform.read_code(line)
     words += freeform.read_words(line, rest, 1)[0]
     code = freeform.whole(line, words, 0, "the dipole's code")
-    value = freeform.number(line, words, 1, "the dipole's value")
+    value = freeform.number(line, words, 1, "the dipole's value", most=freeform.MOST)
     return Dipole(abs(code), value, code < 0, line.text)
 
 

@@ -206,7 +206,7 @@ def _parameter(line: Line) -> Parameter:
     others, end = freeform.read_words(line, rest, 2)
     words = code_word + others
     # SPCAT takes a line without one for the last parameter, without a word
-    value = freeform.number(line, words, 1, "the parameter's value")
+    value = freeform.number(line, words, 1, "the parameter's value", most=freeform.MOST)
     error = freeform.number(line, words, 2, "the parameter's error") if len(words) > 2 and words[2].text else None
     tail = line.body[end:]
     label = tail.partition("/")[2].strip() if "/" in tail else ""
