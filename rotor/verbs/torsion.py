@@ -48,7 +48,10 @@ def _facts(answer: TorsionAnswer, record: Mapping[str, Any]) -> list[tuple[str, 
         else "a turn"
     )
     spread = f" of the geometry; {low:.6g} to {high:.6g} over {turn}" if high - low > 1e-6 * high else ""
-    wells = [f"{well['angle_degrees']:.4g}° ({round(well['energy_cm'], 6):.4g} cm⁻¹)" for well in record["wells"]]
+    # a minimum just below a whole turn is that of the geometry, at 0
+    angles = [float(f"{well['angle_degrees']:.4g}") % 360 for well in record["wells"]]
+    minima = sorted(zip(angles, (round(well["energy_cm"], 6) for well in record["wells"]), strict=True))
+    wells = [f"{angle:.4g}° ({energy:.4g} cm⁻¹)" for angle, energy in minima]
     quanta = sorted({round(well["harmonic_cm"], 1) for well in record["wells"]})
     harmonic = ", ".join(f"{quantum:g}" for quantum in quanta)
     facts = [

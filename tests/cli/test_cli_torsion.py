@@ -112,3 +112,10 @@ def test_a_bond_without_symmetry_says_so(call):
     _, out, _ = call("torsion", "SMILES:CCO", "--bond", "2-3", "--potential", "V1=0.1 V3=1 kcal/mol")
     assert "none: no two positions in a turn are equal" in out
     assert "1 equal positions" not in out
+
+
+def test_a_minimum_just_below_a_turn_is_that_at_zero(call):
+    """The relaxed scan of H2O2 has its minimum at 359.997 degrees, which was printed as 360 and last."""
+    code, out, err = call("torsion", "SMILES:OO", "--bond", "1-2")
+    assert code == 0, err
+    assert "minima          0° (0 cm⁻¹), 101" in out
