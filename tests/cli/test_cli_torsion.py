@@ -115,7 +115,7 @@ def test_a_bond_without_symmetry_says_so(call):
 
 
 def test_a_minimum_just_below_a_turn_is_that_at_zero(call):
-    """The relaxed scan of H2O2 has its minimum at 359.997 degrees, which was printed as 360 and last."""
+    """The relaxed scan of H2O2 has its minimum at 359.9999 degrees, which was printed as 360 and last."""
     code, out, err = call("torsion", "SMILES:OO", "--bond", "1-2")
     assert code == 0, err
     assert "minima          0° (0 cm⁻¹), 101" in out
