@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -110,23 +111,23 @@ def _kinetic_constants(
         turn = _turn_in_principal_axes(top, exchange)
         first = 0.5 * (cosines[0] + turn @ cosines[1])
         cosines = np.array([first, turn @ first])
-    constants: dict[str, float] = {}
-    for number, vector in zip(numbers, cosines, strict=True):
-        norm = float(np.linalg.norm(vector))
-        direction = vector / norm
-        constants |= {
-            f"F0{number}": units.ROTATIONAL_MHZ_U_ANGSTROM2 / norm,
-            f"delta{number}": float(np.arctan2(np.linalg.norm(direction[1:]), direction[0])),
-        }
-        if number:
-            constants[f"epsilon{number}"] = float(np.arctan2(direction[2], direction[1]))
-        elif abs(direction[2]) > IN_PLANE:
-            raise ValueError(
-                f"internal rotation of {top.name or 'this top'}: the axis of the methyl group is {direction[2]:.3g} out of the plane ab; "
-                "give constants in the rho-axis frame (RAM)"
-            )
+    norms = np.linalg.norm(cosines, axis=1)
+    directions = cosines / norms[:, None]
+    constants = {
+        f"F0{number}": units.ROTATIONAL_MHZ_U_ANGSTROM2 / norm
+        for number, norm in zip(numbers, norms.tolist(), strict=True)
+    }
+    planar = bool(np.abs(directions[:, 2]).max() <= IN_PLANE)
+    if not planar and len(groups) == 1:
+        raise ValueError(
+            f"internal rotation of {top.name or 'this top'}: the axis of the methyl group is {directions[0, 2]:.3g} out of the plane ab; "
+            "give constants in the rho-axis frame (RAM)"
+        )
+    for number, (a, b, c) in zip(numbers, directions.tolist(), strict=True):
+        if planar:  # no angle epsilon, so that the Hamiltonian is real
+            constants[f"delta{number}"] = math.atan2(b, a)
         else:
-            constants["delta"] = float(np.arctan2(direction[1], direction[0]))
+            constants |= {f"delta{number}": math.acos(a), f"epsilon{number}": math.atan2(c, b)}
     return constants
 
 

@@ -177,11 +177,11 @@ def energies_alone(
         highest = float(blocks.functions.torsion.energies[jmax].max())
         linear = blocks.summed(model.coefficients, max(below_mhz, highest))
         labels, unit = blocks.functions.labels, np.ones(1)
-        if constants.tops == 1:  # a few functions for each K: whole blocks, energies alone
+        if constants.tops < 3:  # whole blocks, energies alone: faster than few states with their vectors
             solved = [block.energies(unit) for _, block in linear]
         else:
             populated = int((blocks.functions.torsion.energies.min(axis=0) <= below_mhz).sum())  # they rise with t
-            if constants.tops > 2 and populated > MOST_POPULATED:
+            if populated > MOST_POPULATED:
                 _refuse_long_sums((2 * jmax + 1) * constants.functions)
             solved = [states_of(block, unit, labels["t"][rows] < populated)[0] for rows, block in linear]
         energies += solved
