@@ -69,7 +69,8 @@ class Connected:
         second, count = {pair.second for pair in self.pairs}, len(self.states)
         between = [(v, w) for v in range(count) for w in range(v, count)]
         allowed = {
-            (v, w): species_pairs(self.states[v], self.states[w], (v in second, w in second)) for v, w in between
+            (v, w): species_pairs(self.states[v], self.states[w], (v in second, w in second), self.axes[2])
+            for v, w in between
         }
         return {both: species for both, species in allowed.items() if species is not None}
 

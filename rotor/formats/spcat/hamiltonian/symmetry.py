@@ -77,22 +77,24 @@ def weights_agree(axis: str, low: StateOptions, high: StateOptions, odd_spins: i
 
 
 @lru_cache(maxsize=4096)
-def _weights(state: StateOptions, ka: int, kc: int, odd_spins: int = 0) -> tuple[int, ...]:
-    """Weights of A (or B) and of E levels in the Wang block of a species, for K along either axis."""
+def _weights(state: StateOptions, ka: int, kc: int, odd_spins: int = 0, axes: str = "ac") -> tuple[int, ...]:
+    """Weights of A (or B) and of E levels in the Wang block of a species, for K along a or c, or along either of both."""
     ka_array, kc_array = np.array([ka]), np.array([kc])
     if state.fold < 3:
         return (int(state.class_weight(ka_array, kc_array, odd_spins)[0]),)
-    along = {int(k): state.block_weights(ka_array, kc_array, np.array([k]))[0] for k in (ka, kc)}
+    along_axis = {"a": ka, "c": kc}
+    along = {k: state.block_weights(ka_array, kc_array, np.array([k]))[0] for k in map(along_axis.__getitem__, axes)}
     return tuple(sorted({int(weight) for pair in along.values() for weight in pair}))
 
 
 SpeciesPairs = frozenset[tuple[str, str]]
 
 
-def species_pairs(up: StateOptions, low: StateOptions, turned: tuple[bool, bool]) -> SpeciesPairs | None:
+def species_pairs(up: StateOptions, low: StateOptions, turned: tuple[bool, bool], axis: str) -> SpeciesPairs | None:
     """Pairs of species of Wang blocks of two states that an operator may connect, those with equal weights; None for all.
 
     turned: for each state, whether a half turn across the axis changes its sign, as for the second component y of l-doubled states.
+    axis: that of K, a or c, by whose parity the weights of an axis of an even fold differ.
     """
     if low.equivalent or up.equivalent:
         return None
@@ -101,7 +103,7 @@ def species_pairs(up: StateOptions, low: StateOptions, turned: tuple[bool, bool]
         for state, flip in zip((up, low), turned, strict=True)
     )
     up_weights, low_weights = (
-        {"eo"[ka] + "eo"[kc]: _weights(state, ka, kc) for ka, kc in SPECIES} for state in swapped
+        {"eo"[ka] + "eo"[kc]: _weights(state, ka, kc, axes=axis) for ka, kc in SPECIES} for state in swapped
     )
     pairs = frozenset((s, t) for s in up_weights for t in low_weights if up_weights[s] == low_weights[t])
     return pairs if len(pairs) < len(up_weights) * len(low_weights) else None

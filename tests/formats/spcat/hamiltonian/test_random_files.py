@@ -133,6 +133,21 @@ def test_levels_and_strengths_of_more_files(states, spins, limits):
     assert sum(_compare(file_of_states(seed, states, spins, limits)) for seed in range(1, 51)) > 1000
 
 
+@pytest.mark.parametrize("nvib", [3, -3])
+@pytest.mark.parametrize(("iax", "fold"), [(7, 4), (9, 5), (10, 6)])
+def test_l_doubled_states_of_other_folds(iax, fold, nvib):
+    """-2Aζ alone joins both components in every block; energies alone, as not all levels of even folds have weights."""
+    z = 600011 if nvib < 0 else 200011
+    codes = (1, 101, 100 * (fold - 1) + 1)
+    options = [f"s -1 {v or nvib} 0 40 0 {iax} 2 2 {-1 if v < 2 else 0} {code} 0" for v, code in enumerate(codes)]
+    for doubling in ((), ((40012, 9.0),)):
+        parameters = [(1099, 3000.0), (199, 5000.0), (11, 20000.0), (z, 2000.0), *doubling]
+        file = RandomFile.of(0, options, parameters, [Moment((0, 0), 0, 1, 1.0)])
+        groups = [(group, group.levels((0, 8))) for group in connected_groups(file.par, file.intensities)]
+        solved = {f2: l_doubled_solution(file.case, f2) for f2 in range(0, 10, 2)}
+        _compare_levels(file, groups, solved, max(energy.max() for _, _, energy in solved.values()))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("pairs", "spins"), PAIRS)
 def test_levels_and_strengths_of_more_l_doubled_states(pairs, spins):
