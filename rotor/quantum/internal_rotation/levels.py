@@ -98,7 +98,7 @@ class TorsionMoments(SpeciesMoments):
     @cached_property
     def _terms(self) -> list[tuple[ByBlocks, int]]:
         """Elements of the terms, and of further operators, by pairs of blocks, and the number of operators."""
-        operators = [self.levels.source.elements, *([] if self.further is None else [self.further])]
+        operators = [*self.levels.source.separate_elements, *([] if self.further is None else [self.further])]
         return [(elements_by_blocks(each, self.levels.members), len(each.values)) for each in operators]
 
     def _between(self, tensors: Tensors) -> Mapping[tuple[int, int], Entries]:
