@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rotor.alignment.align import AlignmentTrace
     from rotor.tops.top import Top
 
+REVIVALS = 1.1  # after the pulses by default: the whole peak of the full revival
 LONGEST_PS = 100.0  # default time after the pulses for a top without revivals
 DEFAULT_POINTS = 2001
 PULSES = Choices("shape", lambda: SHAPES)
@@ -84,7 +85,7 @@ class AlignRequest:
 
     top: with the property that the pulses act on. pulses: at least one. temperature_k: of the gas, 0 for its lowest level. state: a
     single level instead, by quantum numbers; m: its |M|, None for all. from_ps, until_ps: first and last time; None: begin of the pulses,
-    and one revival after their end. points: number of times. observables: names of cosines. tolerance: of the cosines. jmax: None: as
+    and 1.1 revivals after their end. points: number of times. observables: names of cosines. tolerance: of the cosines. jmax: None: as
     needed for the tolerance. classical_molecules: size of an additional classical gas, 0 for none; seed: of its start.
     """
 
@@ -109,7 +110,7 @@ class AlignRequest:
         example="-1 ps",
     )  # fmt: skip
     until_ps: float | None = declared(
-        None, Quantity("ps", metavar="T"), "Last time (ps); by default one revival after the pulses, or 100 ps", "conditions.last_time",
+        None, Quantity("ps", metavar="T"), "Last time (ps); by default 1.1 revivals after the pulses, or 100 ps", "conditions.last_time",
         option="--until", common=True, example="100 ps",
     )  # fmt: skip
     points: int = declared(DEFAULT_POINTS, Whole(2, MOST_POINTS), "How many times", "conditions.points")
@@ -158,7 +159,7 @@ class AlignRequest:
 
         begins = min(pulse.window_ps[0] for pulse in self.pulses)
         ends = max(pulse.window_ps[1] for pulse in self.pulses)
-        long = LONGEST_PS if self.top.kind == "asymmetric" else revival_period_ps(self.top)
+        long = LONGEST_PS if self.top.kind == "asymmetric" else REVIVALS * revival_period_ps(self.top)
         first = begins if self.from_ps is None else self.from_ps
         return first, ends + long if self.until_ps is None else self.until_ps
 

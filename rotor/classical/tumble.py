@@ -66,6 +66,7 @@ class TumbleRequest:
 
         others: further fields of the request; moments and ω are in one coherent set, such as kg m² and rad/s.
 
+        >>> from rotor.classical.motion import SI
         >>> TumbleRequest.from_angular_velocity([1.0, 2.0, 3.0], [0.0, 5.0, 0.1], units=SI).angular_momentum[1]
         10.0
         """

@@ -32,10 +32,12 @@ def coupling(j_low: float, j_up: float, rank: int, q: int, k: ArrayLike) -> Floa
 def coupling_to(j: ArrayLike, rise: int, rank: int, q: int, k: ArrayLike) -> Floats:
     """`coupling` from J to J' = J + `rise`, arrays of J and k that broadcast."""
     j, k = np.asarray(j, dtype=float), np.asarray(k, dtype=float)
-    exists = (np.abs(k) <= j) & (np.abs(k + q) <= j + rise) & (2 * j + rise >= rank)
+    closes = 2 * j + rise >= rank
+    exists = (np.abs(k) <= j) & (np.abs(k + q) <= j + rise) & closes
     if max(abs(rise), abs(q)) > rank:
         return np.zeros(exists.shape)
-    low = np.maximum(j, (rank - rise + 1) // 2)  # a J and k that exist in place of others
+    # a J and k that exist in place of others; J may be half an odd number
+    low = np.where(closes, j, (rank - rise + 1) // 2)
     inside = np.where(exists, k, np.maximum(-low, -low - rise - q))
     if rank <= 2:
         values = closed_coupling(low, rise, rank, q, inside)

@@ -257,4 +257,4 @@ def test_hessian_on_the_command_line(tmp_path, capsys):
     errors = capsys.readouterr().err
     assert "needs --calculator" in errors
     assert "--hessian: bare constants" in errors
-    assert "none.txt: No such file" in errors
+    assert "none.txt: no such file" in errors

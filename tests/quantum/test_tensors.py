@@ -17,7 +17,7 @@ from slow_matrix import AXES, watson_matrix
 
 from rotor.quantum.reduced import connected_wang_blocks, wang_amplitudes
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.symmetric_top_elements import coupling, coupling_to
 from rotor.quantum.tensors import (
     BodyTensor,
     acting_on,
@@ -474,3 +474,25 @@ def test_acting_on_columns_is_the_matrix():
 def test_what_is_no_tensor_is_an_error(call, said):
     with pytest.raises(ValueError, match=said):
         call()
+
+
+@pytest.mark.parametrize("j", [0.5, 1.0, 1.5, 2.0, 2.5])
+def test_couplings_of_half_integer_j_are_those_of_three_j_symbols(j):
+    """Spins of 1/2 and 3/2 use the same function; a placeholder for missing J once replaced J = 1/2."""
+    for rank in (1, 2, 3):
+        for rise in range(-rank, rank + 1):
+            for q in range(-rank, rank + 1):
+                k = np.arange(-j, j + 1)
+                j_up = j + rise
+                closes = j_up >= 0 and j + j_up >= rank
+                exists = closes & (np.abs(k + q) <= j_up)
+                sign = np.where((j_up - k - q) % 2, -1.0, 1.0)
+                expected = np.array(
+                    [
+                        s * np.sqrt((2 * j_up + 1) * (2 * j + 1)) * float(three_j(j_up, rank, j, -kk - q, q, kk))
+                        if e
+                        else 0.0
+                        for kk, s, e in zip(k, sign, exists, strict=True)
+                    ]
+                )
+                assert coupling_to(j, rise, rank, q, k) == pytest.approx(expected, abs=1e-13), (rank, rise, q)

@@ -266,6 +266,7 @@ def _single_hydrogens(molecule: Molecule, bonds: Sequence[Ints]) -> dict[int, tu
 def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit:
     """Internal rotation of the group with the lowest V3/F; an upper bound if no barrier of a similar molecule is known."""
     from rotor.quantum.estimates.internal_rotation import line_shifts
+    from rotor.quantum.estimates.methyl_groups import are_computed
 
     what = "a methyl group turns" if len(groups) == 1 else f"{len(groups)} methyl groups turn"
     unknown = [group.rotor.f_mhz for group in groups if group.barrier is None]
@@ -275,7 +276,9 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
     least = min(groups, key=lambda group: group.rotor.barrier_mhz / group.rotor.f_mhz)
     here = min(j, HIGHEST_J)
     shifts = line_shifts(top.rotational_constants_mhz, least.rotor, here)
-    return Limit("internal rotation", *_rotor_text(top, what, least, shifts, here))
+    size, text = _rotor_text(top, what, least, shifts, here)
+    computed = top.kind == "asymmetric" and are_computed(groups, top.moments_u_angstrom2)
+    return Limit("internal rotation", size, f"{text}; internal rotation 'geometry' computes it" if computed else text)
 
 
 def _rotor_text(top: Top, what: str, group: MethylGroup, shifts: LineShifts, j: int) -> tuple[float, str]:

@@ -36,9 +36,11 @@ from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.molecules.molecule import Molecule
 from rotor.quantum.estimates.internal_rotation import InternalRotor, rotor_of_moments
+from rotor.tops.internal_rotation import MOST_TOPS
 from rotor.units import MHZ_PER_CM
 
 OFF_AXIS = 0.05  # sine of the angle above which an atom counts as off the axis of a methyl group
+IN_PLANE = 1e-3  # share of an axis along c up to which a molecule counts as symmetric about its plane ab
 FLAT_DEGREES = 355.0  # sum of three angles above which a nitrogen counts as flat, here and for inversion
 
 
@@ -114,6 +116,15 @@ def _with_moments(
             )
         )
     return methyls
+
+
+def are_computed(groups: Sequence[MethylGroup], moments: Sequence[float]) -> bool:
+    """Whether levels can be computed from the geometry: of one group with its axis in the plane ab, or of up to three; with barriers."""
+    axes = np.array([group.rotor.rho for group in groups]) * moments  # λ_g I_α
+    in_plane = abs(axes[0, 2]) <= IN_PLANE * float(np.linalg.norm(axes[0]))
+    return (in_plane if len(groups) == 1 else len(groups) <= MOST_TOPS) and all(
+        group.rotor.barrier_mhz for group in groups
+    )
 
 
 def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Barrier | None:

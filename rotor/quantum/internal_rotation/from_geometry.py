@@ -17,14 +17,13 @@ from rotor.molecules.bonds import bonded_atoms
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.operations import Operation
 from rotor.quantum.bond_torsion import potential_of_scan
-from rotor.quantum.estimates.methyl_groups import MethylGroup, methyl_groups
+from rotor.quantum.estimates.methyl_groups import IN_PLANE, MethylGroup, methyl_groups
 from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION
 from rotor.quantum.reductions import to_representation
 from rotor.tops.internal_rotation import COUNTED, MOST_TOPS, PAIRS, InternalRotationConstants, values_and_settings
 from rotor.tops.top import Top
 
 F0_ERROR = 0.02  # of F0 from a geometry, relative
-IN_PLANE = 1e-3  # share of the top's axis along c up to which a molecule counts as symmetric about its plane ab
 
 
 def with_internal_rotation(top: Top, calculator: Any = None, given: str = "") -> Top:
