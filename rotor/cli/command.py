@@ -22,7 +22,7 @@ import typer.core
 from rotor.checks import NoAnswerError
 from rotor.cli import process
 from rotor.cli.process import HELD, at_end
-from rotor.cli.shared_options import MOST_WORKERS, PLOT_NAMES, picture_fields, picture_settings, picture_style, working
+from rotor.cli.shared_options import MOST_WORKERS, PLOT_NAMES, picture_fields, picture_settings, picture_style
 from rotor.reports.screen import show_parts
 from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, Field
 from rotor.requests.fill import Entries, naming, within
@@ -323,6 +323,8 @@ def processes(verb: Verb, workers: Any) -> Any:
     """The executor of --workers; None for a verb without this option."""
     if not verb.workers:
         return nullcontext()
+    from rotor.cli.workers import working  # loads concurrent.futures
+
     with within("--workers"):
         return working(Whole(1, MOST_WORKERS).read(workers), verb.workers.split()[0])
 

@@ -1,17 +1,14 @@
-"""Options that several commands share: those of the picture, the processes of --workers, a scene file."""
+"""Options that several commands share: those of the picture, a scene file."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import Executor, Future
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
 from rotor.plots.view import View
-from rotor.reports.progress import progress_bar
 from rotor.requests.field import PICTURE, REQUIRED, Field, declared
 from rotor.requests.fill import naming
 from rotor.requests.readers import Custom, Range, Reader, Text
@@ -67,58 +64,6 @@ def picture_style(typed: Mapping[str, Any]) -> Iterator[None]:
             with naming(picture_fields().values(), "option"):
                 stack.enter_context(users_style(typed["style"]))
         yield
-
-
-@contextmanager
-def working(workers: int, what: str) -> Iterator[Executor | None]:
-    """An executor with a bar on standard error; None for one worker without a terminal."""
-    terminal = sys.stderr.isatty()
-    if workers == 1:
-        with progress_bar(what) if terminal else _nothing() as advance:
-            yield Counted(None, advance) if advance else None
-        return
-    from rotor.scenes.worker_processes import worker_processes
-
-    with worker_processes(workers) as pool, progress_bar(what) if terminal else _nothing() as advance:
-        yield Counted(pool, advance)
-
-
-@contextmanager
-def _nothing() -> Iterator[None]:
-    yield None
-
-
-class Counted(Executor):
-    """An executor, or this process if it is None, that reports the number of finished pieces of a `map`."""
-
-    def __init__(self, pool: Executor | None, advance: Callable[[int, int], object] | None) -> None:
-        self._pool, self._advance = pool, advance
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """One call, in the pool or at once."""
-        if self._pool is not None:
-            return self._pool.submit(fn, *args, **kwargs)
-        future: Future[Any] = Future()
-        try:
-            future.set_result(fn(*args, **kwargs))
-        except Exception as error:
-            future.set_exception(error)
-        return future
-
-    def map(
-        self, fn: Callable[..., Any], *iterables: Iterable[Any], timeout: float | None = None, chunksize: int = 1
-    ) -> Iterator[Any]:
-        """`map` of all pieces in order."""
-        pieces = list(zip(*iterables, strict=False))
-        results = (
-            self._pool.map(fn, *zip(*pieces, strict=True), timeout=timeout, chunksize=chunksize)
-            if self._pool is not None and pieces
-            else (fn(*piece) for piece in pieces)
-        )
-        for done, result in enumerate(results, 1):
-            if self._advance is not None:
-                self._advance(done, len(pieces))
-            yield result
 
 
 @dataclass(frozen=True)

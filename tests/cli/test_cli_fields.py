@@ -11,7 +11,7 @@ import pytest
 import rotor
 from rotor.alignment.pulse import GaussianPulse, Kick
 from rotor.alignment.request import AlignRequest, answer_align
-from rotor.cli.shared_options import Counted, working
+from rotor.cli.workers import Counted, working
 from rotor.formats import read
 from rotor.quantum.effects.stark import StarkRequest, answer_stark
 from rotor.quantum.effects.zeeman import ZeemanRequest, answer_zeeman

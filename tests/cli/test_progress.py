@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from rotor.cli.shared_options import working
+from rotor.cli.workers import working
 from rotor.reports import progress
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.scenes.scene import make_scene, write_scene

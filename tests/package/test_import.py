@@ -59,7 +59,7 @@ def test_public_names_exist():
 
 NOT_FOR_SHORT_COMMANDS = (
     "scipy.linalg", "scipy.stats", "scipy.special", "numba", "polars", "pandas", "duckdb", "pydantic", "rdkit", "ase", "matplotlib",
-    "qutip",
+    "qutip", "concurrent.futures",
 )  # fmt: skip
 LIST_TO_J60 = [
     "spectrum",
