@@ -13,7 +13,7 @@ from rotor import units
 from rotor.molecules.bond_rotation import BondRotation
 from rotor.molecules.bond_scan import BondScan, relaxed_scan
 from rotor.molecules.bonds import bonded_atoms
-from rotor.quantum.bond_torsion import FourierSeries, most_harmonics, potential_of_scan
+from rotor.quantum.bond_torsion import FourierSeries, potential_of_scan
 from rotor.quantum.torsion import TorsionalPotential
 from rotor.requests.fill import within
 
@@ -48,7 +48,6 @@ def potential_and_kinetic(
     with within("potential"):
         scan = relaxed_scan(rotation, stated, points=points, progress=progress)
     period = rotation.symmetry_number(isotopes=False)
-    harmonics = most_harmonics(scan.angles, period)
     potential = potential_of_scan(scan, rotation)
     misfit = np.sqrt(np.mean((potential.values(scan.angles) / units.MHZ_PER_CM - scan.energies_cm) ** 2))
     moments = np.array([rotation.reduced_moment(x) for x in scan.positions_angstrom])
@@ -57,7 +56,7 @@ def potential_and_kinetic(
     if symmetry != period:
         return potential, _rigid_kinetic(rotation, points), scan.source, scan, float(misfit)
     kinetic = FourierSeries.fitted(
-        scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, harmonics, rotation.mirror_angle()
+        scan.angles, units.ROTATIONAL_MHZ_U_ANGSTROM2 / moments, period, len(potential.n), rotation.mirror_angle()
     )
     return potential, kinetic, scan.source, scan, float(misfit)
 

@@ -253,9 +253,8 @@ class TorsionAnswer(TextOf):
     @cached_property
     def errors(self) -> ErrorBudget:
         """Error budget of the level energies."""
-        count, fold = self.request.vmax + 1, self.torsion.fold
-        smaller = [self.torsion.states(species, max(3 * self.waves // 4, fold))[0][:count] for species in range(fold)]
-        larger = [self.torsion.states(species, self.waves)[0][:count] for species in range(fold)]
+        smaller = self._species_levels(self.torsion, max(3 * self.waves // 4, self.torsion.fold))
+        larger = self._species_levels(self.torsion, self.waves)
         size = min(map(len, smaller))
         change = max(float(np.abs(a[:size] - b[:size]).max()) for a, b in zip(smaller, larger, strict=True))
         largest = float(self.torsion.kinetic.values(np.zeros(1))[0]) * self.waves**2 + self.torsion.barrier_mhz
@@ -269,12 +268,12 @@ class TorsionAnswer(TextOf):
                 f"functions up to m = {self.waves}, from three quarters of them, and terms of the Fourier series",
             ),
             ErrorTerm(None, "coupling with other vibrations and with the rotation of the whole"),
-            self._error_of_potential(),
+            self._error_of_potential(larger),
             ErrorTerm(0.0, "nothing is sampled"),
         )
 
-    def _error_of_potential(self) -> ErrorTerm:
-        """The shift of levels above the lowest one by one standard deviation of the potential, where that is known."""
+    def _error_of_potential(self, levels: list[Floats]) -> ErrorTerm:
+        """The shift of levels (of each species) above the lowest one by one standard deviation of the potential, where that is known."""
         if self.scan is not None:
             relative, why, hint = self.scan.relative_error, self.scan.doubt, "measured levels or a better calculator"
             unknown = "the error of the scanned energies is not known"
@@ -286,13 +285,13 @@ class TorsionAnswer(TextOf):
             return ErrorTerm(None, unknown, hint)
         potential = self.torsion.potential
         changed = replace(potential, cosines=potential.cosines * (1 + relative), sines=potential.sines * (1 + relative))
-        shift = self._above_lowest(replace(self.torsion, potential=changed)) - self._above_lowest(self.torsion)
-        return ErrorTerm(float(np.abs(shift).max()), f"levels above the lowest, {why}", hint)
+        other = self._species_levels(replace(self.torsion, potential=changed), self.waves)
+        shifts = [(new - other[0][0]) - (old - levels[0][0]) for new, old in zip(other, levels, strict=True)]
+        return ErrorTerm(float(np.abs(np.concatenate(shifts)).max()), f"levels above the lowest, {why}", hint)
 
-    def _above_lowest(self, torsion: BondTorsion) -> Floats:
-        """Levels up to vmax of each species above the lowest one, MHz."""
-        levels = [torsion.states(species, self.waves)[0][: self.request.vmax + 1] for species in range(torsion.fold)]
-        return np.asarray(np.concatenate(levels) - levels[0][0])
+    def _species_levels(self, torsion: BondTorsion, waves: int) -> list[Floats]:
+        """Levels up to vmax of each species, MHz above the foot of the potential."""
+        return [torsion.states(species, waves)[0][: self.request.vmax + 1] for species in range(torsion.fold)]
 
     def facts(self) -> dict[str, Any]:
         """Facts of the answer except its tables, by the keys of docs/verbs."""

@@ -120,11 +120,18 @@ def _with_moments(
 
 def are_computed(groups: Sequence[MethylGroup], moments: Sequence[float]) -> bool:
     """Whether levels can be computed from the geometry: of one group with its axis in the plane ab, or of up to three; with barriers."""
-    axes = np.array([group.rotor.rho for group in groups]) * moments  # λ_g I_α
-    in_plane = abs(axes[0, 2]) <= IN_PLANE * float(np.linalg.norm(axes[0]))
-    return (in_plane if len(groups) == 1 else len(groups) <= MOST_TOPS) and all(
-        group.rotor.barrier_mhz for group in groups
-    )
+    possible = in_plane(axes_of(groups, moments)) if len(groups) == 1 else len(groups) <= MOST_TOPS
+    return possible and all(group.rotor.barrier_mhz for group in groups)
+
+
+def axes_of(groups: Sequence[MethylGroup], moments: Sequence[float]) -> Floats:
+    """λ_g I_α (groups, 3) of the axes along a, b, c, from ρ_g = λ_g I_α/I_g and the moments I_g."""
+    return np.array([group.rotor.rho for group in groups]) * moments
+
+
+def in_plane(axes: Floats) -> bool:
+    """Whether axes (n, 3) of any length lie in the plane ab."""
+    return bool((np.abs(axes[:, 2]) <= IN_PLANE * np.linalg.norm(axes, axis=1)).all())
 
 
 def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Barrier | None:

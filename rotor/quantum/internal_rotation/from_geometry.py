@@ -17,7 +17,7 @@ from rotor.molecules.bonds import bonded_atoms
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.operations import Operation
 from rotor.quantum.bond_torsion import potential_of_scan
-from rotor.quantum.estimates.methyl_groups import IN_PLANE, MethylGroup, methyl_groups
+from rotor.quantum.estimates.methyl_groups import MethylGroup, axes_of, in_plane, methyl_groups
 from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION
 from rotor.quantum.reductions import to_representation
 from rotor.tops.internal_rotation import COUNTED, MOST_TOPS, PAIRS, InternalRotationConstants, values_and_settings
@@ -63,9 +63,11 @@ def with_internal_rotation(top: Top, calculator: Any = None, given: str = "") ->
     errors = {name: F0_ERROR * value for name, value in constants.items() if name.startswith("F0")}
     origins: dict[str, list[str]] = {}
     alike = exchange is not None and values.get("V3_1") == values.get("V3_2")
-    for number, group in zip(numbers, groups, strict=True):
-        if not (alike and origins):
-            barriers, error, origin = _barriers(top, group, calculator, values.get(f"V3{number}"))
+    solved = groups[:1] if alike else groups
+    potentials = [
+        _barriers(top, group, calculator, values.get(f"V3{n}")) for n, group in zip(numbers, solved, strict=False)
+    ]
+    for number, (barriers, error, origin) in zip(numbers, potentials * (2 if alike else 1), strict=True):
         constants |= {f"{name}{number}": value for name, value in barriers.items()}
         errors |= {f"{name}{number}": error * abs(value) for name, value in barriers.items() if error}
         origins.setdefault(origin, []).append(f"V3{number}")
@@ -105,7 +107,7 @@ def _kinetic_constants(
     top: Top, groups: Sequence[MethylGroup], numbers: Sequence[str], exchange: Operation | None
 ) -> dict[str, float]:
     """F0 (MHz), delta and, of several groups, epsilon (radians) of each; equal constants of groups that a rotation exchanges."""
-    cosines = np.array([group.rotor.rho for group in groups]) * np.array(top.moments_u_angstrom2)  # λ_g I_α
+    cosines = axes_of(groups, top.moments_u_angstrom2)
     if exchange is not None:
         turn = _turn_in_principal_axes(top, exchange)
         first = 0.5 * (cosines[0] + turn @ cosines[1])
@@ -116,7 +118,7 @@ def _kinetic_constants(
         f"F0{number}": units.ROTATIONAL_MHZ_U_ANGSTROM2 / norm
         for number, norm in zip(numbers, norms.tolist(), strict=True)
     }
-    planar = bool(np.abs(directions[:, 2]).max() <= IN_PLANE)
+    planar = in_plane(cosines)
     if not planar and len(groups) == 1:
         raise ValueError(
             f"internal rotation of {top.name or 'this top'}: the axis of the methyl group is {directions[0, 2]:.3g} out of the plane ab; "

@@ -105,7 +105,7 @@ def test_levels_and_strengths_of_l_doubled_states_are_those_of_full_matrices(pai
 
 @pytest.mark.parametrize("code", [1000001, 1040001, 10010001, 10000001, 10610010])
 def test_spin_terms_between_states_with_other_ranges_of_k(code):
-    """The functions of both states have to be told apart by K, not by their places in a block."""
+    """The functions of both states have to be distinguished by K, not by their places in a block."""
     parameters = [(typ + v, size) for v in (0, 11) for typ, size in RIGID]
     moments = [Moment((v, v), 0, axis, 1.0) for v, axis in ((0, 1), (1, 3))]
     for ranges in (("0 20", "1 1"), ("1 2", "0 20")):
