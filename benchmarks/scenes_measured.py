@@ -24,7 +24,7 @@ from pathlib import Path
 from rotor.scenes.accuracy_sweep import Row, WorkPrecision, work_precision
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import Scene, read_scene
-from rotor.thermodynamics.gas_numerics import quantile
+from rotor.thermodynamics.gas.numerics import quantile
 
 ROOT = Path(__file__).resolve().parents[1]
 SCENES, RESULTS = ROOT / "examples" / "scenes", ROOT / "benchmarks" / "results" / "scenes_measured.json"

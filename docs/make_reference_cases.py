@@ -24,7 +24,7 @@ from rotor.formats.spcat.text.catalogue import Catalogue
 from rotor.formats.spcat.text.egy import read_egy
 from rotor.formats.spcat.text.par import read_par
 from rotor.quantum.solve import solve_levels
-from rotor.thermodynamics import PartitionFunction, partition_function
+from rotor.thermodynamics.sums.partition import PartitionFunction, partition_function
 from rotor.units import MHZ_PER_CM, MHZ_PER_K
 
 PAGE = Path(__file__).with_name("validation") / "reference_cases.md"

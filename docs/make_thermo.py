@@ -14,15 +14,10 @@ import numpy as np
 
 import rotor
 from rotor.plots.heat_capacity import Panel, Points, curve_temperatures, picture
-from rotor.thermodynamics import (
-    GAS_CONSTANT,
-    ThermoFunctions,
-    VibrationalStates,
-    classical_above_k,
-    classical_limit,
-    rotational_temperatures_k,
-    thermodynamic_functions,
-)
+from rotor.thermodynamics.functions import GAS_CONSTANT, ThermoFunctions, thermodynamic_functions
+from rotor.thermodynamics.sums.classical_limit import classical_limit, rotational_temperatures_k
+from rotor.thermodynamics.sums.classical_onset import classical_above_k
+from rotor.thermodynamics.vibration import VibrationalStates
 from rotor.tops.top import Top
 
 PAGE = Path(__file__).with_name("validation") / "thermo.md"

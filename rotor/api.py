@@ -220,16 +220,16 @@ if TYPE_CHECKING:  # `modules` reads these lines: they declare the names of this
     from rotor.structures.family import family as family
     from rotor.structures.least_squares import fit_structure as fit_structure
     from rotor.structures.substitution import substitution_structure as substitution_structure
-    from rotor.thermodynamics import GAS_CONSTANT as GAS_CONSTANT
-    from rotor.thermodynamics import VibrationalStates as VibrationalStates
-    from rotor.thermodynamics import partition_function as partition_function
-    from rotor.thermodynamics import thermodynamic_functions as thermodynamic_functions
-    from rotor.thermodynamics.classical_gas import GasRequest as GasRequest
-    from rotor.thermodynamics.classical_gas import answer_gas as answer_gas
-    from rotor.thermodynamics.field_mixture import field_mixture as field_mixture
+    from rotor.thermodynamics.functions import GAS_CONSTANT as GAS_CONSTANT
+    from rotor.thermodynamics.functions import thermodynamic_functions as thermodynamic_functions
+    from rotor.thermodynamics.gas.classical_gas import GasRequest as GasRequest
+    from rotor.thermodynamics.gas.classical_gas import answer_gas as answer_gas
+    from rotor.thermodynamics.gas.field_mixture import field_mixture as field_mixture
+    from rotor.thermodynamics.gas.thermal_tumble import thermal_tumble as thermal_tumble
     from rotor.thermodynamics.request import ThermoRequest as ThermoRequest
     from rotor.thermodynamics.request import answer_thermo as answer_thermo
-    from rotor.thermodynamics.thermal_tumble import thermal_tumble as thermal_tumble
+    from rotor.thermodynamics.sums.partition import partition_function as partition_function
+    from rotor.thermodynamics.vibration import VibrationalStates as VibrationalStates
     from rotor.tops.internal_rotation import InternalRotationConstants as InternalRotationConstants
     from rotor.tops.isotopes.isotopologues import isotopologue as isotopologue
     from rotor.tops.isotopes.isotopologues import isotopologues as isotopologues

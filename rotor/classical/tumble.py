@@ -1,7 +1,7 @@
 """Request and answer for the free rotation of a rigid body: the exact motion, its table, its stability.
 
 Moments and angular momentum are the exact data of the motion. For a given angular velocity use
-`TumbleRequest.from_angular_velocity`, for a molecule `rotor.thermodynamics.thermal_tumble`.
+`TumbleRequest.from_angular_velocity`, for a molecule `rotor.thermodynamics.gas.thermal_tumble`.
 """
 
 from __future__ import annotations

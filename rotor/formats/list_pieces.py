@@ -25,8 +25,8 @@ from rotor.quantum.spins.scheme import scheme_of
 from rotor.spectra.intensity import highest_j, intensity_cut
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import all_transitions, spin_functions, transition_count
-from rotor.thermodynamics import PartitionFunction
-from rotor.thermodynamics.trusted_levels import are_trusted
+from rotor.thermodynamics.sums.partition import PartitionFunction
+from rotor.thermodynamics.sums.trusted_levels import are_trusted
 from rotor.tops.top import Top
 
 BATCH = 1 << 18  # lines of a piece in one file, and lines that are converted into text at once

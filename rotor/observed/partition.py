@@ -123,7 +123,7 @@ def top_partition(top: Top, temperatures_k: Sequence[float] = SUMMED_K) -> Parti
     >>> round(table.at(300.0), 2)
     108.79
     """
-    from rotor.thermodynamics.partition import partition_function
+    from rotor.thermodynamics.sums.partition import partition_function
 
     sums = partition_function(top, list(temperatures_k), refuse=False)
     selected = [(value.temperature_k, value.q) for value in sums if value.relative_error < 1e-3]

@@ -24,7 +24,7 @@ from rotor.plots.picture import (
 from rotor.plots.view import WHOLE, View, show_part
 from rotor.spectra.spectrum import Spectrum
 from rotor.statistics.equipartition import Equipartition
-from rotor.thermodynamics.classical_gas import GasAnswer
+from rotor.thermodynamics.gas.classical_gas import GasAnswer
 from rotor.units import MHZ_PER_CM
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rotor.plots.picture import PALETTE, SIZE_INCHES, WIDTH_INCHES, Picture, new_figure, styled, top_title
 from rotor.plots.view import WHOLE, View, show_part
-from rotor.thermodynamics import ThermoFunctions
+from rotor.thermodynamics.functions import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer, answer_thermo
 from rotor.version import version
 

@@ -9,7 +9,7 @@ import numpy as np
 from rotor import units
 from rotor.plots.picture import GREY, PALETTE, SIZE_INCHES, Picture, new_figure, styled, top_title
 from rotor.plots.view import WHOLE, View, show_part
-from rotor.thermodynamics.torsion_request import TorsionAnswer
+from rotor.thermodynamics.torsion.request import TorsionAnswer
 from rotor.version import version
 
 POINTS = 721

@@ -28,7 +28,7 @@ from rotor.quantum.estimates.splittings import depth_lost, splitting_nuclei
 from rotor.requests.budget import ROUNDING, ErrorBudget, ErrorTerm
 from rotor.spectra.emission import KM_PER_S, contrast_k
 from rotor.spectra.emitters import CatalogueLines
-from rotor.thermodynamics.classical_limit import populated_j
+from rotor.thermodynamics.sums.classical_limit import populated_j
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

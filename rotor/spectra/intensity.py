@@ -24,7 +24,7 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.levels import Levels
 
 if TYPE_CHECKING:
-    from rotor.thermodynamics.partition import PartitionFunction
+    from rotor.thermodynamics.sums.partition import PartitionFunction
     from rotor.tops.top import Top
 
 LGINT_NM2_MHZ = 4.16231e-5  # 8π³/3hc for MHz and D² as catalogues use it; for LGINT only

@@ -48,8 +48,9 @@ from rotor.spectra.intensity import (
 )
 from rotor.spectra.transitions import all_transitions
 from rotor.table import counted
-from rotor.thermodynamics import PartitionFunction, VibrationalStates, partition_function
-from rotor.thermodynamics.trusted_levels import are_trusted, in_level_table
+from rotor.thermodynamics.sums.partition import PartitionFunction, partition_function
+from rotor.thermodynamics.sums.trusted_levels import are_trusted, in_level_table
+from rotor.thermodynamics.vibration import VibrationalStates
 from rotor.tops.covariance import Covariance
 from rotor.tops.facts import without_constants
 
@@ -315,7 +316,7 @@ def line_list(
     sort : bool, optional
         Whether to sort by frequency; False leaves the lines in the order of computation.
     untrusted : bool, optional
-        Include lines of levels beyond the reach of the distortion constants (`rotor.thermodynamics.trusted_levels`); by
+        Include lines of levels beyond the reach of the distortion constants (`rotor.thermodynamics.sums.trusted_levels`); by
         default these are left out and counted.
     effects : sequence of QuantumEffect, optional
         The Hamiltonian.

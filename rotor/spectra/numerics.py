@@ -90,7 +90,7 @@ def _spectrum_jmax(request: Any) -> tuple[int, str]:
     """J max of a line list, and the reason."""
     from rotor.spectra import intensity
     from rotor.spectra.lines import line_partition
-    from rotor.thermodynamics import partition_function
+    from rotor.thermodynamics.sums.partition import partition_function
 
     if request.jmax is not None:
         return request.jmax, "given"
@@ -152,7 +152,7 @@ LENGTH = Growth(
 
 def describe_spectrum(request: Any, _: Cost) -> dict[str, Any]:
     """What a line list does."""
-    from rotor.thermodynamics.classical_limit import populated_j
+    from rotor.thermodynamics.sums.classical_limit import populated_j
 
     top, kelvin = request.top, request.temperature_k
     jmax, why = _spectrum_jmax(request)
@@ -178,7 +178,7 @@ def describe_spectrum(request: Any, _: Cost) -> dict[str, Any]:
 
 def describe_raman(request: Any, cost: Cost) -> dict[str, Any]:
     """What Raman lines are, with J max of the answer."""
-    from rotor.thermodynamics.classical_limit import populated_j
+    from rotor.thermodynamics.sums.classical_limit import populated_j
 
     top, answer, jmax = request.top, cost.answer, cost.answer.lines.jmax
     parts = (("J max", f"{jmax}: {answer.jmax_source}"), *level_parts(top, jmax, request.effects))
@@ -210,7 +210,7 @@ RAMAN = _line_numerics(
 
 def describe_emission(request: Any, cost: Cost) -> dict[str, Any]:
     """What a source does."""
-    from rotor.thermodynamics.classical_limit import populated_j
+    from rotor.thermodynamics.sums.classical_limit import populated_j
     from rotor.tops.top import Top
 
     answer, effects = cost.answer, list[str]()

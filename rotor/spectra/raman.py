@@ -31,7 +31,8 @@ from rotor.quantum.solve import solve_levels
 from rotor.spectra.intensity import JMAX_DEFAULT_LIMIT
 from rotor.spectra.lines import line_partition
 from rotor.spectra.raman_strengths import RamanTransitions, anisotropy_squared, raman_transitions
-from rotor.thermodynamics import PartitionFunction, VibrationalStates, partition_function
+from rotor.thermodynamics.sums.partition import PartitionFunction, partition_function
+from rotor.thermodynamics.vibration import VibrationalStates
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

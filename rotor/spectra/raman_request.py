@@ -33,9 +33,9 @@ from rotor.spectra.raman import (
     raman_lines,
 )
 from rotor.table import TextOf
-from rotor.thermodynamics import VibrationalStates
-from rotor.thermodynamics.classical_limit import populated_j
-from rotor.thermodynamics.partition_table import partition_facts
+from rotor.thermodynamics.sums.classical_limit import populated_j
+from rotor.thermodynamics.sums.partition_table import partition_facts
+from rotor.thermodynamics.vibration import VibrationalStates
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.facts import top_facts
 

@@ -30,9 +30,9 @@ from rotor.spectra.intensity import USUAL_CUT, largest
 from rotor.spectra.intensity_accuracy import cut_knob
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
 from rotor.table import TextOf
-from rotor.thermodynamics import VibrationalStates
-from rotor.thermodynamics.classical_limit import populated_j
-from rotor.thermodynamics.partition_table import partition_facts
+from rotor.thermodynamics.sums.classical_limit import populated_j
+from rotor.thermodynamics.sums.partition_table import partition_facts
+from rotor.thermodynamics.vibration import VibrationalStates
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.covariance import Covariance
 from rotor.tops.facts import top_facts, without_constants
@@ -339,7 +339,7 @@ def _expected_q(lines: Lines) -> tuple[float, bool] | None:
     and n the number of spin functions; with three equivalent nuclei a third of n, since one in three exists with a function of the
     rotation. Constants of the other states, couplings and splittings change Q far less than the tenth that gives a note.
     """
-    from rotor.thermodynamics import partition_function
+    from rotor.thermodynamics.sums.partition import partition_function
 
     top, effects, kelvin = lines.top, lines.levels.effects, lines.temperature_k
     state_effects = [effect for effect in effects if effect.states(top)]

@@ -1,6 +1,6 @@
 """Thermodynamic functions of a gas of tops: rotation by the quantum sum and classically, vibration, and the ideal gas.
 
-Rotation, from the sums of `rotor.thermodynamics.level_sums`: U = RT ⟨x⟩, S = R ln Q + U/T, C_v. Energies of all species count from the
+Rotation, from the sums of `rotor.thermodynamics.sums.level_sums`: U = RT ⟨x⟩, S = R ln Q + U/T, C_v. Energies of all species count from the
 lowest existing level of the molecule, so that ortho hydrogen has the 1.42 kJ/mol of its lowest level at 0 K.
 
 Species with a frozen ratio x_s are a mixture of gases: U and C_v are means, and ln q = Σ x_s ln(q_s/x_s), which contains the entropy of
@@ -31,10 +31,10 @@ from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.table import Table
-from rotor.thermodynamics.classical_limit import classical_limit
 from rotor.thermodynamics.electronic import ElectronicStates, electronic_states
-from rotor.thermodynamics.level_sums import LevelSums, Progress, checked_temperatures, level_sums, lowest_level_k
-from rotor.thermodynamics.species import implied_symmetry_number, spin_species
+from rotor.thermodynamics.sums.classical_limit import classical_limit
+from rotor.thermodynamics.sums.level_sums import LevelSums, Progress, checked_temperatures, level_sums, lowest_level_k
+from rotor.thermodynamics.sums.species import implied_symmetry_number, spin_species
 from rotor.thermodynamics.vibration import VibrationalStates, vibrational_functions
 from rotor.tops.spins.spin_weights import SpinWeights
 
@@ -175,7 +175,7 @@ def thermodynamic_functions(
     relative_error : largest error of Q, U and C_v. It can be exceeded, up to 10 %, if levels beyond the range of the distortion
         constants are populated; `ThermoFunctions.relative_error` is the error reached.
     progress : called as `progress(j, last)` during a long sum.
-    effects : effects in the Hamiltonian; with spins Q counts their functions, see `rotor.thermodynamics.spin_sums`.
+    effects : effects in the Hamiltonian; with spins Q counts their functions, see `rotor.thermodynamics.sums.spin_sums`.
 
     Returns
     -------
@@ -262,8 +262,8 @@ def _with_spins(
 ) -> ThermoFunctions:
     """The functions of rotation with spins."""
     from rotor.quantum.hyperfine_method import EXACT, HyperfineMethod
-    from rotor.thermodynamics.spin_factor import spin_functions
-    from rotor.thermodynamics.spin_sums import spin_sums
+    from rotor.thermodynamics.sums.spin_factor import spin_functions
+    from rotor.thermodynamics.sums.spin_sums import spin_sums
 
     refuse_species_with_totals(top, species, effects)
     spin_result = spin_sums(top, list(parts.values()), temperatures, relative_error, effects, progress)
@@ -287,7 +287,7 @@ def _rotation(
     effects: tuple[QuantumEffect, ...] = SEMI_RIGID,
 ) -> ThermoFunctions:
     """The functions of rotation, including spins if the effects contain them."""
-    from rotor.thermodynamics.spin_factor import spin_functions
+    from rotor.thermodynamics.sums.spin_factor import spin_functions
 
     ground_k, temperatures = lowest_level_k(top, [top.spin_weights], effects)[0], sums[0].temperatures_k
     shares = np.array(list(fractions.values()) or [1.0])

@@ -18,8 +18,8 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import OBSERVABLES, check_fields, declared
 from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.table import Table
-from rotor.thermodynamics.classical_limit import populated_j
-from rotor.thermodynamics.partition_table import partition_table
+from rotor.thermodynamics.sums.classical_limit import populated_j
+from rotor.thermodynamics.sums.partition_table import partition_table
 from rotor.tops.constants_budget import constants_budget
 from rotor.tops.facts import top_facts
 from rotor.tops.top import Top

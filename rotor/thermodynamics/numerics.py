@@ -9,7 +9,7 @@ from rotor.quantum.estimates.plans import plan_fields
 from rotor.requests.knob import Knob
 from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut
-from rotor.thermodynamics.classical_limit import populated_j
+from rotor.thermodynamics.sums.classical_limit import populated_j
 
 TEMPERATURES = Knob(
     key="conditions.temperature",
@@ -58,7 +58,7 @@ def describe_torsion(request: Any, cost: Cost) -> dict[str, Any]:
 
 def _has_potential(request: Any) -> bool:
     """Whether nothing can be chosen, since without a scan the basis follows from the energies."""
-    from rotor.thermodynamics.torsion_potential import is_scan
+    from rotor.thermodynamics.torsion.potential import is_scan
 
     return not is_scan(request.potential)
 

@@ -18,8 +18,6 @@ from rotor.requests.field import check_fields, declared
 from rotor.requests.knob import Knob, Measure
 from rotor.requests.readers import Custom, Grid, Quantity, Text
 from rotor.table import TextOf
-from rotor.thermodynamics.classical_limit import classical_limit, populated_j, rotational_temperatures_k
-from rotor.thermodynamics.classical_onset import classical_above_if_known
 from rotor.thermodynamics.electronic import ElectronicStates
 from rotor.thermodynamics.functions import (
     ThermoFunctions,
@@ -28,7 +26,9 @@ from rotor.thermodynamics.functions import (
     species_names,
     thermodynamic_functions,
 )
-from rotor.thermodynamics.level_sums import Progress
+from rotor.thermodynamics.sums.classical_limit import classical_limit, populated_j, rotational_temperatures_k
+from rotor.thermodynamics.sums.classical_onset import classical_above_if_known
+from rotor.thermodynamics.sums.level_sums import Progress
 from rotor.thermodynamics.vibration import VibrationalStates
 from rotor.thermodynamics.vibration_input import vibrations_field
 from rotor.tops.facts import top_facts

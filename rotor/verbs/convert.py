@@ -202,7 +202,7 @@ def _intensities(top: Top, highest: int) -> IntensityFile:
     from rotor.formats.spcat.model import intensity_file
     from rotor.formats.spcat.text.int_file import Request
     from rotor.quantum.effects.of_top import effects_of
-    from rotor.thermodynamics import partition_function
+    from rotor.thermodynamics.sums.partition import partition_function
 
     count = top.states.count if top.states else 1
     q = partition_function(top, 300.0, effects=effects_of(top, bool(top.spin_constants))).q

@@ -219,7 +219,7 @@ def _facts(answer: EmissionAnswer) -> list[tuple[str, str]]:
 def _limits(answer: EmissionAnswer, with_spins: str) -> list[tuple[str, str]]:
     """Neglected effects: of the source, and the largest of each molecule; of many molecules, those of the largest."""
     from rotor.quantum.estimates.limits import model_limits
-    from rotor.thermodynamics.classical_limit import populated_j
+    from rotor.thermodynamics.sums.classical_limit import populated_j
 
     request, largest = answer.request, []
     for name, top, source, lines in zip(request.names, request.molecules, request.sources, answer.emitted, strict=True):

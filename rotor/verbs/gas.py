@@ -13,7 +13,7 @@ from rotor.reports import top_facts
 from rotor.reports.progress import counting
 from rotor.reports.screen import Table, record_table, sampled
 from rotor.requests.fill import Entries
-from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
+from rotor.thermodynamics.gas.classical_gas import GasAnswer, GasRequest, answer_gas, settling_times_ps
 from rotor.verbs.molecule import NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Report, picture, tables
 from rotor.verbs.subjects import OneMolecule
@@ -113,7 +113,7 @@ VERB = Verb(
     scaled=False,
     adapt=adapt,
     invariants="conserved",
-    numerics="rotor.thermodynamics.gas_numerics:GAS",
+    numerics="rotor.thermodynamics.gas.numerics:GAS",
     accuracy="of temperature (K), heat capacity (%), or of C1 and C2 where times are given (%)",
     accuracy_example="1 K",
     start={"molecule": "water", "conditions.temperature": "300 K", "outputs.csv": "gas.csv"},

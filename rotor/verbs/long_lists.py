@@ -15,7 +15,7 @@ from rotor.reports.progress import progress_bar
 from rotor.spectra.intensity import highest_j
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.spectra.transitions import TooManyLinesError, spin_functions, transition_count
-from rotor.thermodynamics.partition import PartitionFunction
+from rotor.thermodynamics.sums.partition import PartitionFunction
 
 if TYPE_CHECKING:
     from rotor.formats.streamed_lines import SortedLines

@@ -10,7 +10,7 @@ from rotor.reports import top_facts
 from rotor.reports.progress import sum_progress
 from rotor.reports.screen import Table, record_table, sampled
 from rotor.requests.field import CONDITIONS
-from rotor.thermodynamics import ThermoFunctions
+from rotor.thermodynamics.functions import ThermoFunctions
 from rotor.thermodynamics.request import ThermoAnswer, ThermoRequest, answer_thermo
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT
 from rotor.verbs.outputs import Report, picture, tables

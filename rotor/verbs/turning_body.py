@@ -266,7 +266,7 @@ def _everyday_body(body: NamedBody) -> Body:
     """An everyday body in SI units; its default motion is one turn a second about the intermediate, unstable axis."""
     from rotor.classical.gas.thermal_momentum import off_intermediate_axis
     from rotor.classical.motion import SI
-    from rotor.thermodynamics.thermal_tumble import TILT_DEGREES
+    from rotor.thermodynamics.gas.thermal_tumble import TILT_DEGREES
 
     moments = np.array(body.moments_kg_m2)
     size = TURN_RAD_PER_S * float(np.sort(moments)[1])
@@ -326,7 +326,7 @@ def _motion_of_body(entries: Entries, subject: Subject, start: BodyInput, motion
 
 
 def _motion_of_top(entries: Entries, subject: Subject, start: BodyInput, motion: MotionInput) -> TumbleRequest:
-    from rotor.thermodynamics.thermal_tumble import thermal_tumble
+    from rotor.thermodynamics.gas.thermal_tumble import thermal_tumble
 
     top, times = subject.top, _times(entries, motion, "ps")
     by_velocity = start.angular_velocity is not None

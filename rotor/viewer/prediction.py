@@ -28,7 +28,7 @@ from rotor.quantum.labelled import MissingLevelsError
 from rotor.quantum.quanta import SPECIES_NUMBERS
 from rotor.spectra.intensity import highest_j
 from rotor.spectra.lines import DEFAULT_MIN_LGINT, Lines, line_list
-from rotor.thermodynamics import partition_function
+from rotor.thermodynamics.sums.partition import partition_function
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 from rotor.viewer.records import Species

@@ -113,7 +113,7 @@ def test_info_of_water(call):
 def test_info_marks_the_temperatures_that_are_beyond_the_series(call, monkeypatch):
     import importlib
 
-    sums = importlib.import_module("rotor.thermodynamics.level_sums")
+    sums = importlib.import_module("rotor.thermodynamics.sums.level_sums")
 
     real = sums._summed
 

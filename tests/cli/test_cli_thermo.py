@@ -12,7 +12,9 @@ import pytest
 from places import PROJECT
 
 import rotor
-from rotor.thermodynamics import GAS_CONSTANT, VibrationalStates, partition_function, thermodynamic_functions
+from rotor.thermodynamics.functions import GAS_CONSTANT, thermodynamic_functions
+from rotor.thermodynamics.sums.partition import partition_function
+from rotor.thermodynamics.vibration import VibrationalStates
 
 CONTRACT = PROJECT / "docs" / "verbs" / "thermo.md"
 COLUMNS = [

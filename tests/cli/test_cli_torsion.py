@@ -12,7 +12,7 @@ from places import ORACLES
 import rotor
 from rotor.formats import read
 from rotor.reports.screen import plain, table_records
-from rotor.thermodynamics.torsion_request import TorsionRequest, answer_torsion
+from rotor.thermodynamics.torsion.request import TorsionRequest, answer_torsion
 
 ETHANE = ("torsion", "C2H6", "--bond", "1-2", "--potential", "V3=1013 cm-1")
 

@@ -21,7 +21,7 @@ from rotor.formats.spcat.text.par import format_par, read_par
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
-from rotor.thermodynamics import partition_function
+from rotor.thermodynamics.sums.partition import partition_function
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top

@@ -254,17 +254,17 @@ MUTATIONS = (
         "tests/hard/test_safeguards.py::test_rotation_has_a_temperature_of_its_own",
     ),
     Mutation(
-        20, "rotor/thermodynamics/classical_limit.py",
+        20, "rotor/thermodynamics/sums/classical_limit.py",
         "(middle**3 / 100 + asymmetric_part)", "(middle**3 / 100)",
         "tests/thermodynamics/test_thermo_functions.py::test_the_next_quantum_correction_is_bounded",
     ),
     Mutation(
-        20, "rotor/thermodynamics/level_sums.py",
+        20, "rotor/thermodynamics/sums/level_sums.py",
         "    return np.where(terms == 0, 0.0, np.where(falls, tail, ENDLESS))", "    return 0 * tail",
         "tests/thermodynamics/test_thermo.py::test_error_is_below_what_was_asked",
     ),
     Mutation(
-        20, "rotor/thermodynamics/level_sums.py",
+        20, "rotor/thermodynamics/sums/level_sums.py",
         "        done = errors.max(axis=0) < enough[0]\n", "        done = errors.max(axis=0) < np.inf\n",
         "tests/thermodynamics/test_thermo.py::test_error_is_below_what_was_asked",
     ),
@@ -295,7 +295,7 @@ MUTATIONS = (
         "tests/scenes/test_error_budgets.py::test_the_steps_of_a_fluid_are_counted_about_the_mean",
     ),
     Mutation(
-        20, "rotor/thermodynamics/level_sums.py",
+        20, "rotor/thermodynamics/sums/level_sums.py",
         "        raise OutOfReachError(refusal(t, error, at_worst) + others)", "        return",
         "tests/thermodynamics/test_thermo.py::test_levels_that_distortion_does_not_serve_are_counted_with_their_error",
     ),

@@ -182,7 +182,7 @@ def aligned(seed: int) -> Case:
 
 def torsion(seed: int) -> Case:
     """Torsional levels of ethane with a barrier drawn at random, against three times as many functions."""
-    from rotor.thermodynamics.torsion_request import TorsionRequest, answer_torsion
+    from rotor.thermodynamics.torsion.request import TorsionRequest, answer_torsion
 
     rng = rng_of(10, seed)
     barrier = f"V3={10 ** rng.uniform(0, 4)} V6={rng.uniform(-50, 50)} cm-1"
@@ -312,7 +312,7 @@ def angle_apart(true, computed) -> float:
 
 def gas(seed: int) -> Case:
     """C1 and C2 of a few molecules against the closed form to 50 digits, or their temperature against exact sums, by turns."""
-    from rotor.thermodynamics.classical_gas import GasRequest, answer_gas
+    from rotor.thermodynamics.gas.classical_gas import GasRequest, answer_gas
 
     rng = rng_of(15, seed)
     top, kelvin, count = random_top(rng, linear=0.0), 10 ** rng.uniform(0.5, 3), int(rng.integers(2, 6))

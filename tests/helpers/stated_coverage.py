@@ -25,7 +25,7 @@ def covered(name: str, draws: int = DRAWS) -> np.ndarray:
 
 def gas_temperature(seed: int) -> list[float]:
     """Of 100 molecules."""
-    from rotor.thermodynamics.classical_gas import GasRequest, answer_gas
+    from rotor.thermodynamics.gas.classical_gas import GasRequest, answer_gas
 
     answer = answer_gas(GasRequest(Top(Constants(A=10e3, B=6e3, C=4e3)), molecules=100, seed=seed))
     departure = 300.0 * (np.mean([degree.mean for degree in answer.test.degrees]) - 1.0)
@@ -36,7 +36,7 @@ def gas_curves(seed: int) -> list[float]:
     """C1 and C2 of 1000 linear molecules at one time, against their closed forms."""
     from rotor import units
     from rotor.classical.gas.correlations import linear_curves
-    from rotor.thermodynamics.classical_gas import GasRequest, answer_gas
+    from rotor.thermodynamics.gas.classical_gas import GasRequest, answer_gas
 
     top, late = Top(CO, (0.1, 0.0, 0.0)), 0.3
     answer = answer_gas(GasRequest(top, molecules=1000, seed=seed, times_ps=(late,)))

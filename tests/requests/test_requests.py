@@ -19,10 +19,10 @@ from rotor.reports.screen import plain, table_records
 from rotor.requests.readers import Whole
 from rotor.spectra.raman_request import RamanRequest, answer_raman
 from rotor.spectra.request import GasLayer, SpectrumRequest, answer_spectrum
-from rotor.thermodynamics import VibrationalStates
-from rotor.thermodynamics.classical_gas import GasRequest, answer_gas, settling_times_ps
+from rotor.thermodynamics.gas.classical_gas import GasRequest, answer_gas, settling_times_ps
+from rotor.thermodynamics.gas.thermal_tumble import thermal_tumble
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
-from rotor.thermodynamics.thermal_tumble import thermal_tumble
+from rotor.thermodynamics.vibration import VibrationalStates
 
 COMMAND_KEYS = {"rotor_version", "command", "input", "files", "strongest", "patterns"}  # keys that no request has
 

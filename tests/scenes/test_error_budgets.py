@@ -318,7 +318,7 @@ def test_components_of_a_line_have_their_mean_at_its_centre():
 
 def test_the_temperature_of_a_gas_scatters_as_stated():
     """Temperatures of 200 gases: their standard deviation against the stated one, and the coverage of the confidence."""
-    from rotor.thermodynamics.classical_gas import GasRequest, answer_gas
+    from rotor.thermodynamics.gas.classical_gas import GasRequest, answer_gas
 
     top, computed = Top.from_constants("A=10 B=6 C=4 GHz"), []
     for seed in range(200):

@@ -23,7 +23,7 @@ from rotor.quantum.hyperfine_method import used_method
 from rotor.scenes.run import run_scene, scene_calculation
 from rotor.scenes.scene import make_scene, write_scene
 from rotor.spectra.numerics import line_error
-from rotor.thermodynamics.classical_gas import answer_gas
+from rotor.thermodynamics.gas.classical_gas import answer_gas
 from rotor.tops.top import Top
 
 

@@ -21,8 +21,8 @@ from rotor.scenes.scene import make_scene, parse_scene, read_scene
 from rotor.spectra.numerics import allowed_lines
 from rotor.spectra.spectrum import Spectrum
 from rotor.spectra.widths import doppler
-from rotor.thermodynamics.classical_limit import classical_partition_function, populated_j
-from rotor.thermodynamics.gas_numerics import neglected_in_gas
+from rotor.thermodynamics.gas.numerics import neglected_in_gas
+from rotor.thermodynamics.sums.classical_limit import classical_partition_function, populated_j
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
 

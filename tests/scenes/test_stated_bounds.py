@@ -7,7 +7,6 @@ of these `.ci/run` takes another part each day.
 import json
 import math
 from dataclasses import replace
-from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 
 import numpy as np
@@ -88,7 +87,8 @@ def test_an_interval_from_half_a_deviation_does_not_cover(monkeypatch):
 
 def test_a_bound_without_its_largest_term_is_none(monkeypatch):
     """Negative control: Q without the terms in A(B - C)²/BC, which the classical limit had left out."""
-    level_sums = import_module("rotor.thermodynamics.level_sums")  # the package has a function of that name
+    from rotor.thermodynamics.sums import level_sums
+
     whole = level_sums.classical_limit
     monkeypatch.setattr(level_sums, "classical_limit", lambda *top: replace(whole(*top), asymmetry_k=0.0))
     with pytest.raises(AssertionError):

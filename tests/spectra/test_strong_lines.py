@@ -12,7 +12,7 @@ from rotor.quantum.tensors import body_tensor
 from rotor.spectra import strong_lines, transitions
 from rotor.spectra.intensity import intensity_cut
 from rotor.spectra.lines import Lines, line_list
-from rotor.thermodynamics import PartitionFunction
+from rotor.thermodynamics.sums.partition import PartitionFunction
 from rotor.tops.top import Top
 
 TOPS = {

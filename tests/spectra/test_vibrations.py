@@ -14,7 +14,8 @@ import rotor
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.spectra.lines import line_list
 from rotor.spectra.raman import raman_lines
-from rotor.thermodynamics import VibrationalStates, partition_function, vibrational_partition_function
+from rotor.thermodynamics.sums.partition import partition_function
+from rotor.thermodynamics.vibration import VibrationalStates, vibrational_partition_function
 
 HC_OVER_K = 1.438776877  # cm K
 

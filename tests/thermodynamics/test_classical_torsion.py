@@ -10,9 +10,9 @@ from scipy.integrate import quad
 import rotor
 from rotor import units
 from rotor.formats import read
-from rotor.thermodynamics import classical_torsion as classical_torsion_module
-from rotor.thermodynamics.classical_torsion import ENERGY_PER_K, classical_torsion, passage_rate, turning_top
-from rotor.thermodynamics.torsion_request import TorsionRequest, answer_torsion
+from rotor.thermodynamics.torsion import classical_torsion as classical_torsion_module
+from rotor.thermodynamics.torsion.classical_torsion import ENERGY_PER_K, classical_torsion, passage_rate, turning_top
+from rotor.thermodynamics.torsion.request import TorsionRequest, answer_torsion
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,10 @@ import rotor
 from rotor.formats.molecules.molecule_file import read_molecule_file
 from rotor.formats.molecules.molecule_writer import molecule_file_text
 from rotor.quantum.effects.of_top import effects_of
-from rotor.thermodynamics import GAS_CONSTANT, VibrationalStates, thermodynamic_functions
 from rotor.thermodynamics.electronic import ElectronicStates, electronic_states
+from rotor.thermodynamics.functions import GAS_CONSTANT, thermodynamic_functions
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
+from rotor.thermodynamics.vibration import VibrationalStates
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 

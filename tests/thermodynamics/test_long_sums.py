@@ -11,14 +11,15 @@ from rotor.quantum.solve import solve_levels
 from rotor.quantum.wang import wang_matrix
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import block_bands, diagonalise, lowest_energies
-from rotor.thermodynamics.level_sums import level_sums
-from rotor.thermodynamics.partition import partition_function
-from rotor.thermodynamics.partition_table import partition_table
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
+from rotor.thermodynamics.sums.classical_onset import classical_above_k
+from rotor.thermodynamics.sums.level_sums import level_sums
+from rotor.thermodynamics.sums.partition import partition_function
+from rotor.thermodynamics.sums.partition_table import partition_table
 from rotor.tops.top import Top
 
-sums_module = import_module("rotor.thermodynamics.level_sums")
-table_module = import_module("rotor.thermodynamics.partition_table")
+sums_module = import_module("rotor.thermodynamics.sums.level_sums")
+table_module = import_module("rotor.thermodynamics.sums.partition_table")
 
 CUT_SHORT = "A=60778.5498 B=10318.0735 C=8.7997 MHz"  # C of SO2 read from a file that ends in the middle of the number
 
@@ -80,7 +81,7 @@ def test_an_onset_that_no_sum_reaches_is_said_and_not_an_error(monkeypatch):
     assert answer.classical_above_k is None
     assert answer.facts()["classical_above_k"] is None
     with pytest.raises(ValueError, match="beyond the reach"):
-        rotor.thermodynamics.classical_above_k(of(CUT_SHORT))
+        classical_above_k(of(CUT_SHORT))
 
 
 MIXED = ("--constants", "A=9400 B=3100 C=2500 MHz", "--state-constants")

@@ -13,14 +13,11 @@ import rotor
 from rotor import units
 from rotor.molecules.nuclei import data_folder
 from rotor.quantum.solve import solve_levels
-from rotor.thermodynamics import (
-    classical_limit,
-    classical_partition_function,
-    level_sums,
-    partition_function,
-    vibrational_partition_function,
-)
-from rotor.thermodynamics.trusted_levels import trusted_energies_mhz
+from rotor.thermodynamics.sums.classical_limit import classical_limit, classical_partition_function
+from rotor.thermodynamics.sums.level_sums import level_sums
+from rotor.thermodynamics.sums.partition import partition_function
+from rotor.thermodynamics.sums.trusted_levels import trusted_energies_mhz
+from rotor.thermodynamics.vibration import vibrational_partition_function
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 
@@ -252,7 +249,7 @@ def test_weights_that_alternate_with_j_do_not_stop_the_sum(constants, weights):
 
 def test_a_looser_error_costs_no_sum_that_a_tighter_one_does_without():
     """Glycolaldehyde at 100 K: the limit with corrections serves errors to 1e-4, so it serves 0.1 too, where the sum would be short."""
-    from rotor.thermodynamics.level_sums import NOT_SUMMED, level_sums
+    from rotor.thermodynamics.sums.level_sums import NOT_SUMMED, level_sums
 
     top = rotor.read("CH2OHCHO")
     for error in (1e-1, 1e-2, 1e-3, 1e-4):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from importlib import import_module
 
 import mpmath
 import numpy as np
@@ -14,21 +13,13 @@ from hypothesis import strategies as st
 import rotor
 from rotor import units
 from rotor.quantum.solve import solve_levels
-from rotor.thermodynamics import (
-    GAS_CONSTANT,
-    VibrationalStates,
-    classical_above_k,
-    classical_limit,
-    implied_symmetry_number,
-    level_sums,
-    partition_function,
-    rotational_temperatures_k,
-    species_names,
-    spin_species,
-    thermodynamic_functions,
-    translational_entropy,
-    vibrational_functions,
-)
+from rotor.thermodynamics.functions import GAS_CONSTANT, species_names, thermodynamic_functions, translational_entropy
+from rotor.thermodynamics.sums.classical_limit import classical_limit, rotational_temperatures_k
+from rotor.thermodynamics.sums.classical_onset import classical_above_k
+from rotor.thermodynamics.sums.level_sums import level_sums
+from rotor.thermodynamics.sums.partition import partition_function
+from rotor.thermodynamics.sums.species import implied_symmetry_number, spin_species
+from rotor.thermodynamics.vibration import VibrationalStates, vibrational_functions
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top
@@ -464,9 +455,9 @@ def test_a_series_that_turns_over_is_refused_before_thousands_of_levels_are_solv
 )
 def test_the_next_quantum_correction_is_bounded(ratios, monkeypatch):
     """ln Q of the corrected classical limit against the sum over the levels, at 12 times the temperature of A."""
-    from rotor.thermodynamics.classical_limit import classical_limit
+    from rotor.thermodynamics.sums import level_sums
+    from rotor.thermodynamics.sums.classical_limit import classical_limit
 
-    level_sums = import_module("rotor.thermodynamics.level_sums")  # the package has a function of that name
     monkeypatch.setattr(level_sums, "LONG_SUM", 10**9)  # the sum, not the limit itself
     b = 1e4
     top = Top.from_constants(f"A={b * ratios[0]} B={b} C={b / ratios[1]} MHz")

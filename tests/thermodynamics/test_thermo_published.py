@@ -11,7 +11,7 @@ import pytest
 from places import ORACLES, PROJECT
 
 from rotor.plots.heat_capacity import heat_capacity_figure, picture
-from rotor.thermodynamics import GAS_CONSTANT, thermodynamic_functions
+from rotor.thermodynamics.functions import GAS_CONSTANT, thermodynamic_functions
 
 KNOWN = tomllib.loads((ORACLES / "heat_capacity.toml").read_text(encoding="utf-8"))
 

@@ -11,12 +11,12 @@ import rotor
 from rotor import units
 from rotor.quantum.effects.of_top import effects_of
 from rotor.spectra.lines import line_list
-from rotor.thermodynamics import partition_function
 from rotor.thermodynamics.functions import ThermoFunctions, thermodynamic_functions
-from rotor.thermodynamics.level_sums import level_sums, lowest_level_k
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
-from rotor.thermodynamics.spin_factor import rotational_sum
-from rotor.thermodynamics.spin_sums import spin_sums, times_functions
+from rotor.thermodynamics.sums.level_sums import level_sums, lowest_level_k
+from rotor.thermodynamics.sums.partition import partition_function
+from rotor.thermodynamics.sums.spin_factor import rotational_sum
+from rotor.thermodynamics.sums.spin_sums import spin_sums, times_functions
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top
 

@@ -9,6 +9,7 @@ import rotor
 from rotor.formats.molecules.library import names
 from rotor.quantum.effects.of_top import effects_of
 from rotor.spectra.request import SpectrumRequest, _expected_q, answer_spectrum
+from rotor.thermodynamics.sums.partition import partition_function
 from rotor.tops.plausible import implausible
 from rotor.tops.spins.spin_constants import SpinConstants
 
@@ -59,13 +60,13 @@ def test_a_partition_function_far_from_the_sum(call, q, noted):
 
 def test_the_sum_beside_a_given_q_is_made_once(call, folder, monkeypatch):
     """The note needs it; the report, the JSON and the files need nothing more of it."""
-    sums, summed = [], rotor.thermodynamics.partition_function
+    sums, summed = [], partition_function
 
     def counting(*arguments, **options):
         sums.append(arguments)
         return summed(*arguments, **options)
 
-    monkeypatch.setattr("rotor.thermodynamics.partition_function", counting)
+    monkeypatch.setattr("rotor.thermodynamics.sums.partition.partition_function", counting)
     monkeypatch.setattr("rotor.spectra.lines.partition_function", counting)
     code, _, err = call(
         "spectrum", "water", "--q", "5", "--jmax", "2", "--json", "a.json", "--csv", "a.csv", "--cat", "a.cat"
@@ -80,7 +81,7 @@ def test_the_note_on_q_estimates_further_states(name, kelvin):
     """A sum over the coupled states of a file took 18 s for the sake of this note; a tenth is enough."""
     answer = answer_spectrum(SpectrumRequest(rotor.read(name), temperature_k=kelvin, jmax=3, q=1.0))
     expected, state_sums = _expected_q(answer.lines)
-    summed = rotor.thermodynamics.partition_function(answer.lines.top, kelvin, effects=answer.lines.levels.effects).q
+    summed = partition_function(answer.lines.top, kelvin, effects=answer.lines.levels.effects).q
     assert state_sums
     assert expected == pytest.approx(summed, rel=0.05)  # half of what the note is about
     assert "about" in answer.notes[-1]
@@ -88,7 +89,7 @@ def test_the_note_on_q_estimates_further_states(name, kelvin):
 
 def test_a_file_of_many_states_is_not_summed_for_a_note(monkeypatch):
     """The sum is of the levels of one state."""
-    from rotor.thermodynamics import partition
+    from rotor.thermodynamics.sums import partition
 
     counted, solve = [], partition.level_sums
 
@@ -112,9 +113,7 @@ def test_the_note_on_q_estimates_three_equivalent_nuclei(name):
     top = rotor.read(KINDS / name / f"{name}.int")
     answer = answer_spectrum(SpectrumRequest(top, temperature_k=30.0, jmax=1, q=1.0, effects=effects_of(top, True)))
     expected = _expected_q(answer.lines)
-    summed = rotor.thermodynamics.partition_function(
-        top, 30.0, relative_error=1e-3, effects=answer.lines.levels.effects
-    ).q
+    summed = partition_function(top, 30.0, relative_error=1e-3, effects=answer.lines.levels.effects).q
     assert expected == (pytest.approx(summed, rel=0.02), True)  # K and -K of few levels; a note is about a tenth
 
 
@@ -128,13 +127,13 @@ def test_the_note_on_q_estimates_spins():
     answer = answer_spectrum(
         SpectrumRequest(top, temperature_k=5.0, jmax=1, q=1.0, effects=effects_of(top, True), min_lgint=None)
     )
-    summed = rotor.thermodynamics.partition_function(top, 5.0, effects=answer.lines.levels.effects).q
+    summed = partition_function(top, 5.0, effects=answer.lines.levels.effects).q
     assert _expected_q(answer.lines) == (pytest.approx(summed, rel=1e-3), True)
 
 
 def test_no_note_where_the_sum_takes_minutes(monkeypatch):
     """Two equivalent nuclei of I = 3/2 in two states: 0.8 GB and half a minute before it was ended."""
-    monkeypatch.setattr("rotor.thermodynamics.partition_function", None)
+    monkeypatch.setattr("rotor.thermodynamics.sums.partition.partition_function", None)
     top = rotor.read(KINDS / "two_quadrupoles_i_tot" / "two_quadrupoles_i_tot.int")
     answer = answer_spectrum(SpectrumRequest(top, jmax=1, q=1.0, effects=effects_of(top, True), min_lgint=None))
     assert _expected_q(answer.lines) is None
@@ -144,6 +143,6 @@ def test_no_note_where_the_sum_takes_minutes(monkeypatch):
 def test_the_note_on_q_takes_the_classical_limit_where_it_is_exact_enough(monkeypatch):
     """Four digits: no levels beyond the ground state are solved, where a sum to six took 50 of 350 ms of a whole command."""
     answer = answer_spectrum(SpectrumRequest(rotor.read("SO2"), jmax=2, q=1.0))
-    summed = rotor.thermodynamics.partition_function(answer.lines.top, 300.0).q
-    monkeypatch.setattr(sys.modules["rotor.thermodynamics.level_sums"], "_summed", None)
+    summed = partition_function(answer.lines.top, 300.0).q
+    monkeypatch.setattr(sys.modules["rotor.thermodynamics.sums.level_sums"], "_summed", None)
     assert _expected_q(answer.lines) == (pytest.approx(summed, rel=1e-5), False)

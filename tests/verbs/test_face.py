@@ -197,13 +197,6 @@ def test_methods_with_new_names_warn_and_answer_under_their_former_names(call, a
         assert call() == answer
 
 
-def test_partition_functions_warns_and_is_partition_function():
-    from rotor import thermodynamics
-
-    with pytest.warns(DeprecationWarning, match="partition_functions is partition_function from version 0"):
-        assert thermodynamics.partition_functions is thermodynamics.partition_function
-
-
 @pytest.mark.parametrize("function", ["run_scene", "run_sweep", "plan_of"])
 def test_the_path_of_a_scene_is_told_from_a_scene(function):
     with pytest.raises(TypeError, match=r"'s\.toml': expected a scene: read_scene reads one from its file"):

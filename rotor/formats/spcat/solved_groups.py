@@ -24,7 +24,7 @@ from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
 from rotor.spectra.transitions import Transitions
-from rotor.thermodynamics import PartitionFunction
+from rotor.thermodynamics.sums.partition import PartitionFunction
 from rotor.tops.top import Top
 
 MOST_EXPONENT = 700.0  # of a population in double precision

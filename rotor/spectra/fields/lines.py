@@ -36,7 +36,7 @@ from rotor.quantum.fields.transitions import pairs_of_blocks, states_of_both_sig
 from rotor.spectra.fields.light import Light, LightText, Vector, light_components
 from rotor.spectra.intensity import INTENSITY_NM2_MHZ
 from rotor.table import Table
-from rotor.thermodynamics.field_mixture import POPULATIONS, Populations, populations_in_field
+from rotor.thermodynamics.gas.field_mixture import POPULATIONS, Populations, populations_in_field
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

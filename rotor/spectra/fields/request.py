@@ -14,7 +14,7 @@ from rotor.requests.field import CONDITIONS, OBSERVABLES, Rule, check_fields, de
 from rotor.requests.readers import Custom, Quantity, Range, Text
 from rotor.spectra.fields.light import LightText, light_components
 from rotor.table import Table
-from rotor.thermodynamics.field_mixture import POPULATIONS, field_mixture
+from rotor.thermodynamics.gas.field_mixture import POPULATIONS, field_mixture
 
 if TYPE_CHECKING:
     from rotor.quantum.fields.field_map import FieldMap

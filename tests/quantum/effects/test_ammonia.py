@@ -20,7 +20,8 @@ from rotor.formats.molecules.level_table import read_level_table, write_level_ta
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.solve import solve_levels
 from rotor.spectra.lines import line_list
-from rotor.thermodynamics import partition_function, thermodynamic_functions
+from rotor.thermodynamics.functions import thermodynamic_functions
+from rotor.thermodynamics.sums.partition import partition_function
 from rotor.tops.isotopes.isotopologues import isotopologue
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_statistics import statistical_weights

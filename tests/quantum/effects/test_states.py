@@ -26,8 +26,8 @@ from rotor.quantum.wang.rotation import solve_rotation
 from rotor.spectra.lines import dipoles_by_state, line_list
 from rotor.spectra.raman import raman_lines
 from rotor.spectra.transitions import all_transitions
-from rotor.thermodynamics import partition_function
 from rotor.thermodynamics.request import ThermoRequest, answer_thermo
+from rotor.thermodynamics.sums.partition import partition_function
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.states.state_constants import GROUPS, StateConstants

@@ -20,7 +20,7 @@ from rotor.quantum.estimates.limits import VIBRATION_CM, VIBRATION_POWER, model_
 from rotor.quantum.estimates.splittings import GRADIENT_MHZ_PER_BARN, GRADIENTS, splitting_nuclei
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Spin
-from rotor.thermodynamics.classical_limit import populated_j
+from rotor.thermodynamics.sums.classical_limit import populated_j
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_CM
 

@@ -260,7 +260,7 @@ def test_partition_function_counts_torsional_states():
 def test_functions_far_above_kt_do_not_count_for_the_partition_function(temperature_k, monkeypatch):
     top = acetaldehyde()
     quick = rotor.api.partition_function(top, temperature_k).q
-    monkeypatch.setattr(import_module("rotor.thermodynamics.level_sums"), "HIGHEST_KT_OF_TORSION", math.inf)
+    monkeypatch.setattr(import_module("rotor.thermodynamics.sums.level_sums"), "HIGHEST_KT_OF_TORSION", math.inf)
     assert quick == pytest.approx(rotor.api.partition_function(top, temperature_k).q, rel=1e-8)  # asked for is 1e-6
 
 

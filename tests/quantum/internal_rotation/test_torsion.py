@@ -17,8 +17,8 @@ from rotor.molecules.readers.read import read_molecule
 from rotor.quantum.bond_torsion import BondTorsion, FourierSeries, most_harmonics, no_terms
 from rotor.quantum.torsion import TorsionalPotential, torsional_states
 from rotor.thermodynamics.functions import GAS_CONSTANT
-from rotor.thermodynamics.hindered_rotor import METHODS, hindered_rotor_functions
-from rotor.thermodynamics.torsion_request import TorsionRequest, answer_torsion
+from rotor.thermodynamics.torsion.hindered_rotor import METHODS, hindered_rotor_functions
+from rotor.thermodynamics.torsion.request import TorsionRequest, answer_torsion
 from rotor.tops.top import Top
 
 F, V3 = 160e3, 3e7  # MHz: a methyl group with 1000 cm⁻¹

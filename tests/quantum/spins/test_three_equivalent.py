@@ -26,7 +26,7 @@ from rotor.quantum.spins.coupling import patterns
 from rotor.quantum.spins.levels import unmixed_levels
 from rotor.quantum.spins.three_spins import patterns_of_three, recoupling_of_three, symmetric_functions
 from rotor.spectra.transitions import all_transitions
-from rotor.thermodynamics.partition import partition_function
+from rotor.thermodynamics.sums.partition import partition_function
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_weights import SpinWeights
 from rotor.tops.top import Top

@@ -12,7 +12,7 @@ from rotor.spectra.fields.lines import field_lines
 from rotor.spectra.fields.spectrum import FieldDistribution, field_spectrum
 from rotor.spectra.fields.stark_coefficients import line_coefficients
 from rotor.spectra.lines import line_list
-from rotor.thermodynamics.field_mixture import field_mixture
+from rotor.thermodynamics.gas.field_mixture import field_mixture
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM, MHZ_PER_K
 

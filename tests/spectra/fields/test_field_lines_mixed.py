@@ -18,7 +18,7 @@ from rotor.quantum.spins import Spin
 from rotor.spectra.fields.light import light_components
 from rotor.spectra.fields.lines import field_lines
 from rotor.spectra.lines import line_list
-from rotor.thermodynamics.field_mixture import field_mixture
+from rotor.thermodynamics.gas.field_mixture import field_mixture
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM
 

@@ -21,9 +21,9 @@ from rotor.arrays import Floats
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import weights_of_levels
 from rotor.quantum.solve import solve_levels
-from rotor.thermodynamics.classical_limit import populated_j
-from rotor.thermodynamics.level_sums import LevelSums, Progress, level_sums, lowest_level_k
-from rotor.thermodynamics.spin_factor import rotational_sum
+from rotor.thermodynamics.sums.classical_limit import populated_j
+from rotor.thermodynamics.sums.level_sums import LevelSums, Progress, level_sums, lowest_level_k
+from rotor.thermodynamics.sums.spin_factor import rotational_sum
 from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:

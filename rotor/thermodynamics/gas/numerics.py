@@ -9,7 +9,7 @@
 The energy E of the f degrees of freedom of one molecule has a gamma distribution of shape f/2: mean f kT/2, variance f (kT)²/2, excess
 kurtosis κ = 12/f. For N independent values the mean has the variance var/N, and the variance has var² (2/(N - 1) + κ/N). z is the
 two-sided quantile of the confidence of the scene. The effects neglected by rigid classical molecules are stated as the terms a/T and d T
-of ln Q (`rotor.thermodynamics.classical_limit`).
+of ln Q (`rotor.thermodynamics.sums.classical_limit`).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from rotor.requests.numerics import Goal, Numerics
 from rotor.requests.plan import Cost, Growth, LeftOut, largest_first
 
 if TYPE_CHECKING:
-    from rotor.thermodynamics.classical_gas import GasAnswer, GasRequest
+    from rotor.thermodynamics.gas.classical_gas import GasAnswer, GasRequest
     from rotor.tops.top import Top
 
 PILOT_MOLECULES = 2_000
@@ -67,7 +67,7 @@ def relative_spread(unit: str, degrees: int) -> float:
 
 def _enough_molecules(sought: Sought) -> list[int]:
     """As many molecules as an accuracy of the temperature (K), the heat capacity (%), or C1 and C2 needs, at most those of a run."""
-    from rotor.thermodynamics.classical_gas import MOST_MOLECULES
+    from rotor.thermodynamics.gas.classical_gas import MOST_MOLECULES
 
     request = sought.request
     deviation = sought.known["deviation"] = quantile(request.confidence) * _spread(request, sought.unit)
@@ -84,7 +84,7 @@ def _spread(request: GasRequest, unit: str) -> float:
     if unit:
         scale = request.temperature_k if unit == "K" else 100.0
         return scale * relative_spread(unit, count_degrees_per_molecule(request))
-    from rotor.thermodynamics.classical_gas import answer_gas
+    from rotor.thermodynamics.gas.classical_gas import answer_gas
 
     pilot = answer_gas(replace(request, molecules=PILOT_MOLECULES))
     # margin: the spread itself has an error of a few percent
@@ -147,7 +147,7 @@ def _curve_error(answer: Any, reference: Any) -> float:
 
 def _gases(request: Any) -> list[Any]:
     """Gases that differ in their seeds."""
-    from rotor.thermodynamics.classical_gas import answer_gas
+    from rotor.thermodynamics.gas.classical_gas import answer_gas
 
     return [answer_gas(replace(request, seed=request.seed + 10 * number)) for number in range(SEEDS)]
 
@@ -198,7 +198,7 @@ CURVES = _molecules(
 
 def neglected_in_gas(top: Top, temperature_k: float) -> tuple[LeftOut, ...]:
     """Effects that a classical gas of rigid molecules neglects, in percent of Q, largest first."""
-    from rotor.thermodynamics.classical_limit import classical_limit
+    from rotor.thermodynamics.sums.classical_limit import classical_limit
 
     limit = classical_limit(top)
     quantum, distortion = abs(limit.a) / temperature_k, abs(limit.d) * temperature_k

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
-from rotor.thermodynamics.classical_limit import ClassicalLimit, classical_limit, classical_partition_function
-from rotor.thermodynamics.level_sums import AT_WORST, Progress, is_quick, refusal
-from rotor.thermodynamics.partition import PartitionFunction, partition_function
-from rotor.thermodynamics.spin_factor import spin_functions
+from rotor.thermodynamics.sums.classical_limit import ClassicalLimit, classical_limit, classical_partition_function
+from rotor.thermodynamics.sums.level_sums import AT_WORST, Progress, is_quick, refusal
+from rotor.thermodynamics.sums.partition import PartitionFunction, partition_function
+from rotor.thermodynamics.sums.spin_factor import spin_functions
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.thermodynamics.classical_limit import classical_limit, rotational_temperatures_k
-from rotor.thermodynamics.level_sums import OutOfReachError, level_sums
+from rotor.thermodynamics.sums.classical_limit import classical_limit, rotational_temperatures_k
+from rotor.thermodynamics.sums.level_sums import OutOfReachError, level_sums
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -14,8 +14,8 @@ from rotor.frozen import dataclass
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.table import Table
-from rotor.thermodynamics.level_sums import NOT_SUMMED, LevelSums, Progress, checked_temperatures, level_sums
-from rotor.thermodynamics.spin_factor import rotational_sum
+from rotor.thermodynamics.sums.level_sums import NOT_SUMMED, LevelSums, Progress, checked_temperatures, level_sums
+from rotor.thermodynamics.sums.spin_factor import rotational_sum
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,7 +116,7 @@ def partition_function(
     """Q(T) of a top: a single value for a number, a table for a list or array of temperatures, from one set of levels.
 
     Q is summed over levels until the relative tail is below `relative_error`. If the sum would be long and the corrected
-    classical limit is as accurate, that is used; see `rotor.thermodynamics.level_sums`.
+    classical limit is as accurate, that is used; see `rotor.thermodynamics.sums.level_sums`.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def partition_function(
     if rotation.is_original:
         sums = level_sums(top, weights, temperature_k, relative_error, effects=rotation.effects, **settings)[0]
     else:  # energies count from the lowest split level
-        from rotor.thermodynamics.spin_sums import spin_sums
+        from rotor.thermodynamics.sums.spin_sums import spin_sums
 
         temperatures = checked_temperatures(temperature_k)
         sums = spin_sums(top, weights, temperatures, relative_error, effects, **settings).sums[0]

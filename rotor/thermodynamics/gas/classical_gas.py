@@ -27,8 +27,8 @@ from rotor.requests.readers import Grid, Quantity, Whole
 from rotor.statistics.degrees_of_freedom import count_degrees
 from rotor.statistics.equipartition import Equipartition, equipartition
 from rotor.table import TextOf
-from rotor.thermodynamics.classical_limit import populated_j
-from rotor.thermodynamics.classical_onset import classical_above_if_known
+from rotor.thermodynamics.sums.classical_limit import populated_j
+from rotor.thermodynamics.sums.classical_onset import classical_above_if_known
 from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ class GasAnswer(TextOf):
     @cached_property
     def errors(self) -> ErrorBudget:
         """Error budget of the temperature, or of C1 and C2."""
-        from rotor.thermodynamics.gas_budget import gas_budget
+        from rotor.thermodynamics.gas.budget import gas_budget
 
         return gas_budget(self)
 

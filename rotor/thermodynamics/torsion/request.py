@@ -24,8 +24,8 @@ from rotor.requests.fill import within
 from rotor.requests.knob import Knob, Measure, with_whole
 from rotor.requests.readers import Custom, Grid, Quantity, Text, Whole
 from rotor.table import Table, TextOf
-from rotor.thermodynamics.hindered_rotor import HinderedRotorFunctions, hindered_rotor_functions
-from rotor.thermodynamics.torsion_potential import (
+from rotor.thermodynamics.torsion.hindered_rotor import HinderedRotorFunctions, hindered_rotor_functions
+from rotor.thermodynamics.torsion.potential import (
     TABLE,
     Progress,
     is_scan,
@@ -38,7 +38,7 @@ from rotor.tops.facts import top_facts
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule
-    from rotor.thermodynamics.classical_torsion import ClassicalTorsion
+    from rotor.thermodynamics.torsion.classical_torsion import ClassicalTorsion
     from rotor.tops.top import Top
 
 MOST_BONDS = 6  # in an error
@@ -121,7 +121,7 @@ class TorsionRequest:
         elif self.potential == TABLE:
             table_barrier(rotation)
         if self.classical_k is not None:
-            from rotor.thermodynamics.classical_torsion import refuse_changing_moments
+            from rotor.thermodynamics.torsion.classical_torsion import refuse_changing_moments
 
             refuse_changing_moments(rotation)
 
@@ -240,7 +240,7 @@ class TorsionAnswer(TextOf):
         """The classical gas; None if the request has no temperature for it."""
         if self.request.classical_k is None:
             return None
-        from rotor.thermodynamics.classical_torsion import classical_torsion, turning_top
+        from rotor.thermodynamics.torsion.classical_torsion import classical_torsion, turning_top
 
         request, body = self.request, turning_top(self.rotation, self.torsion.potential)
         return classical_torsion(body, self.request.classical_k, request.duration_ps, request.molecules, request.seed)

@@ -30,9 +30,9 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID, centrifugal_operators
 from rotor.quantum.levels import Levels, weights_of_levels
 from rotor.quantum.solve import solve_levels
-from rotor.thermodynamics.classical_limit import classical_limit
-from rotor.thermodynamics.species import weights_in_species
-from rotor.thermodynamics.trusted_levels import trusted_energies_mhz
+from rotor.thermodynamics.sums.classical_limit import classical_limit
+from rotor.thermodynamics.sums.species import weights_in_species
+from rotor.thermodynamics.sums.trusted_levels import trusted_energies_mhz
 from rotor.tops.spins.spin_weights import SpinWeights
 
 if TYPE_CHECKING:

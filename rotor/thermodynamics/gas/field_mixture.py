@@ -23,8 +23,8 @@ from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.fields.block_states import BlockStates
 from rotor.quantum.fields.field_map import FieldMap
 from rotor.table import Table
-from rotor.thermodynamics.level_sums import lowest_level_k
-from rotor.thermodynamics.partition import partition_function
+from rotor.thermodynamics.sums.level_sums import lowest_level_k
+from rotor.thermodynamics.sums.partition import partition_function
 from rotor.units import MHZ_PER_K
 
 if TYPE_CHECKING:

@@ -1,0 +1,1 @@
+"""Torsion about a bond: its potential, its levels and the classical motion."""
