@@ -35,7 +35,7 @@ TIMED = re.compile(
 )
 NUMBER = re.compile(r"[-+]?\d+\.?\d*(?:[eE][-+]?\d+)?")
 MOST_SECONDS = 60
-BINARY = (".png", ".pdf", ".svg", ".parquet", ".npz", ".traj")
+BINARY = (".png", ".pdf", ".svg", ".parquet", ".npz", ".traj", ".rotorcat")
 
 
 def cases() -> list[tuple[str, list[str]]]:
@@ -66,13 +66,13 @@ def record(path: Path, checkout: Path, only: str) -> None:
             if name.startswith("scene "):
                 Path(folder, "s.toml").write_text(scene, encoding="utf-8")
             inputs = {path.name for path in Path(folder).iterdir()}
-            results[name] = run(words, Path(folder), inputs)
+            results[name] = run(words, Path(folder), inputs, checkout)
     path.write_text(json.dumps(results, ensure_ascii=False, indent=0), encoding="utf-8")
     print(f"{len(results)} cases, {sum(result['seconds'] for result in results.values()):.0f} s")
 
 
-def run(words: list[str], folder: Path, inputs: set[str]) -> dict[str, Any]:
-    """Exit code, streams and files of one command."""
+def run(words: list[str], folder: Path, inputs: set[str], checkout: Path) -> dict[str, Any]:
+    """Exit code, streams and files of one command, without the places of the folder and of the checkout."""
     from rotor.cli import run as call
 
     here, out, err = Path.cwd(), io.StringIO(), io.StringIO()
@@ -96,7 +96,10 @@ def run(words: list[str], folder: Path, inputs: set[str]) -> dict[str, Any]:
     texts = {"out": out.getvalue()[:60_000], "err": err.getvalue()} | {
         f"file {name}": text for name, text in files.items()
     }
-    clean = {name: TIMED.sub("", text.replace(str(folder), "FOLDER")) for name, text in texts.items()}
+    clean = {
+        name: TIMED.sub("", text.replace(str(folder), "FOLDER").replace(str(checkout), "CHECKOUT"))
+        for name, text in texts.items()
+    }
     return {"code": code, "seconds": round(time.process_time() - start, 3), **clean}
 
 

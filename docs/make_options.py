@@ -13,7 +13,8 @@ from typing import Any
 import typer
 
 from rotor import cli
-from rotor.requests.field import PANELS, Field
+from rotor.requests.field import PANELS, panel_of
+from rotor.requests.readers import Field
 from rotor.verbs import declared_verbs
 from rotor.verbs.verb import verb_of
 
@@ -42,7 +43,9 @@ def section(name: str, command: Any) -> str:
     """The table of one verb: declared inputs first, then what the command takes besides."""
     verb = verb_of(name) if name in declared_verbs() else None
     fields = [field for field in verb.options.values() if field.name not in ("errors", "sources")] if verb else []
-    rows = [*map(row, sorted(fields, key=lambda field: PANELS.index(field.heading) if field.heading in PANELS else 0))]
+    rows = [
+        *map(row, sorted(fields, key=lambda field: PANELS.index(panel_of(field)) if panel_of(field) in PANELS else 0))
+    ]
     shown = {field.flag for field in fields} | EVERYWHERE
     rows += [
         f"| `{option.opts[0]}` | | | {cell(option.help or '')} |"

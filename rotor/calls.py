@@ -15,8 +15,8 @@ from typing import Any
 
 from rotor.checks import did_you_mean
 from rotor.requests.budget import ErrorBudget
-from rotor.requests.field import Field
 from rotor.requests.fill import Entries
+from rotor.requests.readers import Field
 from rotor.verbs.calculation import Calculation, Outcome
 from rotor.verbs.verb import Verb, Work, verb_of
 

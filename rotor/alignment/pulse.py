@@ -29,7 +29,8 @@ from rotor.checks import Renamed
 from rotor.quantum.fields.inputs import INTENSITY
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.fill import within
-from rotor.requests.readers import Custom, Numbers, Quantity
+from rotor.requests.lists import Numbers
+from rotor.requests.readers import Custom, Quantity
 
 Complexes = np.typing.NDArray[np.complex128]
 Axis = tuple[complex, complex, complex]

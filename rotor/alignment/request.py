@@ -16,8 +16,9 @@ from rotor.requests.budget import ErrorBudget
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, check_fields, declared
 from rotor.requests.knob import Estimate, Knob, Measure, Sought
+from rotor.requests.lists import Pairs
 from rotor.requests.plan import Growth
-from rotor.requests.readers import Names, Pairs, Quantity, Whole
+from rotor.requests.readers import Names, Quantity, Whole
 from rotor.table import Table, TextOf
 from rotor.tops.facts import top_facts
 from rotor.units import MOST_POINTS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from rotor.requests.readers import Numbers
+from rotor.requests.lists import Numbers
 
 PREFIX = "SMILES:"
 WORST = 0.03  # largest median relative error of the constants of a geometry that serves as a guess

@@ -12,7 +12,8 @@ from rotor.assignment.bounds import Bounds
 from rotor.assignment.guesses import guess_values
 from rotor.assignment.peaks import PeakList
 from rotor.requests.field import check_fields, declared
-from rotor.requests.readers import Custom, Flag, Numbers, Quantity, Whole
+from rotor.requests.lists import Numbers
+from rotor.requests.readers import Custom, Flag, Quantity, Whole
 
 if TYPE_CHECKING:
     from rotor.assignment.grown import Grown

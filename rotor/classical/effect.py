@@ -16,7 +16,8 @@ from rotor.arrays import Floats
 from rotor.classical.torque_form import TorqueForm
 from rotor.requests.choices import Choices
 from rotor.requests.field import REQUIRED, declared
-from rotor.requests.readers import Array, Quantity, Text
+from rotor.requests.lists import Array
+from rotor.requests.readers import Quantity, Text
 
 DEFAULT_TOLERANCE = 1e-10  # of an adaptive step
 

@@ -24,9 +24,9 @@ from rotor.cli import process
 from rotor.cli.process import HELD, at_end
 from rotor.cli.shared_options import MOST_WORKERS, PLOT_NAMES, picture_fields, picture_settings, picture_style
 from rotor.reports.screen import show_parts
-from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, Field
+from rotor.requests.field import NUMERICS, OUTPUT, PANELS, REQUIRED, panel_of
 from rotor.requests.fill import Entries, naming, within
-from rotor.requests.readers import Flag, Text, Whole
+from rotor.requests.readers import Field, Flag, Text, Whole
 from rotor.verbs.calculation import Calculation, Outcome, answering
 from rotor.verbs.molecule import is_file
 from rotor.verbs.outputs import Files, Report
@@ -91,7 +91,7 @@ def _parameter_of(field: Field) -> tuple[Any, Any]:
         first: Any = ... if field.default is REQUIRED else None
         argument = typer.Argument(first, show_default=False, metavar=flag, help=help_, autocompletion=words)
         return argument, (list[str] if reader.many else str) | None
-    panel = f"{'' if field.common else '+'}{field.heading}"
+    panel = f"{'' if field.common else '+'}{panel_of(field)}"
     if isinstance(reader, Flag):
         names = f"{flag}/--no-{flag[2:]}" if reader.off else flag
         return typer.Option(None, names, show_default=False, help=help_, rich_help_panel=panel), bool | None

@@ -17,9 +17,9 @@ from rotor.cli.shared_options import MOST_WORKERS, SceneFile
 from rotor.frozen import dataclass
 from rotor.reports.progress import elapsed_time, progress_bar
 from rotor.reports.screen import Part, Table, evenly, json_with_rows
-from rotor.requests.field import NUMERICS, OUTPUT, Rule, declared
+from rotor.requests.field import NUMERICS, OUTPUT, declared
 from rotor.requests.fill import within
-from rotor.requests.readers import Flag, Text, Whole
+from rotor.requests.readers import Flag, Rule, Text, Whole
 from rotor.table import counted
 from rotor.verbs.outputs import Report
 from rotor.verbs.verb import ErrorsShown, Tool, Work

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
 from rotor.plots.view import View
-from rotor.requests.field import PICTURE, REQUIRED, Field, declared
+from rotor.requests.field import PICTURE, REQUIRED, declared
 from rotor.requests.fill import naming
-from rotor.requests.readers import Custom, Range, Reader, Text
+from rotor.requests.readers import Custom, Field, Range, Reader, Text
 
 if TYPE_CHECKING:
     from rotor.scenes.scene import Scene

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.requests.field import OBSERVABLES, check_fields, declared
+from rotor.requests.lists import NameList
 from rotor.requests.numerics import Goal, Numerics
-from rotor.requests.readers import Flag, NameList, Text
+from rotor.requests.readers import Flag, Text
 from rotor.table import Table
 
 if TYPE_CHECKING:

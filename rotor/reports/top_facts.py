@@ -13,6 +13,7 @@ from rotor.tops.components import known_dipole
 from rotor.tops.facts import top_formula
 
 if TYPE_CHECKING:
+    from rotor.thermodynamics.sums.partition import PartitionFunction
     from rotor.tops.constants import Constants
     from rotor.tops.top import Top
 
@@ -240,10 +241,9 @@ def weights_text(mapping: Mapping[str, int]) -> str:
     return ", ".join(f"{name} {weight}" for name, weight in mapping.items()) or "not given: 1 for every level"
 
 
-def q_text(record: Mapping[str, Any], classical: bool = True) -> str:
-    """Q with its source, and its classical limit if `classical` is true and a limit is given."""
-    limit = f"; classical limit {record['classical']:.6g}" if classical and record["classical"] else ""
-    return f"{record['q']:.6g}, {record['source']}{limit}"
+def q_text(partition: PartitionFunction, classical: float | None) -> str:
+    """Q with its source, and its classical limit if there is one."""
+    return f"{partition.q:.6g}, {partition.source}" + (f"; classical limit {classical:.6g}" if classical else "")
 
 
 ERROR_KINDS = {

@@ -30,7 +30,8 @@ from rotor.requests.field import REQUIRED, declared
 from rotor.requests.fill import Entries, within
 from rotor.requests.knob import NOTHING_CHEAPER, Choice, Knob, Sought
 from rotor.requests.numerics import Numerics
-from rotor.requests.readers import Custom, Quantity
+from rotor.requests.readers import Custom
+from rotor.units import parse_quantity
 
 CONVERTED = ("MHz", "K", "Å")  # units of an accuracy for which others may stand
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -143,7 +144,7 @@ def read_accuracy(stated: Stated, numerics: Numerics, entries: Entries = Entries
     if percent and unit not in ("", "%"):
         raise ValueError(f"accuracy: {plain!r}: expected {unit}, not a percentage")
     with within("accuracy"):
-        number = Quantity(unit if unit in CONVERTED else "").read(text.removesuffix("%").removesuffix("rad").strip())
+        number = parse_quantity(text.removesuffix("%").removesuffix("rad").strip(), unit if unit in CONVERTED else "")
     if not number > 0.0:
         raise ValueError(f"accuracy: {plain!r}: expected more than 0")
     return Accuracy(0.01 * number if percent and not unit else number, unit, total, numerics)

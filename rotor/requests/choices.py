@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from rotor.frozen import dataclass
-from rotor.requests.field import REQUIRED, Field, all_fields, undeclared
+from rotor.requests.field import REQUIRED, all_fields, undeclared
 from rotor.requests.fill import Entries, equal, read_instance, written_fields
-from rotor.requests.readers import InsideError, Reader
+from rotor.requests.readers import Field, InsideError, Reader
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Declaration of a request's field, written once where the field stands.
+"""Declared fields of a request, each written once where it stands.
 
     @dataclass(frozen=True)
     class RamanRequest:
@@ -18,7 +18,7 @@ from functools import cache
 from typing import Any
 
 from rotor.frozen import dataclass
-from rotor.requests.readers import InsideError, Reader
+from rotor.requests.readers import Field, Reader
 
 MOLECULE, SPINS, CONDITIONS, OBSERVABLES, NUMERICS, OUTPUT, PICTURE = PANELS = (
     "Molecule", "States and spins", "Conditions", "What to compute", "Numerics", "Output", "Picture",
@@ -30,109 +30,6 @@ _PANEL_OF_TABLE = {
 OUTPUTS = "outputs."  # table of the files of a scene
 _DECLARED, _PART = "declared", "part"
 REQUIRED: Any = MISSING  # the default of a field that must be given
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Rule:
-    """Fields or files, by identity, that go with a field: at least one of `needs`, none of `excludes`. why: the reason in errors."""
-
-    needs: tuple[str, ...] = ()
-    excludes: tuple[str, ...] = ()
-    why: str = ""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Field:
-    """Declaration of a field.
-
-    reader: reads, writes and checks a value, with unit and bounds.
-    help: one line, without a full stop.
-    key: table and key in a scene, such as "conditions.temperature"; a key without a table stands before the first table; "" for none.
-    option: name on the command line; None derives it from the key, "" means none; without a leading "-" it is an argument by position.
-    hidden: another option sets this field together with others (`rotor.verbs.verb.Extra`).
-    none: the word that stands for None.
-    common: whether --help lists the option; --help-all lists all.
-    example: value in a template if the default is None.
-    typed: the default as a user would type it, if that differs.
-    panel: heading in --help.
-    knob: how fine an approximation is (`rotor.requests.knob`).
-    rule: other fields or files that it needs or excludes.
-    name, default: filled in by `declared_fields`.
-    """
-
-    reader: Reader
-    help: str
-    key: str = ""
-    option: str | None = None
-    hidden: bool = False
-    none: str | None = None
-    common: bool = False
-    example: Any = None
-    typed: Any = None
-    panel: str = ""
-    metavar: str = ""
-    knob: Any = None
-    rule: Rule | None = None
-    name: str = ""
-    default: Any = None
-
-    @property
-    def table(self) -> str:
-        """The table in a scene; empty for a key before the first table."""
-        return self.key.rpartition(".")[0]
-
-    @property
-    def last(self) -> str:
-        """The key inside its table."""
-        return self.key.rpartition(".")[2]
-
-    @property
-    def flag(self) -> str:
-        """The option, derived from the key where none is given; empty where there is none."""
-        if self.option is not None:
-            return self.option
-        return "--" + (self.last or self.name).replace("_", "-")
-
-    @property
-    def heading(self) -> str:
-        """The panel of --help."""
-        return self.panel or _PANEL_OF_TABLE.get(self.table.partition(".")[0], OBSERVABLES)
-
-    @property
-    def identity(self) -> str:
-        """The name of a value in `Entries`, whatever its origin: the key, or the field's name if it has no key."""
-        return self.key or self.name
-
-    @property
-    def default_text(self) -> str:
-        """The default in the help of the option; empty for one that needs no words."""
-        if self.typed is not None:
-            return str(self.typed)
-        if self.default in (None, REQUIRED, (), "", {}) or isinstance(self.default, bool):
-            return ""
-        return self.reader.show(self.default)
-
-    def called(self, style: str) -> str:
-        """The field's name in errors; style is "option", "key" or "name"."""
-        names = {"option": self.flag, "key": self.key, "name": self.name}
-        return names[style] or self.flag or self.key or self.name
-
-    def read(self, raw: Any, style: str) -> Any:
-        """Read a value; a ValueError names the field in the given style."""
-        word = isinstance(raw, str) and raw.strip().lower() == self.none
-        if raw is None or word:
-            return None
-        try:
-            return self.reader.read(raw)
-        except InsideError as error:
-            raise ValueError(f"{self.called(style)}{error}") from None
-        except ValueError as error:
-            none = f", or {self.none!r}" if self.none and isinstance(raw, str) else ""
-            raise ValueError(f"{self.called(style)}: {error}{none}") from None
-
-    def write(self, value: Any) -> Any:
-        """The value as a scene holds it; None is left out."""
-        return self.none if value is None else self.reader.write(value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -178,6 +75,11 @@ def part(
 def identical(value: Any, _: Any) -> Any:
     """Identity, as `make` and `split` of a part whose value is its inputs."""
     return value
+
+
+def panel_of(field: Field) -> str:
+    """The panel of --help in which a field's option stands."""
+    return field.panel or _PANEL_OF_TABLE.get(field.table.partition(".")[0], OBSERVABLES)
 
 
 @cache

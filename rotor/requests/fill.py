@@ -9,7 +9,8 @@ from dataclasses import field
 from typing import Any
 
 from rotor.frozen import dataclass
-from rotor.requests.field import OUTPUTS, REQUIRED, Field, Part, all_fields, declared_fields, parts_of
+from rotor.requests.field import OUTPUTS, REQUIRED, Part, all_fields, declared_fields, parts_of
+from rotor.requests.readers import Field
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from rotor.frozen import dataclass
-from rotor.requests.field import Field, all_fields
+from rotor.requests.field import all_fields
 from rotor.requests.fill import Entries
+from rotor.requests.readers import Field
 
 if TYPE_CHECKING:
     from rotor.requests.plan import Cost, Run

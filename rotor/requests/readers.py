@@ -1,4 +1,4 @@
-"""Readers: how the value of a field is read from text or a number, checked and written back; one class for each kind of value.
+"""A field of a request, and the readers of its value: how it is read from text or a number, checked and written back.
 
 Text comes from the command line, text or TOML values from a scene, any value from Python. Errors quote what was typed.
 """
@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
+from dataclasses import MISSING
 from typing import Any
 
 from rotor.frozen import dataclass
@@ -40,6 +41,104 @@ class Reader:
     def show(self, value: Any) -> str:
         """The default as the help of an option shows it."""
         return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Rule:
+    """Fields or files, by identity, that go with a field: at least one of `needs`, none of `excludes`. why: the reason in errors."""
+
+    needs: tuple[str, ...] = ()
+    excludes: tuple[str, ...] = ()
+    why: str = ""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Field:
+    """Declaration of a field.
+
+    reader: reads, writes and checks a value, with unit and bounds.
+    help: one line, without a full stop.
+    key: table and key in a scene, such as "conditions.temperature"; a key without a table stands before the first table; "" for none.
+    option: name on the command line; None derives it from the key, "" means none; without a leading "-" it is an argument by position.
+    hidden: another option sets this field together with others (`rotor.verbs.verb.Extra`).
+    none: the word that stands for None.
+    common: whether --help lists the option; --help-all lists all.
+    example: value in a template if the default is None.
+    typed: the default as a user would type it, if that differs.
+    panel: heading in --help.
+    knob: how fine an approximation is (`rotor.requests.knob`).
+    rule: other fields or files that it needs or excludes.
+    name, default: filled in by `declared_fields`.
+    """
+
+    reader: Reader
+    help: str
+    key: str = ""
+    option: str | None = None
+    hidden: bool = False
+    none: str | None = None
+    common: bool = False
+    example: Any = None
+    typed: Any = None
+    panel: str = ""
+    metavar: str = ""
+    knob: Any = None
+    rule: Rule | None = None
+    name: str = ""
+    default: Any = None
+
+    @property
+    def table(self) -> str:
+        """The table in a scene; empty for a key before the first table."""
+        return self.key.rpartition(".")[0]
+
+    @property
+    def last(self) -> str:
+        """The key inside its table."""
+        return self.key.rpartition(".")[2]
+
+    @property
+    def flag(self) -> str:
+        """The option, derived from the key where none is given; empty where there is none."""
+        if self.option is not None:
+            return self.option
+        return "--" + (self.last or self.name).replace("_", "-")
+
+    @property
+    def identity(self) -> str:
+        """The name of a value in `Entries`, whatever its origin: the key, or the field's name if it has no key."""
+        return self.key or self.name
+
+    @property
+    def default_text(self) -> str:
+        """The default in the help of the option; empty for one that needs no words."""
+        if self.typed is not None:
+            return str(self.typed)
+        if self.default in (None, MISSING, (), "", {}) or isinstance(self.default, bool):
+            return ""
+        return self.reader.show(self.default)
+
+    def called(self, style: str) -> str:
+        """The field's name in errors; style is "option", "key" or "name"."""
+        names = {"option": self.flag, "key": self.key, "name": self.name}
+        return names[style] or self.flag or self.key or self.name
+
+    def read(self, raw: Any, style: str) -> Any:
+        """Read a value; a ValueError names the field in the given style."""
+        word = isinstance(raw, str) and raw.strip().lower() == self.none
+        if raw is None or word:
+            return None
+        try:
+            return self.reader.read(raw)
+        except InsideError as error:
+            raise ValueError(f"{self.called(style)}{error}") from None
+        except ValueError as error:
+            none = f", or {self.none!r}" if self.none and isinstance(raw, str) else ""
+            raise ValueError(f"{self.called(style)}: {error}{none}") from None
+
+    def write(self, value: Any) -> Any:
+        """The value as a scene holds it; None is left out."""
+        return self.none if value is None else self.reader.write(value)
 
 
 class Listed(Reader):
@@ -260,30 +359,6 @@ class Range(Reader):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Numbers(Listed):
-    """Numbers in a unit, from a text with commas or a list. counts: allowed lengths; any length if empty."""
-
-    unit: str = ""
-    counts: Collection[int] = ()
-    example: str = "0,0,1"
-    metavar: str = "LIST"
-    scene_type = list[float]
-    item = float
-
-    def read(self, raw: Any) -> tuple[float, ...]:
-        """The numbers."""
-        if isinstance(raw, str):
-            values = tuple(parse_grid(raw, self.unit).tolist()) if ":" not in raw else ()
-        else:
-            values = tuple(map(float, [raw] if isinstance(raw, int | float) else raw))
-        if (self.counts and len(values) not in self.counts) or not values or not all(map(math.isfinite, values)):
-            words = {1: "one", 3: "three"}
-            count = " or ".join(words.get(n, str(n)) for n in self.counts)
-            raise ValueError(f"{raw!r}: expected {count + ' ' if count else ''}finite numbers, such as {self.example}")
-        return values
-
-
-@dataclass(frozen=True, eq=False, repr=False)
 class Names(Listed):
     """Texts: an option that may be repeated, a list in a scene."""
 
@@ -295,86 +370,6 @@ class Names(Listed):
     def read(self, raw: Any) -> tuple[str, ...]:
         """The texts."""
         return (raw,) if isinstance(raw, str) else tuple(raw)
-
-
-_COMMAS = re.compile(r",(?![^()\[\]]*[)\]])")  # commas inside brackets belong to a name
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class NameList(Listed):
-    """Distinct names, from a text with commas or a list. words: the allowed names; any if empty. Commas in brackets belong to a name."""
-
-    words: Collection[str] = ()
-    metavar: str = "LIST"
-    scene_type: Any = list[str]
-
-    def read(self, raw: Any) -> tuple[str, ...]:
-        """The names."""
-        names = [name.strip() for name in _COMMAS.split(raw)] if isinstance(raw, str) else list(raw)
-        if self.words and not set(names) <= set(self.words):
-            raise ValueError(f"{raw!r}: expected each of {', '.join(self.words)} once at most")
-        if not names or not all(names):
-            raise ValueError(f"{raw!r}: names parted by commas are needed, such as A,B,C,DeltaJ")
-        twice = next((name for name in names if names.count(name) > 1), None)
-        if twice:
-            raise ValueError(f"{raw!r}: {twice} is named twice; once is enough")
-        return tuple(names)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Pairs(Reader):
-    """Numbers by name, from `ee=1,eo=3` or a table. number: type of the values. what: what the names stand for."""
-
-    number: type = int
-    what: str = "class"
-    example: str = "ee=1"
-    metavar: str = "LIST"
-    lower: bool = False
-
-    @property
-    def scene_type(self) -> Any:
-        """A table of numbers."""
-        return dict[str, int] if self.number is int else dict[str, float]
-
-    def read(self, raw: Any) -> dict[str, Any]:
-        """The numbers by name."""
-        if isinstance(raw, Mapping):
-            return {str(name): self.number(value) for name, value in raw.items()}
-        table: dict[str, Any] = {}
-        for item in raw.split(","):
-            name, _, number = (part.strip() for part in item.partition("="))
-            name = name.lower() if self.lower else name
-            if not name or not self._is_number(number) or name in table:
-                rule = f"{self.what}=number, each {self.what} once, such as {self.example}"
-                raise ValueError(f"{item.strip()!r} in {raw!r}: expected {rule}")
-            table[name] = self.number(number)
-        return table
-
-    def _is_number(self, text: str) -> bool:
-        pattern = r"\d+" if self.number is int else r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
-        return re.fullmatch(pattern, text) is not None
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Array(Reader):
-    """A vector or matrix: commas separate numbers, semicolons rows. Its owner checks the shape."""
-
-    scene_type: Any = list[float]
-    metavar: str = "LIST"
-
-    def read(self, raw: Any) -> Any:
-        """Numbers from a text; lists and arrays are passed on."""
-        if not isinstance(raw, str):
-            return raw
-        try:
-            rows = [[float(number) for number in row.split(",")] for row in raw.split(";")]
-        except ValueError:
-            raise ValueError(f"{raw!r}: expected numbers, separated by commas; rows by semicolons") from None
-        return rows if ";" in raw else rows[0]
-
-    def write(self, value: Any) -> Any:
-        """The numbers as lists."""
-        return value.tolist() if hasattr(value, "tolist") else list(value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -393,43 +388,3 @@ class Custom(Reader):
     def write(self, value: Any) -> Any:
         """The value that `writing` returns."""
         return self.writing(value)
-
-
-def whole_range(text: str) -> tuple[int, int]:
-    """First and last of a range of whole numbers.
-
-    >>> whole_range("2:5"), whole_range("3")
-    ((2, 5), (3, 3))
-    """
-    parts = [part.strip() for part in text.split(":")]
-    if len(parts) > 2 or not all(part.isdecimal() for part in parts):
-        raise ValueError(f"{text!r}: expected a whole number or a range of them, such as 2:5")
-    first, last = int(parts[0]), int(parts[-1])
-    if first > last:
-        raise ValueError(f"{text!r}: expected a range that rises, but {first} is above {last}")
-    return first, last
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Each(Quantity):
-    """Numbers with a unit, separated by commas: one for all things or one for each. A scene holds one for all."""
-
-    def read(self, raw: Any) -> Any:
-        """The numbers in `unit`."""
-        if isinstance(raw, list | tuple):
-            return tuple(super(Each, self).read(part) for part in raw)
-        parts = raw.split(",") if isinstance(raw, str) else [raw]
-        return tuple(super(Each, self).read(part) for part in parts)
-
-    def check(self, value: Any, typed: Any = None) -> None:
-        """ValueError for a number out of bounds."""
-        for number in value if isinstance(value, tuple) else (value,):
-            super().check(number, typed)
-
-    def write(self, value: Any) -> Any:
-        """The first number with its unit."""
-        return super().write(value[0])
-
-    def show(self, value: Any) -> str:
-        """The first number with its unit."""
-        return super().show(value[0])

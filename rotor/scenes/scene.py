@@ -19,9 +19,10 @@ from rotor.formats.toml import parse_toml, read_toml, toml_key, toml_value
 from rotor.frozen import dataclass
 from rotor.requests.accuracy import Stated, TotalAccuracy
 from rotor.requests.choices import Choices, nearest
-from rotor.requests.field import REQUIRED, Field, all_fields
+from rotor.requests.field import REQUIRED, all_fields
 from rotor.requests.fill import Entries
-from rotor.requests.readers import Custom, Each, Flag, NameList, Names, Quantity, Text
+from rotor.requests.lists import Each, NameList
+from rotor.requests.readers import Custom, Field, Flag, Names, Quantity, Text
 from rotor.verbs import SCENE_VERBS
 from rotor.verbs.outputs import Output
 from rotor.verbs.verb import Verb, verb_of

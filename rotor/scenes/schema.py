@@ -7,7 +7,8 @@ from dataclasses import is_dataclass
 from typing import Any, get_args, get_origin
 
 from rotor.requests.choices import Choices
-from rotor.requests.field import REQUIRED, Field
+from rotor.requests.field import REQUIRED
+from rotor.requests.readers import Field
 from rotor.scenes.scene import SCHEMA, Keys, about, declared_keys, kinds_in, shown_default, tables_of, value_kinds
 from rotor.verbs import SCENE_VERBS
 from rotor.verbs.verb import verb_of

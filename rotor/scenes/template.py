@@ -7,7 +7,7 @@ from typing import Any, get_origin
 
 from rotor.formats.toml import toml_value
 from rotor.requests.choices import Choices
-from rotor.requests.field import Field
+from rotor.requests.readers import Field
 from rotor.scenes.scene import SCHEMA, Keys, about, declared_keys, inner_tables, shown_default, tables_of
 from rotor.verbs import SCENE_VERBS
 from rotor.verbs.verb import Verb, verb_of

@@ -22,7 +22,8 @@ from rotor.quantum.hamiltonian_input import effects_of_each_field
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.field import CONDITIONS, REQUIRED, check_fields, declared, part
 from rotor.requests.knob import DECADES, Knob, Measure
-from rotor.requests.readers import Custom, Each, Quantity, Range
+from rotor.requests.lists import Each
+from rotor.requests.readers import Custom, Quantity, Range
 from rotor.spectra.emission import (
     BACKGROUND_K,
     KM_PER_S,

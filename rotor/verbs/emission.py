@@ -14,10 +14,10 @@ from rotor.quantum.quanta import headings
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Part, Table, listed, record_table, table_records
 from rotor.reports.top_facts import error_facts, hyperfine_lines, short_source
-from rotor.requests.field import OUTPUT, REQUIRED, Field, all_fields, declared, declared_fields
+from rotor.requests.field import OUTPUT, REQUIRED, all_fields, declared, declared_fields
 from rotor.requests.fill import Entries, NamedError, read_instance, written_fields
 from rotor.requests.plan import MOST_LEFT_OUT
-from rotor.requests.readers import Custom, Quantity, Text, Whole
+from rotor.requests.readers import Custom, Field, Quantity, Text, Whole
 from rotor.spectra.emission_request import EmissionAnswer, EmissionRequest, answer_emission
 from rotor.tops.top import Top
 from rotor.verbs.emission_observed import OBSERVED

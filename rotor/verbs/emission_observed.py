@@ -11,8 +11,8 @@ import numpy as np
 
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
-from rotor.requests.field import Rule, changed_fields, declared_fields
-from rotor.requests.readers import INFINITE
+from rotor.requests.field import changed_fields, declared_fields
+from rotor.requests.readers import INFINITE, Rule
 from rotor.verbs.observed_file import (
     FIT_OPTIONS,
     SINGLE,

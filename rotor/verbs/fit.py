@@ -13,9 +13,10 @@ import numpy as np
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, Table, record_table
 from rotor.reports.top_facts import error_facts
-from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, Rule, declared
+from rotor.requests.field import NUMERICS, OBSERVABLES, OUTPUT, declared
 from rotor.requests.fill import NamedError
-from rotor.requests.readers import Flag, NameList, Text, Whole
+from rotor.requests.lists import NameList
+from rotor.requests.readers import Flag, Rule, Text, Whole
 from rotor.table import ColumnTable
 from rotor.verbs.measured_lines import FitInput, MeasuredLines, build
 from rotor.verbs.outputs import Output, Report, picture, tables

@@ -15,7 +15,8 @@ from rotor.reports import top_facts
 from rotor.reports.line_tables import first_rows_title
 from rotor.reports.screen import Table, record_table, table_records
 from rotor.requests.field import OBSERVABLES, OUTPUT, declared
-from rotor.requests.readers import Text, Whole, whole_range
+from rotor.requests.lists import whole_range
+from rotor.requests.readers import Text, Whole
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY
 from rotor.verbs.outputs import Output, Report, drawing, picture, tables
 from rotor.verbs.subjects import OneMolecule

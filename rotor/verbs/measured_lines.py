@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.checks import require_file
 from rotor.frozen import dataclass
-from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, Field, all_fields, declared
+from rotor.requests.field import CONDITIONS, NUMERICS, OBSERVABLES, all_fields, declared
 from rotor.requests.fill import Entries, NamedError, naming, read_instance, within, written_fields
-from rotor.requests.readers import Custom, InsideError, NameList, Names, Quantity, Reader, Text, Whole
+from rotor.requests.lists import NameList
+from rotor.requests.readers import Custom, Field, InsideError, Names, Quantity, Reader, Text, Whole
 from rotor.units import parse_quantity
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
 from rotor.verbs.subjects import MOLECULE, file_name, saved_inputs, saved_molecule

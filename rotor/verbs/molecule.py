@@ -15,7 +15,8 @@ import numpy as np
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE, SPINS, all_fields, declared
 from rotor.requests.fill import Entries, naming, read_instance, within
-from rotor.requests.readers import Names, Numbers, Pairs, Quantity, Text
+from rotor.requests.lists import Numbers, Pairs
+from rotor.requests.readers import Names, Quantity, Text
 
 if TYPE_CHECKING:
     from rotor.molecules.molecule import Molecule

@@ -12,8 +12,9 @@ import numpy as np
 
 from rotor.checks import require_file
 from rotor.frozen import dataclass
-from rotor.requests.field import CONDITIONS, Rule, changed_fields, declared, declared_fields, identical, part
-from rotor.requests.readers import INFINITE, NameList, Names, Numbers, Quantity, Text, Whole
+from rotor.requests.field import CONDITIONS, changed_fields, declared, declared_fields, identical, part
+from rotor.requests.lists import NameList, Numbers
+from rotor.requests.readers import INFINITE, Names, Quantity, Rule, Text, Whole
 from rotor.spectra.emission_request import LayerInput, WindowInput
 from rotor.verbs.molecule import with_some_dipole
 from rotor.verbs.subjects import top_of_word

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rotor.frozen import dataclass
-from rotor.requests.field import OUTPUT, OUTPUTS, REQUIRED, Field, Rule
+from rotor.requests.field import OUTPUT, OUTPUTS, REQUIRED
 from rotor.requests.fill import Entries
-from rotor.requests.readers import Names, Text
+from rotor.requests.readers import Field, Names, Rule, Text
 from rotor.temporary import locked_file
 
 if TYPE_CHECKING:

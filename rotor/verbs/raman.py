@@ -42,7 +42,7 @@ def _facts(answer: RamanAnswer, record: Mapping[str, Any]) -> list[tuple[str, st
         *top_facts.states_facts(top)[:1],
         ("temperature", f"{lines.temperature_k:g} K"),
         ("laser", f"{lines.laser_nm:g} nm in vacuum"),
-        ("Q", top_facts.q_text(record["q"])),
+        ("Q", top_facts.q_text(lines.partition, record["q"]["classical"])),
         ("J max", f"{lines.jmax}: {record['jmax_source']}"),
         ("cut", "none: every allowed line" if least is None else f"{least:g} of the strongest"),
         *top_facts.hyperfine_lines(record["hyperfine"]),

@@ -15,9 +15,9 @@ from rotor.quantum.quanta import headings, rotational_quanta
 from rotor.reports import top_facts
 from rotor.reports.line_tables import lines_table, pattern_records, patterns_table
 from rotor.reports.screen import Part
-from rotor.requests.field import OBSERVABLES, OUTPUT, Rule, changed_fields, declared
+from rotor.requests.field import OBSERVABLES, OUTPUT, changed_fields, declared
 from rotor.requests.fill import Entries, NamedError, read_fields, read_instance
-from rotor.requests.readers import Custom, Flag, Quantity, Text, Whole
+from rotor.requests.readers import Custom, Flag, Quantity, Rule, Text, Whole
 from rotor.spectra.request import SpectrumAnswer, SpectrumRequest, answer_spectrum
 from rotor.verbs import int_files
 from rotor.verbs.long_lists import LongAnswer, answer_long, is_long, refuse_long_output
@@ -216,7 +216,7 @@ def _facts(answer: SpectrumAnswer, record: Mapping[str, Any]) -> list[tuple[str,
         ),
         *top_facts.states_facts(top)[:MOST_FACTS_OF_STATES],
         ("temperature", f"{lines.temperature_k:g} K"),
-        ("Q", top_facts.q_text(record["q"], classical=named)),
+        ("Q", top_facts.q_text(lines.partition, record["q"]["classical"] if named else None)),
         ("J max", f"{record['jmax']}: {record['jmax_source']}"),
         ("cut", cut + _range_text(lines.range_mhz)),
         *top_facts.hyperfine_lines(record["hyperfine"]),

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.frozen import dataclass
-from rotor.requests.field import REQUIRED, Field, all_fields
+from rotor.requests.field import REQUIRED, all_fields
 from rotor.requests.fill import Entries, read_instance, written_fields
-from rotor.requests.readers import Custom
+from rotor.requests.readers import Custom, Field
 from rotor.verbs.molecule import FIELDS, MoleculeInput, Reading, read_molecule, top_of
 from rotor.verbs.verb import Note, Place, Subject, SubjectKind
 

@@ -10,7 +10,7 @@ from rotor import units
 from rotor.reports import top_facts
 from rotor.reports.progress import progress_bar
 from rotor.reports.screen import Table, record_table, table_records
-from rotor.requests.field import Rule
+from rotor.requests.readers import Rule
 from rotor.thermodynamics.torsion.request import TorsionAnswer, TorsionRequest, answer_torsion
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, STATES
 from rotor.verbs.outputs import Report, picture, table_file

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rotor.reports import top_facts
 from rotor.reports.screen import Part, Table, record_table, sampled
-from rotor.requests.field import Rule
 from rotor.requests.fill import NamedError, within
+from rotor.requests.readers import Rule
 from rotor.verbs.molecule import DIPOLE, NUCLEI, POLARIZABILITY, REFINEMENT, STATES
 from rotor.verbs.outputs import Output, Report, drawing, picture, tables
 from rotor.verbs.turning_body import MotionInput, TurningBody, build

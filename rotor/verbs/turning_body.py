@@ -13,9 +13,9 @@ import numpy as np
 from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE
 from rotor.frozen import dataclass
 from rotor.requests.field import MOLECULE as MOLECULE_PANEL
-from rotor.requests.field import NUMERICS, Field, all_fields, declared
+from rotor.requests.field import NUMERICS, all_fields, declared
 from rotor.requests.fill import Entries, NamedError, naming, read_instance, written_fields
-from rotor.requests.readers import Custom, Grid, Quantity, Reader, Whole
+from rotor.requests.readers import Custom, Field, Grid, Quantity, Reader, Whole
 from rotor.units import ASE_TIME_PS, HBAR_CLASSICAL, parse_grid
 from rotor.verbs.subjects import MOLECULE, OneMolecule, saved_molecule
 from rotor.verbs.verb import Place, Subject, Verb

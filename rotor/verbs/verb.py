@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from rotor.frozen import dataclass
 from rotor.reports.screen import Part, json_text, json_with_rows
-from rotor.requests.field import OUTPUT, Field, all_fields, declared
+from rotor.requests.field import OUTPUT, all_fields, declared
 from rotor.requests.fill import Entries, naming, read_fields, read_instance, written_fields
-from rotor.requests.readers import Flag, Names, Text
+from rotor.requests.readers import Field, Flag, Names, Text
 from rotor.table import Table
 from rotor.verbs.outputs import Output, Report
 

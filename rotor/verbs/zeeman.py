@@ -19,7 +19,7 @@ from rotor.reports.field_maps import (
 from rotor.reports.screen import Table
 from rotor.requests.field import CONDITIONS, all_fields, declared
 from rotor.requests.fill import Entries, read_instance, within
-from rotor.requests.readers import Numbers
+from rotor.requests.lists import Numbers
 from rotor.tops.magnetic import MagneticTensors, tensor_for
 from rotor.verbs.molecule import DIPOLE, POLARIZABILITY, REFINEMENT, STATES, Reading
 from rotor.verbs.outputs import Report, picture, tables

@@ -20,7 +20,7 @@ from places import PROJECT
 import rotor
 from rotor.reports import top_facts as report
 from rotor.reports.screen import Table, json_text, show_table, table_text
-from rotor.requests.readers import Numbers
+from rotor.requests.lists import Numbers
 
 WATER_XYZ = "3\nwater\nO 0 0 0\nH 0.75695 0 0.585882\nH -0.75695 0 0.585882\n"
 RIGID = "A=835840.288 B=435351.717 C=278138.7 MHz"

@@ -22,7 +22,8 @@ import rotor
 from rotor.formats import registry
 from rotor.requests.field import all_fields
 from rotor.requests.fill import Entries, read_fields, written_fields
-from rotor.requests.readers import Grid, Names, Numbers, Pairs, Quantity, Range, Text, Whole
+from rotor.requests.lists import Numbers, Pairs
+from rotor.requests.readers import Grid, Names, Quantity, Range, Text, Whole
 from rotor.scenes.run import run_scene
 from rotor.scenes.scene import parse_scene, scene_text
 from rotor.scenes.template import template
@@ -345,8 +346,8 @@ def test_plain_names_in_an_error_are_replaced(text, said):
     ],
 )
 def test_rules_of_fields_and_files(style, given, text):
-    from rotor.requests.field import Field, Rule
     from rotor.requests.fill import refuse_misfits
+    from rotor.requests.readers import Field, Rule
     from rotor.verbs.outputs import Output
 
     fields = (

@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rotor.requests.field import Field
-from rotor.requests.readers import Whole
+from rotor.requests.readers import Field, Whole
 from rotor.scenes.scene import checked_table, make_scene, parse_scene, read_scene, scene_text, tables_of, write_scene
 from rotor.scenes.schema import json_schema, table_schema
 from rotor.scenes.sweep.points import points

@@ -13,7 +13,7 @@ from rotor.arrays import Floats
 from rotor.classical.effect import InertiaChange, vector_field
 from rotor.classical.euler import checked_moments
 from rotor.requests.field import REQUIRED, declared
-from rotor.requests.readers import Array
+from rotor.requests.lists import Array
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,8 @@ from rotor.quantum.fields.operators import Contraction, Magnet
 from rotor.quantum.hamiltonian_input import spins_field
 from rotor.requests.budget import ErrorTerm
 from rotor.requests.field import SPINS, check_fields, declared
-from rotor.requests.readers import Grid, Pairs
+from rotor.requests.lists import Pairs
+from rotor.requests.readers import Grid
 from rotor.tops.magnetic import MagneticTensors
 from rotor.units import AVOGADRO_PER_MOL, NUCLEAR_MAGNETON_MHZ_PER_T, PLANCK_J_S
 

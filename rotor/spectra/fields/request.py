@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from rotor.quantum.effects.stark import StarkRequest
-from rotor.requests.field import CONDITIONS, OBSERVABLES, Rule, check_fields, declared
-from rotor.requests.readers import Custom, Quantity, Range, Text
+from rotor.requests.field import CONDITIONS, OBSERVABLES, check_fields, declared
+from rotor.requests.readers import Custom, Quantity, Range, Rule, Text
 from rotor.spectra.fields.light import LightText, light_components
 from rotor.table import Table
 from rotor.thermodynamics.gas.field_mixture import POPULATIONS, field_mixture
