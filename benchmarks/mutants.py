@@ -30,7 +30,7 @@ ARITHMETIC = {"+": "-", "-": "+", "*": "/", "/": "*", "//": "*", "%": "*", "**":
 REDUCED = {"all": "any", "any": "all", "min": "max", "max": "min", "argmin": "argmax", "argmax": "argmin"}
 OPERATORS = ("comparison", "boolean", "arithmetic", "constant", "all/any", "guard removed", "raise removed", "return removed",
              "arguments swapped", "sign")  # fmt: skip
-COMPILED = re.compile(r"njit|inlined|compiled|jit\b")
+COMPILED = re.compile(r"kernel|inlined|compiled|jit\b")
 
 
 @dataclass(frozen=True)

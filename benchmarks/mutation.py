@@ -35,7 +35,7 @@ from pathlib import Path
 from typing import Any
 
 from mutants import Mutant, sample
-from mutation_ranking import UNREACHED_MOST, WORD, Reach, Selection, append, rows
+from mutation_ranking import UNREACHED_MOST, Reach, Selection, append, rows
 from mutation_session import Session, Unpatchable
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -77,7 +77,7 @@ def prepared(folder: Path, checkout: Path, count: int, seed: int) -> list[Mutant
 
 
 def restored(folder: Path, files: Iterable[str]) -> None:
-    """The files of the copy as they were, with their dates: compiled kernels are stored under these."""
+    """The files of the copy as they were."""
     for file in files:
         shutil.copy2(folder / "original" / file, folder / file)
 
@@ -223,7 +223,10 @@ def finished(folder: Path) -> dict[int, dict[str, Any]]:
 
 def judged(folder: Path, mutant: Mutant, tests: list[str], budget: float) -> dict[str, Any]:
     """Whether a test is red, the likeliest first, up to the budget."""
-    caches = stale_caches(folder, mutant) if mutant.compiled else {}
+    stored = (
+        (folder / "rotor").rglob("*.nb[ic]") if mutant.compiled else ()
+    )  # those of changed kernels are written anew
+    caches = {path: path.read_bytes() for path in stored}
     before, ran = processor_time(), []
     batches = [tests[:FIRST], *(tests[k : k + NEXT] for k in range(FIRST, min(len(tests), MOST), NEXT))]
     try:
@@ -267,23 +270,6 @@ def culprit(folder: Path) -> str:
         r"^(?:FAILED|ERROR) (.*?)(?: - |$)", (folder / "last.log").read_text("utf-8", errors="replace"), re.M
     )
     return match[1] if match else "no start"
-
-
-def stale_caches(folder: Path, mutant: Mutant) -> dict[Path, bytes]:
-    """Compiled kernels that may hold what is changed, removed, with their content."""
-    stems = {Path(mutant.file).stem}
-    kernels = [path for path in (folder / "rotor").rglob("*.py") if "njit" in path.read_text("utf-8")]
-    grown = 0
-    while grown != len(stems):
-        grown = len(stems)
-        stems |= {path.stem for path in kernels if stems & set(WORD.findall(path.read_text("utf-8")))}
-    caches = {}
-    for kernel in kernels:
-        if kernel.stem in stems:
-            for path in (kernel.parent / "__pycache__").glob(f"{kernel.stem}.*.nb*"):
-                caches[path] = path.read_bytes()
-                path.unlink()
-    return caches
 
 
 def exchanged(folder: Path, mutants: list[Mutant], table: Path) -> None:

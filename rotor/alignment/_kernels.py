@@ -1,11 +1,12 @@
 """The compiled loop of the splitting: kicks and drifts of all columns of a block, with snapshots."""
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rotor.kernels import kernel
 
-@njit(cache=True, error_model="numpy")
+
+@kernel(error_model="numpy")
 def _copy(source: NDArray[np.complex128], target: NDArray[np.complex128]) -> None:
     """Copy by plain loops: compiling a slice assignment, with its error messages, takes four seconds more."""
     for i in range(source.shape[0]):
@@ -13,7 +14,7 @@ def _copy(source: NDArray[np.complex128], target: NDArray[np.complex128]) -> Non
             target[i, c] = source[i, c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@kernel(nogil=True, error_model="numpy")
 def kick_and_drift(
     states: NDArray[np.complex128],
     drifts: NDArray[np.complex128],

@@ -3,17 +3,16 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from rotor.assignment.rigid_table import MIXED
+from rotor.kernels import kernel
 from rotor.units import MHZ_PER_K
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def place(theta: Floats, kappa: float) -> tuple[int, float]:
     """Grid interval of κ and the position within it, from 0 to 1, for cubic interpolation between four points."""
     angle = np.arccos(min(1.0, max(-1.0, -kappa)))  # cos θ = -κ; round-off may leave the range
@@ -22,7 +21,7 @@ def place(theta: Floats, kappa: float) -> tuple[int, float]:
     return i, x - i
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def level_energies(levels: Floats, theta: Floats, jj: Floats, constants: Floats, energy: Floats) -> tuple[int, float]:
     """Write energies (MHz) of all levels, to first order in the quartic constants; return the position on the grid."""
     mean, half = 0.5 * (constants[0] + constants[2]), 0.5 * (constants[0] - constants[2])
@@ -40,7 +39,7 @@ def level_energies(levels: Floats, theta: Floats, jj: Floats, constants: Floats,
     return i, w
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 # Lagrange's cubic through four neighbouring points
 def rigid_energies(reduced: Floats, theta: Floats, jj: Floats, top: Floats, energy: Floats) -> None:
     """Write energies (MHz) of all levels of a rigid top A, B, C; reduced (POINTS, levels) : E_κ."""
@@ -53,7 +52,7 @@ def rigid_energies(reduced: Floats, theta: Floats, jj: Floats, top: Floats, ener
         energy[n] = mean * jj[n] + half * shape
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def lines_in_band(
     theta: Floats, upper: Ints, lower: Ints, strength: NDArray[np.float32], constants: Floats, windows: Floats,
     energy: Floats, row: Ints, frequency: Floats, s_nu: Floats,
@@ -81,7 +80,7 @@ def lines_in_band(
     return count
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def derivatives(levels: Floats, theta: Floats, upper: Ints, lower: Ints, rows: Ints, constants: Floats) -> Floats:
     """∂ν/∂(A, B, C, DJ, DJK, DK, d1, d2) of lines (rows, 8)."""
     kappa = (2 * constants[1] - constants[0] - constants[2]) / (constants[0] - constants[2])
@@ -96,7 +95,7 @@ def derivatives(levels: Floats, theta: Floats, upper: Ints, lower: Ints, rows: I
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def strongest_lines(
     levels: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32],
     tops: Floats, log_dipoles: Floats, temperatures: Floats, windows: Floats, count: int, apart: float,
@@ -105,8 +104,9 @@ def strongest_lines(
 
     log_dipoles (tops, 3) : ln μ². Returns rows (tops, 4, count), padded with -1, and ∂ν/∂(A, B, C) (tops, 4, count, 3).
     """
-    rows = np.full((len(tops), 4, count), -1)
-    slopes = np.zeros((len(tops), 4, count, 3))
+    types = log_dipoles.shape[1]
+    rows = np.full((len(tops), types + 1, count), -1)
+    slopes = np.zeros((len(tops), types + 1, count, 3))
     energy, constants = np.empty(len(jj)), np.zeros(8)
     row, f, s_nu = np.empty(len(upper), np.int64), np.empty(len(upper)), np.empty(len(upper))
     for t in range(len(tops)):
@@ -116,10 +116,10 @@ def strongest_lines(
         height = np.empty(line_count)
         for n in range(line_count):
             height[n] = np.log(s_nu[n]) - energy[lower[row[n]]] / (MHZ_PER_K * temperatures[t])
-        for q in range(4):
+        for q in range(types + 1):
             taken = np.empty(count)
             at = 0
-            if q == MIXED:
+            if q == types:  # lines of all types
                 candidates = np.arange(line_count)
                 height += log_dipoles[t][kind[row[:line_count]]]
             else:
@@ -140,7 +140,7 @@ def strongest_lines(
     return rows, slopes
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _windows(f: Floats, sigma: Floats, peaks: Floats, first: Ints, last: Ints) -> None:
     """Write the ranges of peaks within four standard errors of lines."""
     for n in range(len(f)):
@@ -150,7 +150,7 @@ def _windows(f: Floats, sigma: Floats, peaks: Floats, first: Ints, last: Ints) -
             last[n] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _joint(
     f: Floats, height: Floats, scale: float, sigma: Floats, first: Ints, last: Ints, peaks: Floats, log_peaks: Floats,
     log_density: Floats, log_threshold: float, spread: float, detected: float, used: Ints, mark: int, gains: Floats, least: float,
@@ -182,7 +182,7 @@ def _joint(
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def joint_ratio(
     f: Floats, height: Floats, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float,
     spread: float, detected: float,
@@ -200,7 +200,7 @@ def joint_ratio(
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def joint_ratios_along(
     f: Floats, move: Floats, t: Floats, height: Floats, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats,
     log_threshold: float, spread: float, detected: float,
@@ -220,7 +220,7 @@ def joint_ratios_along(
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _gains(
     f: Floats,
     sigma: Floats,
@@ -244,7 +244,7 @@ def _gains(
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def best_scale(
     f: Floats, expected: Floats, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats, log_threshold: float,
     spread: float, detected: float, proposals: int, least: float,
@@ -284,7 +284,7 @@ def best_scale(
     return highest if best > -np.inf else 0.0, best  # no scale fits: the type is taken as absent
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def best_scales(
     f: Floats, expected: Floats, kind: Ints, sigma: Floats, peaks: Floats, log_peaks: Floats, log_density: Floats,
     log_threshold: float, spread: float, detected: float, most: int, proposals: int,
@@ -315,7 +315,7 @@ def best_scales(
     return ratios, scales
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _highest(height: Floats, most: int) -> Ints:
     """Indices of the highest values in descending order; equal values keep their order."""
     out, count = np.empty(most, np.int64), 0
@@ -332,7 +332,7 @@ def _highest(height: Floats, most: int) -> Ints:
     return out[:count]
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _apart(order: Ints, f: Floats, most: int, apart: float) -> Ints:
     """The first lines in this order, without lines closer than `apart` to a preceding one."""
     out = np.empty(min(most, len(order)), np.int64)
@@ -351,7 +351,7 @@ def _apart(order: Ints, f: Floats, most: int, apart: float) -> Ints:
     return out[:count]
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def quick_ratios(
     reduced: Floats, theta: Floats, jj: Floats, upper: Ints, lower: Ints, kind: Ints, strength: NDArray[np.float32], mixed: bool,
     tops: Floats, temperatures: Floats, windows: Floats, sigma_mhz: float, softness: float,
@@ -392,7 +392,7 @@ def quick_ratios(
     return out, best
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def nearest_peaks(
     centre: Floats, height: Floats, errors: Floats, window: float, most_chance: float, peaks: Floats, log_peaks: Floats,
     log_density: Floats, spread: float, most: int,

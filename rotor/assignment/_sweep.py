@@ -3,8 +3,9 @@
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from rotor.kernels import kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -13,7 +14,7 @@ Bytes = NDArray[np.uint8]
 HIGHEST_MHZ = 1e12  # above all frequencies; infinity is not allowed in loops with fastmath
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(nogil=True, fastmath=True)
 def _hits(
     jj: Floats, energies: Floats, k: int, w: float, mean: float, half: float,
     near: Bytes, low: float, high: float, per_mhz: float, reach: float,
@@ -33,7 +34,7 @@ def _hits(
     return hits, misses
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(nogil=True, fastmath=True)
 def _crossing(linear: Floats, a: float, b: float, frequency: float, k: int, last: int) -> tuple[int, float]:
     """Grid position k + w between k and last where the third line has a frequency; w < 0 without one."""
     before = a * linear[k, 3] + b * linear[k, 4]
@@ -45,7 +46,7 @@ def _crossing(linear: Floats, a: float, b: float, frequency: float, k: int, last
     return k, -1.0
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(nogil=True, fastmath=True)
 def _inside(a: float, b: float, c: float, bounds: Floats, margin: float, planar: float) -> bool:
     """Whether A, B, C lie within bounds with a margin, and 1/C is below 1/A + 1/B over `planar`."""
     return bool(
@@ -55,7 +56,7 @@ def _inside(a: float, b: float, c: float, bounds: Floats, margin: float, planar:
     )  # fmt: skip
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(nogil=True, fastmath=True)
 def _linear(difference: Floats, jj: Floats, kappa: Floats) -> Floats:
     """At each κ (κ, 6): factors of the first two lines of a family in ½(A+C), 1/determinant, factors in the third line, and κ."""
     out = np.empty((len(kappa), 6))
@@ -69,7 +70,7 @@ def _linear(difference: Floats, jj: Floats, kappa: Floats) -> Floats:
     return out
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(nogil=True, fastmath=True)
 def _root(
     linear: Floats, sa: float, sb: float, above: float, third: float, first: int, last: int
 ) -> tuple[int, float, float, float, float]:
@@ -82,7 +83,7 @@ def _root(
     return i, w, mean, half, linear[i, 5] + w * (linear[i + 1, 5] - linear[i, 5])
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _narrowed(low: float, high: float, value: float, slope: float, least: float, most: float) -> tuple[float, float]:
     """The part of an interval of x in which value + slope x lies between limits; empty (1, 0) for a slope of 0 beyond them."""
     if slope == 0.0:
@@ -92,7 +93,7 @@ def _narrowed(low: float, high: float, value: float, slope: float, least: float,
     return max(low, min(at_least, at_most)), min(high, max(at_least, at_most))
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _most_asymmetric(kappa: float, planar: float) -> float:
     """The largest (A-C)/(A+C) of tops with C (A+B) > planar A B.
 
@@ -103,7 +104,7 @@ def _most_asymmetric(kappa: float, planar: float) -> float:
     return float(2 * constant / (root - linear))
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _seconds_within(
     first: float, jj: Floats, linear: Floats, largest: Floats, seeds: Floats, bounds: Floats, begin: Ints, end: Ints
 ) -> None:
@@ -142,7 +143,7 @@ def _seconds_within(
         begin[k], end[k] = bottom, top
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def _kappa_ranges(begin: Ints, end: Ints, opening: Ints, closing: Ints) -> None:
     """Write for each seed the first κ, and the last plus 1, at which it lies in the range of second lines."""
     opening[:], closing[:] = len(begin), 0
@@ -151,7 +152,7 @@ def _kappa_ranges(begin: Ints, end: Ints, opening: Ints, closing: Ints) -> None:
             opening[b], closing[b] = min(opening[b], step), step + 1  # the last κ plus 1
 
 
-@njit(cache=True, nogil=True, fastmath=True)
+@kernel(nogil=True, fastmath=True)
 def sweep(
     difference: Floats, jj: Floats, kappa: Floats, companions: Floats, companion_jj: Floats, seeds: Floats, log_seeds: Floats,
     near: Bytes, low: float, high: float, bin_width: float, tolerance: float, softness: float, ratio: float,

@@ -10,13 +10,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical.exponents import STAGES
+from rotor.kernels import kernel
 
 
-@njit(cache=True)
+@kernel()
 def _slopes(form: Any, table: Floats, out: Floats) -> None:
     """d/dt of table (d, 1 + m) = (state, tangent vectors) and of the integral of the trace, in row d."""
     constant, linear, quadratic = form
@@ -39,7 +39,7 @@ def _slopes(form: Any, table: Floats, out: Floats) -> None:
     out[d, 0] = trace
 
 
-@njit(cache=True)
+@kernel()
 def _stepped(form: Any, tableau: Any, table: Floats, h: float, k: Floats, work: Floats) -> float:
     """Try a step of length h; it is made in place if the returned error estimate is at most 1."""
     a, b, e3, e5, tolerance = tableau
@@ -71,7 +71,7 @@ def _stepped(form: Any, tableau: Any, table: Floats, h: float, k: Floats, work: 
     return error
 
 
-@njit(cache=True)
+@kernel()
 def _orthogonal(table: Floats, grown: Floats) -> None:
     """Gram-Schmidt of the tangent vectors, in place; logarithms of their lengths are added to `grown`."""
     d = table.shape[0] - 1
@@ -90,7 +90,7 @@ def _orthogonal(table: Floats, grown: Floats) -> None:
             table[i, c] /= math.sqrt(square)
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def follow(
     form: Any, tableau: Any, table: Floats, interval: float, intervals: int, first: float, grown: Floats
 ) -> tuple[float, int]:

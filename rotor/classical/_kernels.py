@@ -1,14 +1,13 @@
 """Compiled forms of the plain functions that several kernels of classical motion share.
 
-Each is compiled from the plain function of the same name, so that no formula is written twice. Kernels are cached on disk by the
-date of their file only: after a change of a plain function remove the caches (see CONTRIBUTING.md).
+Each is compiled from the plain function of the same name, so that no formula is written twice.
 """
 
 from __future__ import annotations
 
 from rotor.classical.integrators import strang
 from rotor.geometry import error_free
-from rotor.geometry._kernels import inlined
+from rotor.kernels import inlined
 
 halves = inlined(error_free.halves)
 two_sum = inlined(error_free.two_sum)

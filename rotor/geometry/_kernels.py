@@ -1,31 +1,17 @@
-"""Compiled forms of the quaternion algebra for the kernels of other modules, and the compiler of plain functions.
+"""Compiled forms of the quaternion algebra for the kernels of other modules.
 
 Each compiled form is made from the plain function in `quaternions.py`, so that no formula is written twice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from types import FunctionType
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.geometry import quaternions
-
-
-def inlined(function: Callable[..., Any], **callees: Any) -> Any:
-    """The compiled form of a plain function, inlined into its caller and optimised with it.
-
-    `callees` : compiled forms of the plain functions that it calls, by name.
-    """
-    plain: Any = function
-    copy = FunctionType(plain.__code__, {**plain.__globals__, **callees}, plain.__name__, plain.__defaults__)
-    copy.__module__, copy.__qualname__ = plain.__module__, plain.__qualname__
-    return njit(inline="always")(copy)
-
+from rotor.kernels import inlined, kernel
 
 cross = inlined(quaternions.cross)
 product = inlined(quaternions.product)
@@ -37,19 +23,19 @@ to_third = inlined(quaternions.to_third)
 exponential = inlined(quaternions.exponential)
 
 
-@njit(inline="always")
+@kernel(inline="always")
 def vector_at(array: Any, i: int) -> Any:
     """Row i of an array (n, 3) as a tuple."""
     return array[i, 0], array[i, 1], array[i, 2]
 
 
-@njit(inline="always")
+@kernel(inline="always")
 def quaternion_at(array: Any, i: int) -> Any:
     """Row i of an array (n, 4) as a tuple."""
     return array[i, 0], array[i, 1], array[i, 2], array[i, 3]
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def upright(directions: Floats) -> Floats:
     """Rotations (n, 4) that take unit vectors (n, 3) to the third axis."""
     out = np.empty((directions.shape[0], 4))

@@ -5,11 +5,12 @@ only lists of about ten million lines use it.
 """
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rotor.kernels import kernel
 
-@njit(cache=True, nogil=True, error_model="numpy")
+
+@kernel(nogil=True, error_model="numpy")
 def fill_pair(
     energies_up: NDArray[np.float64],
     energies_low: NDArray[np.float64],

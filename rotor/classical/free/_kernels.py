@@ -9,15 +9,15 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical._kernels import two_product, two_sum
 from rotor.classical.free.theta import CIRCULATING, SEPARATRIX, STEADY, Rows
 from rotor.geometry._kernels import product
+from rotor.kernels import kernel
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _phase(t: float, rate_hi: float, rate_lo: float, start_hi: float, start_lo: float) -> Any:
     """t rate + start as an unevaluated sum of two doubles."""
     p, p_low = two_product(t, rate_hi)
@@ -25,7 +25,7 @@ def _phase(t: float, rate_hi: float, rate_lo: float, start_hi: float, start_lo: 
     return s, s_low + ((p_low + t * rate_lo) + start_lo)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _nearest(hi: float, lo: float) -> Any:
     """The sign (-1)^j of the nearest whole number j, and what is left, in [-½, ½]."""
     j = np.rint(hi)
@@ -36,7 +36,7 @@ def _nearest(hi: float, lo: float) -> Any:
     return -1.0 if odd else 1.0, rest - more
 
 
-@njit(cache=True)
+@kernel()
 def _circulating(r: float, c: Any) -> Any:
     """L in its frame and (α, β) for z = πr, by the series in q and q²."""
     z = math.pi * r
@@ -59,7 +59,7 @@ def _circulating(r: float, c: Any) -> Any:
     return m1, m2, m3, w, x, y, k
 
 
-@njit(cache=True)
+@kernel()
 def _near_separatrix(v: float, c: Any) -> Any:
     """L in its frame and (α, β) for v = πu/2K', by the transformed series, everything scaled by e^-|v|."""
     side = -1.0 if v < 0.0 else 1.0
@@ -89,7 +89,7 @@ def _near_separatrix(v: float, c: Any) -> Any:
     return m1, m2, m3, w, x, y, k
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _placed(left: Any, right: Any, w: float, x: float, y: float, z: float, half_turn: float, out: Any) -> None:
     """left e^{i half turn} (α, β) right at unit length."""
     scale = 1.0 / math.sqrt((w * w + z * z) + (x * x + y * y))
@@ -98,7 +98,7 @@ def _placed(left: Any, right: Any, w: float, x: float, y: float, z: float, half_
     out[0], out[1], out[2], out[3] = q
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def evaluate(rows: Rows, times: Floats, momentum: Floats, attitude: Floats) -> None:
     """Momentum (n, t, 3) and attitude (n, t, 4) of n bodies at t times."""
     for b in range(rows.kind.shape[0]):

@@ -10,7 +10,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
@@ -18,16 +17,17 @@ from rotor.classical.free._kernels import evaluate
 from rotor.classical.free.theta import Rows
 from rotor.classical.integrators._kernels import FINITE, LANES, WHOLE_STEP, _length, _upright, block_turns
 from rotor.geometry._kernels import conjugate, product
+from rotor.kernels import kernel
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _turned_vector(w: float, x: float, y: float, z: float, e: Floats) -> Any:
     """e · R e = 1 - 2 |v x e|² for the rotation (w, v) and a unit vector e."""
     a, b, c = y * e[2] - z * e[1], z * e[0] - x * e[2], x * e[1] - y * e[0]
     return 1.0 - 2.0 * (a * a + b * b + c * c)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _turned_tensor(w: float, x: float, y: float, z: float, axes: Floats, beta: Floats) -> Any:
     """Σ_ij β_i β_j R_ij², the rotation seen from the tensor's principal axes (rows), Σ β_i = 0, Σ β_i² = 1.
 
@@ -45,7 +45,7 @@ def _turned_tensor(w: float, x: float, y: float, z: float, axes: Floats, beta: F
     return rest + p * p * xx + q * q * yy + p * q * (xy + yx)
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def add_bodies(rows: Rows, times: Floats, vector: Floats, axes: Floats, beta: Floats, sums: Floats) -> None:
     """Add u(0)·u(t) and β(0):β(t) and their squares, over all bodies of `rows`, to sums (4, times)."""
     momentum, attitude = np.empty((1, times.size, 3)), np.empty((1, times.size, 4))
@@ -65,7 +65,7 @@ def add_bodies(rows: Rows, times: Floats, vector: Floats, axes: Floats, beta: Fl
             sums[3, i] += second * second
 
 
-@njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
+@kernel(nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
 def add_stepped(
     momentum: Floats,
     step: float,
@@ -102,7 +102,7 @@ def add_stepped(
             _add_block(row, here, vector, axes, beta, sums[:, i])
 
 
-@njit(cache=True, fastmath=FINITE, error_model="numpy")
+@kernel(fastmath=FINITE, error_model="numpy")
 def _turn_about_l(row: Floats) -> None:
     """q from the frame of L to space, times (c, 0, 0, s)."""
     for k in range(LANES):
@@ -111,7 +111,7 @@ def _turn_about_l(row: Floats) -> None:
         row[6 * LANES + k], row[7 * LANES + k], row[8 * LANES + k], row[9 * LANES + k] = q
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
+@kernel(fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
 def _add_block(row: Floats, here: int, vector: Floats, axes: Floats, beta: Floats, out: Floats) -> None:
     """Sums over the bodies of a block, seen in the frame of `add_stepped`."""
     s1 = s2 = s3 = s4 = 0.0

@@ -6,10 +6,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.geometry._kernels import conjugate, cross, exponential, product, quaternion_at, turned, vector_at
+from rotor.kernels import kernel
 
 COSINE = tuple((-1) ** n / math.factorial(2 * n) for n in range(9))
 SINE = tuple(0.5 * (-1) ** n / math.factorial(2 * n + 1) for n in range(8))
@@ -21,7 +21,7 @@ BERNOULLI = (
 SERIES_BELOW = 1.0
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def seen_from_body(attitude: Floats, vector: Floats) -> Floats:
     """One vector (3,) of space in the axes of each body, (n, 3) for attitudes (n, 4)."""
     out, v = np.empty((attitude.shape[0], 3)), (vector[0], vector[1], vector[2])
@@ -30,7 +30,7 @@ def seen_from_body(attitude: Floats, vector: Floats) -> Floats:
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def lever(attitude: Floats, arm: Floats, force: Floats) -> Floats:
     """arm x force in body axes (n, 3), for an arm (3,) of the body and a force (3,) of space."""
     out, a, f = np.empty((attitude.shape[0], 3)), (arm[0], arm[1], arm[2]), (force[0], force[1], force[2])
@@ -39,7 +39,7 @@ def lever(attitude: Floats, arm: Floats, force: Floats) -> Floats:
     return out
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def half_angle_terms(u: Any) -> Any:
     """cos(θ/2), sin(θ/2)/θ and (1 - (θ/2) cot(θ/2))/θ² of a rotation vector, θ = |u|.
 
@@ -62,14 +62,14 @@ def half_angle_terms(u: Any) -> Any:
     return cosine, 0.5 * sine / half, (1.0 - half * cosine / sine) / square
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def ahead(q: Any, u: Any) -> Any:
     """q exp(u)."""
     cosine, half_sinc, _ = half_angle_terms(u)
     return product(q, exponential(cosine, half_sinc, u))
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def rotation_vector_rate(u: Any, omega: Any, factor: Any) -> Any:
     """du/dt = ω + ½ u x ω + f u x (u x ω), f = (1 - (θ/2) cot(θ/2))/θ², θ = |u|: the last of `half_angle_terms`."""
     a = cross(u, omega)
@@ -81,7 +81,7 @@ def rotation_vector_rate(u: Any, omega: Any, factor: Any) -> Any:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def placed(attitude: Floats, change: Floats, space: Floats, here: Floats, momentum: Floats) -> None:
     """here = attitude exp(u), and L in body axes, from change (n, 6) = (change of L in space, u)."""
     for i in range(attitude.shape[0]):
@@ -91,7 +91,7 @@ def placed(attitude: Floats, change: Floats, space: Floats, here: Floats, moment
         momentum[i, 0], momentum[i, 1], momentum[i, 2] = turned(conjugate(q), now)
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def turning(change: Floats, omega: Floats, out: Floats) -> None:
     """out[:, 3:] = du/dt of `rotation_vector_rate` for u = change[:, 3:]."""
     for i in range(change.shape[0]):
@@ -100,7 +100,7 @@ def turning(change: Floats, omega: Floats, out: Floats) -> None:
         out[i, 3], out[i, 4], out[i, 5] = rotation_vector_rate(u, vector_at(omega, i), factor)
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def to_space(attitude: Floats, vectors: Floats, out: Floats) -> None:
     """out[:, :3] = vectors (n, 3) of the bodies, seen from space."""
     for i in range(attitude.shape[0]):

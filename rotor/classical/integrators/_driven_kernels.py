@@ -9,16 +9,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical.integrators._step_kernels import kick_body, symmetric_drift, turn_body
 from rotor.classical.integrators._torque_kernels import torque_at
+from rotor.kernels import kernel
 
 NO_OMEGA = (np.nan, np.nan, np.nan)  # torques that depend on ω are refused before
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def kicked(
     form: Any,
     inverse: Floats,

@@ -12,7 +12,6 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
@@ -20,29 +19,30 @@ from rotor.classical.integrators._kernels import FINITE, LANES, WHOLE_STEP, sine
 from rotor.classical.integrators._torque_kernels import swing, times_matrix, turning_axis
 from rotor.classical.torque_form import BODY_FIXED, LEVER, SPACE_FIXED, TURNING
 from rotor.geometry._kernels import conjugate, cross, exponential, product, quaternion_at, turned, vector_at
+from rotor.kernels import kernel
 
 RUNS = 14
 Q, OUTER, INNER, SPHERE, TORQUE, WIDEST = 3 * LANES, 7 * LANES, 8 * LANES, 9 * LANES, 10 * LANES, 13 * LANES
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _quaternion(row: Any, i: int) -> Any:
     return row[Q + i], row[Q + LANES + i], row[Q + 2 * LANES + i], row[Q + 3 * LANES + i]
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _place(row: Any, i: int, q: Any) -> None:
     row[Q + i], row[Q + LANES + i], row[Q + 2 * LANES + i], row[Q + 3 * LANES + i] = q
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _seen_turned(row: Any, a: int, b: int, s: float, c: float) -> None:
     """Components a, b of L from a body that turned by the angle of half-angle sine s, cosine c about the third axis."""
     x, y, sine, versed = row[a], row[b], 2.0 * s * c, 2.0 * s * s
     row[a], row[b] = x + (sine * y - versed * x), y - (sine * x + versed * y)
 
 
-@njit(cache=True, fastmath=FINITE, error_model="numpy")
+@kernel(fastmath=FINITE, error_model="numpy")
 def _inner_turn(row: Floats, time: float) -> None:
     """Each body turns about the second axis of its frame by rate L2 time."""
     for i in range(LANES):
@@ -54,7 +54,7 @@ def _inner_turn(row: Floats, time: float) -> None:
         row[WIDEST + i] = max(row[WIDEST + i], half * half)
 
 
-@njit(cache=True, fastmath=FINITE, error_model="numpy")
+@kernel(fastmath=FINITE, error_model="numpy")
 def _outer_turn(row: Floats, time: float) -> None:
     """Turns of all bodies about the first axis."""
     for i in range(LANES):
@@ -65,7 +65,7 @@ def _outer_turn(row: Floats, time: float) -> None:
         row[WIDEST + i] = max(row[WIDEST + i], half * half)
 
 
-@njit(cache=True)
+@kernel()
 def field_turns(row: Floats, inner: float, outer: float) -> None:
     """The inner turn of a block for a time, then the outer one."""
     if inner != 0.0:
@@ -73,7 +73,7 @@ def field_turns(row: Floats, inner: float, outer: float) -> None:
     _outer_turn(row, outer)
 
 
-@njit(cache=True, fastmath=FINITE, error_model="numpy")
+@kernel(fastmath=FINITE, error_model="numpy")
 def _sphere(row: Floats, step: float) -> None:
     """The sphere's flow: each body turns about L by |L| step / I."""
     for i in range(LANES):
@@ -85,14 +85,14 @@ def _sphere(row: Floats, step: float) -> None:
         row[WIDEST + i] = max(row[WIDEST + i], square)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _gain(row: Any, i: int, t: Any) -> None:
     row[TORQUE + i] += t[0]
     row[TORQUE + LANES + i] += t[1]
     row[TORQUE + 2 * LANES + i] += t[2]
 
 
-@njit(cache=True, fastmath=FINITE, error_model="numpy")
+@kernel(fastmath=FINITE, error_model="numpy")
 def _torque(codes: Any, p: Floats, time: float, row: Floats) -> None:
     """Sum of the torques of `torque_form.py` on a block."""
     for i in range(3 * LANES):
@@ -119,13 +119,13 @@ def _torque(codes: Any, p: Floats, time: float, row: Floats) -> None:
                 _gain(row, i, cross(times_matrix(p, k, field), field))
 
 
-@njit(cache=True, fastmath=FINITE, error_model="numpy")
+@kernel(fastmath=FINITE, error_model="numpy")
 def _kick(row: Floats, time: float) -> None:
     for i in range(3 * LANES):
         row[i] += time * row[TORQUE + i]
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+@kernel(nogil=True, fastmath={"contract"}, error_model="numpy")
 def advance_in_field(
     blocks: Any, form: Any, clock: Any, rates: Floats, axes: Floats, state: Any, widest: Floats
 ) -> None:

@@ -12,11 +12,11 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical._kernels import symmetric_steps
 from rotor.geometry._kernels import conjugate, half_third_row, matrix, product, quaternion_at, to_third
+from rotor.kernels import kernel
 
 WHOLE_STEP = (1.0,)  # fractions of a step of order 2
 LANES = 128
@@ -25,7 +25,7 @@ FINITE = {"contract", "nnan", "ninf", "nsz"}  # products with zeros of a quatern
 WIDEST_TURN = 0.5  # rad per step: half of it is the largest argument of the polynomials below
 
 
-@njit(cache=True, inline="always", fastmath={"contract"})
+@kernel(inline="always", fastmath={"contract"})
 def sine_series(y: Any) -> Any:
     """(x - sin x)/x³ and (1 - cos x)/x² by y = x², |x| <= ¼: Taylor polynomials, truncated at x¹³/13! = 2e-18 and x¹⁴/14!."""
     # Horner's rule; for the angles allowed here the next terms are below the last digit
@@ -33,7 +33,7 @@ def sine_series(y: Any) -> Any:
     return s, 1 / 2 - y * (1 / 24 - y * (1 / 720 - y * (1 / 40320 - y * (1 / 3628800 - y * (1 / 479001600)))))
 
 
-@njit(cache=True, inline="always", fastmath={"contract"})
+@kernel(inline="always", fastmath={"contract"})
 def sine_cosine(x: Any) -> Any:
     """sin x and cos x, |x| <= ¼."""
     y = x * x
@@ -41,7 +41,7 @@ def sine_cosine(x: Any) -> Any:
     return x - x * y * s, 1.0 - y * c
 
 
-@njit(cache=True, fastmath=FINITE, error_model="numpy")
+@kernel(fastmath=FINITE, error_model="numpy")
 def block_turns(row: Floats, inner: float, outer: float) -> None:
     """The inner turn of a block, about axis 2 of its frame, then the outer one, about axis 1: q becomes q exp(½ angle e).
 
@@ -55,7 +55,7 @@ def block_turns(row: Floats, inner: float, outer: float) -> None:
         row[i], row[LANES + i], row[2 * LANES + i], row[3 * LANES + i] = product(q, (c, s, 0.0, 0.0))
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _length(v: Any) -> Any:
     """|v|, without overflow of the squares."""
     size = max(abs(v[0]), abs(v[1]), abs(v[2]))  # scaled by the largest component, so that squares do not overflow
@@ -64,13 +64,13 @@ def _length(v: Any) -> Any:
     return size * math.sqrt(a * a + b * b + c * c)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _upright(v: Any, size: float) -> Any:
     """A rotation that takes v of length `size` to the third axis."""
     return to_third((v[0] / size, v[1] / size, v[2] / size) if size > 0.0 else (0.0, 0.0, 1.0))
 
 
-@njit(cache=True, nogil=True, fastmath={"contract"}, error_model="numpy")
+@kernel(nogil=True, fastmath={"contract"}, error_model="numpy")
 def advance_blocks(blocks: Any, step: float, steps: int, rates: Floats, axes: Floats, state: Any, out: Any) -> None:
     """`steps` >= 1 steps of the bodies in blocks first to last - 1.
 

@@ -10,18 +10,18 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical.integrators._attitude_kernels import ahead, half_angle_terms, rotation_vector_rate
 from rotor.classical.integrators._rolling_kernels import rolling_omega, rolling_torque
 from rotor.classical.integrators._torque_kernels import torque_at
 from rotor.geometry._kernels import conjugate, exponential, product, turned
+from rotor.kernels import kernel
 
 STAGES = 12
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _carried(slopes: Floats, weights: Floats, row: int, stages: int, h: float, out: Floats) -> None:
     """out (n, 6) = h Σ weights[row] slopes over the first `stages`."""
     for i in range(out.shape[0]):
@@ -38,7 +38,7 @@ def _carried(slopes: Floats, weights: Floats, row: int, stages: int, h: float, o
         out[i, 0], out[i, 1], out[i, 2], out[i, 3], out[i, 4], out[i, 5] = h * a, h * b, h * c, h * d, h * e, h * f
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _rate(form: Any, inverse: Floats, time: float, state: Any, change: Any, out: Any, stage: int, i: int) -> None:
     """dL/dt in space and du/dt of body i into out[stage, i]; state: L in space and attitude before the step."""
     codes, parameters, inner = form
@@ -57,7 +57,7 @@ def _rate(form: Any, inverse: Floats, time: float, state: Any, change: Any, out:
         out[stage, i, k], out[stage, i, 3 + k] = torque[k], rate[k]
 
 
-@njit(cache=True)
+@kernel()
 def _rolling_rate(
     forms: Any, inverse: Floats, time: float, state: Any, change: Any, out: Any, stage: int, i: int
 ) -> None:
@@ -76,7 +76,7 @@ def _rolling_rate(
         out[stage, i, k], out[stage, i, 3 + k] = torque[k], rate[k]
 
 
-@njit(cache=True, fastmath={"contract"})
+@kernel(fastmath={"contract"})
 def _error(slopes: Floats, h: float, third: Floats, fifth: Floats, state: Floats, change: Floats) -> float:
     """The estimate |h| |e5|²/√(|e5|² + 0.01 |e3|²) of the worst body, momenta over |L| + |change of L|."""
     worst = 0.0
@@ -99,7 +99,7 @@ def _error(slopes: Floats, h: float, third: Floats, fifth: Floats, state: Floats
     return worst
 
 
-@njit(cache=True, fastmath={"contract"})
+@kernel(fastmath={"contract"})
 def _stepped(
     form: Any, rolling: Any, inverse: Floats, tableau: Any, time: float, h: float, state: Floats, work: Any
 ) -> float:
@@ -121,7 +121,7 @@ def _stepped(
     return _error(slopes, h, third, fifth, state, change)
 
 
-@njit(cache=True, fastmath={"contract"})
+@kernel(fastmath={"contract"})
 def _accept(state: Floats, change: Floats) -> None:
     for i in range(state.shape[0]):
         q = ahead((state[i, 3], state[i, 4], state[i, 5], state[i, 6]), (change[i, 3], change[i, 4], change[i, 5]))
@@ -130,7 +130,7 @@ def _accept(state: Floats, change: Floats) -> None:
         state[i, 3], state[i, 4], state[i, 5], state[i, 6] = q
 
 
-@njit(cache=True, fastmath={"contract"})
+@kernel(fastmath={"contract"})
 def _next_factor(error: float, control: Any) -> Any:
     """Factor for the next step; control: tolerance, SHRINK, GROW, SAFETY, order."""
     _, shrink, grow, safety, order = control
@@ -141,7 +141,7 @@ def _next_factor(error: float, control: Any) -> Any:
     return min(grow, max(shrink, factor))
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def to_time(
     form: Any, rolling: Any, inverse: Floats, tableau: Any, control: Any, span: Any, state: Floats, step: float
 ) -> Any:
@@ -172,7 +172,7 @@ def to_time(
     return step, steps, (end if (end - time) * forward <= smallest else time), True
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def to_times(
     form: Any,
     rolling: Any,

@@ -8,18 +8,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
-
 from rotor.arrays import Floats
 from rotor.geometry._kernels import conjugate, cross, turned
+from rotor.kernels import kernel
 
 
-@njit(cache=True)
+@kernel()
 def _dot(a: Any, b: Any) -> Any:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@kernel()
 def _stretched(p: Floats, k: int, v: Any) -> Any:
     """S² v."""
     return (
@@ -29,7 +28,7 @@ def _stretched(p: Floats, k: int, v: Any) -> Any:
     )
 
 
-@njit(cache=True)
+@kernel()
 def _support(p: Floats, k: int, q: Any) -> Any:
     """x, μ, S²μ and √(μᵀS²μ) in body axes."""
     down = turned(conjugate(q), (p[k, 2], p[k, 3], p[k, 4]))
@@ -39,7 +38,7 @@ def _support(p: Floats, k: int, q: Any) -> Any:
     return x, down, far, height
 
 
-@njit(cache=True)
+@kernel()
 def rolling_omega(p: Floats, q: Any, relative: Any, inverse: Any) -> Any:
     """ω from (I + Σ m (x² - x xᵀ)) ω = L - h, by cofactors; inverse: 1/I_i."""
     a, b, c, d, e, f = 1.0 / inverse[0], 1.0 / inverse[1], 1.0 / inverse[2], 0.0, 0.0, 0.0  # 11, 22, 33, 12, 13, 23
@@ -57,7 +56,7 @@ def rolling_omega(p: Floats, q: Any, relative: Any, inverse: Any) -> Any:
     return _dot(rows[0], relative) / whole, _dot(rows[1], relative) / whole, _dot(rows[2], relative) / whole
 
 
-@njit(cache=True)
+@kernel()
 def rolling_torque(p: Floats, q: Any, omega: Any) -> Any:
     """Σ m [g μ x x - x' x (x x ω)] in body axes."""
     t0, t1, t2 = 0.0, 0.0, 0.0

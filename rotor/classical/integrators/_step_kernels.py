@@ -13,21 +13,21 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.classical._kernels import halves, remainders, symmetric_steps, two_product, two_square, two_sum
 from rotor.geometry._kernels import cross, exponential, product
+from rotor.kernels import kernel
 
 NEWTON_SWEEPS = 40  # a bound: convergence is quadratic where the step has a root near the guess
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _add(row: Any, lost: Any, i: int, increment: float) -> None:
     row[i], lost[i] = two_sum(row[i], increment + lost[i])
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _squared_length(x: float, y: float, z: float) -> Any:
     """x² + y² + z² as the sum of two doubles."""
     (a, al), (b, bl), (c, cl) = two_square(x), two_square(y), two_square(z)
@@ -36,7 +36,7 @@ def _squared_length(x: float, y: float, z: float) -> Any:
     return total, (rest + more) + (al + bl + cl)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _versed(square: float, square_low: float, cosine: float) -> Any:
     """v + l = 1 - cosine with (1 - v - l)² + sine² = 1, from the sine's square in two doubles and a rounded cosine."""
     v = square / (1.0 + cosine) if cosine > 0.0 else 1.0 - cosine
@@ -46,7 +46,7 @@ def _versed(square: float, square_low: float, cosine: float) -> Any:
     return v, rest / (2.0 * cosine) if cosine > 0.1 else 0.0
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _turn_momentum(row: Any, lost: Any, a: int, b: int, sine: float, cosine: float) -> None:
     """Components a, b of L as seen from a body that turns about the third axis."""
     sine2, sine2_low = two_square(sine)
@@ -58,7 +58,7 @@ def _turn_momentum(row: Any, lost: Any, a: int, b: int, sine: float, cosine: flo
     _add(row, lost, b, -sine * ma - v * mb)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _turn_attitude(row: Any, lost: Any, cosine: float, x: float, y: float, z: float) -> None:
     """q (cosine, x, y, z), added as an increment."""
     sine2, sine2_low = _squared_length(x, y, z)
@@ -72,7 +72,7 @@ def _turn_attitude(row: Any, lost: Any, cosine: float, x: float, y: float, z: fl
     _add(row, lost, 6, change[3])
 
 
-@njit(cache=True)
+@kernel()
 def _turn(row: Any, lost: Any, k: int, a: int, b: int, angle: float) -> None:
     """The body turns by `angle` about its axis k of (k, a, b) = a cyclic order of (0, 1, 2)."""
     s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
@@ -81,7 +81,7 @@ def _turn(row: Any, lost: Any, k: int, a: int, b: int, angle: float) -> None:
     _turn_attitude(row, lost, c, x, y, z)
 
 
-@njit(cache=True)
+@kernel()
 def _turn_about(row: Any, lost: Any, x: float, y: float, z: float) -> None:
     """The body turns by the rotation vector (x, y, z), L staying where it is in the body."""
     half = 0.5 * math.sqrt(x * x + y * y + z * z)
@@ -90,7 +90,7 @@ def _turn_about(row: Any, lost: Any, x: float, y: float, z: float) -> None:
     _turn_attitude(row, lost, c, x, y, z)
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def rotations(state: Floats, carry: Floats, inverse: Floats, step: float, fractions: Floats, steps: int) -> None:
     """Steps R1 R2 R3 R2 R1 of half, half, whole, half, half turns about the body's axes, composed with `fractions`."""
     for body in range(state.shape[0]):
@@ -107,7 +107,7 @@ def rotations(state: Floats, carry: Floats, inverse: Floats, step: float, fracti
                 _turn(row, lost, 0, 1, 2, 0.5 * h * i0 * row[0])
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _turns(body: Any, inner: float, outer: float) -> None:
     """The inner turn of one body for a time, then the outer one; body = row, lost, rates and axes of (outer, inner)."""
     row, lost, (outer_rate, inner_rate), (a, b) = body
@@ -116,7 +116,7 @@ def _turns(body: Any, inner: float, outer: float) -> None:
     _turn(row, lost, a, (a + 1) % 3, (a + 2) % 3, outer * outer_rate * row[a])
 
 
-@njit(cache=True)
+@kernel()
 def symmetric_drift(row: Any, lost: Any, inverse: Any, axes: Any, step: float, fractions: Any, steps: int) -> None:
     """Steps of `strang.py` of one body; inverse moments (3,), axes (3,) of (outer, inner, sphere)."""
     a, b, equal = axes[0], axes[1], inverse[axes[2]]
@@ -126,7 +126,7 @@ def symmetric_drift(row: Any, lost: Any, inverse: Any, axes: Any, step: float, f
     _turn_about(row, lost, whole * row[0], whole * row[1], whole * row[2])
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def symmetric(
     state: Floats, carry: Floats, inverse: Floats, axes: Any, step: float, fractions: Floats, steps: int
 ) -> None:
@@ -135,7 +135,7 @@ def symmetric(
         symmetric_drift(state[body], carry[body], inverse[body], axes[body], step, fractions, steps)
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _slopes(m: Any, j: Any, d: Any, x: Any) -> Any:
     """Derivatives of (1 + |x|²) m + d (x2 x3, x3 x1, x1 x2) - j x by x, in rows."""
     return (
@@ -145,7 +145,7 @@ def _slopes(m: Any, j: Any, d: Any, x: Any) -> Any:
     )
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _correction(a: Any, f: Any) -> Any:
     """-a⁻¹ f of a 3x3 matrix, by Cramer's rule."""
     (a11, a12, a13), (a21, a22, a23), (a31, a32, a33) = a
@@ -158,7 +158,7 @@ def _correction(a: Any, f: Any) -> Any:
     )
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _residual(m: Any, lost: Any, j: Any, d: Any, x: Any) -> Any:
     """(1 + |x|²) (m + lost) + d (x2 x3, x3 x1, x1 x2) - j x for x of 26 bits: products exact, 1e-16 of the difference."""
     (s, s_low), square = two_sum(x[0] * x[0], x[1] * x[1]), x[2] * x[2]
@@ -172,14 +172,14 @@ def _residual(m: Any, lost: Any, j: Any, d: Any, x: Any) -> Any:
     )
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _row_residual(m: float, lost: float, j: float, d: float, n: float, n_low: float, x: float, xx: float) -> Any:
     (p, p_low), (q, q_low), (r, r_low) = two_product(n, m), two_product(d, xx), two_product(j, x)
     s, s_low = two_sum(p, q)
     return (s - r) + (s_low + ((p_low + q_low) - r_low) + (n_low * m + n * lost))
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _near_root(m: Any, j: Any, d: Any, guess: Any) -> Any:
     """Newton from `guess` until the root is known to about 1e-9, and whether it settled."""
     x = guess
@@ -197,7 +197,7 @@ def _near_root(m: Any, j: Any, d: Any, guess: Any) -> Any:
     return x, False
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _refined(m: Any, lost: Any, j: Any, d: Any, near: Any) -> Any:
     """The root near `near` as x + low, with a relative error of about 1e-24.
 
@@ -215,7 +215,7 @@ def _refined(m: Any, lost: Any, j: Any, d: Any, near: Any) -> Any:
     return y, ((x[0] - y[0]) + r[0], (x[1] - y[1]) + r[1], (x[2] - y[2]) + r[2])
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _cayley(row: Any, lost: Any, x: Any) -> None:
     """The body turns by the quaternion (1, x)/√(1 + |x|²), L staying where it is in space."""
     square, square_low = _squared_length(x[0], x[1], x[2])
@@ -231,7 +231,7 @@ def _cayley(row: Any, lost: Any, x: Any) -> None:
     _turn_attitude(row, lost, scale, scale * x[0], scale * x[1], scale * x[2])
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def _nudge(row: Any, lost: Any, x: Any, low: Any) -> None:
     """The additional rotation of x + low relative to x: (1, x + low) ∝ (1, x) (1, e) with e = (low - x × low)/(1 + |x|²)."""
     scale = 1.0 / (1.0 + (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]))
@@ -245,7 +245,7 @@ def _nudge(row: Any, lost: Any, x: Any, low: Any) -> None:
         lost[3 + i] += attitude_change[i]
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def moser_veselov(state: Floats, carry: Floats, scaled: Floats, steps: int) -> int:
     """Steps of the discrete Moser-Veselov map with moments `scaled` = 2J/h (n, 3); return the index of a failed body, or -1."""
     for body in range(state.shape[0]):
@@ -273,7 +273,7 @@ def moser_veselov(state: Floats, carry: Floats, scaled: Floats, steps: int) -> i
     return -1
 
 
-@njit(cache=True)
+@kernel()
 def turn_body(row: Any, lost: Any, x: float, y: float, z: float) -> None:
     """The body turns by the rotation vector (x, y, z) in body axes while L stays where it is in space."""
     angle = math.sqrt(x * x + y * y + z * z)
@@ -290,14 +290,14 @@ def turn_body(row: Any, lost: Any, x: float, y: float, z: float) -> None:
         _add(row, lost, 2, sine * across[2] + v * inward[2])
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def turn_uniformly(state: Floats, carry: Floats, vectors: Floats) -> None:
     """Each body turns by its rotation vector (n, 3) in body axes while L stays where it is in space."""
     for body in range(state.shape[0]):
         turn_body(state[body], carry[body], vectors[body, 0], vectors[body, 1], vectors[body, 2])
 
 
-@njit(cache=True)
+@kernel()
 def kick_body(row: Any, lost: Any, torque: Any, time: float) -> None:
     """L gains torque times time."""
     _add(row, lost, 0, time * torque[0])
@@ -305,7 +305,7 @@ def kick_body(row: Any, lost: Any, torque: Any, time: float) -> None:
     _add(row, lost, 2, time * torque[2])
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def kick(state: Floats, carry: Floats, torque: Floats, time: float) -> None:
     """L of each body gains its torque (n, 3) times time."""
     for body in range(state.shape[0]):

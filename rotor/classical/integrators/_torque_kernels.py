@@ -5,20 +5,19 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
-
 from rotor.arrays import Floats
 from rotor.classical.torque_form import BODY_FIXED, INDUCED, LEVER, LINEAR, SPACE_FIXED, TURNING
 from rotor.geometry._kernels import conjugate, cross, turned
+from rotor.kernels import kernel
 
 
-@njit(cache=True)
+@kernel()
 def _seen(q: Any, x: float, y: float, z: float) -> Any:
     """A vector of space in the axes of a body of attitude q."""
     return turned(conjugate(q), (x, y, z))
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def times_matrix(p: Any, k: int, v: Any) -> Any:
     """The first nine parameters of torque k, a matrix by rows, times a vector."""
     return (
@@ -28,26 +27,26 @@ def times_matrix(p: Any, k: int, v: Any) -> Any:
     )
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def scaled(factor: Any, v: Any) -> Any:
     """factor v."""
     return factor * v[0], factor * v[1], factor * v[2]
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def swing(p: Any, k: int, time: float) -> Any:
     """cos(Ω t + φ) of torque k; 1, without evaluating the cosine, for a constant vector."""
     return math.cos(p[k, 3] * time + p[k, 4]) if p[k, 3] != 0.0 or p[k, 4] != 0.0 else 1.0
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def turning_axis(p: Any, k: int, time: float) -> Any:
     """(cos φ, sin φ, 0) of torque k with φ = φ0 + Ω t + β t²/2."""
     angle = p[k, 9] + (p[k, 10] + 0.5 * p[k, 11] * time) * time
     return math.cos(angle), math.sin(angle), 0.0
 
 
-@njit(cache=True, inline="always")
+@kernel(inline="always")
 def torque_at(codes: Any, p: Floats, time: float, q: Any, omega: Any) -> Any:
     """Sum of the torques in body axes on a body with attitude q and angular velocity omega (used by drag only).
 

@@ -10,17 +10,17 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.fluids.forces._pair_kernels import FAST
 from rotor.fluids.forces.assembly import Integers
+from rotor.kernels import kernel
 
 LANES = 128
 CHARGE, START_C, START_S, NOW_C, NOW_S, TURN_C, TURN_S, SUM, FX, FY, FZ, HEAD = range(12)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def unit_phases(sites: Floats, charged: Integers, waves: Floats) -> Floats:
     """cos and sin of 2πx/L, 2πy/L, 2πz/L of the charges, (n, 6)."""
     phases = np.empty((len(charged), 6))
@@ -31,7 +31,7 @@ def unit_phases(sites: Floats, charged: Integers, waves: Floats) -> Floats:
     return phases
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _fill_block(block: Floats, phases: Floats, charges: Floats, first: int, highest: Integers) -> None:
     """Charges, the turn along z, and e^{2πi n x/L}, e^{2πi n y/L} for n = 0... of LANES charges; charge 0 beyond the last."""
     for k in range(LANES):
@@ -50,7 +50,7 @@ def _fill_block(block: Floats, phases: Floats, charges: Floats, first: int, high
                 run += 2
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _start_column(block: Floats, nx: int, ny: int, highest: Integers) -> None:
     """e^{i(kx x + ky y)} of the block."""
     at_x = (HEAD + 2 * nx) * LANES
@@ -63,14 +63,14 @@ def _start_column(block: Floats, nx: int, ny: int, highest: Integers) -> None:
         block[SUM * LANES + k] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _back_to_start(block: Floats) -> None:
     for k in range(LANES):
         block[NOW_C * LANES + k] = block[START_C * LANES + k]
         block[NOW_S * LANES + k] = block[START_S * LANES + k]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _sum_charges(block: Floats) -> Any:
     """Σ q e^{ik·r} of the block."""
     real, imaginary = 0.0, 0.0
@@ -80,7 +80,7 @@ def _sum_charges(block: Floats) -> Any:
     return real, imaginary
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _turn_and_sum(block: Floats, sign: float) -> Any:
     """Turn the phases by e^{±i 2π z/L} to the next wave vector and sum."""
     real, imaginary = 0.0, 0.0
@@ -94,14 +94,14 @@ def _turn_and_sum(block: Floats, sign: float) -> Any:
     return real, imaginary
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _push(block: Floats, real: float, imaginary: float) -> None:
     """One wave vector's part of the force where kz = 0: sin(k·r) Re S - cos(k·r) Im S."""
     for k in range(LANES):
         block[SUM * LANES + k] += block[NOW_S * LANES + k] * real - block[NOW_C * LANES + k] * imaginary
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _turn_and_push(block: Floats, sign: float, real: float, imaginary: float, kz: float) -> None:
     """Turn the phases to the next wave vector and add its forces, and those times kz."""
     for k in range(LANES):
@@ -114,14 +114,14 @@ def _turn_and_push(block: Floats, sign: float, real: float, imaginary: float, kz
         block[FZ * LANES + k] += kz * t
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _end_column(block: Floats, kx: float, ky: float) -> None:
     for k in range(LANES):
         block[FX * LANES + k] += kx * block[SUM * LANES + k]
         block[FY * LANES + k] += ky * block[SUM * LANES + k]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def structure_factors(phases: Floats, charges: Floats, highest: Integers, columns: Integers, factors: Floats) -> None:
     """Add Σ q e^{ik·r} to factors (wave vectors, 2); phases from `unit_phases`.
 
@@ -147,7 +147,7 @@ def structure_factors(phases: Floats, charges: Floats, highest: Integers, column
                     factors[place + sign * n, 1] += imaginary
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def fourier_forces(
     phases: Floats,
     charged: Integers,
@@ -179,7 +179,7 @@ def fourier_forces(
                 forces[charged[first + k], axis] += charges[first + k] * block[(FX + axis) * LANES + k]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def inner_correction(
     sites: Floats, first_site: Integers, site_charges: Floats, alpha: float, coulomb: float, forces: Floats
 ) -> float:

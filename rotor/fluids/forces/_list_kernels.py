@@ -9,15 +9,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.fluids.forces.assembly import Integers
+from rotor.kernels import kernel
 
 IMAGES = 2  # largest distance of a neighbour in cells
 
 
-@njit(cache=True)
+@kernel()
 def _sorted_into_bins(centres: Floats, low: Floats, width: Floats, bins: Integers) -> Any:
     """Bin of each centre (3 numbers), starts of the bins, molecules in the order of bins and the place of each in it."""
     n = len(centres)
@@ -38,7 +38,7 @@ def _sorted_into_bins(centres: Floats, low: Floats, width: Floats, bins: Integer
     return places, starts, order, rank
 
 
-@njit(cache=True)
+@kernel()
 def _longer(array: Any, more: int) -> Any:
     """A copy of the list with free space at its end."""
     out = np.empty(len(array) + more, dtype=array.dtype)
@@ -47,20 +47,20 @@ def _longer(array: Any, more: int) -> Any:
     return out
 
 
-@njit(cache=True)
+@kernel()
 def _gap2(place: float, low: float, width: float) -> float:
     """Squared distance of a point from an interval."""
     return max(low - place, place - low - width, 0.0) ** 2
 
 
-@njit(cache=True)
+@kernel()
 def _image(raw: int, bins: int, box: float) -> int:
     """The cell of a bin relative to the central one; out of range (IMAGES + 1) beyond the edge without periodicity."""
     image = raw // bins
     return IMAGES + 1 if box == 0.0 and image != 0 else image
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _keep_near(
     sorted_centres: Floats, order: Integers, start: int, stop: int, x: float, y: float, z: float, range2: float, code: int, count: int,
     mine: Integers,
@@ -73,7 +73,7 @@ def _keep_near(
     return count
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _along_column(
     m: int, raw_x: int, raw_y: int, left: float, same_column: bool, rank: int, places: Integers, starts: Integers, sorted_centres: Floats,
     order: Integers, here: Floats, box: Floats, low: Floats, width: Floats, bins: Integers, range2: float, count: int,
@@ -100,7 +100,7 @@ def _along_column(
     return count, mine
 
 
-@njit(cache=True)
+@kernel()
 def _by_kind(
     mine: Integers, count: int, kinds: Integers, species: int, entries: Integers, used: int, starts: Integers
 ) -> int:
@@ -114,7 +114,7 @@ def _by_kind(
     return used
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def neighbour_list(
     centres: Floats,
     box: Floats,
@@ -161,7 +161,7 @@ def neighbour_list(
     return starts, entries[:used]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def closest_atoms(
     starts: Integers, entries: Integers, images: Floats, centres: Floats, sites: Floats, first_site: Integers, first_atom: Integers,
     within2: float,

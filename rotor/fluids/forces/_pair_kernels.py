@@ -11,10 +11,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from rotor.arrays import Floats
 from rotor.fluids.forces.assembly import Integers
+from rotor.kernels import kernel
 
 LANES = 128
 RUNS = 6  # x y z and force of a neighbour's site
@@ -31,7 +31,7 @@ ERFC = (
 FAST = {"reassoc", "contract", "nsz", "arcp"}  # sums may be taken by eights; inf and nan keep their meaning
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def place_sites(
     positions: Floats, first_atom: Integers, first_site: Integers, kinds: Integers, weights: Floats, atoms: Integers, counts: Integers,
     box: Floats, reference: Floats, fresh: bool, sites: Floats, local: Floats, centres: Floats,
@@ -70,7 +70,7 @@ def place_sites(
     return farthest
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def carry_to_atoms(
     forces: Floats,
     first_atom: Integers,
@@ -92,7 +92,7 @@ def carry_to_atoms(
                     out[first_atom[m] + a, c] += w * forces[first_site[m] + s, c]
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def mass_centres(sites: Floats, first_atom: Integers, first_site: Integers, masses: Floats, centres: Floats) -> None:
     """Centres of mass; the real atoms of a molecule are the first of its sites."""
     for m in range(len(centres)):
@@ -106,7 +106,7 @@ def mass_centres(sites: Floats, first_atom: Integers, first_site: Integers, mass
         centres[m, 0], centres[m, 1], centres[m, 2] = x / total, y / total, z / total
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def lever_tensor(forces: Floats, arms_to: Floats, arms_from: Floats, first_site: Integers, by_molecule: bool) -> Floats:
     """Σ F ⊗ (to - from) over sites or, by_molecule, over molecules with their total force: (3, 3), not symmetric."""
     tensor = np.zeros((3, 3))
@@ -125,7 +125,7 @@ def lever_tensor(forces: Floats, arms_to: Floats, arms_from: Floats, first_site:
     return tensor
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _lennard_jones(row: Floats, n: int, x: float, y: float, z: float, c12: float, c6: float, cut: Floats) -> Any:
     """S(r) (c12/r¹² - c6/r⁶), S = 1 - t³ (10 - 15 t + 6 t²), t = (r - r_s)/(r_c - r_s) clamped to 0..1; cut = r_c², r_s, 1/(r_c - r_s)."""
     limit, begin, slope = cut[0], cut[1], cut[2]
@@ -156,7 +156,7 @@ def _lennard_jones(row: Floats, n: int, x: float, y: float, z: float, c12: float
     return fx, fy, fz, energy
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _reaction_field(row: Floats, n: int, x: float, y: float, z: float, qq: float, field: Floats) -> Any:
     """qq (1/r + k r² - c); field = r_c², k, c."""
     limit, k_field, c_field = field[0], field[1], field[2]
@@ -178,7 +178,7 @@ def _reaction_field(row: Floats, n: int, x: float, y: float, z: float, qq: float
     return fx, fy, fz, energy
 
 
-@njit(cache=True, inline="always", error_model="numpy", fastmath=FAST)
+@kernel(inline="always", error_model="numpy", fastmath=FAST)
 def gauss_and_erfc(x: Any) -> Any:
     """exp(-x²) and erfc(x) for 0 <= x <= 7, relative errors 2e-14.
 
@@ -219,7 +219,7 @@ def gauss_and_erfc(x: Any) -> Any:
     return g, g * p * (x + 3.75) * over
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _screened(row: Floats, n: int, x: float, y: float, z: float, qq: float, field: Floats) -> Any:
     """qq [erfc(αr)/r - c + b (r - r_c)]; field = r_c², b, c, α, 2α/√π, r_c; b = c = 0 is Ewald's part in real space."""
     limit, b, c, alpha, slope, cutoff = field[0], field[1], field[2], field[3], field[4], field[5]
@@ -242,7 +242,7 @@ def _screened(row: Floats, n: int, x: float, y: float, z: float, qq: float, fiel
     return fx, fy, fz, energy
 
 
-@njit(cache=True, inline="always", error_model="numpy")
+@kernel(inline="always", error_model="numpy")
 def _collect(
     entries: Integers, at: int, stop: int, images: Floats, centres: Floats, m: int, reach2: float, first: Integers, base: Integers,
     arms: Floats,
@@ -263,7 +263,7 @@ def _collect(
     return n, at
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
+@kernel(error_model="numpy", fastmath=FAST)
 def _add_virial(arms: Floats, rows: Floats, sites: int, n: int, totals: Floats) -> None:
     """Σ F ⊗ d over neighbours, symmetric part in the order xx yy zz yz xz xy."""
     for s in range(sites):
@@ -286,7 +286,7 @@ def _add_virial(arms: Floats, rows: Floats, sites: int, n: int, totals: Floats) 
         totals[7] += 0.5 * xy
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _gather(rows: Floats, local: Floats, base: Integers, arms: Floats, count: int, n: int, padded: int) -> None:
     """Sites of the neighbours relative to the centre of this molecule; forces 0; padding lanes up to `padded` far away."""
     for s in range(count):
@@ -303,7 +303,7 @@ def _gather(rows: Floats, local: Floats, base: Integers, arms: Floats, count: in
             row[3 * LANES + k], row[4 * LANES + k], row[5 * LANES + k] = 0.0, 0.0, 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _scatter(rows: Floats, forces: Floats, base: Integers, count: int, n: int) -> None:
     for s in range(count):
         row = rows[s * RUNS * LANES : (s + 1) * RUNS * LANES]
@@ -315,7 +315,7 @@ def _scatter(rows: Floats, forces: Floats, base: Integers, count: int, n: int) -
             forces[at + TWO] += row[5 * LANES + k]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel(error_model="numpy")
 def _site_pairs(
     rows: Floats, padded: int, local: Floats, mine: Integers, pairs: Integers, numbers: Floats, cut: Floats, field: Floats,
     screened: bool, forces: Floats, totals: Floats,
@@ -343,7 +343,7 @@ def _site_pairs(
             forces[at + 2] += fz
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@kernel(error_model="numpy", nogil=True)
 def pair_forces(
     first: int, last: int, starts: Integers, entries: Integers, images: Floats, reach2: Floats,
     local: Floats, centres: Floats, first_site: Integers, kinds: Integers, counts: Integers,

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba import njit
-
 from rotor.arrays import Floats
 from rotor.geometry._kernels import conjugate, cross, quaternion_at, turned, vector_at
+from rotor.kernels import kernel
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def place(centres: Floats, attitude: Floats, sites: Floats, order: Any, starts: Any, out: Floats) -> None:
     """out (atoms, 3) = centre + q s q*."""
     for body in range(starts.shape[0] - 1):
@@ -24,7 +23,7 @@ def place(centres: Floats, attitude: Floats, sites: Floats, order: Any, starts: 
             out[atom, 0], out[atom, 1], out[atom, 2] = c[0] + s[0], c[1] + s[1], c[2] + s[2]
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def wrench(
     vectors: Floats, attitude: Floats, sites: Floats, order: Any, starts: Any, total: Floats, turning: Floats
 ) -> None:
@@ -42,7 +41,7 @@ def wrench(
         turning[body, 0], turning[body, 1], turning[body, 2] = t1, t2, t3
 
 
-@njit(cache=True, nogil=True)
+@kernel(nogil=True)
 def momenta(
     velocity: Floats,
     omega: Floats,
