@@ -60,9 +60,11 @@ def pick_peaks_in_pieces(pieces: Sequence[tuple[Floats, Floats]], source: str = 
     Two pieces or more are the recorded windows of the list. Raises ValueError as pick_peaks does.
     """
     where = f"{source}: " if source else ""
-    for f, _ in pieces:
-        if len(f) < LEAST_POINTS or not (np.diff(f) > 0).all():
-            raise ValueError(f"{where}expected a spectrum of at least {LEAST_POINTS} points with rising frequencies")
+    for f, x in pieces:
+        if len(f) < LEAST_POINTS or not (np.diff(f) > 0).all() or not np.isfinite(x).all():
+            raise ValueError(
+                f"{where}expected a spectrum of at least {LEAST_POINTS} points with rising frequencies and finite intensities"
+            )
     parts = [_Piece(f, x) for f, x in pieces]
     count = sum(len(part.top) for part in parts)
     if count > MOST_PEAKS:

@@ -24,6 +24,7 @@ class PeakList(Table):
 
     frequency_mhz, intensity, uncertainty_mhz (n,). band_mhz : first and last recorded frequency. given_windows (k, 2) : recorded parts
     of the band, if known. trace : frequencies and intensities of each piece of the spectrum in which the peaks were found.
+    notes : assumptions and omissions of the file.
     """
 
     frequency_mhz: Floats
@@ -33,6 +34,7 @@ class PeakList(Table):
     source: str = ""
     stated_windows: Floats | None = None
     trace: tuple[tuple[Floats, Floats], ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def columns(self) -> dict[str, NDArray[Any]]:

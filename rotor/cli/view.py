@@ -47,7 +47,10 @@ class ViewRequest:
         panel=CONDITIONS,
     )
     axis_unit: str | None = declared(
-        None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, cm-1", panel=PANEL
+        None, Text(metavar="UNIT"), "Unit of the spectral axis of a text: MHz, GHz, cm-1, km/s", panel=PANEL
+    )
+    rest_mhz: float | None = declared(
+        None, Quantity("MHz", metavar="F"), "Rest frequency of a velocity axis (MHz)", option="--rest", panel=PANEL
     )
     unit: str | None = declared(
         None, Text(metavar="UNIT"), "Unit of the intensities: K, mK, V, absorbance, Jy/beam", panel=PANEL
@@ -82,6 +85,7 @@ def answer(request: ViewRequest, work: Work) -> Opened:
         session=request.session,
         temperature_k=request.temperature_k,
         axis_unit=request.axis_unit,
+        rest_mhz=request.rest_mhz,
         unit=request.unit,
         noise=request.noise,
         save=page is None,

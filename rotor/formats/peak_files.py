@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
-from rotor.assignment.peak_finding import LEAST_POINTS, pick_peaks, pick_peaks_in_pieces
+from rotor.assignment.peak_finding import LEAST_POINTS, pick_peaks_in_pieces
 from rotor.assignment.peaks import PeakList, peak_list
 from rotor.checks import require_file
 from rotor.formats.packed import first_bytes, load
 from rotor.formats.spectra.axis import AXIS_UNITS
+from rotor.observed.spectrum import lost_channels
 
 EQUAL_STEPS = 0.02  # largest relative spread of the steps of a grid
 LEAST_GRID = 64  # fewest steps of a grid
@@ -36,7 +37,7 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
     error of the frequency; a heading and lines of comment (#) are optional. Frequencies are in MHz, or in the unit of their heading
     (frequency_ghz, f (cm-1)). A .npy file has the same as columns or rows. Frequencies in equal steps are a spectrum, whose peaks are
     found. A spectrum may have gaps: then at least 300 rows, of which nine in ten lie on grids of equal steps; its peaks are found piece
-    by piece. A FITS file is always a spectrum.
+    by piece. Channels without a finite number are gaps, with a note. A FITS file is always a spectrum.
 
     band_mhz: first and last recorded frequency; peaks outside are left out.
     Raises ValueError with file and rule, for unreadable input.
@@ -47,16 +48,21 @@ def read_peaks(path: str | os.PathLike[str], band_mhz: tuple[float, float] | Non
         from rotor.formats.spectra.read import read_spectrum
 
         spectrum = read_spectrum(path)
-        return _in_band(pick_peaks(spectrum.frequency_mhz, spectrum.intensity, name), band_mhz)
+        columns = np.column_stack([spectrum.frequency_mhz, spectrum.intensity])
+        pieces = _pieces(columns) or [(spectrum.frequency_mhz, spectrum.intensity)]
+        return replace(_in_band(pick_peaks_in_pieces(pieces, name), band_mhz), notes=spectrum.notes)
     columns = _from_npy(name) if name.lower().endswith(".npy") else _from_csv(Path(path))
     return peaks_from_columns(columns, band_mhz, name)
 
 
 def peaks_from_columns(columns: Floats, band_mhz: tuple[float, float] | None = None, name: str = "") -> PeakList:
-    """The peaks of columns (n, 2 or 3): a list of them, or a spectrum on a grid, which may have gaps."""
+    """The peaks of columns (n, 2 or 3): a list of them, or a spectrum on a grid, which may have gaps.
+
+    Channels of a spectrum without a finite number are gaps, with a note; in a list of peaks they are an error.
+    """
     pieces = _pieces(columns)
     if pieces:
-        return _in_band(pick_peaks_in_pieces(pieces, name), band_mhz)
+        return replace(_in_band(pick_peaks_in_pieces(pieces, name), band_mhz), notes=lost_channels(_infinite(columns)))
     error = columns[:, 2] if columns.shape[1] > 2 else None
     try:
         return _in_band(peak_list(columns[:, 0], columns[:, 1], error, source=name), band_mhz)
@@ -68,15 +74,15 @@ def peaks_from_columns(columns: Floats, band_mhz: tuple[float, float] | None = N
 
 def _pieces(columns: Floats) -> list[tuple[Floats, Floats]]:
     """Frequencies and intensities of the pieces of a spectrum, rising and without overlap; none for a list of peaks."""
-    if len(columns) <= LEAST_GRID:
+    finite = columns[~_infinite(columns)]
+    if len(finite) <= LEAST_GRID:
         return []
-    order = -1 if np.median(np.diff(columns[:, 0])) < 0 else 1
-    f, x = columns[::order, 0], columns[::order, 1]
-    steps = np.diff(f)
-    if steps.mean() > 0 and np.ptp(steps) < EQUAL_STEPS * steps.mean():
+    order = -1 if np.median(np.diff(finite[:, 0])) < 0 else 1
+    f, x = finite[::order, 0], finite[::order, 1]
+    if _equal_steps(f):
         return [(f, x)]
-    joined = _equal_neighbours(steps)
-    if len(columns) < LEAST_WITH_GAPS or joined.mean() < MOSTLY:
+    joined = _equal_neighbours(np.diff(f))
+    if not _equal_steps(columns[::order, 0]) and (len(finite) < LEAST_WITH_GAPS or joined.mean() < MOSTLY):
         return []
     parts = sorted(np.split(np.arange(len(f)), np.flatnonzero(~joined) + 1), key=lambda part: float(f[part[0]]))
     out, end = list[tuple[Floats, Floats]](), -np.inf
@@ -86,6 +92,17 @@ def _pieces(columns: Floats) -> list[tuple[Floats, Floats]]:
             out.append((f[new], x[new]))
             end = float(f[new[-1]])
     return out
+
+
+def _infinite(columns: Floats) -> NDArray[np.bool_]:
+    """Which rows lack a finite frequency or intensity."""
+    return np.asarray(~np.isfinite(columns[:, :2]).all(axis=1))
+
+
+def _equal_steps(frequency: Floats) -> bool:
+    """Whether frequencies rise in equal steps."""
+    steps = np.diff(frequency)
+    return bool(steps.mean() > 0 and np.ptp(steps) < EQUAL_STEPS * steps.mean())
 
 
 def _equal_neighbours(steps: Floats) -> NDArray[np.bool_]:

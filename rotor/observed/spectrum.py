@@ -139,9 +139,7 @@ def observed_spectrum(
     order = np.flatnonzero(finite)[np.argsort(x[finite], kind="stable")]
     x, y = x[order], y[order]
     _refuse_bad_axis(x, source)
-    notes = tuple(facts.pop("notes", ()))
-    if (lost := int((~finite).sum())) > 0:
-        notes += (f"{counted(lost, 'channel')} without a finite number left out",)
+    notes = (*facts.pop("notes", ()), *lost_channels(~finite))
     if facts.get("unit", KELVIN) not in UNITS:
         raise ValueError(f"{source or 'spectrum'}: unit {facts['unit']!r}: known are {', '.join(UNITS)}")
     if spread is None:
@@ -153,6 +151,11 @@ def observed_spectrum(
     if not (sigma > 0).all():
         raise ValueError(f"{source or 'spectrum'}: noise of 0 or less; state the noise of a channel")
     return ObservedSpectrum(x, y, sigma, source=source, notes=notes, **facts)
+
+
+def lost_channels(lost: NDArray[np.bool_]) -> tuple[str, ...]:
+    """The note on channels that are left out; none if there are none."""
+    return (f"{counted(int(lost.sum()), 'channel')} without a finite number left out",) if lost.any() else ()
 
 
 def _refuse_bad_axis(frequency: Floats, source: str) -> None:

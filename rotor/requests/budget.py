@@ -111,7 +111,10 @@ class ErrorBudget:
         return numerical + model + math.hypot(spread[0], spread[1])
 
     def shown(self) -> Iterator[tuple[str, ErrorTerm]]:
-        """Non-zero terms for the screen, largest first and unestimated ones last; rounding and truncation are joined."""
+        """Terms for the screen, largest first and unestimated ones last; rounding and truncation are joined.
+
+        Left out are terms of 0, and those that the rounding of the result hides.
+        """
         larger = max((self.truncation, self.rounding), key=lambda term: -1.0 if term.value is None else term.value)
         missing = next((term for term in (self.truncation, self.rounding) if term.value is None), None)
         numerical = missing or ErrorTerm(self.numerical, larger.source, larger.remedy)
@@ -121,7 +124,8 @@ class ErrorBudget:
             ("data", self.data),
             ("statistics", self.statistics),
         ]
-        known = [(name, term) for name, term in named if term.value]
+        hidden = self.rounding.value or 0.0
+        known = [(name, term) for name, term in named if term.value and (term is numerical or term.value > hidden)]
         yield from sorted(known, key=lambda pair: -(pair[1].value or 0.0))
         yield from ((name, term) for name, term in named if term.value is None)
 
@@ -130,12 +134,14 @@ class ErrorBudget:
 
     def line(self) -> str:
         """One line of a report: each size with the first clause of its source; --errors has the full sources."""
-        texts = []
+        texts = dict[str, list[str]]()  # names by text: several terms may be unknown for the same reason
         for name, term in self.shown():
             about = "about " if name == "left out" and term.value else ""
             source = "" if name == "numerical" and term.value is not None else re.split("[;:]", term.source)[0]
-            texts.append(f"{name} {about}{replace(term, source=source or 'x').text(self.unit)}".removesuffix(" (x)"))
-        return f"errors of {self.of}: " + (", ".join(texts) or "none beyond the last digit")
+            text = f"{about}{replace(term, source=source or 'x').text(self.unit)}".removesuffix(" (x)")
+            texts.setdefault(text, []).append(name)
+        named = [f"{', '.join(names)} {text}" for text, names in texts.items()]
+        return f"errors of {self.of}: " + (", ".join(named) or "none beyond the last digit")
 
     def shortfall(self, accuracy: float) -> str:
         """Terms that exceed an accuracy (in the unit of the budget), largest first, with remedies; empty if none does.

@@ -81,7 +81,10 @@ class SpectrumFile(SubjectKind):
             raise ValueError("no spectrum: expected a file with a list of peaks or a spectrum, such as peaks.csv")
         is_file = isinstance(inputs.source, str)
         spectrum = Path(place.folder) / inputs.source if is_file else inputs.source
-        values: dict[str, Any] = {"peaks": (read_peaks if is_file else peaks_from_columns)(spectrum, inputs.range_mhz)}
+        peaks = (read_peaks if is_file else peaks_from_columns)(spectrum, inputs.range_mhz)
+        for text in peaks.notes:
+            place.note(text)
+        values: dict[str, Any] = {"peaks": peaks}
         if inputs.molecule is not None:
             path = Path(place.folder) / inputs.molecule
             top = read(path if path.is_file() else inputs.molecule)

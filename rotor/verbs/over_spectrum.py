@@ -47,6 +47,7 @@ class Comparison:
         """Counts and fit, by the keys of docs/verbs."""
         low, high = self.peaks.band_mhz
         out: dict[str, Any] = {"peaks": len(self.peaks), "band_mhz": [low, high], "lines": len(self.lines)}
+        out["notes"] = list(self.peaks.notes)
         if self.fit is None:
             return out | {"fit": None, "reason": self.why}
         determined = math.isfinite(self.fit.temperature_k)
@@ -65,6 +66,7 @@ def over_facts(record: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Rows of the report on a comparison."""
     band = " to ".join(f"{end:g}" for end in record["band_mhz"])
     rows = [("over", f"{record['peaks']} peaks from {band} MHz; {record['lines']} lines in this band")]
+    rows += [("", text) for text in record["notes"]]
     fit = record["fit"]
     if fit is None:
         return [*rows, ("intensities", record["reason"])]

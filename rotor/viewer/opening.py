@@ -22,6 +22,7 @@ from rotor.viewer.species_actions import add_species
 
 Note = Callable[[str], None]
 _READABLE = f"expected a spectrum (text, FITS or .npy) or a session ({SUFFIX})"
+STATED = ("axis_unit", "rest_mhz", "unit", "noise")  # of `SpectrumFile`
 ALIKE = 0.1  # relative difference of neighbouring steps of a spectrum; those of a list of peaks are random
 
 
@@ -38,12 +39,8 @@ def open_spectrum(path: Path, reading: SpectrumFile | None = None) -> ObservedSp
         columns = values if values.shape[1] in (2, 3) else values.T
         noise = None if reading is None else reading.noise
         return observed_spectrum(columns[:, 0], columns[:, 1], noise=noise, source=path.name)
-    choices = (
-        ReadChoices()
-        if reading is None
-        else ReadChoices(axis_unit=reading.axis_unit, unit=reading.unit, noise=reading.noise)
-    )
-    return read_spectrum(path, choices)
+    stated = {} if reading is None else {name: getattr(reading, name) for name in STATED}
+    return read_spectrum(path, ReadChoices(**stated))
 
 
 def read_peak_list(path: Path, spectrum: ObservedSpectrum) -> PeakList | None:
@@ -65,6 +62,7 @@ def open_session(
     session: str | os.PathLike[str] | None = None,
     temperature_k: float = 300.0,
     axis_unit: str | None = None,
+    rest_mhz: float | None = None,
     unit: str | None = None,
     noise: float | None = None,
     save: bool = True,
@@ -74,8 +72,8 @@ def open_session(
 
     source: a spectrum (text, FITS, .npy), or the file of a session. molecules: names, files or SMILES:... of species; those that the
     session has already are not added again. lines: assigned lines (.lin, .csv, .cat) of the first molecule. session: the session file; by
-    default SPECTRUM.view.json beside the spectrum. temperature_k: of the added species. axis_unit, unit, noise: what the file of the
-    spectrum does not state. save: whether the session is written to its file. note: takes remarks.
+    default SPECTRUM.view.json beside the spectrum. temperature_k: of the added species. axis_unit, rest_mhz, unit, noise: what the
+    file of the spectrum does not state. save: whether the session is written to its file. note: takes remarks.
     Raises ValueError with file and rule for what cannot be read, and where another program has the session.
     """
     path = Path(source)
@@ -95,19 +93,21 @@ def open_session(
         stated = msgspec.structs.replace(
             opened.spectrum,
             axis_unit=axis_unit or opened.spectrum.axis_unit,
+            rest_mhz=rest_mhz or opened.spectrum.rest_mhz,
             unit=unit or opened.spectrum.unit,
             noise=opened.spectrum.noise if noise is None else noise,
         )
         spectrum = open_spectrum(where, stated)
         _bind(opened, stated, where, file.parent, len(spectrum), resumed)
         service = Service(opened, spectrum, read_peak_list(where, spectrum))
-        _fill(service, molecules, lines, temperature_k, note)
+        remarks = list(spectrum.notes)
+        _fill(service, molecules, lines, temperature_k, remarks.append)
         service.facts()  # every molecule of the session can be read
         opened.save()
     except BaseException:
         opened.release()
         raise
-    for text in opened.warnings:
+    for text in (*opened.warnings, *remarks):
         note(text)
     return service
 

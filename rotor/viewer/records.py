@@ -18,13 +18,14 @@ COLOURS = 7  # of the page's palette
 class SpectrumFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The file of the observed spectrum: path from the folder of the session file, hash and number of points.
 
-    axis_unit, unit, noise: stated by the user for files that lack them.
+    axis_unit, rest_mhz (of a velocity axis), unit, noise: stated by the user for files that lack them.
     """
 
     path: str
     sha256: str
     points: int
     axis_unit: str | None = None
+    rest_mhz: float | None = None
     unit: str | None = None
     noise: float | None = None
 

@@ -20,6 +20,7 @@ def view(
     session: str | os.PathLike[str] | None = None,
     temperature_k: float = 300.0,
     axis_unit: str | None = None,
+    rest_mhz: float | None = None,
     unit: str | None = None,
     noise: float | None = None,
     save: bool = True,
@@ -41,6 +42,8 @@ def view(
         Of the added species.
     axis_unit, unit : str, optional
         What the file of the spectrum does not state, such as "GHz" and "mK".
+    rest_mhz : float, optional
+        Rest frequency of a velocity axis.
     noise : float, optional
         Of a channel.
     save : bool, optional
@@ -61,8 +64,8 @@ def view(
     names = [molecules] if isinstance(molecules, str) else list(molecules)
     remarks: list[str] = []
     service = open_session(
-        source, names, lines=lines, session=session, temperature_k=temperature_k, axis_unit=axis_unit, unit=unit,
-        noise=noise, save=save, note=remarks.append,
+        source, names, lines=lines, session=session, temperature_k=temperature_k, axis_unit=axis_unit,
+        rest_mhz=rest_mhz, unit=unit, noise=noise, save=save, note=remarks.append,
     )  # fmt: skip
     service.session.warnings += tuple(text for text in remarks if text not in service.session.warnings)
     return widget_class()(service, height)

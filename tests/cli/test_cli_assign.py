@@ -14,7 +14,7 @@ import rotor
 from rotor.assignment.assign import answer_assign
 from rotor.assignment.peak_finding import pick_peaks
 from rotor.assignment.request import AssignRequest
-from rotor.formats.peak_files import read_peaks
+from rotor.formats.peak_files import peaks_from_columns, read_peaks
 
 Call = Callable[..., tuple[int, str, str]]
 
@@ -204,6 +204,26 @@ def test_a_spectrum_with_gaps_is_read_piece_by_piece(folder: Path, digits: int, 
     part = read_peaks(folder / "alma.txt", (9310.0, 12010.0))
     assert part.windows[0, 0] == 9310.0
     assert part.windows[-1, 1] == 12010.0
+
+
+@pytest.mark.parametrize("points", [100, 2000])
+def test_channels_without_a_number_hide_no_line_elsewhere(call: Call, folder: Path, points: int) -> None:
+    """A single channel that is NaN hid every peak within 4096 channels, without a word."""
+    rows = in_pieces(((9000.0, 9000.0 + 0.1 * points, 0.1),))[:points]
+    complete = peaks_from_columns(rows)
+    columns = (
+        1 if points < 300 else [0, 1]
+    )  # a frequency is missing too in a file long enough to be a spectrum with gaps
+    rows[[points // 30, points // 30 + 1], columns] = np.nan
+    np.savetxt(folder / "grid.txt", rows)
+    peaks = read_peaks(folder / "grid.txt")
+    np.testing.assert_allclose(peaks.frequency_mhz, complete.frequency_mhz, atol=2e-3)
+    assert peaks.notes == ("2 channels without a finite number left out",)
+    assert "note: 2 channels without a finite number left out" in call("assign", "grid.txt")[2]
+    with pytest.raises(ValueError, match="row 2: intensity is nan"):
+        peaks_from_columns(np.array([[9000.0, 1.0], [9100.0, np.nan]]))
+    with pytest.raises(ValueError, match="finite intensities"):
+        pick_peaks(rows[20:, 0], np.append(rows[20:-1, 1], np.nan))
 
 
 def test_overlapping_windows_count_once(folder: Path) -> None:

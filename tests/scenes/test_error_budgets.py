@@ -49,6 +49,15 @@ def test_the_largest_term_comes_first_and_json_comes_back():
     assert unknown.line().endswith("left out not estimated: no geometry")
 
 
+def test_what_rounding_hides_is_not_printed_and_a_reason_stands_once():
+    hidden = replace(BUDGET, model=ErrorTerm(9e-10, "a shift"), data=EXACT, statistics=EXACT)
+    assert hidden.line() == "errors of energies: numerical 2e-06 MHz"
+    assert replace(hidden, model=ErrorTerm(1.1e-9, "a shift")).line().endswith("left out about 1.1e-09 MHz (a shift)")
+    unknown = ErrorTerm(None, "no moments")
+    several = replace(hidden, rounding=unknown, model=unknown, data=unknown)
+    assert several.line() == "errors of energies: numerical, left out, data not estimated: no moments"
+
+
 @pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
 def test_impossible_errors_are_refused(value):
     with pytest.raises(ValueError, match="expected a finite number of at least 0"):
