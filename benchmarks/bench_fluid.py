@@ -31,7 +31,6 @@ import numpy as np
 from ase import Atoms, units
 from ase.io import read, write
 
-from rotor.fluids.analysis import drift_per_ns
 from rotor.fluids.engines import lammps, openmm
 from rotor.fluids.engines.engine_input import make_engine_input
 from rotor.fluids.engines.pair_tables import Form
@@ -39,6 +38,7 @@ from rotor.fluids.forces.models import find_model
 from rotor.fluids.initial_box import lattice_box, relax
 from rotor.fluids.run import make_calculator, make_dynamics
 from rotor.fluids.settings import Settings
+from rotor.fluids.summary import drift_per_ns
 
 KJ_PER_MOL = units.mol / units.kJ
 LAMMPS_RUN = """

@@ -21,7 +21,7 @@ import numpy as np
 from ase import Atoms, units
 from ase.io import read, write
 
-from rotor.fluids.analysis import block_errors, diffusion, drift_per_ns, pair_distribution, yeh_hummer_correction
+from rotor.fluids.analysis import block_errors, diffusion, pair_distribution, yeh_hummer_correction
 from rotor.fluids.engines.results import run_engine
 from rotor.fluids.forces.models import find_model
 from rotor.fluids.forces.potential import RigidPotential
@@ -29,7 +29,7 @@ from rotor.fluids.initial_box import lattice_box, relax
 from rotor.fluids.record import FluidRecord
 from rotor.fluids.run import make_dynamics, pressure_bar
 from rotor.fluids.settings import Settings
-from rotor.fluids.summary import series_mean
+from rotor.fluids.summary import drift_per_ns, series_mean
 
 KJ_PER_MOL = units.mol / units.kJ  # of 1 eV
 VISCOSITY = 0.729e-3  # Pa s, SPC/E at 298 K: M. A. González and J. L. F. Abascal, J. Chem. Phys. 132, 096101 (2010)

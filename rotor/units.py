@@ -7,6 +7,7 @@ which is not imported here because it would double the time of `import rotor`.
 import math
 import re
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,7 +147,7 @@ def _numbers(items: Sequence[str], unit: str, text: str) -> list[float]:
         raise ValueError(f"{text!r}: {error}") from None
 
 
-def parse_quantity(value: float | str, unit: str) -> float:
+def parse_quantity(value: float | Real | str, unit: str) -> float:
     """A number in `unit`, from a number in that unit or a text that may carry another unit.
 
     Raises ValueError for a text without a number, a unit of another kind, and non-finite values.

@@ -15,12 +15,13 @@ from rotor.arrays import Floats
 from rotor.checks import require_between
 from rotor.classical.bodies import NamedBody
 from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE, ClassicalEffect
-from rotor.classical.euler import checked_moments, checked_momentum
+from rotor.classical.euler import checked_moments, checked_momentum, checked_velocity
 from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
 from rotor.classical.integrators.method import Method, Motion, integrate
 from rotor.classical.motion import COHERENT, MotionTable, Units
 from rotor.classical.step_errors import driven_budget, step_truncation
 from rotor.classical.system import flatten_system, total_momentum
+from rotor.classical.tolerance_search import ORDER
 from rotor.classical.tumble import Three
 from rotor.requests.budget import ErrorBudget
 
@@ -65,6 +66,8 @@ class DrivenRequest:
         if not np.isfinite(self.angular_velocity or self.angular_momentum).all():  # type: ignore[arg-type]
             raise ValueError("angular_velocity, angular_momentum: expected three finite numbers")
         self._check_step()
+        if self.angular_velocity is not None:
+            checked_velocity(self.angular_velocity, moments)
         checked_momentum(self.momentum, moments)
 
     def _check_step(self) -> None:
@@ -85,6 +88,13 @@ class DrivenRequest:
         from rotor.classical.integrators.splitting import SymmetricTopSplitting
 
         return SymmetricTopSplitting(self.step, self.order)
+
+    @property
+    def stepping(self) -> str:
+        """The integrator in words."""
+        if self.step is None:
+            return f"Runge-Kutta of order {ORDER}, adaptive, tolerance {self.tolerance:g} of a step"
+        return f"splitting of order {self.order}, step {self.step:g}"
 
     @property
     def momentum(self) -> Floats:
@@ -137,7 +147,7 @@ class DrivenAnswer:
             "axes": list(self.request.axes),
             "moments": list(self.request.moments),
             "effects": [BODY_EFFECTS.line(effect) for effect in self.request.effects],
-            "method": repr(self.request.method),
+            "method": self.request.stepping,
             "steps": self.motion.steps,
             "energy_first": float(energy[0]),
             "energy_last": float(energy[-1]),

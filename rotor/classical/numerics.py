@@ -172,9 +172,8 @@ def describe_motion(request: Any, cost: Cost) -> dict[str, Any]:
 
 def _stepping(request: DrivenRequest, steps: int) -> str:
     if request.step is not None:
-        return f"splitting of order {request.order}, step {request.step:g}"
-    mean = abs(request.times[-1] - request.times[0]) / steps
-    return f"Runge-Kutta of order {search.ORDER}, adaptive, tolerance {request.tolerance:g} of a step; {mean:.3g} a step in the mean"
+        return request.stepping
+    return f"{request.stepping}; {abs(request.times[-1] - request.times[0]) / steps:.3g} a step in the mean"
 
 
 TUMBLE = Numerics(

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats
 from rotor.checks import Renamed
 from rotor.classical.bodies import NamedBody
-from rotor.classical.euler import checked_moments, checked_momentum, energy
+from rotor.classical.euler import checked_moments, checked_momentum, checked_velocity, energy
 from rotor.classical.free.free_motion import FreeMotion, free_motion
 from rotor.classical.free.stability import Stability, stability
 from rotor.classical.motion import COHERENT, InvariantDrift, MotionTable, Units, invariant_drift, sampled
@@ -72,7 +72,7 @@ class TumbleRequest:
         """
         body = np.asarray(moments, dtype=np.float64)
         a, b, c = (float(x) for x in body)
-        p, q, r = (float(x) for x in body * np.asarray(omega, dtype=np.float64))
+        p, q, r = (float(x) for x in body * checked_velocity(omega, body))
         return cls((a, b, c), (p, q, r), **others)
 
     of_angular_velocity = Renamed("from_angular_velocity")

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from rotor import units
 from rotor.arrays import Floats
-from rotor.fluids.summary import series_mean
 from rotor.table import Table
 
 YEH_HUMMER_XI = 2.837297  # of a cubic cell; I.-C. Yeh and G. Hummer, J. Phys. Chem. B 108, 15873 (2004), below eq. 12
@@ -207,14 +206,6 @@ def block_errors(series: ArrayLike) -> Floats:
         even = len(values) // 2 * 2
         values = 0.5 * (values[0:even:2] + values[1:even:2])
     return np.array(errors)
-
-
-def drift_per_ns(time_ps: ArrayLike, energy: ArrayLike) -> tuple[float, float]:
-    """Slope of an energy per ns, and its standard error from the scatter about the line, including correlations."""
-    t, e = np.asarray(time_ps, dtype=np.float64) / 1000, np.asarray(energy, dtype=np.float64)
-    slope, start = np.polyfit(t, e, 1)
-    rest = series_mean("", "", e - start - slope * t)
-    return float(slope), rest.error / float(t.std())
 
 
 def _path(path: Any) -> Floats:

@@ -170,7 +170,7 @@ class FluidAnswer(TextOf):
     def facts(self) -> dict[str, Any]:
         """Facts of the answer except its table, by the keys of docs/verbs."""
         bodies, degrees, _ = self._count
-        rms, drift = conserved(self.record)
+        rms, drift, drift_error = conserved(self.record)
         return {
             "engine": self.request.engine,
             "settings": asdict(self.request.settings),
@@ -187,6 +187,7 @@ class FluidAnswer(TextOf):
             "motion_reason": self.motion_reason or None,
             "conserved_rms_ev": rms,
             "conserved_drift_ev_per_ns": drift,
+            "conserved_drift_error_ev_per_ns": drift_error,
             "notes": list(self.notes),
             "errors": self.errors.as_json(),
         }

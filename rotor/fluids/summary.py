@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 from rotor.fluids.record import FluidRecord
@@ -71,10 +72,20 @@ def series_ratio(quantity: str, above: Floats, below: Floats) -> Mean:
     return series_mean(quantity, "", ratio + (above - ratio * below) / below.mean())
 
 
-def conserved(record: FluidRecord) -> tuple[float, float]:
-    """Root mean square of the conserved energy about its mean, eV, and its drift by least squares, eV/ns."""
+def conserved(record: FluidRecord) -> tuple[float, float, float]:
+    """Root mean square of the conserved energy about its mean, eV, and its drift with a standard error, eV/ns."""
     if len(record) < 2:
-        return math.nan, math.nan
-    time_ns = (record.time_ps - record.time_ps.mean()) * 1e-3
-    away = record.total_ev - record.total_ev.mean()
-    return float(np.sqrt(np.mean(away**2))), float(time_ns @ away / (time_ns @ time_ns))
+        return math.nan, math.nan, math.nan
+    return float(record.total_ev.std()), *drift_per_ns(record.time_ps, record.total_ev)
+
+
+def drift_per_ns(time_ps: ArrayLike, energy: ArrayLike) -> tuple[float, float]:
+    """Slope of an energy per ns by least squares, and its standard error from the scatter about the line, including correlations.
+
+    The error is nan for two rows, which leave no scatter.
+    """
+    t, e = np.asarray(time_ps, dtype=np.float64) / 1000, np.asarray(energy, dtype=np.float64)
+    away = t - t.mean()
+    slope = float(away @ (e - e.mean()) / (away @ away))
+    rest = series_mean("", "", e - e.mean() - slope * away)
+    return slope, rest.error / float(t.std()) if len(t) > 2 else math.nan

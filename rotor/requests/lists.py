@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Mapping
+from numbers import Real
 from typing import Any
 
 from rotor.frozen import dataclass
@@ -28,7 +29,7 @@ class Numbers(Listed):
         if isinstance(raw, str):
             values = tuple(parse_grid(raw, self.unit).tolist()) if ":" not in raw else ()
         else:
-            values = tuple(map(float, [raw] if isinstance(raw, int | float) else raw))
+            values = tuple(map(float, [raw] if isinstance(raw, Real) else raw))
         if (self.counts and len(values) not in self.counts) or not values or not all(map(math.isfinite, values)):
             words = {1: "one", 3: "three"}
             count = " or ".join(words.get(n, str(n)) for n in self.counts)

@@ -9,6 +9,7 @@ import math
 import re
 from collections.abc import Callable, Collection
 from dataclasses import MISSING
+from numbers import Real
 from typing import Any
 
 from rotor.frozen import dataclass
@@ -237,7 +238,7 @@ class Quantity(Reader):
 
     def read(self, raw: Any) -> float:
         """The number in `unit`."""
-        if isinstance(raw, bool) or not isinstance(raw, str | int | float):
+        if isinstance(raw, bool) or not isinstance(raw, str | Real):
             raise ValueError(f"{raw!r}: expected a number{' with a unit' if self.unit else ''}")
         if isinstance(raw, str) and ":" in raw:
             raise ValueError(f"{raw!r}: expected a single value, not a range; the sweep of a scene goes over several")
@@ -312,7 +313,7 @@ class Grid(Listed):
             if raw.count(":") == 2 and count.isdecimal() and (len(count) > 18 or int(count) > self.most_points):
                 raise ValueError(f"{raw!r}: at most {self.most_points} numbers; ask for fewer")
             values = tuple(parse_grid(raw, self.unit, self.points).tolist())
-        elif isinstance(raw, int | float) and not isinstance(raw, bool):
+        elif isinstance(raw, Real) and not isinstance(raw, bool):
             values = (float(raw),)
         else:
             values = tuple(map(float, raw))

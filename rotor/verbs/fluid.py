@@ -294,6 +294,8 @@ def show(answer: FluidAnswer, report: Report) -> Iterable[Part | None]:
 
 def _facts(content: Mapping[str, Any], settings: Settings) -> list[tuple[str, str]]:
     degrees, rms, drift = content["degrees"], content["conserved_rms_ev"], content["conserved_drift_ev_per_ns"]
+    drift_error = content["conserved_drift_error_ev_per_ns"]
+    about = "" if isnan(drift_error) else f" ± {drift_error:.2g}"
     noisy = (
         content["engine"] == "lammps" and settings.ensemble != "nve"
     )  # the error under its thermostat noise is not known
@@ -305,7 +307,10 @@ def _facts(content: Mapping[str, Any], settings: Settings) -> list[tuple[str, st
         ("start", content["start"]),
         ("degrees", motions),
         ("thermometer", content["thermometer"] + ("" if noisy else ": no error of order h²")),
-        ("conserved", "not known from one row alone" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g} eV/ns"),
+        (
+            "conserved",
+            "not known from one row alone" if isnan(rms) else f"rms {rms:.3g} eV, drift {drift:.3g}{about} eV/ns",
+        ),
     ]
     if content["density_g_cm3"] is not None:
         edges = " x ".join(f"{edge:.6g}" for edge in content["box_angstrom"])

@@ -127,7 +127,7 @@ def _driven_parts(answer: DrivenAnswer, content: Mapping[str, Any]) -> list[Part
     names = [type(effect).name or type(effect).__name__ for effect in answer.request.effects]
     energy = f" {units.energy}" if units.energy else ""
     drift = content["energy_drift"]
-    last = "not conserved" if drift is None else f"conserved to {drift:.1e} of the largest kinetic one"
+    last = "the effects change it" if drift is None else f"conserved to {drift:.1e} of the largest kinetic one"
     facts = [
         *((f"effect {number}", text) for number, text in enumerate(content["effects"], 1)),
         ("method", f"{content['method']}, {content['steps']} steps"),
@@ -187,7 +187,7 @@ def _axes_table(answer: TumbleAnswer, report: Report) -> Table:
     fates = {
         "stable": "a push oscillates",
         "unstable": "a push grows",
-        "neutral": "a push drifts",
+        "neutral": "a push stays" if answer.request.kind in ("linear", "spherical") else "a push drifts",
         "none": "no rotation about it",
     }
     units = answer.request.units

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -88,7 +89,7 @@ class InBodyUnits(Reader):
 
     def write(self, value: Any) -> Any:
         """Text and a single number unchanged, several numbers as a list."""
-        return value if isinstance(value, str | int | float) else [float(number) for number in value]
+        return value if isinstance(value, str | Real) else [float(number) for number in value]
 
 
 @dataclass(frozen=True)
@@ -349,7 +350,7 @@ def _start(
 
     units: of the angular velocity and of the angular momentum.
     """
-    from rotor.classical.euler import checked_momentum
+    from rotor.classical.euler import checked_momentum, checked_velocity
 
     by_velocity = start.angular_velocity is not None
     in_body = BODY if start.angular_momentum is not None else MOTION  # the key of a scene's body
@@ -360,7 +361,7 @@ def _start(
     text = value if isinstance(value, str) else list(value)
     try:
         vector = three(value, units[0] if by_velocity else units[1])
-        momentum = checked_momentum(moments * vector if by_velocity else vector, moments)
+        momentum = moments * checked_velocity(vector, moments) if by_velocity else checked_momentum(vector, moments)
     except ValueError as error:
         message = str(error)
         quoted = message if message.startswith(f"{text!r}") else f"{text!r}: {message}"

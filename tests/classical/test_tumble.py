@@ -16,6 +16,7 @@ from places import PROJECT
 import rotor
 from rotor.classical.free.free_motion import free_motion
 from rotor.classical.gas.thermal_momentum import mean_thermal_momentum
+from rotor.classical.tumble import TumbleRequest
 from rotor.geometry.rotations import distance
 from rotor.plots import animation
 from rotor.units import ASE_TIME_PS, CM_PER_EV, EV_PER_K, HBAR_CLASSICAL
@@ -182,7 +183,7 @@ def test_the_separatrix_is_told(call):
     assert code == 0
     assert "on the separatrix" in out
     assert "10 turns about L" in out
-    assert "periodic, not chaotic" in out
+    assert "motion that runs into it" in out
 
 
 @pytest.mark.parametrize("source", ["OCS", "CH4"])
@@ -395,3 +396,41 @@ def test_the_scene_of_an_everyday_body_keeps_its_name(call, tmp_path):
     for said in ("wing nut: asymmetric top", "Lbolt (kg m²/s)"):
         assert said in out
         assert said in again
+
+
+@pytest.mark.parametrize(
+    "body", [("OCS", "--omega", "1,1,0"), ("--moments", "0,1,1", "--omega", "3,1,0"),
+             ("--moments", "0,1,1", "--omega", "3,1,0", "--times", "0:1:3", "--effect", "linear drag coefficients=1,1,1")],
+)  # fmt: skip
+def test_a_linear_body_refuses_a_rotation_about_its_own_axis(call, body):
+    code, out, err = call("tumble", *body)
+    assert (code, out) == (2, "")
+    assert "a linear rotor does not rotate about its own axis: set that component to 0" in err
+    with pytest.raises(ValueError, match="own axis"):
+        TumbleRequest.from_angular_velocity([0.0, 1.0, 1.0], [3.0, 1.0, 0.0])
+
+
+@pytest.mark.parametrize(("source", "stays"), [("OCS", True), ("CH4", True), ("CH3CN", False)])
+def test_a_push_moves_l_on_only_where_a_moment_differs(call, source, stays):
+    code, out, err = call("tumble", source)
+    assert code == 0, err
+    out = " ".join(out.split())
+    assert ("a push stays" in out, "a push drifts" in out) == (stays, not stays)
+    assert ("at a single rate" in out, "at a second rate" in out) == (stays, not stays)
+
+
+def test_numbers_of_numpy_are_numbers():
+    for kelvin in (np.float32(300), np.int64(300), np.float64(300)):
+        assert rotor.tumble("water", temperature_k=kelvin).request.temperature_k == 300.0
+    assert rotor.raman("N2", laser_nm=np.float32(488)).request.laser_nm == 488.0
+    assert rotor.thermo("N2", temperatures_k=np.int64(300)).table.temperature_k.tolist() == [300.0]
+    with pytest.raises(ValueError, match="expected a number"):
+        rotor.tumble("water", temperature_k=np.bool_(True))
+
+
+def test_a_driven_motion_names_its_method_in_words(call):
+    code, out, err = call("tumble", "--moments", "1,2,2.5", "--omega", "1,1,0", "--times", "0:1:3", "--effect",
+                          "constant torque vector=0,0,1")  # fmt: skip
+    assert code == 0, err
+    assert "Runge-Kutta of order 8, adaptive, tolerance 1e-10 of a step" in out
+    assert "the effects change it" in out

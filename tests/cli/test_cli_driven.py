@@ -92,7 +92,7 @@ def test_a_pendulum_swings_with_its_period_and_keeps_its_energy(call):
     # of 1e-3 rad, the next term is θ0²/16 of the phase
     assert np.allclose(swing, 1e-3 * np.cos(rate * np.linspace(0, 4, 9)), rtol=0, atol=1e-9)
     assert content["energy_first"] == pytest.approx(content["energy_last"], rel=1e-12)
-    assert content["method"] == "SymmetricTopSplitting(step=0.01, order=4)"
+    assert content["method"] == "splitting of order 4, step 0.01"
 
 
 def test_the_report_and_the_files(call, tmp_path):

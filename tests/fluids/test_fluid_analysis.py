@@ -9,12 +9,12 @@ from rotor.fluids.analysis import (
     Diffusion,
     block_errors,
     diffusion,
-    drift_per_ns,
     mean_square_displacement,
     pair_distribution,
     yeh_hummer_correction,
 )
-from rotor.fluids.summary import series_mean
+from rotor.fluids.record import FluidRecord
+from rotor.fluids.summary import conserved, drift_per_ns, series_mean
 
 
 def test_an_ideal_gas_has_g_of_one_for_any_number() -> None:
@@ -115,6 +115,16 @@ def test_drift_is_the_slope_and_white_noise_has_its_textbook_error() -> None:
     assert error == pytest.approx(0.01 / (math.sqrt(2001) * 0.5 / math.sqrt(12)), rel=0.15)  # σ/(√n s_t)
     assert slope == pytest.approx(0.7, abs=4 * error)
     assert drift_per_ns(t, 2.0 * t)[0] == pytest.approx(2000.0, rel=1e-9)
+    assert math.isnan(drift_per_ns([0.0, 1.0], [0.0, 1.0])[1])  # a line through two points leaves no scatter
+
+
+def test_the_drift_of_correlated_energies_is_zero_within_its_error() -> None:
+    rng, deviations = np.random.default_rng(3), []
+    for _ in range(200):
+        energy = np.convolve(rng.normal(size=1020), np.ones(21) / 21, mode="valid")  # no drift, correlated over 21 rows
+        _, drift, error = conserved(FluidRecord(np.arange(1000) * 0.02, *[energy] * 8))
+        deviations.append(drift / error)
+    assert 0.8 < np.std(deviations) < 1.3  # 4 to 5 where rows are taken for independent
 
 
 @pytest.mark.parametrize(("call", "message"), [

@@ -22,8 +22,8 @@ class FixedAxis:
     """Steady rotation about a principal axis.
 
     axis: 0, 1 or 2, in the order of the moments given.
-    kind: "stable", "unstable", "neutral" (another axis has the same moment: a deviation drifts, without growth or oscillation) or "none"
-    (the axis of a linear rotor, about which it cannot rotate).
+    kind: "stable", "unstable", "neutral" (another axis has the same moment: a deviation drifts or, where all axes that it can turn about
+    have the same moment, stays) or "none" (the axis of a linear rotor, about which it cannot rotate).
     rate: of the small oscillation (stable) or of growth (unstable), rad or 1 per time; zero for the other kinds.
     """
 
@@ -34,21 +34,35 @@ class FixedAxis:
 
 @dataclass(frozen=True)
 class Stability:
-    """Closed-form properties of a free rotation; see the functions of the same names."""
+    """Closed-form properties of a free rotation; see the functions of the same names.
+
+    limit: "steady" where L stands still in the body, "saddle" where it stands on the intermediate axis or runs into it, otherwise empty.
+    """
 
     axes: tuple[FixedAxis, FixedAxis, FixedAxis]
     separatrix_ratio: float
     growth_rate: float
     period: float
     asymptotic_period: float
+    limit: str = ""
 
     @property
     def chaos(self) -> str:
         """Why the motion is not chaotic."""
+        if self.limit == "saddle":
+            return (
+                "Free rotation is not chaotic: the growth rate is the largest Lyapunov exponent of the rotation about the intermediate "
+                "axis, and of a motion that runs into it; it is zero for every other torque-free motion."
+            )
+        if self.limit == "steady":
+            return (
+                "Steady rotation is periodic, not chaotic: L stands still in the body, which turns about it at a single rate; its largest "
+                "Lyapunov exponent is zero."
+            )
         growth = "the growth rate belongs to the unstable axis alone; " if self.growth_rate > 0 else ""
         return (
             "Free tumbling is quasi-periodic, not chaotic: L repeats in the body, and the body turns about L at a second rate; "
-            f"{growth}the largest Lyapunov exponent of every torque-free motion is zero."
+            f"{growth}the largest Lyapunov exponent of this motion is zero."
         )
 
 
@@ -170,11 +184,14 @@ def stability(moments: ArrayLike, momentum: ArrayLike) -> Stability:
     size = float(np.linalg.norm(momentum))
     axes = fixed_axes(moments, size)
     if np.any(moments == 0.0):
-        return Stability(axes, np.nan, 0.0, np.inf, np.inf)
+        return Stability(axes, np.nan, 0.0, np.inf, np.inf, "steady")
     # a spherical top has no separatrix
     ratio = np.nan if np.ptp(moments) == 0.0 else float(separatrix_ratio(moments))
     period, asymptote = float(tumbling_period(moments, momentum)), float(asymptotic_period(moments, momentum))
-    return Stability(axes, ratio, float(growth_rate(moments, size)), period, asymptote)
+    growth = float(growth_rate(moments, size))
+    speed, mc = _speed_and_modulus(moments, momentum)
+    limit = "saddle" if growth > 0.0 and mc == 0.0 else "steady" if speed == 0.0 else ""
+    return Stability(axes, ratio, growth, period, asymptote, limit)
 
 
 def _fixed_axis(moments: Floats, axis: int, momentum: float) -> FixedAxis:

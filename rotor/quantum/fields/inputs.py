@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -77,7 +78,7 @@ def read_m(raw: Any) -> tuple[float, ...]:
 
 def read_direction(raw: Any) -> tuple[float, float, float]:
     """Three components from a list, or the direction in the plane XZ at an angle (degrees) with Z; exactly Z for 0."""
-    if isinstance(raw, str | int | float):
+    if isinstance(raw, str | Real):
         try:
             angle = parse_quantity(raw, "deg")
         except ValueError as error:

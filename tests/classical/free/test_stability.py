@@ -169,8 +169,12 @@ def test_one_table_for_every_kind_of_body():
     assert (sphere.growth_rate, sphere.period) == (0.0, np.inf)
     assert "growth rate" in water.chaos
     assert "growth rate" not in sphere.chaos  # it has no unstable axis
+    assert "single rate" in sphere.chaos
     linear = stab.stability([0.0, 2.0, 2.0], [0.0, 0.75, 1.0])
     assert (linear.growth_rate, linear.period) == (0.0, np.inf)
+    assert "single rate" in linear.chaos
+    for momentum, limit in (([0.0, 2.0, 0.0], "saddle"), ([2.0, 0.0, 0.0], "steady"), ([0.1, 2.0, 0.1], "")):
+        assert stab.stability([1.0, 2.0, 3.0], momentum).limit == limit
     assert stab.separatrix_ratio([[1.0, 2.0, 2.0], [1.0, 1.0, 2.0]]).tolist() == [np.inf, 0.0]
 
 
