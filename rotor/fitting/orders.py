@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from rotor.fitting.top_constants import ConstantSet, TopConstants
-from rotor.quantum.effects.spin_effect import parse_name
 from rotor.tops.operators import distortion_terms, spelled_powers
+from rotor.tops.parameter_names import parse_name
 
 
 def j_order(name: str, constants: ConstantSet) -> int:

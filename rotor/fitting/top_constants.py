@@ -20,11 +20,11 @@ from typing import Any
 
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.of_top import effects_of
-from rotor.quantum.effects.spin_effect import parse_name
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional
+from rotor.tops.parameter_names import parse_name
 from rotor.tops.spins.spin_constants import SpinConstants, spin_names
 from rotor.tops.states.state_constants import StateConstants, state_numbers
 from rotor.tops.top import Top

@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from rotor.arrays import Ints
 from rotor.fitting.top_constants import ConstantSet, TopConstants
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.label_tracking import TrackedLevels, without_level
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError, level_model
-from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels
 from rotor.quantum.quanta import value_text
 from rotor.quantum.solve import solve_levels
@@ -70,6 +68,8 @@ def _text(constants: TopConstants, label: Ints) -> str:
 
 
 def _state_levels(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
+    from rotor.quantum.labelled_states import labelled_states
+
     labels_by_row = np.column_stack(
         [columns["j"], columns.get("v", np.zeros_like(columns["j"])), columns["ka"], columns["kc"]]
     )
@@ -83,6 +83,7 @@ def _levels_with_spins(
     begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]
 ) -> LevelModel:
     from rotor.quantum.estimates.labelled_spins import assigned_with_spins  # with all that spins need
+    from rotor.quantum.label_tracking import TrackedLevels, without_level
 
     total = begin.quanta[-1]
     doubled = columns[total] if total in begin.halves else 2 * columns[total]

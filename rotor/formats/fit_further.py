@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -100,18 +99,3 @@ def _bootstrap(request: FitRequest, fit: Fit, samples: int, seed: int) -> tuple[
 
     values, spread = bootstrap(fit, samples, np.random.default_rng(seed), request.options, model=request.model)
     return spread.tolist(), len(values)
-
-
-def trial_record(trial: Trial) -> dict[str, Any]:
-    """A trial by the keys of docs/verbs."""
-    return {
-        "name": trial.name,
-        "added": trial.added,
-        "f": trial.f_ratio,
-        "chance": trial.chance,
-        "aicc": trial.aicc,
-        "aicc_before": trial.aicc_before,
-        "cross_validated_rms": trial.cross_validated,
-        "weighted_rms": trial.fit.weighted_rms,
-        "better": trial.better,
-    }

@@ -25,9 +25,6 @@ from rotor.fitting.report import fit_facts, report_text
 from rotor.fitting.result import Fit, determined_covariance
 from rotor.fitting.top_constants import DIPOLES, ConstantSet, TopConstants
 from rotor.formats.assigned_lines import QUANTA, names_field, names_sums, read_assigned_lines
-from rotor.formats.spcat.fits.fit_input import SpfitInput, fitted_file, read_fit
-from rotor.formats.spcat.fits.named_fit import named_file
-from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.labelled import LevelModel
 from rotor.requests.budget import ErrorBudget
 from rotor.requests.fill import within
@@ -39,6 +36,8 @@ from rotor.version import version
 if TYPE_CHECKING:
     from rotor.fitting.choose import Suggestion, Trial
     from rotor.formats.molecules.molecule_file import MoleculeFile
+    from rotor.formats.spcat.fits.fit_input import SpfitInput
+    from rotor.formats.spcat.text.par import ParameterFile
 
 
 @dataclass(frozen=True)
@@ -156,6 +155,8 @@ def answer_fit(request: FitRequest, progress: Progress | None = None) -> FitAnsw
 
 def spfit_request(par: str, lin: str | None = None) -> FitRequest:
     """The request of a .par file and its lines; the file states free parameters and starting values. Raises ValueError as `read_fit`."""
+    from rotor.formats.spcat.fits.fit_input import read_fit
+
     inputs = read_fit(par, lin)
     title = inputs.file.title or Path(par).stem
     files = FitFiles(par, lin)
@@ -384,5 +385,9 @@ def fitted_par(answer: FitAnswer, *, variances: bool) -> ParameterFile:
     """The .par file after the fit, or the .var file; ValueError for parameters that SPFIT does not have."""
     request, fit = answer.request, answer.fit
     if request.spfit is not None:
+        from rotor.formats.spcat.fits.fit_input import fitted_file
+
         return fitted_file(request.spfit, fit, variances=variances)
+    from rotor.formats.spcat.fits.named_fit import named_file
+
     return named_file(fit, request.title, variances=variances)

@@ -81,7 +81,6 @@ def parameter_records(answer: FitAnswer) -> ColumnTable:
 def answer(request: FitRequest, work: Work) -> FitAnswer:
     """The fit and the analyses beside it; iterations are shown on a terminal."""
     from rotor.formats.assigned_lin import lin_notes
-    from rotor.formats.fit_further import chosen_fit, with_further
     from rotor.formats.fit_request import answer_fit
 
     further: FitShown = work.shown
@@ -90,10 +89,15 @@ def answer(request: FitRequest, work: Work) -> FitAnswer:
             "choose: a scene holds no choice of constants; choose first, then save the fit of those constants"
         )
     if further.choose is not None:
+        from rotor.formats.fit_further import chosen_fit
+
         fit_answer = chosen_fit(request, further.choose, not further.all_orders)
     else:
         fit_answer = answer_fit(request, _show_iteration if work.progress and sys.stderr.isatty() else None)
-    fit_answer = with_further(fit_answer, further.try_constants, further.suggest, further.bootstrap, further.seed)
+    if further.try_constants is not None or further.suggest is not None or further.bootstrap:
+        from rotor.formats.fit_further import with_further  # with all that lists of lines need
+
+        fit_answer = with_further(fit_answer, further.try_constants, further.suggest, further.bootstrap, further.seed)
     if any(path.suffix.lower() == ".lin" for path in work.files.get("save_lines", ())):
         for text in lin_notes(fit_answer.fit.marked_lines):
             work.note(text)
@@ -183,8 +187,6 @@ def write_constants(answer: FitAnswer, path: Path, report: Report) -> None:
 
 def content(answer: FitAnswer, shown: FitShown) -> dict[str, Any]:
     """Constants, correlations, lines and analyses, by the keys of docs/verbs."""
-    from rotor.formats.fit_further import trial_record
-
     fit, constants = answer.fit, answer.fit.constants
     return {
         **{name: getattr(constants, name, None) for name in ("kind", "reduction", "representation")},
@@ -192,10 +194,25 @@ def content(answer: FitAnswer, shown: FitShown) -> dict[str, Any]:
         "uncertainties_mhz": None if constants is None else dict(constants.uncertainties),
         "bootstrap_errors": list(answer.spread) or None,
         "correlations": fit.statistics.correlations,
-        "chosen": [trial_record(trial) for trial in answer.steps],
-        "trials": [trial_record(trial) for trial in answer.trials],
+        "chosen": [_trial_record(trial) for trial in answer.steps],
+        "trials": [_trial_record(trial) for trial in answer.trials],
         "suggestions": [vars(suggestion) for suggestion in answer.suggestions],
         "lines": _line_records(fit),
+    }
+
+
+def _trial_record(trial: Trial) -> dict[str, Any]:
+    """A trial by the keys of docs/verbs."""
+    return {
+        "name": trial.name,
+        "added": trial.added,
+        "f": trial.f_ratio,
+        "chance": trial.chance,
+        "aicc": trial.aicc,
+        "aicc_before": trial.aicc_before,
+        "cross_validated_rms": trial.cross_validated,
+        "weighted_rms": trial.fit.weighted_rms,
+        "better": trial.better,
     }
 
 

@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rotor.quantum.effects.spin_effect import TRACELESS, SpinEffect, Symbol, parse_name, traceless_of
+from rotor.quantum.effects.spin_effect import TRACELESS, SpinEffect, Symbol, traceless_of
 from rotor.quantum.spins.operators import Cosines
 from rotor.quantum.spins.scheme import Spin
+from rotor.tops.parameter_names import parse_name
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

@@ -10,6 +10,7 @@ from rotor.checks import did_you_mean, first_names
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.hyperfine_method import EXACT, TOLERANCE_MHZ, HyperfineMethod
+from rotor.tops.parameter_names import parse_name
 
 if TYPE_CHECKING:
     from rotor.quantum.effects.spin_effect import SpinEffect
@@ -43,7 +44,6 @@ def spin_effects(top: Top) -> tuple[QuantumEffect, ...]:
 def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
     """Effects of spin constants, each with its parameters."""
     from rotor.quantum.effects.hyperfine import NuclearQuadrupole
-    from rotor.quantum.effects.spin_effect import parse_name
     from rotor.quantum.effects.spin_rotation import SpinRotation
     from rotor.quantum.effects.spin_spin import SpinSpin
     from rotor.quantum.spins.scheme import Spin
@@ -67,8 +67,6 @@ def _effects(constants: SpinConstants) -> tuple[QuantumEffect, ...]:
 
 def _refuse_unknown_states(top: Top) -> None:
     """Raise ValueError for a spin constant of a state that the top does not have."""
-    from rotor.quantum.effects.spin_effect import parse_name
-
     assert top.spin_constants is not None
     count = top.state_count
     for name in top.spin_constants.values:
@@ -81,8 +79,6 @@ def _refuse_unknown_states(top: Top) -> None:
 
 def _refuse_across_a_line(top: Top) -> None:
     """Raise ValueError if a tensor of a linear molecule, whose axis is a, differs along b and c."""
-    from rotor.quantum.effects.spin_effect import parse_name
-
     assert top.spin_constants is not None
     values = {parse_name(name): value for name, value in top.spin_constants.values.items()}
     for parts, value in values.items():
