@@ -174,15 +174,15 @@ def read_spcat_top(path: Path, *, errors: bool = False, alone: bool = True) -> T
     """
     from rotor.formats.spcat.hamiltonian.states import file_states
     from rotor.formats.spcat.names.named_top import named_top
+    from rotor.formats.spcat.predict import FLAGS_IN_CM, files_in_mhz
     from rotor.formats.spcat.prediction_notes import range_notes
     from rotor.formats.spcat.text.int_file import read_int
     from rotor.formats.spcat.text.par import parameters_beside, read_par
-    from rotor.formats.spcat.wavenumbers import FROM, files_in_mhz
 
     intensities = path.with_suffix(".int")
     parameters = parameters_beside(path) if path.suffix.lower() == ".int" else path
     file, light = read_par(parameters), read_int(intensities) if intensities.exists() else None
-    if light is not None and light.request.flags >= FROM:
+    if light is not None and light.request.flags >= FLAGS_IN_CM:
         file, light = files_in_mhz(file, light)
     try:
         top = named_top(file, light, errors=errors)

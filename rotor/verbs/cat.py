@@ -291,7 +291,7 @@ class CatAnswer:
     @property
     def errors(self) -> ErrorBudget:
         """Error budget of the frequencies, from the errors in the file."""
-        from rotor.formats.spcat.catalogue_budget import catalogue_budget
+        from rotor.formats.spcat.compare import catalogue_budget
 
         return catalogue_budget(self.lines)
 

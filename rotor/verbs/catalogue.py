@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from rotor.formats.spcat.catalogue_budget import stored_budget
+from rotor.formats.spcat.compare import stored_budget
 from rotor.frozen import dataclass
 from rotor.reports.progress import rewritten_line
 from rotor.reports.screen import Part, Table, record_table, table_records

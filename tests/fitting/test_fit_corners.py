@@ -28,9 +28,9 @@ from rotor.formats.fit_request import answer_fit, lines_request, write_fitted_to
 from rotor.formats.spcat.fits.fit_input import fitted_file, spfit_input
 from rotor.formats.spcat.fits.named_fit import named_file
 from rotor.formats.spcat.hamiltonian.codes import FIXED
+from rotor.formats.spcat.solved_groups import variance_factor
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.formats.spcat.variances import variance_factor
 from rotor.quantum.estimates import contracted, labelled_spins
 from rotor.quantum.estimates.contracted import ContractedLevels
 from rotor.tops.constants import Constants

@@ -19,11 +19,11 @@ from rotor.formats.spcat.fits.fit_input import error_factor, fitted_file, read_f
 from rotor.formats.spcat.fits.fit_states import FileLevels, groups_for_fit, quanta_names
 from rotor.formats.spcat.fits.fit_table import publication_rows
 from rotor.formats.spcat.predict import predict
+from rotor.formats.spcat.solved_groups import variance_factor
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.int_file import read_int
 from rotor.formats.spcat.text.lin import LineList, read_lin
 from rotor.formats.spcat.text.par import read_par
-from rotor.formats.spcat.variances import variance_factor
 from rotor.quantum.estimates.contracted import ContractedLevels
 
 # weighted rms, rms of lines in MHz and of those in cm-1, as SPFIT printed them

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from rotor.formats.spcat.hamiltonian.codes import constants_and_matrix
+from rotor.formats.spcat.solved_groups import variance_factor
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.formats.spcat.variances import variance_factor
 from rotor.tops.covariance import Covariance
 
 

@@ -11,7 +11,7 @@ from ocs_species import OCS_SPECIES
 from places import ORACLES
 
 from rotor import units
-from rotor.formats.spcat.catalogue_budget import catalogue_budget
+from rotor.formats.spcat.compare import catalogue_budget
 from rotor.formats.spcat.text.cat import read_cat
 from rotor.formats.spcat.text.catalogue import Layout
 from rotor.reports.top_facts import error_rows

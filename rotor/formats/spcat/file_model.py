@@ -23,8 +23,7 @@ from rotor.formats.spcat.hamiltonian.dipole_codes import (
     line_moment,
     split_dipoles,
 )
-from rotor.formats.spcat.hamiltonian.entries import Connected
-from rotor.formats.spcat.hamiltonian.file_effect import FileEffect
+from rotor.formats.spcat.hamiltonian.entries import Connected, FileEffect
 from rotor.formats.spcat.hamiltonian.l_doubled import Pair, named_by_l
 from rotor.formats.spcat.hamiltonian.labels import (
     BY_DIAG,

@@ -1,6 +1,10 @@
 """Catalogue predicted from an .int and a .var or .par file as by SPCAT, with the Q, limits, cut, weights and labels of the files.
 
 Notes of the prediction report input that SPCAT ignores silently.
+
+FLAGS of 1000 and more: constants are in cm⁻¹, and so are FQLIM, the frequencies and their errors, with six decimals; a frequency that
+prints as 0.000000 is left out, and STR1 counts (ν cm/300 000)², ν in cm⁻¹ as the program has it in its variable of MHz (H. M. Pickett,
+documentation of SPFIT and SPCAT, "FLAGS"; STR1 as the program's lists say).
 """
 
 from __future__ import annotations
@@ -11,20 +15,26 @@ from collections.abc import Callable, Iterable
 from dataclasses import field, replace
 from functools import cached_property, partial
 
-from rotor.formats.spcat import wavenumbers
+from rotor import units
 from rotor.formats.spcat.block_numbers import numbered_blocks
 from rotor.formats.spcat.file_lines import as_catalogue, as_level_list, group_lines, group_transitions
 from rotor.formats.spcat.file_model import connected_groups
 from rotor.formats.spcat.file_quanta import quanta_format
+from rotor.formats.spcat.hamiltonian.code_table import Digits, file_codes
+from rotor.formats.spcat.hamiltonian.codes import HELD_BELOW
 from rotor.formats.spcat.prediction_notes import prediction_notes
 from rotor.formats.spcat.solved_groups import highest_n, joined_lines, solved_groups
-from rotor.formats.spcat.text.catalogue import Catalogue
+from rotor.formats.spcat.text.catalogue import Catalogue, Layout
 from rotor.formats.spcat.text.egy import LevelList
 from rotor.formats.spcat.text.fields import QUANTUM_RANGE
 from rotor.formats.spcat.text.int_file import IntensityFile, Request, read_int
-from rotor.formats.spcat.text.par import ParameterFile, parameters_beside, read_par
+from rotor.formats.spcat.text.par import Parameter, ParameterFile, parameters_beside, read_par
 from rotor.frozen import dataclass
 from rotor.spectra.lines import Lines
+
+FLAGS_IN_CM = 1000  # and above
+_LEAST_CM = 5e-7
+_DECIMALS_IN_CM = (6, 6, 4, 4)
 
 
 @dataclass(frozen=True)
@@ -96,10 +106,10 @@ def predict(
     """
     request = intensities.request
     _refuse_limits(request)
-    if request.flags >= wavenumbers.FROM:
-        files = wavenumbers.files_in_mhz(parameters, intensities)
+    if request.flags >= FLAGS_IN_CM:
+        files = files_in_mhz(parameters, intensities)
         in_mhz = predict(*files, as_spcat=as_spcat, full_basis=full_basis)
-        return replace(in_mhz, catalogue=wavenumbers.catalogue_in_cm(in_mhz.catalogue), request=request)
+        return replace(in_mhz, catalogue=catalogue_in_cm(in_mhz.catalogue), request=request)
     if as_spcat and request.qrot < 1:
         request = replace(request, qrot=1.0)
     highest = highest_n(parameters, request)
@@ -133,3 +143,46 @@ def _refuse_limits(request: Request) -> None:
         raise ValueError(f"QROT = {request.qrot}: a partition function is a number above 0")
     if not (math.isfinite(request.temperature_k) and request.temperature_k > 0):
         raise ValueError(f"TEMP = {request.temperature_k:g}: a temperature is above 0 K")
+
+
+def files_in_mhz(parameters: ParameterFile, intensities: IntensityFile) -> tuple[ParameterFile, IntensityFile]:
+    r"""Both files converted to MHz: values and errors of parameters, limits of the request.
+
+    >>> from rotor.formats.spcat.text.int_file import Request
+    >>> from rotor.formats.spcat.text.par import read_par
+    >>> file = read_par(b"CO\n 1 0 0 0\nl -1 1 0 0\n 100 1.9225 1e-37\n")
+    >>> file, intensities = files_in_mhz(file, IntensityFile("", Request(flags=1001, fqlim_ghz=100.0), ()))
+    >>> round(file.parameters[0].value, 3), round(intensities.request.fqlim_ghz, 6)
+    (57635.1, 2997.92458)
+    """
+    request = intensities.request
+    request = replace(
+        request,
+        flags=request.flags % FLAGS_IN_CM,
+        fqlim_ghz=request.fqlim_ghz * units.MHZ_PER_CM * 1e-3,
+        str1=request.str1 - 2.0 * math.log10(units.MHZ_PER_CM),
+        text="",
+    )
+    in_mhz = tuple(map(_in_mhz, parameters.parameters, file_codes(parameters)))
+    return replace(parameters, parameters=in_mhz), replace(intensities, request=request)
+
+
+def _in_mhz(parameter: Parameter, digits: Digits) -> Parameter:
+    if digits.is_constant:  # ρ, a and b of a series are pure numbers
+        return parameter
+    error = parameter.error
+    if error is not None and error >= HELD_BELOW:
+        error *= units.MHZ_PER_CM
+    return replace(parameter, value=parameter.value * units.MHZ_PER_CM, error=error, text="")
+
+
+def catalogue_in_cm(catalogue: Catalogue) -> Catalogue:
+    """The lines of a catalogue in MHz, with frequencies and errors converted to cm⁻¹ with six decimals."""
+    frequency = catalogue.frequency_mhz / units.MHZ_PER_CM
+    converted = replace(
+        catalogue,
+        frequency_mhz=frequency,
+        error_mhz=catalogue.error_mhz / units.MHZ_PER_CM,
+        layout=Layout(decimals=_DECIMALS_IN_CM),
+    )
+    return converted.take(frequency >= _LEAST_CM)

@@ -1,10 +1,16 @@
-"""Levels of the groups of an .int file, with their errors, and its lines with one table of levels."""
+"""Levels of the groups of an .int file, with their errors, and its lines with one table of levels.
+
+The covariance of a .var file is C = D V Vᵀ D. D are the errors of the parameter lines; V (upper triangular, column by column, ten
+characters for each number) follows them. Without V the errors are uncorrelated, as in SPCAT. A parameter with a minus sign has a fixed
+ratio to the one before.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,11 +21,10 @@ from rotor.formats.spcat.file_model import Group
 from rotor.formats.spcat.file_quanta import Format
 from rotor.formats.spcat.hamiltonian.code_table import file_codes
 from rotor.formats.spcat.hamiltonian.coded_file import line_names
-from rotor.formats.spcat.hamiltonian.codes import file_constants
+from rotor.formats.spcat.hamiltonian.codes import FREE_ABOVE, HELD_BELOW, NO_LEADER, file_constants
 from rotor.formats.spcat.hamiltonian.states import file_states, options_alone
 from rotor.formats.spcat.text.int_file import Request
-from rotor.formats.spcat.text.par import ParameterFile
-from rotor.formats.spcat.variances import variance_factor
+from rotor.formats.spcat.text.par import Parameter, ParameterFile
 from rotor.quantum.estimates.derivatives import level_derivatives
 from rotor.quantum.levels import Levels
 from rotor.spectra.lines import Lines
@@ -28,6 +33,7 @@ from rotor.thermodynamics.sums.partition import PartitionFunction
 from rotor.tops.top import Top
 
 MOST_EXPONENT = 700.0  # of a population in double precision
+_DIGITS = 10  # characters of each correlation
 
 
 def highest_n(parameters: ParameterFile, request: Request) -> int:
@@ -167,3 +173,64 @@ def _shown(parameters: ParameterFile, group: Group) -> Top:
     except ValueError:
         return group.top
     return replace(group.top, constants=constants)
+
+
+def variance_factor(file: ParameterFile) -> Floats | None:
+    """F (parameters, k) in MHz with F Fᵀ the covariance of the parameter lines; None without estimated errors.
+
+    Raises ValueError for correlations of another number of parameters, or that are not numbers.
+    """
+    errors = np.array([_estimated(parameter) for parameter in file.parameters])
+    if not errors.any():
+        return None
+    leaders = [i for i, parameter in enumerate(file.parameters) if not parameter.constrained]
+    fitted = [i for i in leaders if errors[i] > 0]
+    correlations = _correlations(file)
+    named = leaders if len(correlations) == len(leaders) else fitted
+    if not len(correlations):
+        correlations = np.eye(len(named))
+    if len(correlations) != len(named):
+        raise ValueError(
+            f"correlations of {len(correlations)} parameters stand at the end of the file, which has {len(fitted)} with an error; "
+            "give the .var as it was written"
+        )
+    factor = np.zeros((len(file.parameters), len(named)))
+    factor[named] = errors[named, None] * correlations
+    for i, parameter in enumerate(file.parameters):
+        if parameter.constrained:
+            leader = max((j for j in leaders if j < i), default=None)
+            if leader is None:
+                raise parameter.refusal(NO_LEADER)
+            value = file.parameters[leader].value
+            factor[i] = factor[leader] * (parameter.value / value) if value else 0.0
+    return factor
+
+
+def _estimated(parameter: Parameter) -> float:
+    error = parameter.error or 0.0
+    return error if HELD_BELOW <= error < FREE_ABOVE and not parameter.constrained else 0.0
+
+
+def _correlations(file: ParameterFile) -> Floats:
+    """V (k, k), upper triangular; (0, 0) if the file has none.
+
+    As in SPCAT (`getpar`, `getvar`), V is ignored after fewer parameters than NPAR, and so is text after the parameters, such as another
+    list."""
+    rows = list(takewhile(lambda line: line.strip()[:1] in "+-.0123456789", file.rest.splitlines()))
+    if len(file.parameters) < file.header.npar:
+        rows = []
+    words = [line[i : i + _DIGITS] for line in rows for i in range(0, len(line.rstrip()), _DIGITS)]
+    try:
+        values = [float(word) for word in words if word.strip()]
+    except ValueError:
+        raise ValueError(
+            f"the correlations at the end of the file are no numbers of {_DIGITS} characters each"
+        ) from None
+    size = int((np.sqrt(8 * len(values) + 1) - 1) / 2)
+    if size * (size + 1) // 2 != len(values):
+        raise ValueError(
+            f"{len(values)} correlations stand at the end of the file; k (k + 1)/2 are needed for k parameters"
+        )
+    out = np.zeros((size, size))
+    out.T[np.tril_indices(size)] = values
+    return out

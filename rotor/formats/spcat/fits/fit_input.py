@@ -21,11 +21,10 @@ from rotor.fitting.parameters import Parameters
 from rotor.fitting.result import Fit
 from rotor.formats.assigned_lin import with_excluded_lines
 from rotor.formats.assigned_lines import QUANTA
-from rotor.formats.spcat.hamiltonian.codes import FIXED, constants_and_matrix, is_held
+from rotor.formats.spcat.hamiltonian.codes import FIXED, FREE_ABOVE, NO_LEADER, constants_and_matrix, is_held
 from rotor.formats.spcat.hamiltonian.states import is_plain
 from rotor.formats.spcat.text.lin import LineList, default_note, read_lin, remark_notes, with_defaults
 from rotor.formats.spcat.text.par import Header, Parameter, ParameterFile, npar_notes, read_par
-from rotor.formats.spcat.variances import FREE_ABOVE, NO_LEADER
 from rotor.quantum.labelled import LevelModel
 from rotor.table import counted
 from rotor.tops.constants import AxisOrderError, Constants

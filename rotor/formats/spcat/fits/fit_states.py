@@ -1,6 +1,6 @@
 """Levels of SPFIT's files with spins or several states as functions of the parameters, for fits.
 
-Each parameter line of the file is a constant, named as in `file_effect`. Connected states are solved together, for those F in which a line
+Each parameter line of the file is a constant, named as in `entries`. Connected states are solved together, for those F in which a line
 has a level. Levels are identified by the quantum numbers that the file lists. Levels of lines without resolved hyperfine structure have F
 below 0.
 
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from rotor.arrays import Floats, Ints, distinct
+from rotor.arrays import Floats, Ints, distinct, rows_of_keys
 from rotor.formats.spcat.file_model import Group, connected_groups
 from rotor.formats.spcat.file_quanta import Format, listed_quanta, quanta_format
 from rotor.formats.spcat.hamiltonian.code_table import Digits, Kind
@@ -248,13 +248,12 @@ def _assign_with_spins(
 
 def _label_rows(group: Group, levels: Levels, form: Format, labels: Ints) -> Ints:
     """The row of each label among the levels, -1 if it has none."""
-    rows_by_label: dict[tuple[int, ...], int] = {}
-    for negative in (True, False):
-        for row, label in enumerate(map(tuple, listed_quanta(group, levels, form, negative).tolist())):
-            rows_by_label.setdefault(label, row)
+    # of equal labels the first row counts
+    table = np.concatenate([listed_quanta(group, levels, form, negative) for negative in (True, False)])[::-1]
+    rows = rows_of_keys(table, labels)
     if form.rotation == 2:  # a label without a level is that of the opposite sign of K
-        rows_by_label = {(n, -k, *others): row for (n, k, *others), row in rows_by_label.items()} | rows_by_label
-    return np.array([rows_by_label.get(tuple(label), -1) for label in labels.tolist()])
+        rows = np.where(rows < 0, rows_of_keys(table * np.where(np.arange(table.shape[1]) == 1, -1, 1), labels), rows)
+    return np.where(rows < 0, -1, (len(table) - 1 - rows) % max(len(levels), 1))
 
 
 def _assign_in_blocks(

@@ -218,6 +218,8 @@ def code_factors(constants: Constants) -> Factors:
 
 FIXED = 1e-37  # error of a parameter that is not fitted
 HELD_BELOW = 1e-30  # a smaller error marks a parameter as not fitted
+FREE_ABOVE = 1e15  # MHz; a larger a-priori error counts as none, as in SPFIT
+NO_LEADER = "the first one has none before it to keep a ratio to"
 
 
 def is_held(parameter: Parameter) -> bool:

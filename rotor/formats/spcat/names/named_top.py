@@ -33,6 +33,7 @@ from rotor.formats.spcat.hamiltonian.symmetry import halved_across
 from rotor.formats.spcat.model import class_weights, reduced_weights
 from rotor.formats.spcat.text.int_file import IntensityFile
 from rotor.formats.spcat.text.par import Options, Parameter, ParameterFile
+from rotor.quantum.effects.spin_effect import matrix_of
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Scalar
 from rotor.tops.constants import AxisOrderError, Constants
 from rotor.tops.spins.spin_constants import SpinConstants, is_isotope
@@ -230,23 +231,21 @@ def _states(
 def _elements(kind: str, terms: list[tuple[Floats, float]]) -> dict[str, tuple[float, float | None]]:
     """The elements of a tensor by name, each with its error if it comes from one parameter.
 
-    terms: of one kind with the same spins, powers and states: matrices along a, b, c (or numbers), and their relative errors.
+    terms: of one kind with the same spins, powers and states: matrices along a, b, c, and their relative errors.
     """
     total = np.sum([matrix for matrix, _ in terms], axis=0)
     out: dict[str, tuple[float, float | None]] = {}
     for letters in _letters(kind, total):
         spreads = [abs(part) * error for matrix, error in terms if (part := _element(matrix, letters))]
         error = float(f"{spreads[0]:.12g}") if len(spreads) == 1 and spreads[0] > 0 else None
-        out[f"{kind}_{letters}" if letters else kind] = float(f"{_element(total, letters):.15g}"), error
+        out[kind if kind == "J" else f"{kind}_{letters}"] = float(f"{_element(total, letters):.15g}"), error
     return out
 
 
 def _letters(kind: str, total: Floats) -> list[str]:
     """The nonzero elements that define a tensor; for spin-rotation only the scalar if it is one."""
-    if kind == "J":
-        return [""]
     # equal but for round-off
-    if kind == "C" and np.allclose(total, total[0, 0] * np.eye(3), rtol=0, atol=1e-14 * np.abs(total).max()):
+    if kind in "CJ" and np.allclose(total, total[0, 0] * np.eye(3), rtol=0, atol=1e-14 * np.abs(total).max()):
         return ["iso"]
     names = ["aa", "bb", "cc", *PAIRS] if kind == "C" else ["aa", "bb-cc", *PAIRS]
     # elements of round-off get no name
@@ -254,14 +253,7 @@ def _letters(kind: str, total: Floats) -> list[str]:
 
 
 def _element(matrix: Floats, letters: str) -> float:
-    if not letters:
-        return float(matrix)
-    if letters == "bb-cc":
-        return float(matrix[1, 1] - matrix[2, 2])
-    if letters in PAIRS:
-        return float(matrix[PAIRS[letters]])
-    place = "abc".index(letters[0]) if letters != "iso" else 0
-    return float(matrix[place, place])
+    return float((np.triu(matrix_of("aa" if letters == "iso" else letters)) * matrix).sum())
 
 
 def _spins(
@@ -288,7 +280,7 @@ def _spins(
         key = kind, f"{_with_powers('', o.n2, o.nz2, o.ns)}({spins}){state_suffix}"
         spread = parameter.error or 0.0
         relative = spread / abs(value) if errors and spread > HELD_BELOW and value else 0.0
-        sums.setdefault(key, []).append((value * (matrix[::-1, ::-1] if turned and matrix.ndim else matrix), relative))
+        sums.setdefault(key, []).append((value * (matrix[::-1, ::-1] if turned else matrix), relative))
     if not sizes:
         return None
     named = {
@@ -317,10 +309,10 @@ def _spin_names(rows: list[CodedLine], sizes: tuple[int, ...]) -> list[str]:
 
 
 def _tensor(operator: CodedOperator) -> tuple[str, Floats]:
-    """The tensor of a spin term, and the matrix (or 1) that its value multiplies."""
+    """The tensor of a spin term, and the matrix that its value multiplies."""
     rotor, spins = operator.rotor, operator.spins
     if isinstance(rotor, Scalar) and len(spins) == 2:
-        return "J", np.array(1.0)
+        return "J", np.eye(3)
     if isinstance(rotor, CosinesWithN):
         return "C", np.array(rotor.components)
     if isinstance(rotor, Cosines) and rotor.rank == 2:

@@ -15,6 +15,7 @@ from rotor.frozen import dataclass
 from rotor.table import Table
 
 MAX_TAG = 999_999
+WIDE_MHZ = 99999999.0  # from here on FREQ has three decimals, and ERR and LGINT with it
 
 
 @dataclass(frozen=True)

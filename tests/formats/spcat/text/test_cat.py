@@ -11,7 +11,7 @@ from places import ORACLES, PROJECT, SHARED
 
 from rotor.formats.atomic_write import atomic_path, open_atomic
 from rotor.formats.spcat.text import cat, rows
-from rotor.formats.spcat.text.cat import format_lines, read_cat, write_cat
+from rotor.formats.spcat.text.cat import format_lines, read_cat, spell_record, write_cat
 from rotor.formats.spcat.text.catalogue import DTYPES, Catalogue, Layout
 from rotor.formats.spcat.text.fields import (
     BLANK,
@@ -21,7 +21,6 @@ from rotor.formats.spcat.text.fields import (
     spell_degeneracy,
     spell_quantum,
 )
-from rotor.formats.spcat.text.line import spell_record
 
 SAMPLES = sorted((ORACLES / "spcat").glob("*.cat"))
 REFERENCE = SHARED / "reference"

@@ -12,9 +12,9 @@ from places import ORACLES
 from rotor.fitting.fit import fit_lines
 from rotor.formats.spcat.fits.fit_input import fitted_file, read_fit, spfit_input
 from rotor.formats.spcat.fits.fit_states import FileLevels, left_at_zero, stay_at_zero
+from rotor.formats.spcat.solved_groups import variance_factor
 from rotor.formats.spcat.text.lin import line_list, read_lin
 from rotor.formats.spcat.text.par import format_par, read_par
-from rotor.formats.spcat.variances import variance_factor
 
 GS = ORACLES / "kinds" / "cyanomethcycloprop"  # its README says from where
 FREE = ("B_gs", "C_gs", "-DJ_gs", "-DJK_gs", "-dJ_gs")
