@@ -25,7 +25,7 @@ from rotor.alignment.pulse import RAD_PER_PS_MHZ, GaussianPulse
 from rotor.alignment.qutip_objects import block_objects, solve_windows
 from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.fields.operators import Contraction
-from rotor.quantum.fields.space import field_space
+from rotor.quantum.fields.solved_space import field_space
 from rotor.tops.top import Top
 
 OCS = Top.from_constants("B=6081.492 MHz", dipole_abc_debye=(0.71519, 0, 0)).with_polarizability(

@@ -34,7 +34,7 @@ def absolute_cosine(block: FieldBlock) -> Floats:
     """⟨J' k M| |cosθ| |J k M⟩ over a block (n, n) of a linear or symmetric top, θ of its figure axis; exact but for round-off.
 
     >>> from rotor.quantum.fields.operators import Contraction
-    >>> from rotor.quantum.fields.space import field_space
+    >>> from rotor.quantum.fields.solved_space import field_space
     >>> from rotor.tops.top import Top
     >>> z2 = Contraction(np.diag([1.0, 0, 0]), np.diag([0, 0, 1.0]))
     >>> block = field_space(Top.from_constants("B=6000 MHz"), 2, [z2]).blocks(0)[0]

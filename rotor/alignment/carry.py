@@ -19,7 +19,7 @@ from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.axial import AxialSpace
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.operators import Contraction
-from rotor.quantum.fields.space import field_space
+from rotor.quantum.fields.solved_space import field_space
 from rotor.tops.top import require_single_state
 
 if TYPE_CHECKING:

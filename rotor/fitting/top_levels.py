@@ -1,7 +1,7 @@
 """Labelled levels of a top with further states or spins, and their derivatives by its named constants.
 
 The Hamiltonian is that of `rotor.quantum.effects.of_top`, as in predictions. Only the J or F with a level of a line are solved:
-connected Wang blocks of states (`labelled_states`), blocks of one F (`labelled_spins`), or, for uncoupled states of a symmetric top,
+connected Wang blocks of states (`label_tracking`), blocks of one F (`effect_units`), or, for uncoupled states of a symmetric top,
 the exact sum E = Σ c ∂E/∂c.
 """
 
@@ -68,7 +68,7 @@ def _text(constants: TopConstants, label: Ints) -> str:
 
 
 def _state_levels(begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]) -> LevelModel:
-    from rotor.quantum.labelled_states import labelled_states
+    from rotor.quantum.label_tracking import labelled_states
 
     labels_by_row = np.column_stack(
         [columns["j"], columns.get("v", np.zeros_like(columns["j"])), columns["ka"], columns["kc"]]
@@ -82,7 +82,7 @@ def _state_levels(begin: TopConstants, columns: dict[str, Ints], labels: Ints, n
 def _levels_with_spins(
     begin: TopConstants, columns: dict[str, Ints], labels: Ints, names: tuple[str, ...]
 ) -> LevelModel:
-    from rotor.quantum.estimates.labelled_spins import assigned_with_spins  # with all that spins need
+    from rotor.quantum.estimates.effect_units import assigned_with_spins  # with all that spins need
     from rotor.quantum.label_tracking import TrackedLevels, without_level
 
     total = begin.quanta[-1]

@@ -36,9 +36,9 @@ from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesL
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.levels import SolvedBlock, placed
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
+from rotor.quantum.spins.linear_blocks import slopes_by_rotation, slopes_by_spins
 from rotor.quantum.spins.rotor import Terms, channels_of
 from rotor.quantum.spins.scheme import Scheme, SpinTerm, scheme_of
-from rotor.quantum.spins.species_slopes import slopes_by_rotation, slopes_by_spins
 from rotor.tops.internal_rotation import InternalRotationConstants, is_torsional, sigma_species
 
 MOVED = 0.01  # relative change of a torsional constant above which the torsional functions are rebuilt

@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis.elements import ROUND_OFF, Elements
-from rotor.quantum.basis.labelled import Basis
+from rotor.quantum.basis.labelled import ROUND_OFF, Basis, Elements
 from rotor.quantum.connected import part_numbers
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.operators.algebra import Operator

@@ -15,14 +15,80 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from rotor.tops.operators import Operators
+from rotor.frozen import dataclass
+from rotor.tops.operators import Operators, added
 
 if TYPE_CHECKING:
-    from rotor.quantum.moments import Moment
     from rotor.quantum.operators.algebra import Operator
+    from rotor.quantum.spins.operators import Rotor
     from rotor.quantum.spins.scheme import Spin, SpinTerm
-    from rotor.quantum.states import Coupling, State
+    from rotor.quantum.wang.basis import SpeciesFactors
+    from rotor.tops.spins.spin_weights import SpinWeights
     from rotor.tops.top import Top
+
+
+@dataclass(frozen=True)
+class State:
+    """A state with a rotational Hamiltonian of its own, Σ c O over named parameters c of the effect that brings it.
+
+    v: its number, 1 or more (0 is the top's own). terms: for each parameter the operators J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊ that
+    it multiplies, by powers (p, q, n); (0, 0, 0) is the unit operator, that of the energy of the state. spin_weights: None for those of
+    the top.
+    """
+
+    v: int
+    terms: dict[str, Operators]
+    spin_weights: SpinWeights | None = None
+
+    def operators(self, values: dict[str, float]) -> Operators:
+        """The terms times the values of the parameters, added."""
+        return added((terms, values[name]) for name, terms in self.terms.items())
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """What the parameter `name` of an effect multiplies: |bra⟩⟨ket| ⊗ O + Hermitian conjugate; O alone where bra is ket.
+
+    bra, ket: numbers v of states. operator: O on |J K⟩ of a representation, which leaves J alone. An operator that time reversal changes
+    in sign (an odd power of J) has a factor i, which belongs to O. factors: what its elements between Wang blocks are multiplied with.
+    """
+
+    name: str
+    bra: int
+    ket: int
+    operator: Operator
+    factors: SpeciesFactors | None = None
+
+
+DEBYE_PER_BOHR_MAGNETON = 0.009274  # as SPCAT has it; 9.2740101e-3 by CODATA 2018
+
+
+class Moment(NamedTuple):
+    """A moment that makes lines besides the dipole of a state: |v'⟩⟨v| of its states times an operator, and its Hermitian conjugate.
+
+    electric    Σ_i μ_i φ_pi, times functions of N', N, K', K (Herman-Wallis corrections, Fourier terms of internal rotation), or
+                products of one direction cosine with components of N
+    magnetic    g μB N_p, g μB S_p of one spin, or g μB Σ_ij c_ij φ_pi S_j (j along the molecule), c symmetric and traceless;
+                g μB Σ_ij c_ij ½{φ_pi, N_j}
+    of a spin   Σ_q ½{φ_p, N_q} S_q with the part of rank 2 alone, φ = Σ_i μ_i φ_i; i Σ_ij c_ij φ_pi S_j between two states
+
+    p is a direction in space, i and j are a, b, c. In a level of good parity electric and magnetic moments do not interfere.
+    rotor: of rank 1, or the part on |N K⟩ that the vector of a spin multiplies. spin: the name of that spin, "" for none. electric: whether
+    it adds to the electric dipole in amplitude; elements are those of i times the moment (`spins.operators`). imaginary: whether elements
+    are i times those of a plain dipole within one state: their squares are added.
+    """
+
+    value_debye: float
+    states: tuple[int, int]
+    rotor: Rotor
+    spin: str = ""
+    electric: bool = True
+    imaginary: bool = False
+
+    @property
+    def conjugate_sign(self) -> float:
+        """What (-1)^(N'-N) times the transpose of the elements is multiplied with in the elements of the conjugate."""
+        return -1.0 if self.electric and not self.imaginary else 1.0
 
 
 class QuantumEffect(ABC):
@@ -142,8 +208,6 @@ def k_limits_of(top: Top, effects: Iterable[QuantumEffect]) -> dict[int, tuple[i
 
 def couplings_of(top: Top, effects: Iterable[QuantumEffect], representation: str) -> list[Coupling]:
     """Couplings of effects, and what acts in the top's own state by other operators of J than powers."""
-    from rotor.quantum.states import Coupling
-
     couplings: list[Coupling] = []
     for effect in effects:
         couplings += effect.couplings(top, representation)

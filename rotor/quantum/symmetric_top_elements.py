@@ -5,6 +5,7 @@ Phases and normalisation are those of `tensors`, which puts Wang blocks together
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -110,3 +111,24 @@ def _tensor_level(j: float | Floats, k: Floats, q: int) -> Floats:
     if q == 1:
         return np.asarray(-(2 * k + 1) * np.sqrt(3 * (j - k) * (j + k + 1) / norm))
     return np.asarray(np.sqrt(3 * (j - k) * (j - k - 1) * (j + k + 1) * (j + k + 2) / norm))
+
+
+def space_factor(twice_up: int, twice_low: int, rank: int, twice_m: int, q: int = 0) -> float:
+    """(-1)^(F'-M') (F' K F; -M' q M) of doubled F', F and M, M' = M + q; 0 where a rule forbids it.
+
+    ⟨F'τ'M'|T^K_q|F τ M⟩ is this times ⟨F'τ'‖T^K‖F τ⟩ (R. N. Zare, Angular Momentum, 1988, eq. 5.14), whatever was contracted into τ.
+
+    >>> round(space_factor(2, 0, 1, 0), 6)  # 1/√3
+    0.57735
+    """
+    if abs(twice_m) > twice_low or abs(twice_m + 2 * q) > twice_up:
+        return 0.0
+    return float(_factors(twice_up, twice_low, rank, q)[(twice_low + twice_m) // 2])
+
+
+@lru_cache(maxsize=8192)
+def _factors(twice_up: int, twice_low: int, rank: int, q: int) -> Floats:
+    """Of M = -F ... F."""
+    m = np.arange(-twice_low, twice_low + 1, 2) / 2
+    j_up, j_low = (twice // 2 if twice % 2 == 0 else twice / 2 for twice in (twice_up, twice_low))
+    return np.asarray(coupling(j_low, j_up, rank, q, m) / np.sqrt((twice_up + 1.0) * (twice_low + 1)))

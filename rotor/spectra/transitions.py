@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Indices, Ints, Workspace
 from rotor.frozen import dataclass
+from rotor.quantum.effect import Moment
 from rotor.quantum.levels import Levels, SolvedBlock
-from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import connections, wang_columns
 from rotor.quantum.stacked_blocks import are_whole
 from rotor.quantum.tensors import body_tensor

@@ -32,7 +32,7 @@ from rotor.alignment.request import AlignRequest, answer_align
 from rotor.alignment.timeline import timeline
 from rotor.quantum.estimates.limits import all_limits
 from rotor.quantum.fields.operators import Contraction
-from rotor.quantum.fields.space import field_space
+from rotor.quantum.fields.solved_space import field_space
 from rotor.tops.top import Top
 
 OCS = Top.from_constants("B=6081.492 MHz").with_polarizability(np.diag([8.04, 4.0, 4.0]), "test")

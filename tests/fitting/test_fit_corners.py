@@ -31,7 +31,7 @@ from rotor.formats.spcat.hamiltonian.codes import FIXED
 from rotor.formats.spcat.solved_groups import variance_factor
 from rotor.formats.spcat.text.lin import read_lin
 from rotor.formats.spcat.text.par import ParameterFile
-from rotor.quantum.estimates import contracted, labelled_spins
+from rotor.quantum.estimates import contracted, effect_units
 from rotor.quantum.estimates.contracted import ContractedLevels
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
@@ -82,7 +82,7 @@ def test_n_of_0_among_large_blocks(monkeypatch):
     constants, labels = TopConstants(NITROGEN, True), with_f(LEVELS)
     values = np.array(list(constants.values.values()))
     energies, slopes = top_levels(constants, labels).levels(values)
-    monkeypatch.setattr(labelled_spins, "_LARGE", 0)
+    monkeypatch.setattr(effect_units, "_LARGE", 0)
     monkeypatch.setattr(contracted, "_WIDE", np.inf)
     model = top_levels(constants, labels)
     assert not model.tracked

@@ -340,18 +340,18 @@ def test_lines_of_unresolved_structure_leave_out_the_last_parameters():
 
 def test_levels_of_large_blocks_are_those_of_the_whole_matrix(monkeypatch):
     """Two chlorines, two states with Coriolis coupling, N = 13: each level among the functions near it, or all diagonalised."""
-    from rotor.quantum.estimates import contracted, labelled_spins
+    from rotor.quantum.estimates import contracted, effect_units
 
     text = TWO_CHLORINES.parameters.replace("10000 ", "10099 ").replace("20000 ", "20099 ").replace("30000 ", "30099 ")
     text = re.sub(r"(?m)^(-?[12]{2}00\d00)00 ", r"\g<1>99 ", text).replace("200 -1e-3", "299 -1e-3")  # of both states
     file = parameter_file(replace(TWO_CHLORINES, options="a 44 2 0 20 0 3 1 1 0 1 0", parameters=text + _TWO_STATES))
     values = np.array([p.value for p in file.parameters])
     labels = np.array([[n, ka, n - ka, v, n + 1, n + 2] for n in (13,) for ka in (0, 1, 9) for v in (0, 1)])
-    monkeypatch.setattr(labelled_spins, "_LARGE", 100)
+    monkeypatch.setattr(effect_units, "_LARGE", 100)
     model = FileLevels.from_labels(file, labels)
     assert isinstance(model.whole.others[0].blocks, contracted.ContractedLevels)
     computed, slopes = model.levels(values)
-    monkeypatch.setattr(labelled_spins, "_LARGE", 10**9)
+    monkeypatch.setattr(effect_units, "_LARGE", 10**9)
     whole, whole_slopes = FileLevels.from_labels(file, labels).levels(values)
     assert computed == pytest.approx(whole, abs=contracted.TOLERANCE_MHZ)  # what is left out is below it
     assert np.abs(slopes - whole_slopes).max(axis=0) == pytest.approx(0, abs=1e-6 * np.abs(whole_slopes).max())  # v²/W²

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from coupled_spaces import Space, contracted_elements
 
-from rotor.quantum.basis.elements import Elements, merged
+from rotor.quantum.basis.labelled import Elements, merged
 from rotor.quantum.blocks import connected_blocks, elements_by_blocks, expectations
 from rotor.quantum.connected import part_numbers
 from rotor.quantum.operators.algebra import shift

@@ -47,8 +47,8 @@ from rotor.formats.spcat.text.int_file import Dipole, IntensityFile
 from rotor.formats.spcat.text.par import Options, ParameterFile
 from rotor.frozen import dataclass
 from rotor.quantum.connected import connected_parts
+from rotor.quantum.effect import Moment
 from rotor.quantum.levels import Levels
-from rotor.quantum.moments import Moment
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.quantum.spins.operators import is_axial

@@ -18,7 +18,7 @@ from rotor.formats.spcat.hamiltonian.states import is_odd
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.frozen import dataclass
 from rotor.quantum.levels import Levels
-from rotor.quantum.spins.three_spins import symmetric_functions
+from rotor.quantum.spins.coupling import symmetric_functions
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 The elements of ½[Jz^2q, J₊^2n + J₋^2n]₊ in the Wang blocks of every J are made at once, in whole arrays; every state has the same, times
 X^p and the factors of its parameters. Couplings of states, and operators of J that no powers describe, are a unit matrix each. Fits
-(`labelled_states`) and derivatives of levels take their blocks from here.
+(`label_tracking`) and derivatives of levels take their blocks from here.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ import numpy as np
 from rotor.arrays import Floats, Ints, distinct, numbers_in_runs
 from rotor.quantum.basis.wang_functions import BetweenStates, WangElements, WangFunctions
 from rotor.quantum.connected import connected_parts
-from rotor.quantum.effect import QuantumEffect, couplings_of
+from rotor.quantum.effect import Coupling, QuantumEffect, State, couplings_of
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, LinearStack, numbered, stack_numbers
 from rotor.quantum.operators.algebra import Operator
-from rotor.quantum.states import Coupling, State
 from rotor.quantum.wang.basis import SpeciesFactors, WangBlock, parts_of
-from rotor.quantum.wang.unit_diagonals import unit_diagonals
+from rotor.quantum.wang.wang_matrix import unit_diagonals
 from rotor.tops.operators import Operators, Powers
 
 if TYPE_CHECKING:

@@ -16,11 +16,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, ClassVar, Self
 
 from rotor.frozen import dataclass
-from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effect import Coupling, QuantumEffect, State
 from rotor.quantum.effects.watson import operators_of_name
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import components, ladders, with_powers
-from rotor.quantum.states import Coupling, State
 from rotor.tops.operators import Operators
 from rotor.tops.parameter_names import parse_name
 from rotor.tops.spins.spin_weights import SpinWeights

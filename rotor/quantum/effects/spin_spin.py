@@ -13,8 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from rotor.quantum.effects.spin_effect import TRACELESS, ParameterName, SpinEffect, Symbol, traceless_of
+from rotor.quantum.effects.spin_effect import TRACELESS, SpinEffect, Symbol, traceless_of
 from rotor.quantum.spins.operators import Cosines, Scalar
+from rotor.tops.parameter_names import ParameterName
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

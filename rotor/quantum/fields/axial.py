@@ -20,9 +20,8 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace, FreeLevels
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Magnet, along
-from rotor.quantum.in_field import space_factor
 from rotor.quantum.solve import solve_levels
-from rotor.quantum.symmetric_top_elements import coupling
+from rotor.quantum.symmetric_top_elements import coupling, space_factor
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

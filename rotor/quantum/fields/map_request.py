@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from rotor.arrays import Floats, Ints
 from rotor.quantum.fields.blocks import FieldBlock, FieldSpace
 from rotor.quantum.fields.operators import Contraction, FieldOperator
+from rotor.quantum.fields.solved_space import field_space
 from rotor.quantum.fields.solver import Matrix, Terms
-from rotor.quantum.fields.space import field_space
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect

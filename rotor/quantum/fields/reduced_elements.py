@@ -12,9 +12,9 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from rotor.quantum.effect import Moment
 from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.levels import Connections, Levels, SolvedBlock
-from rotor.quantum.moments import Moment
 from rotor.quantum.reduced import connections, no_elements
 
 Pair = tuple[int, int]  # numbers of blocks, the higher or equal F first

@@ -1,9 +1,12 @@
 """Solved states of any Hamiltonian in a field: sets of solved blocks that operators connect, for one M or with all M mixed.
 
 A sector is a solved block of one total angular momentum, or its states of one torsional state. The matrix between two sectors is that of
-reduced elements (`rotor.quantum.fields.reduced_elements`) times a factor of M (`rotor.quantum.in_field`); reduced elements are computed
-once for all M and fields. No static field connects torsional species. Elements between states of different v_t, whose overlaps are small,
+reduced elements (`rotor.quantum.fields.reduced_elements`) times a factor of M (`space_factor`); reduced elements are computed once
+for all M and fields. No static field connects torsional species. Elements between states of different v_t, whose overlaps are small,
 are neglected: levels shift by less than (μE)²/ΔE, 0.1 MHz at 1 kV/cm for 1 D and 100 cm⁻¹.
+
+Between real functions (`rotor.quantum.tensors`) reduced elements of odd rank are i times real. States of a sector times 1 or i, its
+colour, make all matrices real where such operators lead to the other factor and all others to the same one.
 
 Fields of other directions than Z mix M as asymmetry mixes K. In the contraction Σ_pq S^K_p* T^K_q D^K*_pq of a body tensor T with a space
 tensor S, M and space play the part of k and body,
@@ -28,17 +31,20 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.quantum.connected import coloured_components, connected_parts
+from rotor.quantum.fields.axial import AxialSpace, axial_levels
 from rotor.quantum.fields.blocks import BEFORE_J, FieldBlock, FieldSpace, FreeLevels
-from rotor.quantum.fields.operators import FieldOperator, Key, Magnet
+from rotor.quantum.fields.operators import Contraction, FieldOperator, Key, Magnet
 from rotor.quantum.fields.reduced_elements import ReducedElements
-from rotor.quantum.in_field import space_factor
 from rotor.quantum.levels import Levels
 from rotor.quantum.solve import solve_levels
+from rotor.quantum.symmetric_top_elements import space_factor
 from rotor.quantum.tensors import BodyTensor, block_elements, body_tensor
+from rotor.quantum.wang.basis import wang_blocks
 
 if TYPE_CHECKING:
     from rotor.quantum.effect import QuantumEffect
     from rotor.tops.top import Top
+
 
 SPARSE_ABOVE = 600  # matrices over more states of mixed M are sparse
 NO_M = -1  # in place of M where it is mixed
@@ -194,7 +200,8 @@ class SolvedSpace(FieldSpace):
     def reversed_states(self, block: FieldBlock, places: Ints, vectors: NDArray[Any]) -> NDArray[Any]:
         """v(-M) of states v(M) (fields, n, states) over some places of a block.
 
-        They are (-1)^(F + c) v(M)*, up to a common sign (see `rotor.quantum.in_field`).
+        They are (-1)^(F + c) v(M)*, up to a common sign, with the colours c: (F' K F; M 0 -M) = (-1)^(F' + F + K) (F' K F; -M 0 M) and
+        the elements of odd rank change sign when they are conjugated.
         """
         twice_f = np.array([self.sectors[i].twice_f for i in block.members])
         odd = ((twice_f - twice_f[0]) // 2 + np.array(block.colours)) % 2
@@ -338,3 +345,50 @@ def solved_levels(top: Top, jmax: int, effects: Sequence[QuantumEffect]) -> Leve
     if top.internal_rotation is not None or any(effect.spins(top) for effect in effects):
         return solve_levels(top, jmax, effects=effects)
     return solve_rotation(top, effects, 0, jmax, in_blocks=True)
+
+
+def field_space(
+    top: Top, jmax: int, operators: Sequence[FieldOperator], effects: Sequence[QuantumEffect] = ()
+) -> FieldSpace:
+    """The states of a top up to `jmax` (of N with spins) and the blocks that the operators, all that will act, do not connect.
+
+    effects: the Hamiltonian without the field; by default all effects of the top except spins. Raises ValueError for a spherical top, and
+    for a field at an angle with Z beside spins or internal rotation.
+    """
+    if top.kind == "spherical":
+        raise ValueError(
+            f"{top.name or 'this top'} is a spherical top: it has neither a dipole nor an anisotropy, and no field of the first "
+            "or second order turns it"
+        )
+    if not all(operator.along_z for operator in operators):
+        return tilted_space(top, jmax, operators, effects)
+    axis = 2 if top.kind == "oblate" else 0
+    axial = top.kind != "asymmetric" and not effects and top.states is None
+    if axial and all(operator.axial_about(axis) for operator in operators):
+        oriented = any(operator.rank == 1 for operator in operators)
+        magnetic = any(operator.time_odd for operator in operators)
+        return AxialSpace(axial_levels(top, jmax), jmax, axis, oriented, magnetic)
+    return solved_space(top, solved_levels(top, jmax, effects), jmax, operators)
+
+
+def tilted_space(
+    top: Top, jmax: int, operators: Sequence[FieldOperator], effects: Sequence[QuantumEffect] = ()
+) -> SolvedSpace:
+    """The space of a top for fields of any direction; ValueError for spins, internal rotation and magnetic fields."""
+    if any(effect.spins(top) for effect in effects):
+        raise ValueError("a top with spins is solved in fields along Z alone; leave out the angle")
+    if top.internal_rotation is not None:
+        raise ValueError("a top with internal rotation is solved in fields along Z alone; leave out the angle")
+    if not all(isinstance(operator, Contraction) for operator in operators):
+        raise ValueError("a magnetic field is solved along Z only")
+    levels = solved_levels(top, jmax, effects)
+    elements = ReducedElements(levels)
+    projections = {j: wang_blocks(j, SPACE_AXES) for j in range(jmax + 1)}
+    sectors = tuple(
+        FieldSector(
+            number, None, np.tile(block.start + np.arange(len(block.energies_mhz)), wang.size), block.twice_total, wang
+        )
+        for number, block in enumerate(elements.blocks)
+        for wang in projections[block.twice_total // 2]
+    )
+    return SolvedSpace(FreeLevels.from_levels(levels), jmax, sectors, elements, tuple(operators))

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis.elements import ROUND_OFF, Elements, merged
+from rotor.quantum.basis.labelled import ROUND_OFF, Elements, merged
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 

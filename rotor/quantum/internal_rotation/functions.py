@@ -19,8 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Ints
-from rotor.quantum.basis.elements import ROUND_OFF, Elements
-from rotor.quantum.basis.labelled import Basis, rotation_labels
+from rotor.quantum.basis.labelled import ROUND_OFF, Basis, Elements, rotation_labels
 from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis.elements import Elements
+from rotor.quantum.basis.labelled import Elements
 from rotor.quantum.blocks import ByBlocks, Entries, elements_by_blocks, expectations
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.exchange import SpinCounts

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rotor.arrays import Floats, Ints
-from rotor.quantum.basis.elements import Elements
+from rotor.quantum.basis.labelled import Elements
 from rotor.quantum.blocks import FunctionBlocks, connected_blocks, elements_by_blocks, expectations
 from rotor.quantum.internal_rotation.contracted import Product, Terms
 from rotor.quantum.internal_rotation.functions import TorsionRotation

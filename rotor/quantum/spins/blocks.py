@@ -31,6 +31,7 @@ from rotor.quantum.spins.contraction import (
     stacks_of,
     within_blocks,
 )
+from rotor.quantum.spins.coupling import Allowed
 from rotor.quantum.spins.many_f import Frame, Group, frame_of, groups_by_number, groups_of
 from rotor.quantum.spins.parts import PartColumns, SpinPart, named_states
 from rotor.quantum.spins.pattern_tables import pattern_table
@@ -45,7 +46,6 @@ from rotor.quantum.spins.rotor import (
     valued_terms,
 )
 from rotor.quantum.spins.scheme import Scheme, scheme_of
-from rotor.quantum.spins.three_spins import Allowed
 from rotor.tops.top import without_internal_rotation
 
 if TYPE_CHECKING:
@@ -242,7 +242,7 @@ def rotor_plan(blocks: list[SolvedBlock], representation: str, scheme: Scheme, t
     channels = channels_of(terms, scheme)
     hamiltonians = list[Floats]()
     if scheme.equivalent == 3:
-        from rotor.quantum.spins.threefold_rotor import in_wang_functions
+        from rotor.quantum.spins.three_equivalent import in_wang_functions
 
         blocks, hamiltonians = in_wang_functions(blocks)
     firsts = _alike(channels)

@@ -2,6 +2,9 @@
 
     ∂H/∂c = Σ_channels c(p', p) ⟨r'|X_c|r⟩,     ∂E_i/∂c = ⟨i|∂H/∂c|i⟩     (Hellmann and Feynman, see `estimates.derivatives`).
 
+States r of a species of internal rotation take the place of functions; for a coefficient of the torsion-rotation the species derives
+mixtures Σ_r v_rp |r⟩ of its states, and sums over p.
+
 Elements of the rotation alone come from `basis.state_elements`, all others from `contraction` with basis functions in place of eigenstates.
 They are sparse, and tables by row (`many_f`), since functions of one kind have elements at the same places for all N. Fits and derivatives
 of levels use these matrices, `estimates.contracted` for large blocks too.
@@ -9,28 +12,31 @@ of levels use these matrices, `estimates.contracted` for large blocks too.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
 from rotor.quantum.basis.state_elements import StateTerms, blocks_of_terms
 from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.levels import Levels, SolvedBlock
+from rotor.quantum.levels import Levels, Mixtures, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock, WeightedElements, linear_block
 from rotor.quantum.spins.blocks import Shared, SpinFunctions
 from rotor.quantum.spins.contraction import Contracted, Stack, operators_of_stacks, padded_vectors, stacks_of
-from rotor.quantum.spins.many_f import Frame, Group
+from rotor.quantum.spins.many_f import Coefficients, Frame, Group, Tables, between, coefficients_by_f, tables_of
 from rotor.quantum.spins.many_f_lines import groups_of_blocks
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.pattern_tables import couplings_by_f
-from rotor.quantum.spins.rotor import ALONE, Piece, parameter_channels
+from rotor.quantum.spins.rotor import ALONE, Channels, Piece, parameter_channels
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
+
 
 _REACH = 2  # largest difference of N that the operators of a Hamiltonian connect
 Kinds = tuple[int, int, int]  # kinds of both blocks and the distance of their rows
@@ -255,7 +261,7 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")
     if levels.blocks[0].spins.rotor.moments is not None:
-        from rotor.quantum.spins.species_slopes import species_derivatives
+        from rotor.quantum.spins.linear_blocks import species_derivatives
 
         return species_derivatives(top, levels, names)[rows]
     tables = function_tables(top, levels.effects, names, levels.blocks[0].spins.shared)
@@ -310,3 +316,59 @@ def _elements(block: SpinFunctions, tables: FunctionTables) -> Iterator[Weighted
         present = (rows >= 0) & (columns >= 0) & ((rows >= columns) | (each.twice > 1))
         places = np.maximum(rows, columns) * size + np.minimum(rows, columns)
         yield WeightedElements(places[present], factors[present], each.of_kinds.parameters)
+
+
+def species_derivatives(top: Top, levels: Levels, names: Sequence[str]) -> Floats:
+    """∂E/∂c (levels, names) of levels by constants of the spins and of the torsion-rotation."""
+    scheme = levels.blocks[0].spins.shared.scheme
+    slopes = slopes_by_spins(levels.blocks, parameter_channels(top, levels.effects, names, scheme))
+    for block in levels.blocks:
+        of_rotation = partial(block.spins.rotor.moments.slopes, names=names)
+        slopes[block.start : block.start + len(block.energies_mhz)] += slopes_by_rotation(block, of_rotation)
+    return slopes
+
+
+def slopes_by_rotation(block: SolvedBlock, mixture_slopes: Callable[[Mixtures], Floats]) -> Floats:
+    """Derivatives (n, coefficients) by coefficients of the torsion-rotation: those of mixtures of the states of each N."""
+    n, by_patterns = len(block.energies_mhz), dict[int, list[tuple[SolvedBlock, NDArray[Any]]]]()
+    for part in block.spins.parts:
+        mixture = block.vectors[part.place].reshape(part.repeats, -1, n).swapaxes(0, 1)
+        by_patterns.setdefault(part.patterns.start, []).append((part.rotor, mixture))
+    return np.asarray(sum(mixture_slopes(mixtures) for mixtures in by_patterns.values()))
+
+
+def slopes_by_spins(blocks: Sequence[SolvedBlock], by_parameter: Sequence[Channels]) -> Floats:
+    """Derivatives (states, parameters) of the states of blocks by parameters, from their spin terms."""
+    shared: Shared = blocks[0].spins.shared
+    frame = shared.frame
+    operators = [list(_operators(shared, channels)) for channels in by_parameter]
+    number = blocks[-1].start + len(blocks[-1].energies_mhz)
+    out = np.zeros((number + 1, len(by_parameter)))  # the last row takes the padding
+    for states in groups_of_blocks(blocks, number):
+        for at, vectors, rows in states.runs():
+            for parameter, terms in enumerate(operators):
+                out[rows, parameter] = sum(_expectations(states.group, at, vectors, *term, frame) for term in terms)
+    return out[:-1]
+
+
+def _operators(shared: Shared, channels: Channels) -> Iterator[tuple[Tables, Coefficients]]:
+    """Elements of the rotation and coefficients of each channel."""
+    frame = shared.frame
+    for channel, pieces in channels.items():
+        (contracted,) = operators_of_stacks(shared.stacks, channel.rank, [pieces], shared.representation)
+        couplings = couplings_by_f(shared.scheme, channel, frame.twice_f[0], frame.twice_f[-1])
+        yield tables_of(contracted, frame), coefficients_by_f(couplings, frame)
+
+
+def _expectations(
+    group: Group, at: Ints, vectors: NDArray[Any], tables: Tables, coefficients: Coefficients, frame: Frame
+) -> Floats:
+    """⟨i|Σ c X|i⟩ (blocks, n) of vectors (blocks, columns, states, n); columns of different N or kind have elements in one order."""
+    (count, _, height, n), total = vectors.shape, np.zeros((len(vectors), vectors.shape[3]))
+    for left, right, elements, coupling in between(group, group, at, 0, tables, coefficients, frame, (height, height)):
+        _, rows, columns = elements.shape
+        moved = np.matmul(elements[:, None], vectors[:, right.columns, :columns]).reshape(count, -1, rows * n)
+        moved = np.matmul(coupling, moved).reshape(count, -1, rows, n)
+        each = np.einsum("bpsn,bpsn->bn", vectors[:, left.columns, :rows].conj(), moved).real
+        total += each if left is right else 2 * each
+    return total

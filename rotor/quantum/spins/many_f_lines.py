@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Indices, Ints, Workspace, runs_of_similar_size
 from rotor.frozen import dataclass
+from rotor.quantum.effect import Moment
 from rotor.quantum.levels import Connections, Levels, SolvedBlock
-from rotor.quantum.moments import Moment
 from rotor.quantum.spins.blocks import Shared
 from rotor.quantum.spins.contraction import Contracted, pieces_in_both_orders, tensors_of_stacks
 from rotor.quantum.spins.coupling import ChainOperator

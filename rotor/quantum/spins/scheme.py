@@ -14,9 +14,8 @@ import numpy as np
 
 from rotor.arrays import Floats, Ints
 from rotor.frozen import dataclass
-from rotor.quantum.spins.coupling import patterns, patterns_of_total, recoupling
+from rotor.quantum.spins.coupling import patterns, patterns_of_three, patterns_of_total, recoupling, recoupling_of_three
 from rotor.quantum.spins.operators import EVERY_STATE, Rotor
-from rotor.quantum.spins.three_spins import patterns_of_three, recoupling_of_three
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top

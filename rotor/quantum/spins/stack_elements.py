@@ -27,7 +27,7 @@ from rotor.quantum.spins.operators import (
 from rotor.quantum.symmetric_top_elements import coupling_to, wang_coupling
 from rotor.quantum.tensors import BodyTensor, overlap
 from rotor.quantum.wang.basis import SPECIES, Part, SpeciesFactors, WangBlock
-from rotor.quantum.wang.unit_diagonals import unit_diagonals
+from rotor.quantum.wang.wang_matrix import unit_diagonals
 
 MOST_RANK = 2  # highest rank with closed forms for many N at once
 

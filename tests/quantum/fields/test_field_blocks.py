@@ -13,7 +13,7 @@ from rotor.alignment.axis_functions import absolute_cosine, asymmetric_elements
 from rotor.quantum.connected import coloured_components
 from rotor.quantum.fields.axial import cosine_bands, cosine_squared_bands
 from rotor.quantum.fields.operators import Contraction
-from rotor.quantum.fields.space import field_space, tilted_space
+from rotor.quantum.fields.solved_space import field_space, tilted_space
 from rotor.tops.constants import Constants
 from rotor.tops.top import Top
 

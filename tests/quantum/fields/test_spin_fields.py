@@ -12,7 +12,7 @@ from rotor.quantum.effects.stark import stark_map
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.effects.zeeman import zeeman_map
 from rotor.quantum.fields.operators import Magnet
-from rotor.quantum.fields.space import field_space
+from rotor.quantum.fields.solved_space import field_space
 from rotor.quantum.spins import Spin
 from rotor.tops.top import Top
 from rotor.units import NUCLEAR_MAGNETON_MHZ_PER_T

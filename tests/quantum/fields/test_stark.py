@@ -18,8 +18,8 @@ from rotor.quantum.effects.stark import MHZ_ANGSTROM3_W_PER_CM2, stark_map
 from rotor.quantum.fields.chains import chain_states, is_chain
 from rotor.quantum.fields.diabatic import crossings
 from rotor.quantum.fields.operators import Contraction
+from rotor.quantum.fields.solved_space import field_space
 from rotor.quantum.fields.solver import solve_fields, spanned_states
-from rotor.quantum.fields.space import field_space
 from rotor.tops.top import Top
 from rotor.units import MHZ_PER_DEBYE_KV_PER_CM, PLANCK_J_S
 

@@ -8,7 +8,7 @@ from rotor.quantum.effects.interactions import InteractingStates
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.estimates.contracted import TOLERANCE_MHZ, ContractedLevels
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.estimates.labelled_spins import assigned_with_spins
+from rotor.quantum.estimates.effect_units import assigned_with_spins
 from rotor.quantum.spins.levels import levels_of_f
 from rotor.tops.spins.spin_constants import SpinConstants
 from rotor.tops.top import Top

@@ -9,13 +9,12 @@ import pytest
 import qutip
 from direct_product import on_spins, rotor_matrix, space_cosines, states_up_to
 
-from rotor.quantum.effect import QuantumEffect
+from rotor.quantum.effect import Moment, QuantumEffect
 from rotor.quantum.effects.hyperfine import NuclearQuadrupole
 from rotor.quantum.effects.spin_rotation import SpinRotation
 from rotor.quantum.effects.spin_spin import SpinSpin
 from rotor.quantum.effects.watson import SEMI_RIGID
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.moments import Moment
 from rotor.quantum.operators.algebra import half_anticommutator
 from rotor.quantum.operators.rotation import direction_cosine, j_squared
 from rotor.quantum.solve import solve_levels

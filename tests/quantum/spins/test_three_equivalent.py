@@ -22,9 +22,8 @@ from rotor.quantum.fields.reduced_elements import ReducedElements
 from rotor.quantum.hyperfine_method import HyperfineMethod
 from rotor.quantum.solve import solve_levels
 from rotor.quantum.spins import Scheme, Spin
-from rotor.quantum.spins.coupling import patterns
+from rotor.quantum.spins.coupling import patterns, patterns_of_three, recoupling_of_three, symmetric_functions
 from rotor.quantum.spins.levels import unmixed_levels
-from rotor.quantum.spins.three_spins import patterns_of_three, recoupling_of_three, symmetric_functions
 from rotor.spectra.transitions import all_transitions
 from rotor.thermodynamics.sums.partition import partition_function
 from rotor.tops.constants import Constants

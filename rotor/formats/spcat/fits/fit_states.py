@@ -41,11 +41,9 @@ from rotor.formats.spcat.text.int_file import IntensityFile, Request
 from rotor.formats.spcat.text.par import ParameterFile
 from rotor.quantum.connected import connected_parts
 from rotor.quantum.estimates.derivatives import level_derivatives
-from rotor.quantum.estimates.effect_units import Functions, unit_levels
-from rotor.quantum.estimates.labelled_spins import assigned_with_spins
-from rotor.quantum.label_tracking import AssignedLevels, TrackedLevels, without_level
+from rotor.quantum.estimates.effect_units import Functions, assigned_with_spins, unit_levels
+from rotor.quantum.label_tracking import AssignedLevels, TrackedLevels, labelled_states, without_level
 from rotor.quantum.labelled import AT_ZERO_MHZ, ClosedForm, LevelModel, MissingLevelsError
-from rotor.quantum.labelled_states import labelled_states
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.wang.rotation import solve_rotation

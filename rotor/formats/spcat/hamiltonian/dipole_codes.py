@@ -34,7 +34,7 @@ from rotor.formats.spcat.hamiltonian.codes import AXES, NOT_YET, basis_of
 from rotor.formats.spcat.hamiltonian.operators import as_matrix, imaginary, operator_of
 from rotor.formats.spcat.hamiltonian.series import Series, k_factor
 from rotor.formats.spcat.text.int_file import Dipole
-from rotor.quantum.moments import DEBYE_PER_BOHR_MAGNETON, Moment
+from rotor.quantum.effect import DEBYE_PER_BOHR_MAGNETON, Moment
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import Weight, components, direction_cosine, j_squared, j_z, weighted
 from rotor.quantum.spins.operators import ByElements, Cosines, CosinesWithN

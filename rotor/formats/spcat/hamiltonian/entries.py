@@ -27,13 +27,11 @@ from rotor.formats.spcat.hamiltonian.phases import half_turned
 from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.formats.spcat.hamiltonian.symmetry import SpeciesPairs, exchange_part, halved_across, species_pairs
 from rotor.frozen import dataclass
-from rotor.quantum.effect import QuantumEffect
-from rotor.quantum.moments import Moment
+from rotor.quantum.effect import Coupling, Moment, QuantumEffect, State
 from rotor.quantum.spins import Scheme, Spin
 from rotor.quantum.spins.operators import EVERY_STATE, ByElements, BySpecies, Cosines, CosinesWithN, Rotor, Scalar
 from rotor.quantum.spins.scheme import SpinTerm
 from rotor.quantum.spins.stack_elements import elements_of_pair
-from rotor.quantum.states import Coupling, State
 from rotor.quantum.wang.basis import SpeciesFactors, factors_of_pairs, wang_blocks
 from rotor.tops.operators import Operators
 

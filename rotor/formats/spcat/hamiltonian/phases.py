@@ -27,7 +27,7 @@ import numpy as np
 from rotor.formats.spcat.hamiltonian.code_table import Digits
 from rotor.formats.spcat.hamiltonian.codes import PLURAL_NOT_YET
 from rotor.formats.spcat.text.par import Options
-from rotor.quantum.moments import Moment
+from rotor.quantum.effect import Moment
 from rotor.quantum.spins.operators import BySpecies, Cosines, Vector
 from rotor.quantum.wang.basis import SpeciesFactors, half_turn
 
