@@ -20,7 +20,7 @@ from rotor.quantum.basis.state_elements import StateTerms, wang_stacks
 from rotor.quantum.effects.watson import operators_by_name
 from rotor.quantum.linear_stacks import LinearStack, numbered
 from rotor.quantum.wang.basis import SPECIES, WangBlock, names_of_blocks, wang_blocks
-from rotor.quantum.wang.turn import order_beyond_the_turn, turned
+from rotor.quantum.wang.wang_matrix import diagonal_elements
 from rotor.table import with_article
 from rotor.tops.constants import Constants
 from rotor.tops.operators import REPRESENTATIONS
@@ -101,12 +101,8 @@ class ClosedForm(LevelModel):
     def from_labels(cls, constants: Constants, labels: Ints) -> ClosedForm:
         """Σ c X^p K^2q of every named constant."""
         by_name = operators_by_name(constants)
-        x = (labels[:, 0] * (labels[:, 0] + 1)).astype(float)
-        k = labels[:, 1].astype(float) if labels.shape[1] > 1 else np.zeros(len(labels))
-        columns = [
-            sum((factor * x**p * k ** (2 * q) for (p, q, _), factor in terms.items()), np.zeros(len(labels)))
-            for terms in by_name.values()
-        ]
+        j, k = labels[:, 0], labels[:, 1] if labels.shape[1] > 1 else np.zeros_like(labels[:, 0])
+        columns = [diagonal_elements(terms, j, k) for terms in by_name.values()]
         return cls(tuple(by_name), np.stack(columns, axis=1))
 
     def levels(self, values_mhz: Floats) -> tuple[Floats, Floats]:
@@ -210,3 +206,26 @@ def _blocks_of_labels(labels: Ints, representation: str, kmax: int | None) -> tu
         label = " ".join(map(str, labels[missing[0]].tolist()))
         raise ValueError(f"level {label} is not among the states with K up to {kmax}; raise KNMAX")
     return blocks, number, rank
+
+
+def turned(diagonal: Floats, sizes: Ints) -> tuple[Ints, Ints]:
+    """Numbers of the blocks whose diagonal has its maximum (the turn) before the end, and the place of the maximum in each block."""
+    turn = np.where(np.arange(diagonal.shape[1]) < sizes[:, None], diagonal, -np.inf).argmax(axis=1)
+    return np.flatnonzero((turn > 0) & (turn < sizes - 1)), turn
+
+
+def order_beyond_the_turn(turning: tuple[Ints, Ints], sizes: Ints, energies: Floats, vectors: Floats) -> None:
+    """Move states beyond the turn of the diagonal to the end of their block, ordered by mean K, in place.
+
+    Constants that describe K up to 20 may shift states of K = 60 down among lower K, where the distortion series diverges. These states are
+    mostly beyond the turn; the other states are labelled by rank among themselves. turning: from `turned`, for the diagonals with the sign
+    that makes them rise in a molecule. energies (blocks, size) rise; vectors (blocks, size, size) stand in columns.
+    """
+    blocks, turn = turning
+    for b in blocks.tolist():
+        n = sizes[b]
+        share = vectors[b, :n, :n] ** 2
+        beyond = share[turn[b] + 1 :].sum(axis=0) > 0.5
+        order = np.lexsort((np.where(beyond, np.arange(n) @ share, 0.0), beyond))
+        energies[b, :n] = energies[b, order]
+        vectors[b, :n, :n] = vectors[b, :n, order].T

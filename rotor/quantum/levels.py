@@ -7,7 +7,7 @@ Nothing outside this folder computes a row from quantum numbers: `Levels.find` a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rotor.arrays import Floats, Ints
+from rotor.arrays import Floats, Ints, matching_rows
 from rotor.frozen import dataclass
-from rotor.quantum.level_weights import weights_of_quanta
 from rotor.quantum.quanta import labels as texts_of_labels
 from rotor.quantum.wang.basis import Part, WangBlock
 from rotor.table import Table
@@ -28,8 +27,6 @@ if TYPE_CHECKING:
     from rotor.quantum.spins.operators import Rotor
     from rotor.quantum.tensors import Tensors
     from rotor.tops.top import Top
-
-FEW_LEVELS = 64  # among which one is found by looking at all
 
 
 @dataclass(frozen=True)
@@ -258,13 +255,9 @@ class Levels(Table):
         >>> solve_levels(Top.from_constants("A=10 B=6 C=4 MHz"), 4).find(j=4, ka=1, kc=3)
         23
         """
-        if len(self) <= FEW_LEVELS and set(quanta) == set(self.quanta):
-            here = np.ones(len(self), dtype=bool)
-            for name, value in quanta.items():
-                here &= self.quanta[name] == value
-            row = int(here.argmax()) if here.any() else -1
-        else:
-            row = int(self.rows_of(**{name: [value] for name, value in quanta.items()})[0])
+        self._refuse_names(quanta)
+        here = np.logical_and.reduce([self.quanta[name] == value for name, value in quanta.items()])
+        row = int(here.argmax()) if here.any() else -1
         if row < 0:
             label, total = (
                 ", ".join(f"{name} = {value}" for name, value in quanta.items()),
@@ -278,33 +271,17 @@ class Levels(Table):
 
         Raises ValueError where not all the names that label a level are given, or others.
         """
+        self._refuse_names(quanta)
+        shape = np.shape(next(iter(quanta.values())))
+        keys = [np.ravel(np.asarray(quanta[name])) for name in self.quanta]
+        return matching_rows(list(self.quanta.values()), keys).reshape(shape)
+
+    def _refuse_names(self, quanta: Collection[str]) -> None:
+        """ValueError unless these are the names that label a level."""
         if set(quanta) != set(self.quanta):
             raise ValueError(
                 f"quantum numbers {', '.join(quanta)}: these levels are labelled by {', '.join(self.quanta)}"
             )
-        codes, rows, scales = self._index
-        expected = np.zeros(np.shape(next(iter(quanta.values()))), dtype=np.int64)
-        inside = np.ones(expected.shape, dtype=bool)
-        for name, (values, scale) in zip(self.quanta, scales, strict=True):
-            place = np.searchsorted(values, np.asarray(quanta[name]))
-            place = np.minimum(place, len(values) - 1)
-            inside &= values[place] == np.asarray(quanta[name])
-            expected += place * scale
-        place = np.minimum(np.searchsorted(codes, expected), max(len(codes) - 1, 0))
-        known = inside & (codes[place] == expected) if len(codes) else np.zeros(expected.shape, dtype=bool)
-        return np.where(known, rows[place] if len(codes) else -1, -1)
-
-    @cached_property
-    def _index(self) -> tuple[Ints, Ints, list[tuple[NDArray[Any], int]]]:
-        """One whole number for each level (sorted), its row, and the values and scale of each quantum number."""
-        code, scale, scales = np.zeros(len(self), dtype=np.int64), 1, []
-        for column in self.quanta.values():
-            values, place = np.unique(column, return_inverse=True)
-            scales.append((values, scale))
-            code += place * scale
-            scale *= max(len(values), 1)
-        rows = np.argsort(code, kind="stable")
-        return code[rows], rows, scales
 
     def labels(self, rows: NDArray[Any]) -> list[str]:
         """The levels `rows` as text, one row of quantum numbers each."""
@@ -381,3 +358,49 @@ def levels_of_blocks(
     """The levels of blocks of several states or with spins; others: see `Levels`."""
     energies, mixing = (np.concatenate([getattr(b, name) for b in blocks]) for name in ("energies_mhz", "mixing"))
     return levels_table(top, effects, jmax, energies, quanta, representation, blocks=blocks, mixing=mixing, **others)
+
+
+Quanta = Mapping[str, NDArray[Any]]
+
+
+def weights_of_quanta(kind: str, quanta: Quanta, weights: SpinWeights) -> Ints:
+    """Spin weights of the levels of a top of this kind.
+
+    Beside a total spin I of two nuclei the weights are those of even I; levels of odd I have those of the other class.
+
+    >>> weights_of_quanta("linear", {"j": np.arange(3)}, SpinWeights.from_mapping({"even": 1, "odd": 3})).tolist()
+    [1, 3, 1]
+    """
+    if "i_tot" in quanta and "i_sym" not in quanta and weights.rule != "none":
+        even, odd = (_rotational_weights(kind, quanta, rule) for rule in (weights, weights.exchanged()))
+        return np.where(quanta["i_tot"] % 2 == 0, even, odd)
+    return _rotational_weights(kind, quanta, weights)
+
+
+def _rotational_weights(kind: str, quanta: Quanta, weights: SpinWeights) -> Ints:
+    """By the rotational quantum numbers alone."""
+    if "irrep" in quanta:
+        weight_of = {name: weights.irrep_weight(name) for name in np.unique(quanta["irrep"]).tolist()}
+        return np.array([weight_of[name] for name in quanta["irrep"].tolist()], dtype=np.int64)
+    j = np.asarray(quanta["n" if "n" in quanta else "j"])
+    if "kc" in quanta:
+        return _asymmetric_weights(kind, j, quanta["ka"], quanta["kc"], weights)
+    if "k" in quanta:
+        return weights.symmetric_weights(j, np.abs(quanta["k"]), oblate=kind == "oblate")
+    return weights.spherical_weights(j) if kind == "spherical" else weights.linear_weights(j)
+
+
+def _asymmetric_weights(kind: str, j: Ints, ka: Ints, kc: Ints, weights: SpinWeights) -> Ints:
+    """By parities of (Ka, Kc); a symmetric top whose ±K are split has weights by K, one component each.
+
+    Of a pair with K a multiple of n, 0even and 0odd go by the parity of the other label, which is J where K = 0: a half turn about
+    an axis across the main one distinguishes the two components of the pair.
+    """
+    if kind in ("prolate", "oblate") and weights.rule == "K":
+        k, other = (kc, ka) if kind == "oblate" else (ka, kc)
+        # of K = 0, whose other label is J
+        at_zero = np.array([weights.symmetric_weights(number, 0) for number in (0, 1)])
+        both = weights.symmetric_weights(j, k, oblate=kind == "oblate") // np.where(k == 0, 1, 2)
+        return np.where(k % weights.modulus == 0, at_zero[other % 2], both)
+    by_parity = np.array([[weights.asymmetric_weight(a + c) for c in "eo"] for a in "eo"], dtype=np.int64)
+    return np.asarray(by_parity[ka % 2, kc % 2])

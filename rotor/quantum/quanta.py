@@ -1,4 +1,4 @@
-"""Names of quantum numbers: their order, and from them column names, headings of tables and labels of states.
+"""Names of quantum numbers, and from them column names, headings of tables and labels of states.
 
 | name | what it is |
 |---|---|
@@ -31,40 +31,8 @@ from rotor.tops.internal_rotation import sigma_species
 
 FIELD_STEP_KV_PER_CM = 1e-12  # labels are whole numbers: of a level in a field, the field in these steps
 
-# in which tables and files list them
-ORDER = (
-    "species",
-    "vt",
-    "v",
-    "n",
-    "j",
-    "k",
-    "ka",
-    "kc",
-    "irrep",
-    "i_sym",
-    "i_tot",
-    "f1",
-    "f2",
-    "f3",
-    "f4",
-    "f5",
-    "f6",
-    "f7",
-    "f8",
-    "f",
-    "m",
-)
-_HEADINGS = {
-    "ka": "Ka",
-    "kc": "Kc",
-    "i_tot": "I",
-    "i_sym": "Γ",
-    "irrep": "irrep",
-    "v": "v",
-    "vt": "v_t",
-    "species": "species",
-}
+_HEADINGS = {"ka": "Ka", "kc": "Kc", "i_tot": "I", "i_sym": "Γ", "vt": "v_t"}
+_HEADINGS |= {name: name for name in ("irrep", "v", "species")}  # others have capitals
 
 # how a picture writes sums with spins, in TeX
 _SUBSCRIPTED = {f"f{i}": f"F_{i}" for i in range(1, 9)} | {"i_tot": "I", "i_sym": r"\Gamma_I"}

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rotor.arrays import Floats
+from rotor.arrays import Floats, matching_rows
 from rotor.quantum.estimates.plans import describe_levels
-from rotor.requests.budget import ROUNDING
 from rotor.requests.knob import NOTHING_CHEAPER, Estimate, Knob, Measure, Sought
 from rotor.requests.numerics import Goal, Numerics, numerical_error
 from rotor.requests.plan import Growth
@@ -90,11 +89,6 @@ def _spin_size(top: Any) -> float:
     return max((effect.size_mhz(top, 1) for effect in spin_effects(top)), default=0.0)
 
 
-def rounding_mhz(levels: Any) -> float:
-    """Rounding error of levels: that of the largest eigenvalue."""
-    return ROUNDING * float(np.abs(levels.energy_mhz).max(initial=0.0))
-
-
 def levels_error(answer: Any, top: Any, levels: Any) -> float:
     """The numerical error that an answer states, plus the size of known spin couplings that are neglected."""
     has_spins = top.spin_constants is None or any(effect.spins(top) for effect in levels.effects)
@@ -107,16 +101,9 @@ def energies_like(reference: Levels, levels: Levels) -> Floats:
     J and N, the rotational angular momentum, are matched with each other.
     """
     shared = [name for name in reference.quanta_names if name in levels.quanta_names and name not in ("n", "j")]
-    pairs = [(reference.rotational, levels.rotational)]
-    pairs += [(reference.quanta[name], levels.quanta[name]) for name in shared]
-    key = np.zeros(len(reference) + len(levels), dtype=np.int64)
-    for both in pairs:
-        _, code = np.unique(np.concatenate(both), return_inverse=True)
-        _, key = np.unique(key * (int(code.max(initial=0)) + 1) + code, return_inverse=True)
-    sought, level_keys = key[: len(reference)], key[len(reference) :]
-    order = np.argsort(level_keys, kind="stable")
-    rows = order[np.minimum(np.searchsorted(level_keys[order], sought), len(level_keys) - 1)]
-    return np.where(level_keys[rows] == sought, levels.energy_mhz[rows], np.nan)
+    table, keys = ([each.rotational, *(each.quanta[name] for name in shared)] for each in (levels, reference))
+    rows = matching_rows(table, keys)
+    return np.where(rows >= 0, levels.energy_mhz[rows], np.nan)
 
 
 def level_error(levels: Levels, reference: Levels) -> float:
@@ -227,9 +214,11 @@ def _treated(request: Any, _: str, treatment: Treatment) -> Any:
 
 def rounding_of(top: Any, j: int) -> float:
     """Rounding error (MHz) of the rotational energies of one J."""
+    from rotor.quantum.estimates.budgets import rounding_term
     from rotor.quantum.request import LevelsRequest, answer_levels
 
-    return rounding_mhz(answer_levels(LevelsRequest(top, jmin=j, jmax=j)).table.levels)
+    levels = answer_levels(LevelsRequest(top, jmin=j, jmax=j)).table.levels
+    return rounding_term(levels.energy_mhz).value or 0.0
 
 
 def by_blocks(top: Top, j: float) -> float:

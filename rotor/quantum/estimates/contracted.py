@@ -15,7 +15,7 @@ column of V; W is chosen so that this is below `TOLERANCE_MHZ`. Where V is too l
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -27,7 +27,7 @@ from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.levels import Levels, SolvedBlock
 from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins, rotation_blocks
-from rotor.quantum.spins.parts import SpinPart, assigned, named_states
+from rotor.quantum.spins.parts import SpinPart, assigned, named_states, turned
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -65,19 +65,12 @@ class _Coupled(NamedTuple):
 
     def over_functions(self, columns: Floats) -> Floats:
         """Columns over rotational states times patterns as columns over basis functions."""
-        return self._turned(columns, self.rotation.vectors)
+        return turned(self.parts, columns, self.rotation.vectors)
 
     def over_states(self, columns: Floats) -> Floats:
         """Columns over basis functions as columns over rotational states times patterns."""
-        return self._turned(columns, {part.number: self.rotation.vectors[part.number].T for part in self.parts})
-
-    def _turned(self, columns: Floats, matrices: Mapping[int, Floats]) -> Floats:
-        """Columns, each part of which is multiplied by the matrix of its rotational block."""
-        out = np.empty_like(columns)
-        for part in self.parts:
-            rows = columns[part.place].reshape(part.repeats, -1, columns.shape[1])
-            out[part.place] = np.matmul(matrices[part.number], rows).reshape(-1, columns.shape[1])
-        return out
+        vectors = self.rotation.vectors
+        return turned(self.parts, columns, {part.number: vectors[part.number].T for part in self.parts})
 
 
 @dataclass(frozen=True)
@@ -138,12 +131,10 @@ def _states_by_name(rotor: SolvedBlock, vectors: Floats) -> dict[tuple[int, ...]
 
 def _coupled(parts: tuple[SpinPart, ...], linear: LinearBlock, rotation: _Rotation, values_mhz: Floats) -> _Coupled:
     """A block at values (parameters,) in MHz."""
-    from scipy.sparse import coo_array  # loaded in fits of large blocks only
+    from scipy.sparse import tril  # loaded in fits of large blocks only
 
-    rows, columns, elements = linear.rows, linear.columns, linear.elements(values_mhz)
-    off = rows != columns
-    places = np.append(rows, columns[off]), np.append(columns, rows[off])
-    matrix = coo_array((np.append(elements, elements[off]), places), shape=(linear.size, linear.size)).tocsr()
+    lower = linear.sparse(values_mhz)
+    matrix = (lower + tril(lower, -1).T).tocsr()
     energies, diagonal = [], []
     for part in parts:
         vectors = rotation.vectors[part.number]
@@ -205,8 +196,8 @@ def _eliminated(
     mixed = others / apart[:, None]
     factor = np.linalg.cholesky(np.eye(len(inside)) + mixed.T @ mixed)
     back = np.linalg.inv(factor)
-    energies, turned = np.linalg.eigh(back @ (solved + others.T @ mixed) @ back.T)
-    vectors = back.T @ turned
+    energies, mixtures = np.linalg.eigh(back @ (solved + others.T @ mixed) @ back.T)
+    vectors = back.T @ mixtures
     states = mixed @ vectors
     states[inside] = vectors
     return energies + centre, states

@@ -17,7 +17,7 @@ import numpy as np
 from rotor.arrays import distinct, numbers_in_runs
 from rotor.quantum.effect import QuantumEffect
 from rotor.quantum.effects.watson import SEMI_RIGID, Rigid, rigid_operators
-from rotor.quantum.estimates.derivatives import term_expectations
+from rotor.quantum.estimates.derivatives import expectations
 from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.wang_matrix import elements_by_order, order_of, scalar_energy
@@ -166,7 +166,7 @@ def disordered_blocks(top: Top, levels: Levels) -> list[tuple[int, str]]:
     number, rows = numbers_in_runs(
         np.array([len(block.energies_mhz) for block in blocks]), np.array([block.start for block in blocks])
     )
-    rigid = term_expectations(levels, list(along_and_across), rows) @ list(along_and_across.values())
+    (rigid,) = expectations(levels, [along_and_across], rows).T
     largest = np.maximum.reduceat(np.abs(rigid), np.searchsorted(number, np.arange(len(blocks))))
     falls = (np.diff(rigid) < -1e-9 * largest[number[1:]]) & (np.diff(number) == 0)
     return [(blocks[i].j, blocks[i].basis.species) for i in distinct(number[1:][falls]).tolist()]

@@ -22,7 +22,8 @@ from rotor.quantum.hyperfine_method import are_with_spins
 from rotor.quantum.levels import Levels
 from rotor.quantum.wang.rotation import hamiltonian
 from rotor.quantum.wang.spherical_top import scalar_and_tensor, tensor_eigenvalues
-from rotor.tops.operators import Operators, Powers
+from rotor.quantum.wang.wang_matrix import diagonal_elements
+from rotor.tops.operators import Operators
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -67,16 +68,6 @@ def level_derivatives(top: Top, levels: Levels, names: Sequence[str] | None = No
     return _derivatives_of_uncoupled(top, levels, names, rows)
 
 
-def _sums_of_terms(levels: Levels, operators: Sequence[Operators], rows: Rows) -> Floats:
-    """Expectation values (rows, sums) of sums of terms."""
-    terms = sorted({powers for operator in operators for powers in operator})
-    if not terms:
-        return np.zeros((len(rows), len(operators)))
-    expectations = term_expectations(levels, terms, rows)
-    factors = np.array([[operator.get(powers, 0.0) for operator in operators] for powers in terms])
-    return np.asarray(expectations @ factors)
-
-
 def _derivatives_of_uncoupled(top: Top, levels: Levels, names: Sequence[str], rows: Rows) -> Floats:
     """Derivatives of levels of one state or of uncoupled ones, in closed form: each parameter acts in its state only."""
     terms = {0: parameter_operators(top, levels.effects)}
@@ -84,7 +75,7 @@ def _derivatives_of_uncoupled(top: Top, levels: Levels, names: Sequence[str], ro
     out, v = np.zeros((len(rows), len(names))), levels.quantum("v")
     for number, by_name in terms.items():
         here = v[rows] == number
-        out[here] = _sums_of_terms(levels, [by_name.get(name, {}) for name in names], rows[here])
+        out[here] = expectations(levels, [by_name.get(name, {}) for name in names], rows[here])
     return out
 
 
@@ -131,25 +122,24 @@ def _derivatives_of_spherical(top: Top, levels: Levels, names: Sequence[str], ro
     return out[rows]
 
 
-def term_expectations(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Floats:
-    """⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms) of levels."""
+def expectations(levels: Levels, operators: Sequence[Operators], rows: Rows) -> Floats:
+    """⟨Σ c J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, operators) of levels."""
     if "kc" in levels.quanta:
-        return _expectations_in_blocks(levels, terms, rows)
-    j = levels.rotational[rows].astype(float)
-    k = levels.quanta["k"][rows].astype(float) if "k" in levels.quanta else np.zeros_like(j)
-    return np.stack([(j * (j + 1)) ** p * k ** (2 * q) for p, q, _ in terms], axis=1)
+        return _expectations_in_blocks(levels, operators, rows)
+    j, k = levels.rotational[rows], levels.quantum("k")[rows]
+    return np.stack([diagonal_elements(terms, j, k) for terms in operators], axis=1)
 
 
-def _expectations_in_blocks(levels: Levels, terms: Sequence[Powers], rows: Rows) -> Floats:
-    """⟨J^2p ½[Jz^2q, J₊^2n + J₋^2n]₊⟩ (rows, terms) of states of Wang blocks."""
+def _expectations_in_blocks(levels: Levels, operators: Sequence[Operators], rows: Rows) -> Floats:
+    """`expectations` in states of Wang blocks."""
     if not levels.blocks:
         raise ValueError("these levels were solved without vectors; solve them with vectors=True")
     starts = np.array([block.start for block in levels.blocks])
     numbers = distinct(np.searchsorted(starts, rows, side="right") - 1)
     blocks = [levels.blocks[i] for i in numbers.tolist()]
-    of_terms = StateTerms.from_operators([0], [(0, i, {powers: 1.0}) for i, powers in enumerate(terms)], ())
-    out, space = np.empty((len(levels), len(terms))), Workspace()
-    for positions, stack in wang_stacks([block.basis for block in blocks], of_terms, len(terms)):
+    terms = StateTerms.from_operators([0], [(0, i, operator) for i, operator in enumerate(operators)], ())
+    out, space = np.empty((len(levels), len(operators))), Workspace()
+    for positions, stack in wang_stacks([block.basis for block in blocks], terms, len(operators)):
         alike = [blocks[i] for i in positions.tolist()]
         vectors = np.zeros((len(alike), stack.size, stack.size))
         for place, block in enumerate(alike):

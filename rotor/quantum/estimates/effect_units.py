@@ -29,7 +29,7 @@ from rotor.quantum.linear_stacks import LinearBlock
 from rotor.quantum.spins.blocks import SpinFunctions
 from rotor.quantum.spins.levels import levels_of_f, unmixed_levels
 from rotor.quantum.spins.linear_blocks import linear_blocks_of_spins
-from rotor.quantum.spins.parts import assigned, functions_by_sub_block, labels_by_shares, names_of_parts
+from rotor.quantum.spins.parts import assigned, functions_by_sub_block, labels_by_shares, names_of_parts, turned
 from rotor.quantum.spins.scheme import scheme_of
 
 if TYPE_CHECKING:
@@ -90,15 +90,8 @@ def _names(block: SolvedBlock) -> Ints:
 
 def _names_by(block: SolvedBlock, functions: Floats, names: Ints) -> Ints:
     """Labels of the states of a block from their overlaps with functions over the basis."""
-    rows = [
-        block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1) for part in block.spins.parts
-    ]
-    over_basis = np.concatenate(
-        [
-            np.matmul(part.rotor.vectors, part_rows).reshape(-1, block.vectors.shape[1])
-            for part, part_rows in zip(block.spins.parts, rows, strict=True)
-        ]
-    )
+    parts = block.spins.parts
+    over_basis = turned(parts, block.vectors, {part.number: part.rotor.vectors for part in parts})
     return np.asarray(names[assigned((functions @ over_basis) ** 2, np.ones(len(names), dtype=np.int64))])
 
 

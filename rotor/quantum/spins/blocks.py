@@ -42,6 +42,7 @@ from rotor.quantum.spins.rotor import (
     Exist,
     Terms,
     channels_of,
+    in_wang_functions,
     solved_rotor,
     valued_terms,
 )
@@ -242,8 +243,6 @@ def rotor_plan(blocks: list[SolvedBlock], representation: str, scheme: Scheme, t
     channels = channels_of(terms, scheme)
     hamiltonians = list[Floats]()
     if scheme.equivalent == 3:
-        from rotor.quantum.spins.three_equivalent import in_wang_functions
-
         blocks, hamiltonians = in_wang_functions(blocks)
     firsts = _alike(channels)
     distinct = {first: channels[first] for first in firsts.values()}

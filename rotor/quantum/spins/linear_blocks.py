@@ -33,6 +33,7 @@ from rotor.quantum.spins.many_f_lines import groups_of_blocks
 from rotor.quantum.spins.operators import AxialState
 from rotor.quantum.spins.pattern_tables import couplings_by_f
 from rotor.quantum.spins.rotor import ALONE, Channels, Piece, parameter_channels
+from rotor.quantum.wang.wang_matrix import diagonal_elements
 
 if TYPE_CHECKING:
     from rotor.tops.top import Top
@@ -178,10 +179,9 @@ def rotation_blocks(terms: StateTerms, count: int, blocks: Sequence[SolvedBlock]
 
 def _powers_of_axial(terms: StateTerms, count: int, v: Ints | int, n: Ints, k: Ints) -> Floats:
     """Diagonal elements [N(N+1)]^p K^2q by function and parameter, (functions, count); operators that change K do not contribute."""
-    x, out = n * (n + 1.0), np.zeros((len(n), count))
-    for state, (p, q, order), column, factor in terms.by_power():
-        if not order:
-            out[:, column] += np.where(v == state, factor * x**p * k ** (2.0 * q), 0.0)
+    out = np.zeros((len(n), count))
+    for state, powers, column, factor in terms.by_power():
+        out[:, column] += np.where(v == state, diagonal_elements({powers: factor}, n, k), 0.0)
     return out
 
 
@@ -261,8 +261,6 @@ def derivatives(top: Top, levels: Levels, names: Sequence[str], rows: Ints) -> F
     if not levels.blocks:
         raise ValueError("these levels have no vectors; solve them with their spins anew")
     if levels.blocks[0].spins.rotor.moments is not None:
-        from rotor.quantum.spins.linear_blocks import species_derivatives
-
         return species_derivatives(top, levels, names)[rows]
     tables = function_tables(top, levels.effects, names, levels.blocks[0].spins.shared)
     out = np.zeros((len(levels) + 1, len(names)))  # the last row takes the padding
@@ -330,10 +328,9 @@ def species_derivatives(top: Top, levels: Levels, names: Sequence[str]) -> Float
 
 def slopes_by_rotation(block: SolvedBlock, mixture_slopes: Callable[[Mixtures], Floats]) -> Floats:
     """Derivatives (n, coefficients) by coefficients of the torsion-rotation: those of mixtures of the states of each N."""
-    n, by_patterns = len(block.energies_mhz), dict[int, list[tuple[SolvedBlock, NDArray[Any]]]]()
+    by_patterns = dict[int, list[tuple[SolvedBlock, NDArray[Any]]]]()
     for part in block.spins.parts:
-        mixture = block.vectors[part.place].reshape(part.repeats, -1, n).swapaxes(0, 1)
-        by_patterns.setdefault(part.patterns.start, []).append((part.rotor, mixture))
+        by_patterns.setdefault(part.patterns.start, []).append((part.rotor, part.rows(block.vectors).swapaxes(0, 1)))
     return np.asarray(sum(mixture_slopes(mixtures) for mixtures in by_patterns.values()))
 
 

@@ -6,12 +6,13 @@ each sub-block has as many levels as functions. Among the levels of one sub-bloc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, numbers_in_runs
 from rotor.frozen import dataclass
@@ -35,6 +36,10 @@ class SpinPart(NamedTuple):
     def repeats(self) -> int:
         """Number of patterns."""
         return int(self.patterns.stop - self.patterns.start)
+
+    def rows(self, columns: NDArray[Any]) -> NDArray[Any]:
+        """The rows of the part in columns (functions of the block, n), by pattern and rotational state: (patterns, states, n)."""
+        return columns[self.place].reshape(self.repeats, -1, columns.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,14 +143,20 @@ def over_functions(columns: PartColumns, blocks: Sequence[int], vectors: Floats)
 
 def _over_functions(part: SpinPart, vectors: Floats) -> Floats:
     """Vectors of one part over rotational functions, by Wang block, then pattern; unchanged for a single Wang block."""
-    rows = vectors[part.place]
     if len(part.rotor.parts) == 1:
-        return rows
-    each = rows.reshape(part.repeats, len(part.rotor.energies_mhz), -1)
+        return vectors[part.place]
+    each, n = part.rows(vectors), vectors.shape[1]
     if part.rotor.moments is not None:  # states of a species are functions by themselves
-        return each.swapaxes(0, 1).reshape(rows.shape)
+        return each.swapaxes(0, 1).reshape(-1, n)
     each = np.matmul(part.rotor.vectors, each)
-    return np.concatenate([each[:, wang_part.place].reshape(-1, rows.shape[1]) for wang_part in part.rotor.parts])
+    return np.concatenate([each[:, wang_part.place].reshape(-1, n) for wang_part in part.rotor.parts])
+
+
+def turned(parts: Sequence[SpinPart], columns: Floats, matrices: Mapping[int, Floats]) -> Floats:
+    """Columns (functions of a block, n), each part of which is multiplied by the matrix of its rotational block."""
+    return np.concatenate(
+        [np.matmul(matrices[part.number], part.rows(columns)).reshape(-1, columns.shape[1]) for part in parts]
+    )
 
 
 def functions_by_sub_block(parts: Sequence[SpinPart]) -> Ints:

@@ -27,7 +27,7 @@ from rotor.quantum.spins.operators import (
 from rotor.quantum.symmetric_top_elements import coupling_to, wang_coupling
 from rotor.quantum.tensors import BodyTensor, overlap
 from rotor.quantum.wang.basis import SPECIES, Part, SpeciesFactors, WangBlock
-from rotor.quantum.wang.wang_matrix import unit_diagonals
+from rotor.quantum.wang.wang_matrix import diagonal_elements, unit_diagonals
 
 MOST_RANK = 2  # highest rank with closed forms for many N at once
 
@@ -253,9 +253,7 @@ def _axial_powers(rotor: Scalar, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | 
     """Elements of powers of N within functions |N K⟩."""
     if pairs.rise or (k_up != k).any():
         return None
-    n, squared = pairs.n[:, :, None].astype(float), (k**2.0)[:, None, None]
-    powers = [factor * (n * (n + 1)) ** p * squared**q for (p, q, _), factor in rotor.operators]
-    return np.asarray(np.sum(powers, axis=0))
+    return diagonal_elements(dict(rotor.operators), pairs.n[:, 0], k)[:, None, None]
 
 
 def _axial_elements_of_operator(rotor: ByElements, pairs: Pairs, k_up: Ints, k: Ints) -> Floats | None:

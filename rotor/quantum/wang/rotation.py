@@ -18,6 +18,7 @@ from rotor.quantum.wang.basis import WangBlock, blocks_within, names_of_blocks
 from rotor.quantum.wang.spherical_top import DIMENSION, is_cubic, scalar_and_tensor, tensor_eigenvalues
 from rotor.quantum.wang.wang_matrix import (
     block_bands,
+    diagonal_elements,
     diagonalise_all,
     lowest_energies,
     scalar_energy,
@@ -132,9 +133,8 @@ def _symmetric(
     """Symmetric tops: E(J, K) = Σ c X^p K^2q of each state, with one row for ±K; ordered by J, state and K."""
     all_j = np.arange(jmin, jmax + 1)
     j, k = np.repeat(all_j, all_j + 1), np.concatenate([np.arange(value + 1) for value in all_j.tolist()])
-    x, squares, numbers = (j * (j + 1)).astype(float), (k * k).astype(float), sorted(states)
-    energies = [sum((c * x**p * squares**q for (p, q, _), c in states[v].items()), np.zeros(j.shape)) for v in numbers]
-    energy, quanta = np.concatenate(energies), {"j": j, "k": k}
+    numbers, quanta = sorted(states), {"j": j, "k": k}
+    energy = np.concatenate([diagonal_elements(states[v], j, k) for v in numbers])
     if len(numbers) > 1:
         v, j, k = np.repeat(numbers, len(j)), np.tile(j, len(numbers)), np.tile(k, len(numbers))
         order = np.lexsort((k, v, j))

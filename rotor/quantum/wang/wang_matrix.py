@@ -34,6 +34,12 @@ def scalar_energy(operators: Operators, j: int) -> float:
     return float(sum(c * x**p for (p, q, n), c in operators.items() if q == n == 0))
 
 
+def diagonal_elements(operators: Operators, j: Ints, k: Ints) -> Floats:
+    """Σ c X^p K^2q of the terms without ladders, at every J and K (n,)."""
+    x, squares = (j * (j + 1)).astype(float), (k * k).astype(float)
+    return np.asarray(sum((c * x**p * squares**q for (p, q, n), c in operators.items() if not n), np.zeros(x.shape)))
+
+
 def order_of(operators: Iterable[Powers]) -> int:
     """The highest power n of the ladder operators."""
     return max((n for _, _, n in operators), default=0)

@@ -9,7 +9,7 @@ import pytest
 
 from rotor.quantum.effects.of_top import effects_of
 from rotor.quantum.effects.watson import operators_by_name
-from rotor.quantum.estimates.derivatives import level_derivatives, term_expectations
+from rotor.quantum.estimates.derivatives import expectations, level_derivatives
 from rotor.quantum.solve import solve_levels
 from rotor.tops.constants import Constants
 from rotor.tops.spins.spin_constants import SpinConstants
@@ -83,7 +83,9 @@ def test_derivatives_of_a_block_add_up_to_the_trace():
     assert sums["DeltaJ"] == pytest.approx(-states * x**2, rel=1e-13)
     assert sums["DeltaK"] == pytest.approx(-2 * sum(k**4 for k in range(31)), rel=1e-13)
     for name in ("deltaJ", "deltaK", "phiJ", "phiJK", "phiK", "lK"):
-        largest = max(abs(term_expectations(levels, list(operators_by_name(A_SET)[name]), np.arange(61))[:, 0]))
+        largest = max(
+            abs(expectations(levels, [{powers: 1.0} for powers in operators_by_name(A_SET)[name]], np.arange(61))[:, 0])
+        )
         assert abs(sums[name]) < 1e-12 * largest * states
 
 

@@ -329,10 +329,9 @@ def _functions_with_spins(block: SolvedBlock, representation: str) -> Functions:
     """The functions of a block with spins."""
     pieces = []
     for part in block.spins.parts:
-        rows = block.vectors[part.place].reshape(part.repeats, len(part.rotor.energies_mhz), -1)
         for wang_part in part.rotor.parts:
             assert isinstance(wang_part.basis, WangBlock)
-            inside = np.einsum("kr,prn->pkn", part.rotor.vectors[wang_part.place], rows)
+            inside = np.einsum("kr,prn->pkn", part.rotor.vectors[wang_part.place], part.rows(block.vectors))
             patterns = block.spins.patterns[part.patterns]
             pieces += [
                 (wang_part.v, wang_part.basis, pattern, each) for pattern, each in zip(patterns, inside, strict=True)
