@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints, rows_of_keys
 from rotor.fitting.top_constants import TopConstants
-from rotor.quantum.internal_rotation.chain_rule import ANGLE, ChainRule, chain_rule, further_operators
+from rotor.quantum.internal_rotation.chain_rule import TILT, ChainRule, chain_rule, further_operators
 from rotor.quantum.internal_rotation.hyperfine import (
     coupled_blocks,
     refuse_across_plane,
@@ -31,8 +31,9 @@ from rotor.quantum.internal_rotation.levels import (
     turning_model,
 )
 from rotor.quantum.internal_rotation.model import RamModel
-from rotor.quantum.internal_rotation.rho_axis_tensors import slope_by_angle
+from rotor.quantum.internal_rotation.rho_axis_tensors import slope_by_tilt
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian, SpeciesLevels
+from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes
 from rotor.quantum.labelled import LevelModel, MissingLevelsError
 from rotor.quantum.levels import SolvedBlock, placed
 from rotor.quantum.quanta import SPECIES_NUMBERS, value_text
@@ -83,12 +84,15 @@ class Spins:
         """The terms with the values of their constants."""
         return [(values[term.name] * term.factor, term) for term in self.terms if values[term.name]]
 
-    def derivatives(self, values: Mapping[str, float], by_angle: bool) -> dict[str, Terms]:
-        """Derivatives of the terms by each constant, and by the angle of ρ, with which all tensors turn."""
+    def derivatives(self, values: Mapping[str, float], frame: Axes, chain: ChainRule) -> dict[str, Terms]:
+        """Derivatives of the terms by each constant, and by the tilts of ρ, with which all tensors turn."""
         names = dict.fromkeys(term.name for term in self.terms)
         out: dict[str, Terms] = {name: [(t.factor, t) for t in self.terms if t.name == name] for name in names}
-        if by_angle:
-            out[ANGLE] = [(value, replace(t, rotor=slope_by_angle(t.rotor))) for value, t in self.valued(values)]
+        for tilt in (q for q in chain.quantities if q.startswith(TILT)):
+            towards = tilt.removeprefix(TILT)
+            out[tilt] = [
+                (value, replace(t, rotor=slope_by_tilt(t.rotor, frame, towards))) for value, t in self.valued(values)
+            ]
         return out
 
 
@@ -131,7 +135,7 @@ class TorsionLevels(LevelModel):
             spin_slopes: dict[str, Floats] = {}
         else:
             moments = TorsionMoments(levels, model, elements)
-            spins = self.spins.derivatives(named, ANGLE in chain.quantities)
+            spins = self.spins.derivatives(named, model.frame, chain)
             values, direct, spin_slopes = _with_spins(self.spins, part, moments, self.spins.valued(named), spins)
         count = len(model.coefficients)
         slopes = dict(zip(model.values, (direct[:, :count] @ model.jacobian).T, strict=True))
@@ -143,7 +147,7 @@ class TorsionLevels(LevelModel):
         """The torsion-rotation levels of a species; with spins up to the v_t of predictions, as basis of the hyperfine levels."""
         vt_max = max(part.vt_max, self.constants.vt_max if self.spins else 0)
         by_energy = self.constants.names == "energy"
-        if isinstance(model, RamModel) and not model.angle:
+        if isinstance(model, RamModel) and model.frame == PRINCIPAL:
             return self._species_blocks(part, model).solve(model.coefficients, vt_max, by_energy)
         return self._new_blocks(part, name, model).solve_once(model.coefficients, vt_max, by_energy)
 
@@ -166,7 +170,7 @@ def _with_spins(
 ) -> tuple[Floats, Floats, dict[str, Floats]]:
     """Energies of labels, and their derivatives by coefficients of the torsion-rotation and by those of terms with spins."""
     if moments.model.has_plane:
-        refuse_across_plane(terms)
+        refuse_across_plane(terms, moments.model.frame)
     quanta = moments.levels.quanta
     names = np.column_stack([np.arange(len(quanta["vt"])), quanta["ka"], quanta["kc"]])
     free = placed(species_rotors(moments, 1))

@@ -145,11 +145,11 @@ def _spin(settings: dict[str, int], values: dict[str, float]) -> SpinConstants |
 
 
 def _single_top(values: dict[str, float]) -> dict[str, float]:
-    """F0, delta and barriers of one top with its axis in the plane ab."""
+    """F0, delta, epsilon unless the axis is in the plane ab, and barriers of one top."""
     constants = _top_constants(values, "")
     turn = constants.pop("epsilon", 0.0)
     if abs(np.sin(turn)) > 1e-6:
-        raise ValueError(f"epsil = {turn:g}: the axis of the top is not in the ab plane; such a top is not computed")
+        return constants | {"epsilon": turn}
     return constants | {"delta": float(np.cos(turn)) * constants["delta"]}
 
 

@@ -5,7 +5,8 @@ In the rho-axis frame (RAM) z is along ρ and the rotational constants of the to
     H = A Pa² + B Pb² + C Pc² + D_ab {Pa, Pb} + F (p - ρPa)² + ½V3 (1 - cos 3α) + ...,
 
 A beside F (p - ρPa)². In the principal-axis frame (PAM, as XIAM has it) the rotational constants and distortion are those of the principal
-axes, F0 = ħ²/2I_α of the top alone, and delta is the angle of its axis from a, in the plane ab. The names of further terms are in
+axes, F0 = ħ²/2I_α of the top alone, delta is the angle of its axis from a, and epsilon (0 if missing) that of the plane of both about a,
+from b: π/2 for an axis in the plane ac. The names of further terms are in
 `rotor.quantum.internal_rotation.terms`. Two or three tops are given in the PAM, with the number of the top behind each name: F0_1, delta_1,
 epsilon_1 (about a, from b), V3_1, V6_1, F0_2 ..., and V12, V12s (V13 ...) for what couples them.
 Constants without a stated frame are refused.
@@ -44,6 +45,7 @@ PAIRS = {"V12": 2, "V12s": 2, "V13": 3, "V13s": 3, "V23": 3, "V23s": 3}  # and o
 BARE = (
     "rho",
     "delta",
+    "epsilon",
     *(name for name in NUMBERED if name.startswith(("delta", "epsilon"))),
 )
 DEFAULT_FUNCTIONS = {
@@ -76,7 +78,7 @@ def is_torsional(name: str) -> bool:
     >>> [is_torsional(name) for name in ("V3", "J2p2", "Jz1Jpm1", "DeltaJ")]
     [True, True, False, False]
     """
-    if name in ("F", "rho", "F0", "delta", *BARRIERS, *NAMED, *NUMBERED, *PAIRS):
+    if name in ("F", "rho", "F0", "delta", "epsilon", *BARRIERS, *NAMED, *NUMBERED, *PAIRS):
         return True
     match = SPELLED.fullmatch(name)
     return bool(name) and match is not None and (match["p"] is not None or match["wave"] is not None)
@@ -169,7 +171,7 @@ class InternalRotationConstants:
                     f"J2p2{did_you_mean(name, known)}"
                 )
         needed: tuple[str, ...] = NEEDED[self.frame]
-        others: tuple[str, ...] = NEEDED["PAM" if self.frame == "RAM" else "RAM"]
+        others: tuple[str, ...] = (*NEEDED["PAM"], "epsilon") if self.frame == "RAM" else NEEDED["RAM"]
         place = f"in the frame {self.frame}"
         if self.tops > 1:
             needed = tuple(f"{name}_{top}" for top in range(1, self.tops + 1) for name in ("F0", "delta", "V3"))

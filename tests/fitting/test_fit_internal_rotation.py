@@ -15,6 +15,7 @@ from rotor.tops.internal_rotation import InternalRotationConstants
 
 CM = rotor.units.MHZ_PER_CM
 NAMES = ("j", "ka", "kc", "species", "vt")
+OF_TOP = ("F0", "delta", "epsilon", "V3")
 
 # 2ba.inp and 2ba.out: value before and after its fit, standard error; ½ of what multiplies N₊ⁿ + N₋ⁿ, Watson's signs
 WESTERFIT = {
@@ -109,13 +110,13 @@ def test_a_label_that_no_level_has_is_named():
             label_model(constants, np.vstack([labels, [label]]))
 
 
-def principal_axes(**changes):
-    values = {"F0": 158e3, "delta": 0.6, "V3": 3.0e6} | {k: v for k, v in changes.items() if k in ("F0", "delta", "V3")}
+def principal_axes(dipole=(1.4, 0.9, 0.0), **changes):
+    values = {"F0": 158e3, "delta": 0.6, "V3": 3.0e6} | {k: v for k, v in changes.items() if k in OF_TOP}
     abc = {"A": 9100.0, "B": 4300.0, "C": 3000.0, "DeltaJ": 1e-3, "DeltaK": 2e-2}
     abc |= {k: v for k, v in changes.items() if k in abc}
     constants = rotor.Constants(**abc, reduction="A", representation="Ir")
     internal = InternalRotationConstants(values, "PAM", vt_max=0)
-    return rotor.Top.from_constants(constants, dipole_abc_debye=(1.4, 0.9, 0), internal_rotation=internal)
+    return rotor.Top.from_constants(constants, dipole_abc_debye=dipole, internal_rotation=internal)
 
 
 def lines_of(top, jmax):
@@ -128,14 +129,23 @@ def lines_of(top, jmax):
     return assignments(NAMES, upper, lower, seen.frequency_mhz, 0.01)
 
 
-def test_derivatives_by_constants_of_principal_axes_are_those_of_finite_differences():
-    constants = TopConstants(principal_axes())
+@pytest.mark.parametrize(
+    ("angles", "dipole"),
+    [
+        ({}, (1.4, 0.9, 0.0)),
+        ({"epsilon": np.pi / 2}, (1.4, 0.0, 0.9)),
+        ({"delta": np.pi / 2, "epsilon": 0.7}, (0.0, 1.4, 0.9)),
+        ({"epsilon": 0.7}, (1.4, 0.9, 0.0)),
+    ],
+)
+def test_derivatives_by_constants_of_principal_axes_are_those_of_finite_differences(angles, dipole):
+    constants = TopConstants(principal_axes(dipole, **angles))
     labels, _, _ = levels_in(lines_of(constants.top, 4))
     model = label_model(constants, labels)
     values = np.array(list(constants.values.values()))
     _, slopes = model.levels(values)
     for i, (name, value) in enumerate(constants.values.items()):
-        step = value * (1e-5 if name in ("F0", "delta", "V3") else 1e-3)
+        step = value * (1e-5 if name in OF_TOP else 1e-3)
         changed = [np.where(np.arange(len(values)) == i, value + sign * step, values) for sign in (1, -1)]
         upper, lower = (model.levels(c)[0] for c in changed)
         expected = (upper - lower) / (2 * step)
@@ -143,11 +153,15 @@ def test_derivatives_by_constants_of_principal_axes_are_those_of_finite_differen
         assert np.allclose(slopes[:, i], expected, rtol=1e-4, atol=1e-4 * np.abs(expected).max() + noise), name
 
 
-def test_constants_of_principal_axes_are_found_again():
-    true = principal_axes()
+@pytest.mark.parametrize(("epsilon", "free"), [(0.0, ()), (np.pi / 2, ()), (0.7, ("epsilon",))])
+def test_constants_of_principal_axes_are_found_again(epsilon, free):
+    dipole = (1.4, 0.0, 0.9) if epsilon > 1 else (1.4, 0.9, 0.0)
+    true = principal_axes(dipole, epsilon=epsilon)
     lines = lines_of(true, 5)
-    start = TopConstants(principal_axes(A=9102.0, B=4300.4, delta=0.602, V3=3.02e6))
-    fit = fit_lines(lines, start, parameters(start, ["A", "B", "C", "delta", "V3", "F0"]))
+    start = TopConstants(
+        principal_axes(dipole, A=9102.0, B=4300.4, delta=0.602, V3=3.02e6, epsilon=epsilon + 0.002 * len(free))
+    )
+    fit = fit_lines(lines, start, parameters(start, ["A", "B", "C", "delta", "V3", "F0", *free]))
     assert fit.converged
     expected = dict(true.constants.values) | dict(true.internal_rotation.values)
     for name, value in zip(fit.parameters.names, fit.values, strict=True):

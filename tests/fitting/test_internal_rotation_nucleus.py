@@ -1,5 +1,7 @@
 """One top with one 14N, both frames, against the direct product |N K M⟩|m⟩|I M_I⟩ without contraction, and in fits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from spherical_tensors import spherical, symbol
@@ -12,14 +14,21 @@ from rotor.fitting.top_constants import TopConstants
 from rotor.fitting.top_levels import label_model
 from rotor.formats.assigned_lines import write_assigned_lines
 from rotor.tops.internal_rotation import InternalRotationConstants
+from rotor.tops.spins.spin_constants import SpinConstants
 
 CM = rotor.units.MHZ_PER_CM
 F, WAVES = 4, 8  # total angular momentum of the compared levels; k of the free functions exp i(3k + σ)α
 ABC = {"A": 9100.0, "B": 4300.0, "C": 3000.0}
 PAM = {"F0": 158e3, "delta": 0.6, "V3": 60 * CM}
+# the axis of the top in a plane of principal axes, or in none; and the component of the tensor that its plane leaves
+DIRECTIONS = {
+    "PAM": ({}, "ab"),
+    "PAM ac": ({"epsilon": np.pi / 2}, "ac"),
+    "PAM bc": ({"delta": np.pi / 2, "epsilon": 0.7}, "bc"),
+    "PAM any": ({"epsilon": 0.7}, "ac"),
+}
 RAM = {"F": 5.2 * CM, "rho": 0.21, "V3": 60 * CM, "Dab": -900.0}
 SPINS = "chi_aa(14N)=-4.2 chi_bb-cc(14N)=1.3 chi_ab(14N)=2.1 C_aa(14N)=0.03 C_bb(14N)=-0.02 MHz"
-CHI = np.array([[-4.2, 2.1, 0.0], [2.1, (4.2 + 1.3) / 2, 0.0], [0.0, 0.0, (4.2 - 1.3) / 2]])
 TOML = """
 name = "top"
 [constants]
@@ -47,14 +56,27 @@ C_bb = -0.02
 ROTATION = np.diag([0.03, -0.02, 0.0])
 
 
+def chi(frame):
+    """The quadrupole tensor along a, b, c."""
+    tensor = np.diag([-4.2, (4.2 + 1.3) / 2, (4.2 - 1.3) / 2])
+    i, j = ("abc".index(letter) for letter in DIRECTIONS.get(frame, ({}, "ab"))[1])
+    tensor[i, j] = tensor[j, i] = 2.1
+    return tensor
+
+
 def turning_top(frame, vt_max, spins=SPINS, **changes):
-    values = (PAM if frame == "PAM" else RAM) | {name: value for name, value in changes.items() if name not in "ABC"}
+    values = RAM
+    if frame != "RAM":
+        direction, pair = DIRECTIONS[frame]
+        values, spins = PAM | direction, spins.replace("chi_ab", f"chi_{pair}")
+    values = values | {name: value for name, value in changes.items() if name not in "ABC"}
     constants = rotor.Constants(
         **ABC | {n: v for n, v in changes.items() if n in "ABC"}, reduction="A", representation="Ir"
     )
-    internal = InternalRotationConstants(values, frame, vt_max=vt_max)
+    internal = InternalRotationConstants(values, frame[:3], vt_max=vt_max)
+    dipole = (0.0, 0.8, 1.5) if frame == "PAM bc" else (1.5, 0.0, 0.8) if frame == "PAM ac" else (1.5, 0.8, 0.0)
     return rotor.Top.from_constants(
-        constants, dipole_abc_debye=(1.5, 0.8, 0.0), spin_constants=spins, internal_rotation=internal
+        constants, dipole_abc_debye=dipole, spin_constants=spins, internal_rotation=internal
     )
 
 
@@ -87,11 +109,15 @@ def direct_product(frame, sigma):
     axes = components(states)
     matrix, vector = turned_tensors(states, 2), turned_tensors(states, 1)
     rotation = sum(ABC[name] * axis @ axis for name, axis in zip("ABC", axes, strict=True))
-    if frame == "PAM":  # ρ_g = λ_g B_g/F0, F = F0/(1 - Σ λ_g ρ_g)
-        direction = np.array([np.cos(PAM["delta"]), np.sin(PAM["delta"])])
-        rho = direction * [ABC["A"], ABC["B"]] / PAM["F0"]
+    if frame != "RAM":  # ρ_g = λ_g B_g/F0, F = F0/(1 - Σ λ_g ρ_g)
+        angles = {"epsilon": 0.0} | PAM | DIRECTIONS[frame][0]
+        across = np.sin(angles["delta"])
+        direction = np.array(
+            [np.cos(angles["delta"]), across * np.cos(angles["epsilon"]), across * np.sin(angles["epsilon"])]
+        )
+        rho = direction * list(ABC.values()) / PAM["F0"]
         f, barrier = PAM["F0"] / (1 - direction @ rho), PAM["V3"]
-        coupling = rho[0] * axes[0] + rho[1] * axes[1]
+        coupling = sum(x * axis for x, axis in zip(rho, axes, strict=True))
     else:
         rotation = rotation + RAM["Dab"] * (axes[0] @ axes[1] + axes[1] @ axes[0])
         f, barrier, coupling = RAM["F"], RAM["V3"], RAM["rho"] * axes[0]
@@ -109,7 +135,7 @@ def direct_product(frame, sigma):
         return left[np.ix_(rows, rows)] * right[np.ix_(spin_index, spin_index)]
 
     order = [1, 2, 0]  # x, y, z = b, c, a
-    body_tensor = spherical(CHI[np.ix_(order, order)])
+    body_tensor = spherical(chi(frame)[np.ix_(order, order)])
     squares = [[(u @ v + v @ u) / 2 - (2 / 3 * np.eye(3) if i == k else 0) for k, v in enumerate((ix, iy, iz))]
                for i, u in enumerate((ix, iy, iz))]  # fmt: skip
     quadrupole = [part / 2 for part in spherical(squares)]  # 2I(2I - 1) = 2
@@ -128,7 +154,7 @@ def direct_product(frame, sigma):
     return np.linalg.eigvalsh(whole + np.kron(np.eye(len(rows)), f * p @ p + hindering))
 
 
-@pytest.mark.parametrize("frame", ["RAM", "PAM"])
+@pytest.mark.parametrize("frame", ["RAM", *DIRECTIONS])
 @pytest.mark.parametrize("species", ["A", "E"])
 def test_levels_with_one_nucleus_are_those_of_the_direct_product(frame, species):
     expected = direct_product(frame, "AE".index(species))
@@ -158,7 +184,7 @@ def hyperfine_lines(top, nmax, error_mhz=0.002, noise=None, vt=(0, 1)):
     return assignments(NAMES, upper, lower, frequency, error_mhz, blend=blend)
 
 
-@pytest.mark.parametrize("frame", ["RAM", "PAM"])
+@pytest.mark.parametrize("frame", ["RAM", "PAM", "PAM ac", "PAM any"])
 @pytest.mark.parametrize("second", ["", pytest.param("chi_aa(35Cl)=-57 chi_ab(35Cl)=20 ", marks=pytest.mark.slow)])
 def test_derivatives_with_spins_are_those_of_finite_differences(frame, second):
     top = turning_top(frame, 0, SPINS.replace("MHz", second + "MHz"))
@@ -172,7 +198,7 @@ def test_derivatives_with_spins_are_those_of_finite_differences(frame, second):
     energies, slopes = model.levels(values)
     assert np.abs(energies - levels.energy_mhz[few]).max() < 1e-6  # MHz: the levels of the prediction
     for i, (name, value) in enumerate(constants.values.items()):
-        step = max(abs(value) * (1e-5 if name in ("F", "F0", "rho", "delta", "V3") else 1e-3), 1e-6)
+        step = max(abs(value) * (1e-5 if name in ("F", "F0", "rho", "delta", "epsilon", "V3") else 1e-3), 1e-6)
         changed = [np.where(np.arange(len(values)) == i, value + sign * step, values) for sign in (1, -1)]
         upper, lower = (model.levels(c)[0] for c in changed)
         expected = (upper - lower) / (2 * step)
@@ -219,6 +245,9 @@ def test_lines_with_spins_are_fitted_from_a_table(tmp_path, call):
 
 
 def test_a_tensor_component_across_the_mirror_plane_is_refused():
-    top = turning_top("RAM", 0, "chi_aa(14N)=-4 chi_ac(14N)=1 MHz")
-    with pytest.raises(ValueError, match=r"chi_ac.*mirror"):
-        rotor.api.solve_levels(top, 1, effects=rotor.api.effects_of(top, True))
+    for frame, plane in (("RAM", "ab"), ("PAM ac", "ac"), ("PAM bc", "bc")):
+        other = "ac" if plane == "ab" else "ab"
+        spins = SpinConstants({"chi_aa(14N)": -4.0, f"chi_{other}(14N)": 1.0}, {"14N": 2}, "test")
+        top = replace(turning_top(frame, 0), spin_constants=spins)
+        with pytest.raises(ValueError, match=rf"chi_{other}.*the plane {plane} as a mirror"):
+            rotor.api.solve_levels(top, 1, effects=rotor.api.effects_of(top, True))

@@ -62,6 +62,12 @@ def test_an_axis_on_the_other_side_of_a_has_a_delta_below_zero(mtbe):
     assert rotor.read(mtbe).internal_rotation.values["delta"] == pytest.approx(-0.460684017)
 
 
+def test_an_axis_out_of_the_plane_ab_has_its_epsilon(mtbe):
+    mtbe.write_text(INPUT + " epsil  0.3\n")
+    values = rotor.read(mtbe).internal_rotation.values
+    assert (values["delta"], values["epsilon"]) == pytest.approx((0.460684017, 0.3))
+
+
 @pytest.mark.parametrize("ntop", [2, 3])
 def test_xiam_files_of_several_tops_are_read(tmp_path, ntop):
     path = tmp_path / "several.xi"
@@ -87,7 +93,6 @@ def test_xiam_files_of_several_tops_are_read(tmp_path, ntop):
         (" F0 ", " XX ", "F0 missing"),
         ("reduc 1", "reduc 2", "reduc 2"),
         ("ntop 1", "ntop 4", "4 tops"),
-        ("\\F(1) ", " epsil 0.3\n\\F(1) ", "not in the ab plane"),
         ("\\F(1) ", " Dpi2J 1E-6\n\\F(1) ", "Dpi2J.*which no term here does"),
         ("\\F(1) ", " chi_z 1E-3\n\\F(1) ", "chi_aa beside spin 0: expected spin 2"),
         ("reduc 1", "reduc 1\nspin 2\nspin2 2", "spin2 2: rotor reads a single nucleus"),

@@ -277,7 +277,7 @@ def _internal_rotation(top: Top, groups: Sequence[MethylGroup], j: int) -> Limit
     here = min(j, HIGHEST_J)
     shifts = line_shifts(top.rotational_constants_mhz, least.rotor, here)
     size, text = _rotor_text(top, what, least, shifts, here)
-    computed = top.kind == "asymmetric" and are_computed(groups, top.moments_u_angstrom2)
+    computed = top.kind == "asymmetric" and are_computed(groups)
     return Limit("internal rotation", size, f"{text}; internal rotation 'geometry' computes it" if computed else text)
 
 

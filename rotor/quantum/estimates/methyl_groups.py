@@ -40,7 +40,6 @@ from rotor.tops.internal_rotation import MOST_TOPS
 from rotor.units import MHZ_PER_CM
 
 OFF_AXIS = 0.05  # sine of the angle above which an atom counts as off the axis of a methyl group
-IN_PLANE = 1e-3  # share of an axis along c up to which a molecule counts as symmetric about its plane ab
 FLAT_DEGREES = 355.0  # sum of three angles above which a nitrogen counts as flat, here and for inversion
 
 
@@ -118,20 +117,14 @@ def _with_moments(
     return methyls
 
 
-def are_computed(groups: Sequence[MethylGroup], moments: Sequence[float]) -> bool:
-    """Whether levels can be computed from the geometry: of one group with its axis in the plane ab, or of up to three; with barriers."""
-    possible = in_plane(axes_of(groups, moments)) if len(groups) == 1 else len(groups) <= MOST_TOPS
-    return possible and all(group.rotor.barrier_mhz for group in groups)
+def are_computed(groups: Sequence[MethylGroup]) -> bool:
+    """Whether levels can be computed from the geometry: of up to three groups with barriers."""
+    return len(groups) <= MOST_TOPS and all(group.rotor.barrier_mhz for group in groups)
 
 
 def axes_of(groups: Sequence[MethylGroup], moments: Sequence[float]) -> Floats:
     """λ_g I_α (groups, 3) of the axes along a, b, c, from ρ_g = λ_g I_α/I_g and the moments I_g."""
     return np.array([group.rotor.rho for group in groups]) * moments
-
-
-def in_plane(axes: Floats) -> bool:
-    """Whether axes (n, 3) of any length lie in the plane ab."""
-    return bool((np.abs(axes[:, 2]) <= IN_PLANE * np.linalg.norm(axes, axis=1)).all())
 
 
 def barrier_beside(molecule: Molecule, bonds: Sequence[Ints], carbon: int) -> Barrier | None:

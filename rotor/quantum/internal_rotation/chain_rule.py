@@ -1,8 +1,8 @@
 """Derivatives of levels by constants of principal axes, which enter the Hamiltonian also through F, ρ and angles.
 
-F, ρ and the angle of ρ of one top, and F_ij and ρ_i of several, follow from A, B, C, F0, delta and epsilon, so that
+F, ρ and the direction of ρ of one top, and F_ij and ρ_i of several, follow from A, B, C, F0, delta and epsilon, so that
 
-    dE/dc = ∂E/∂c + Σ_q ∂E/∂q ∂q/∂c,        q = F, ρ, angle;    F1, F2, F12, ρ_1a, ρ_1b ....
+    dE/dc = ∂E/∂c + Σ_q ∂E/∂q ∂q/∂c,        q = F, ρ, tilts of ρ;    F1, F2, F12, ρ_1a, ρ_1b ....
 
 ∂E/∂q is the expectation value of a term of the Hamiltonian or of a further operator; ∂q/∂c is a central difference of closed forms."""
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -17,10 +18,11 @@ import numpy as np
 from rotor.arrays import Floats
 from rotor.quantum.internal_rotation.contracted import Product
 from rotor.quantum.internal_rotation.frames import torsional_kinetics
-from rotor.quantum.internal_rotation.model import RamModel, model_of_principal_axes
+from rotor.quantum.internal_rotation.model import RamModel
 from rotor.quantum.internal_rotation.several_tops import SeveralTops
+from rotor.quantum.internal_rotation.terms import Axes
 
-ANGLE = "angle"  # name of the angle of ρ from the axis a
+TILT = "tilt "  # before x or y: the angle by which ρ turns towards this axis of its frame
 RELATIVE_STEP, ANGLE_STEP = 1e-5, 1e-5  # steps (angles in radians) at which central differences are exact to 1e-10
 
 
@@ -55,20 +57,26 @@ def chain_rule(model: RamModel | SeveralTops, values: Mapping[str, float]) -> Ch
         return _rule(kinetics_of_tops, values, quantities, [*"ABC", *angles])
     if "F0" not in values:
         return NO_CHAIN
-    return _rule(kinetics_of_one_top, values, ["F", "rho", ANGLE], [*"ABC", "F0", "delta"])
+    angles = [name for name in ("delta", "epsilon") if name in values]
+    tilts = [TILT + towards for towards in model.tilts]
+    closed_form = partial(kinetics_of_one_top, frame=model.frame)
+    return _rule(closed_form, values, ["F", "rho", *tilts], [*"ABC", "F0", *angles])
 
 
 def further_operators(model: RamModel | SeveralTops, species: str, chain: ChainRule) -> dict[str, list[Product]]:
     """∂H/∂q of the quantities that are not coefficients of the Hamiltonian."""
     if isinstance(model, SeveralTops):
         return model.slopes_by_rho(model.species[species])
-    return {ANGLE: model.slope_by_angle(model.species[species])} if ANGLE in chain.quantities else {}
+    sigma = model.species[species]
+    return {q: model.slope_by_tilt(q.removeprefix(TILT), sigma) for q in chain.quantities if q.startswith(TILT)}
 
 
-def kinetics_of_one_top(values: Mapping[str, float]) -> dict[str, float]:
-    """F, ρ and the angle of ρ of one top."""
-    model = model_of_principal_axes(values)
-    return {"F": model.values["F"], "rho": model.values["rho"], ANGLE: model.angle}
+def kinetics_of_one_top(values: Mapping[str, float], frame: Axes) -> dict[str, float]:
+    """F, ρ and the tilts of ρ of one top from z of a frame."""
+    f, (rho,) = torsional_kinetics(values, values)
+    z, x, y = frame.matrix @ rho
+    tilts = {f"{TILT}x": np.arctan2(x, z), f"{TILT}y": np.arctan2(y, z)}
+    return {"F": float(f[0, 0]), "rho": float(np.linalg.norm(rho)), **{q: float(angle) for q, angle in tilts.items()}}
 
 
 def kinetics_of_tops(values: Mapping[str, float]) -> dict[str, float]:

@@ -12,7 +12,8 @@ The axes of the RAM have z along ρ; for ρ in the plane ab, at the angle θ = a
 
     A_RAM = A cos²θ + B sin²θ,    B_RAM = A sin²θ + B cos²θ,    D_ab = -½ (A - B) sin 2θ,    C_RAM = C,
 
-an exact rotation: A_RAM stands beside F (p - ρPz)². Published A may contain Fρ² (IAM, A_eff = A + Fρ²).
+an exact rotation: A_RAM stands beside F (p - ρPz)². Published A may contain Fρ² (IAM, A_eff = A + Fρ²). In any other direction of ρ the
+rotation is that of `frame_along`, and the Hamiltonian is real if ρ lies in a plane of two principal axes, whose normal is then y.
 """
 
 from __future__ import annotations
@@ -24,17 +25,24 @@ from numpy.typing import ArrayLike
 
 from rotor.arrays import Floats
 
+IN_PLANE = 1e-12  # a smaller cosine of ρ across a plane of principal axes is round-off
+
 
 def frame_along(rho_abc: ArrayLike) -> Floats:
-    """Rows a, b, c of the rho-axis frame (z, x, y) along the principal axes: a along ρ, c as near the principal axis c as possible."""
+    """Rows z, x, y of the rho-axis frame along the principal axes: z along ρ, y along the principal axis that is normal to ρ (c before b
+    before a), or as near c as possible.
+
+    >>> frame_along([3.0, 0.0, 4.0]).tolist()  # in the plane ac
+    [[0.6, 0.0, 0.8], [-0.8, 0.0, 0.6], [0.0, -1.0, 0.0]]
+    """
     first = np.asarray(rho_abc, dtype=float)
     first = first / np.linalg.norm(first)
-    third = np.array([0.0, 0.0, 1.0])
+    first = np.where(np.abs(first) < IN_PLANE, 0.0, first)
+    normal = 2 - int(np.argmax(first[::-1] == 0.0))  # c if ρ lies in no plane
+    third = np.eye(3)[normal] * (-1.0 if normal == 1 else 1.0)
     third = third - (third @ first) * first
-    if np.linalg.norm(third) < 1e-12:  # ρ along c
-        third = np.array([0.0, 1.0, 0.0])
     third /= np.linalg.norm(third)
-    return np.stack([first, np.cross(third, first), third])
+    return np.stack([first, np.cross(third, first), third]) + 0.0
 
 
 def torsional_kinetics(rotation: Mapping[str, float], constants: Mapping[str, float]) -> tuple[Floats, Floats]:

@@ -17,13 +17,14 @@ from rotor.molecules.bonds import bonded_atoms
 from rotor.molecules.molecule import Molecule
 from rotor.molecules.symmetry.operations import Operation
 from rotor.quantum.bond_torsion import potential_of_scan
-from rotor.quantum.estimates.methyl_groups import MethylGroup, axes_of, in_plane, methyl_groups
+from rotor.quantum.estimates.methyl_groups import MethylGroup, axes_of, methyl_groups
 from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION
 from rotor.quantum.reductions import to_representation
 from rotor.tops.internal_rotation import COUNTED, MOST_TOPS, PAIRS, InternalRotationConstants, values_and_settings
 from rotor.tops.top import Top
 
 F0_ERROR = 0.02  # of F0 from a geometry, relative
+IN_PLANE = 1e-3  # cosine of axes to c, b or a up to which a molecule counts as symmetric about its plane ab, ac or bc
 
 
 def with_internal_rotation(top: Top, calculator: Any = None, given: str = "") -> Top:
@@ -46,7 +47,7 @@ def with_internal_rotation(top: Top, calculator: Any = None, given: str = "") ->
     Raises
     ------
     ValueError
-        If there is no geometry, no methyl group or more than three, no known barrier, or the axis of a single group out of the plane ab.
+        If there is no geometry, no methyl group or more than three, or no known barrier.
 
     Notes
     -----
@@ -118,17 +119,14 @@ def _kinetic_constants(
         f"F0{number}": units.ROTATIONAL_MHZ_U_ANGSTROM2 / norm
         for number, norm in zip(numbers, norms.tolist(), strict=True)
     }
-    planar = in_plane(cosines)
-    if not planar and len(groups) == 1:
-        raise ValueError(
-            f"internal rotation of {top.name or 'this top'}: the axis of the methyl group is {directions[0, 2]:.3g} out of the plane ab; "
-            "give constants in the rho-axis frame (RAM)"
-        )
+    across = (np.abs(directions) <= IN_PLANE).all(axis=0)
     for number, (a, b, c) in zip(numbers, directions.tolist(), strict=True):
-        if planar:  # no angle epsilon, so that the Hamiltonian is real
+        if across[2]:  # the exact plane, so that the Hamiltonian is real
             constants[f"delta{number}"] = math.atan2(b, a)
+        elif across[1]:
+            constants |= {f"delta{number}": math.atan2(c, a), f"epsilon{number}": math.pi / 2}
         else:
-            constants |= {f"delta{number}": math.acos(a), f"epsilon{number}": math.atan2(c, b)}
+            constants |= {f"delta{number}": math.acos(0.0 if across[0] else a), f"epsilon{number}": math.atan2(c, b)}
     return constants
 
 

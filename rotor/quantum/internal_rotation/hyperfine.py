@@ -30,6 +30,7 @@ from rotor.quantum.internal_rotation.levels import (
 )
 from rotor.quantum.internal_rotation.rho_axis_tensors import REPRESENTATION, leaves_plane
 from rotor.quantum.internal_rotation.several_tops import SeveralTops
+from rotor.quantum.internal_rotation.terms import Axes
 from rotor.quantum.levels import Levels, SolvedBlock, placed
 from rotor.quantum.spins.blocks import rotor_plan
 from rotor.quantum.spins.levels import solved_blocks, within_n
@@ -60,7 +61,7 @@ def hyperfine_levels(
         )
     terms = valued_terms(top, effects)
     if model.has_plane:
-        refuse_across_plane(terms)
+        refuse_across_plane(terms, model.frame)
     first = max(2 * nmin - scheme.total, scheme.total % 2)
     all_f = range(first, 2 * nmax + scheme.total + 1, 2)  # neighbouring N are solved too, since spins mix them in
     free = torsion_rotation_levels(top, constants, effects, max(0, nmin - scheme.total), nmax + scheme.total)
@@ -107,11 +108,12 @@ def refuse_unlike_nuclei(scheme: Scheme, terms: Iterable[SpinTerm]) -> None:
             )
 
 
-def refuse_across_plane(terms: Terms) -> None:
-    """ValueError for a tensor with a component that a mirror ab excludes."""
+def refuse_across_plane(terms: Terms, frame: Axes) -> None:
+    """ValueError for a tensor with a component that the mirror across y excludes."""
     for _, term in terms:
-        if leaves_plane(term.rotor):
+        if leaves_plane(term.rotor, frame):
+            plane = "abc".replace(frame.normal, "")
             raise ValueError(
-                f"{term.name} beside internal rotation: the molecule has the plane ab as a mirror, which leaves components along "
-                "aa, bb, cc and ab; leave it out"
+                f"{term.name} beside internal rotation: the molecule has the plane {plane} as a mirror, which leaves components along "
+                f"aa, bb, cc and {plane}; leave it out"
             )

@@ -73,7 +73,7 @@ class TorsionMoments(SpeciesMoments):
     def beside_spins(self, rotor: Rotor) -> Callable[[SolvedBlock, SolvedBlock], NDArray[Any] | None]:
         """The function of the reduced elements (n_up, n_low) of an operator of N in a term with spins; None where it does not act."""
         if rotor not in self._cache:
-            operator = operator_beside_spins(rotor, self.model.angle, self.model.has_plane)
+            operator = operator_beside_spins(rotor, self.model.frame, self.model.has_plane)
             self._cache[rotor] = self._entries(operator, rotor.rank, rotor.rank == 1)
         by_blocks = self._cache[rotor]
 
@@ -105,13 +105,13 @@ class TorsionMoments(SpeciesMoments):
         """Elements of a tensor by pairs of blocks: overlaps of torsional functions times elements of the rotation."""
         body = tensors[0, 0]
         if body not in self._cache:
-            turned = turned_components(np.array(body.components), self.model.angle)
+            turned = turned_components(np.array(body.components), self.model.frame)
             if self.model.has_plane and np.iscomplexobj(turned):
-                raise ValueError(
-                    "a dipole along c beside internal rotation: the molecule has the plane ab as a mirror"
-                    if body.rank == 1
-                    else "a tensor along ac or bc beside internal rotation: the molecule has the plane ab as a mirror"
-                )
+                across = self.model.frame.normal
+                plane = "abc".replace(across, "")
+                pairs = " or ".join("".join(sorted(letter + across)) for letter in plane)
+                what = f"dipole along {across}" if body.rank == 1 else f"tensor along {pairs}"
+                raise ValueError(f"a {what} beside internal rotation: the molecule has the plane {plane} as a mirror")
             self._cache[body] = self._entries(body_tensor(turned), body.rank)
         return self._cache[body]
 

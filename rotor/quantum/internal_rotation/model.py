@@ -15,11 +15,10 @@ from rotor.quantum.internal_rotation.contracted import Product, Terms, Torsion, 
 from rotor.quantum.internal_rotation.frames import torsional_kinetics
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
-from rotor.quantum.internal_rotation.terms import Axes, products_of, torsional_products
+from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes, is_real, products_of, torsional_products
 from rotor.quantum.torsion import TorsionalPotential
 from rotor.tops.internal_rotation import BARRIERS
 
-COMPLEX = ("Dbc", "Dac")  # terms of a molecule without a plane of symmetry through the rho axis
 ANGLE_STEP = 1e-3  # radian; terms go with sines and cosines of up to six times the angle, so slopes are good to 1e-5
 DEFAULT_COUNT = 9  # n_v; error 1 Hz for v_t = 0 at J = 25 of methanols and methyl formate
 
@@ -28,13 +27,13 @@ DEFAULT_COUNT = 9  # n_v; error 1 Hz for v_t = 0 at J = 25 of methanols and meth
 class RamModel:
     """Constants in the rho-axis frame: MHz by name, rho without a unit. See `terms` for the names.
 
-    values: A, B, C, F, rho and any others. fold: fold of the top. angle: angle (radians, towards b) of ρ from the axis a of A, B, C and
-    distortion; 0 if these belong to the rho-axis frame.
+    values: A, B, C, F, rho and any others. fold: fold of the top. frame: the rho-axis frame along the axes a, b, c of A, B, C and
+    distortion; these axes themselves if the constants belong to the rho-axis frame.
     """
 
     values: Mapping[str, float]
     fold: int = 3
-    angle: float = 0.0
+    frame: Axes = PRINCIPAL
     # σ; E stands for ±1, of equal energies at ∓K
     species: ClassVar[Mapping[str, int]] = MappingProxyType({"A": 0, "E": 1})
 
@@ -63,19 +62,23 @@ class RamModel:
 
     def terms(self, sigma: int) -> Terms:
         """Operators by coefficient: the linear constants, then F, -2Fρ and Fρ²."""
-        return {name: products_of(name, sigma, Axes(self.angle)) for name in self.linear_names} | torsional_products(
-            sigma
-        )
+        terms = {name: products_of(name, sigma, self.frame) for name in self.linear_names}
+        return terms | torsional_products(sigma)
 
-    def slope_by_angle(self, sigma: int) -> list[Product]:
-        """∂H/∂angle at fixed F and ρ as products, by central differences: A, B, C and all named terms turn about c."""
+    @property
+    def tilts(self) -> str:
+        """The axes x and y towards which ρ may turn and change energies to first order; in a plane of symmetry x alone."""
+        return "x" if self.has_plane else "xy"
+
+    def slope_by_tilt(self, towards: str, sigma: int) -> list[Product]:
+        """∂H/∂angle of a turn of ρ towards x or y, at fixed F and |ρ|, as products, by central differences."""
         products = []
         for step in (ANGLE_STEP, -ANGLE_STEP):
+            frame = self.frame.turned(towards, step)
             for name in self.linear_names:
                 factor = self.values[name] / (2 * step)
                 products += [
-                    Product(factor * product.rotation, product.torsion)
-                    for product in products_of(name, sigma, Axes(self.angle + step))
+                    Product(factor * product.rotation, product.torsion) for product in products_of(name, sigma, frame)
                 ]
         return products
 
@@ -104,7 +107,19 @@ class RamModel:
     @property
     def has_plane(self) -> bool:
         """Whether every term is real in |J K⟩|K t⟩: a plane of symmetry contains the rho axis."""
-        return not any(self.values.get(name) for name in COMPLEX)
+        return bool(self.frame.normal) and all(
+            is_real(name, self.frame) for name in self.linear_names if self.values[name]
+        )
+
+    @property
+    def by_energy(self) -> bool:
+        """Whether Ka and Kc are counted by energy because K along ρ cannot stand for Ka.
+
+        ρ is then normal to a, or ⟨J K|H_rot|J K⟩ = ½(tr D - D_zz) J(J+1) + (3 D_zz - tr D) K²/2 does not rise with |K|.
+        """
+        abc = np.array([self.values[name] for name in "ABC"])
+        along = float(self.frame.matrix[0] ** 2 @ abc)
+        return self.frame.normal == "a" or 3 * along <= abc.sum()
 
     def blocks(
         self,
@@ -123,18 +138,16 @@ class RamModel:
         torsion = contracted_torsion(self.torsion, sigma, jmax, count, waves)
         functions = TorsionRotation(torsion, jmin, jmax, folded=sigma == 0 and self.has_plane)
         chosen: NDArray[np.bool_] | None = None if needed is None else np.isin(functions.labels["J"], needed)
-        return SpeciesHamiltonian(functions, self.terms(sigma), chosen)
+        return SpeciesHamiltonian(functions, self.terms(sigma), chosen, self.frame.normal, self.by_energy)
 
 
 def model_of_principal_axes(values: Mapping[str, float]) -> RamModel:
-    """The model from A, B, C, distortion, F0, delta, V3 ... in principal axes (PAM).
+    """The model from A, B, C, distortion, F0, delta, epsilon (0 if missing), V3 ... in principal axes (PAM).
 
     >>> model = model_of_principal_axes({"A": 9e3, "B": 5e3, "C": 4e3, "F0": 157e3, "delta": 0.5, "V3": 1e7})
-    >>> round(model.values["F"], 3), round(model.values["rho"], 8), round(model.angle, 8)
+    >>> round(model.values["F"], 3), round(model.values["rho"], 8), np.arccos(model.frame.matrix[0, 0]).round(8).item()
     (165519.071, 0.05257323, 0.29466597)
     """
-    others = {name: value for name, value in values.items() if name not in ("F0", "delta")}
+    others = {name: value for name, value in values.items() if name not in ("F0", "delta", "epsilon")}
     f, (rho,) = torsional_kinetics(values, values)
-    return RamModel(
-        {**others, "F": f[0, 0], "rho": float(np.linalg.norm(rho))}, angle=float(np.arctan2(rho[1], rho[0]))
-    )
+    return RamModel({**others, "F": f[0, 0], "rho": float(np.linalg.norm(rho))}, frame=Axes.along(rho))

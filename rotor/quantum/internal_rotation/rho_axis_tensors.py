@@ -3,7 +3,7 @@
     H = Σ_i χ_i T²(u_i)·T²(I, I)/(2I(2I-1)) + Σ_i C_i Σ_gh (u_i)_gh ½{Φ_g, N_h}·I
 
 with the matrix u_i that a constant multiplies, such as (aa) or (bb) - (cc), in the axes of A, B, C: those of ρ in the RAM, principal
-axes, from which ρ lies at an angle, in the PAM. The torsional functions multiply each tensor by their overlaps.
+axes in the PAM, turned into the axes z, x, y of ρ. The torsional functions multiply each tensor by their overlaps.
 """
 
 from __future__ import annotations
@@ -14,49 +14,51 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rotor.arrays import Floats
+from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes
 from rotor.quantum.operators.algebra import Operator, half_anticommutator
 from rotor.quantum.operators.rotation import body_tensor, j_x, j_y, j_z
 from rotor.quantum.spins.operators import Cosines, CosinesWithN, Rotor
 from rotor.quantum.tensors import cartesian_of, spherical_components
 
 REPRESENTATION = "Ir"  # of the rho-axis frame: z, x, y = a, b, c
-# derivative of the turn from a towards b at angle 0
-TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
-def turned_by(body: Floats, angle: float) -> Floats:
-    """A vector or tensor along the axes of ρ, which lie at an angle (radians) from a towards b."""
-    turn = np.array([[np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+def turned_by(body: Floats, frame: Axes) -> Floats:
+    """A vector or tensor along the axes z, x, y of ρ from that along a, b, c."""
+    turn = frame.matrix
     return np.asarray(turn @ body if body.ndim == 1 else turn @ body @ turn.T)
 
 
-def slope_by_angle(rotor: Rotor) -> Cosines | CosinesWithN:
-    """The derivative of a tensor along the axes of ρ by their angle."""
+def slope_by_tilt(rotor: Rotor, frame: Axes, towards: str) -> Cosines | CosinesWithN:
+    """The derivative, along a, b, c, of a tensor along the axes of ρ by the angle of a turn of ρ towards x or y."""
     assert isinstance(rotor, Cosines | CosinesWithN)
+    z, x, y = frame.matrix
+    other = x if towards == "x" else y
+    turn = np.outer(z, other) - np.outer(other, z)
     matrix = np.array(rotor.components)
-    first, second, third = (TURN @ matrix + matrix @ TURN.T).tolist()
+    first, second, third = (turn @ matrix + matrix @ turn.T).tolist()
     return type(rotor)((tuple(first), tuple(second), tuple(third)))
 
 
-def leaves_plane(rotor: Rotor) -> bool:
-    """Whether a mirror ab changes the sign of some elements of a tensor."""
+def leaves_plane(rotor: Rotor, frame: Axes) -> bool:
+    """Whether the mirror across y changes the sign of some elements of a tensor."""
     assert isinstance(rotor, Cosines | CosinesWithN)
-    matrix = np.array(rotor.components)
+    matrix = turned_by(np.array(rotor.components), frame)
     return bool(matrix[:2, 2].any() or matrix[2, :2].any())
 
 
-def turned_components(components: NDArray[Any], angle: float) -> NDArray[Any]:
-    """Spherical components along the axes of ρ, at an angle (radians, from a towards b) to the tensor's axes; real if possible."""
-    if angle:
-        body = turned_by(cartesian_of(components, REPRESENTATION), angle)
+def turned_components(components: NDArray[Any], frame: Axes) -> NDArray[Any]:
+    """Spherical components along the axes of ρ from those along a, b, c; real if possible."""
+    if frame != PRINCIPAL:
+        body = turned_by(cartesian_of(components, REPRESENTATION), frame)
         components = spherical_components(body, body.ndim, REPRESENTATION)
     return _real(components)
 
 
-def operator_beside_spins(rotor: Rotor, angle: float, has_plane: bool) -> Operator:
-    """T²(c) or Σ_gh c_gh ½{Φ_g, N_h} along the axes of ρ; has_plane: without the components that a mirror ab excludes."""
+def operator_beside_spins(rotor: Rotor, frame: Axes, has_plane: bool) -> Operator:
+    """T²(c) or Σ_gh c_gh ½{Φ_g, N_h} along the axes of ρ; has_plane: without the components that the mirror across y excludes."""
     assert isinstance(rotor, Cosines | CosinesWithN)
-    matrix = turned_by(np.array(rotor.components, dtype=float), angle)
+    matrix = turned_by(np.array(rotor.components, dtype=float), frame)
     if has_plane:
         matrix[:2, 2] = matrix[2, :2] = 0.0
     if isinstance(rotor, Cosines):

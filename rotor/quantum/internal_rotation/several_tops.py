@@ -21,10 +21,10 @@ import numpy as np
 from rotor.arrays import Floats, Ints
 from rotor.quantum.internal_rotation.contracted import ContractedTorsion, Product, Torsion, contracted_torsion
 from rotor.quantum.internal_rotation.exchange import TURNS, ExchangedTops, exchange_axis
-from rotor.quantum.internal_rotation.frames import torsional_kinetics
+from rotor.quantum.internal_rotation.frames import IN_PLANE, torsional_kinetics
 from rotor.quantum.internal_rotation.functions import TorsionRotation
 from rotor.quantum.internal_rotation.species import SpeciesHamiltonian
-from rotor.quantum.internal_rotation.terms import products_of
+from rotor.quantum.internal_rotation.terms import PRINCIPAL, Axes, products_of
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_x, j_y, j_z
 from rotor.quantum.operators.torsion import cosine, p_alpha, sine
@@ -34,7 +34,6 @@ from rotor.tops.internal_rotation import DEFAULT_FUNCTIONS, PAIRS, sigma_species
 AXES = (j_z(), j_x(), j_y())  # P along a, b, c
 EACH = 9  # functions of each top from which products are formed
 ALIKE = 1e-4  # largest difference of the directions (radian) and constants (relative) of equivalent tops: five digits of a file
-IN_PLANE = 1e-12  # a smaller component of ρ across the plane ab is round-off
 Species = tuple[int, ...]  # σ of each top: 0, 1 or -1
 
 
@@ -112,7 +111,7 @@ class SeveralTops:
     tops: tuple[InternalTop, ...]
     between: Mapping[str, float] = field(default_factory=dict)
     axis: str = ""
-    angle: ClassVar[float] = 0.0  # of z from the axis a
+    frame: ClassVar[Axes] = PRINCIPAL  # z, x, y = a, b, c
 
     @property
     def species(self) -> Mapping[str, Species]:

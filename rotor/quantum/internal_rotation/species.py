@@ -33,12 +33,15 @@ class SpeciesHamiltonian:
     """H_b(c) = Σ c_i O_i,b of one species over torsion-rotation functions.
 
     needed: functions whose blocks are made; None for all. Elements of each term are computed at first use, for fits that solve at many
-    values; `solve_once` computes only those of the sum.
+    values; `solve_once` computes only those of the sum. normal: the principal axis along y. by_energy: whether
+    Ka and Kc are always counted by energy inside v_t.
     """
 
     functions: TorsionRotation
     terms: Terms
     needed: NDArray[np.bool_] | None = None
+    normal: str = "c"
+    by_energy: bool = False
 
     @cached_property
     def elements(self) -> Elements:
@@ -96,7 +99,7 @@ class SpeciesHamiltonian:
             highest.append(float(energies[-1]))
         each, numbers, names = (np.concatenate(column) for column in zip(*levels, strict=True))
         members = [rows for rows, _ in linear]
-        return SpeciesLevels(self, members, states, each, numbers, names, max(highest), by_energy)
+        return SpeciesLevels(self, members, states, each, numbers, names, max(highest), by_energy or self.by_energy)
 
     def _zeroth_order(self, linear: FunctionBlocks, coefficients: Floats) -> Floats:
         """⟨J K t|H|J K t⟩ of the functions; s = ±1 share their mean, which leaves out the coupling of K and -K."""
@@ -163,7 +166,7 @@ class SpeciesLevels:
         if self.by_energy:
             k, kc = counted_ka_kc(j, v, self.energies)
         elif self.functions.has_parity:
-            kc = kc_of_parity(j, k, self._parity(name, v))
+            kc = kc_of_parity(j, k, self._parity(name, v) * np.where((k % 2 == 1) & (self.source.normal == "b"), -1, 1))
         else:
             kc = kc_of_pairs({"J": j, "vt": v}, k, self.energies)
         return {"j": j, "vt": v, "k": k, "ka": np.abs(k), "kc": kc}

@@ -26,45 +26,72 @@ from dataclasses import dataclass
 from functools import lru_cache, reduce
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from rotor.arrays import Floats
 from rotor.checks import did_you_mean, first_names
+from rotor.quantum.basis.labelled import Basis, rotation_labels
 from rotor.quantum.internal_rotation.contracted import Product
+from rotor.quantum.internal_rotation.frames import frame_along
 from rotor.quantum.operators.algebra import UNIT, Operator, half_anticommutator
 from rotor.quantum.operators.rotation import j_squared, j_x, j_y, j_z, ladder, sum_of_powers
 from rotor.quantum.operators.torsion import cosine, p_alpha, sine
 from rotor.tops.internal_rotation import BARRIERS, NAMED, SPELLED
 from rotor.tops.operators import Operators, distortion_terms
 
+Rows = tuple[tuple[float, float, float], ...]
+MOST_STEPS = 4  # J whose elements show the phase of operators with up to eight steps of K
+
 
 @dataclass(frozen=True)
 class Axes:
-    """Components of P along a, b, c, as operators in the frame whose z is along ρ, which lies at `angle` (radians) from a towards b."""
+    """Components of P along a, b, c, as operators in the frame whose z is along ρ. rows: the axes z, x, y of that frame along a, b, c."""
 
-    angle: float = 0.0
+    rows: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+    @classmethod
+    def along(cls, rho_abc: ArrayLike) -> Axes:
+        """The axes of the rho-axis frame of ρ along a, b, c."""
+        return cls._of(frame_along(rho_abc))
+
+    @classmethod
+    def _of(cls, matrix: Floats) -> Axes:
+        first, second, third = (tuple(row) for row in matrix.tolist())
+        return cls((first, second, third))
 
     @property
-    def a(self) -> Operator:
-        """Pa = cos θ Pz - sin θ Px."""
-        return j_z() if not self.angle else np.cos(self.angle) * j_z() - np.sin(self.angle) * j_x()
+    def matrix(self) -> Floats:
+        """The cosines (z, x, y; a, b, c)."""
+        return np.array(self.rows)
 
     @property
-    def b(self) -> Operator:
-        """Pb = sin θ Pz + cos θ Px."""
-        return j_x() if not self.angle else np.sin(self.angle) * j_z() + np.cos(self.angle) * j_x()
+    def normal(self) -> str:
+        """The axis a, b or c along y, across a plane that contains ρ; "" if y is along none of them."""
+        others = np.flatnonzero(np.array(self.rows[2]))
+        return "abc"[others[0]] if len(others) == 1 else ""
 
-    @property
-    def c(self) -> Operator:
-        """Pc = Py."""
-        return j_y()
+    def turned(self, towards: str, angle: float) -> Axes:
+        """The axes after z has turned towards x or y by an angle (radians)."""
+        cosine, sine = np.cos(angle), np.sin(angle)
+        z, x, y = self.matrix
+        if towards == "x":
+            return self._of(np.array([cosine * z + sine * x, cosine * x - sine * z, y]))
+        return self._of(np.array([cosine * z + sine * y, x, cosine * y - sine * z]))
+
+    def component(self, letter: str) -> Operator:
+        """Pa, Pb or Pc from Pz, Px, Py."""
+        cosines = [row["abc".index(letter)] for row in self.rows]
+        return sum((x * axis for x, axis in zip(cosines, (j_z(), j_x(), j_y()), strict=True) if x), Operator())
 
     def distortion(self, operators: Operators) -> Operator:
         """Σ c P^2p ½[Pa^2q, P₊^2n + P₋^2n]₊ over a table {(p, q, n): c}, P± = Pb ∓ i Pc stepping along a."""
-        if not self.angle:
+        if self == PRINCIPAL:
             return sum_of_powers(operators)
-        up, down = self.b - 1j * self.c, self.b + 1j * self.c
+        a, b, c = (self.component(letter) for letter in "abc")
+        up, down = b - 1j * c, b + 1j * c
         total = Operator()
         for (p, q, n), factor in operators.items():
-            axial = self.a ** (2 * q)
+            axial = a ** (2 * q)
             steps = half_anticommutator(axial, up ** (2 * n) + down ** (2 * n)) if n else axial
             total = total + factor * (j_squared(p) @ steps)
         return total
@@ -96,7 +123,7 @@ def products_of(name: str, sigma: int, axes: Axes = PRINCIPAL) -> tuple[Product,
             f"{name!r} is no term of internal rotation: known are {first_names(accepted)}, and operators such as J2p2 or "
             f"Jz1p1cos3{did_you_mean(name, accepted)}"
         )
-    if axes.angle:
+    if axes != PRINCIPAL:
         raise ValueError(f"{name}: terms that are spelled as operators belong to the rho-axis frame")
     return (_spelled(match, sigma),)
 
@@ -104,7 +131,7 @@ def products_of(name: str, sigma: int, axes: Axes = PRINCIPAL) -> tuple[Product,
 @lru_cache(maxsize=8)
 def _named(sigma: int, axes: Axes) -> Mapping[str, Product]:
     """Operators of the table of this module."""
-    a, b, c = axes.a, axes.b, axes.c
+    a, b, c = (axes.component(letter) for letter in "abc")
     plane = b @ b - c @ c
     p, p2 = p_alpha(sigma), p_alpha(sigma, 2)
     hindering = UNIT - cosine(1)
@@ -135,6 +162,13 @@ def _named(sigma: int, axes: Axes) -> Mapping[str, Product]:
         "DabJ": Product(j_squared() @ ab),
         "DabK": Product(half_anticommutator(a**3, b)),
     }
+
+
+@lru_cache(maxsize=256)
+def is_real(name: str, axes: Axes = PRINCIPAL) -> bool:
+    """Whether the operator of a constant is real in |J K⟩|K t⟩."""
+    rotations = [product.rotation for product in products_of(name, 0, axes)]
+    return not np.iscomplexobj(Basis(rotation_labels(MOST_STEPS)).elements(rotations).values)
 
 
 def torsional_products(sigma: int) -> dict[str, tuple[Product, ...]]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rotor.arrays import Floats, Ints
 
@@ -32,10 +33,10 @@ def is_dominated(size: int, count: int) -> bool:
     return size > SMALL and 0 < count <= SHARE * size
 
 
-def dominated_states(lower: Any, chosen: Ints) -> tuple[Floats, Floats] | None:
+def dominated_states(lower: Any, chosen: Ints) -> tuple[Floats, NDArray[Any]] | None:
     """Energies (p,), rising, and vectors (n, p) of the p states with the largest shares in p chosen functions.
 
-    lower: sparse lower triangle of a real symmetric matrix in MHz. None where all states are to be solved instead: for a small matrix, many
+    lower: sparse lower triangle of a Hermitian matrix in MHz. None where all states are to be solved instead: for a small matrix, many
     functions, and without convergence.
 
     >>> from scipy.sparse import csr_array
@@ -47,16 +48,16 @@ def dominated_states(lower: Any, chosen: Ints) -> tuple[Floats, Floats] | None:
     True
     """
     size, count = lower.shape[0], len(chosen)
-    if not is_dominated(size, count) or np.iscomplexobj(lower):
+    if not is_dominated(size, count):
         return None
-    diagonal = lower.diagonal()
-    whole = (lower + lower.T).tocsr()
+    diagonal = lower.diagonal().real
+    whole = (lower + lower.conj().T).tocsr()
     whole.setdiag(diagonal)
     image = whole[:, chosen].toarray()  # of H on the space: the chosen functions, then `beyond`
-    inner, beyond = image[chosen], np.zeros((size, 0))
+    inner, beyond = image[chosen], np.zeros((size, 0), dtype=image.dtype)
     for _ in range(STEPS):
         energies, mixing = np.linalg.eigh(inner)
-        best = np.sort(np.argsort(-(mixing[:count] ** 2).sum(axis=0), kind="stable")[:count])
+        best = np.sort(np.argsort(-(np.abs(mixing[:count]) ** 2).sum(axis=0), kind="stable")[:count])
         energies, mixing = energies[best], mixing[:, best]
         vectors = beyond @ mixing[count:]
         vectors[chosen] = mixing[:count]
@@ -73,16 +74,16 @@ def dominated_states(lower: Any, chosen: Ints) -> tuple[Floats, Floats] | None:
             step[chosen] = 0.0  # r is 0 there, and E - D small
         more = _orthonormal(step, beyond)
         applied = whole @ more
-        beside = np.vstack([applied[chosen], beyond.T @ applied])
-        inner = np.block([[inner, beside], [beside.T, more.T @ applied]])
+        beside = np.vstack([applied[chosen], beyond.conj().T @ applied])
+        inner = np.block([[inner, beside], [beside.conj().T, more.conj().T @ applied]])
         beyond, image = np.hstack([beyond, more]), np.hstack([image, applied])
     return None
 
 
-def _orthonormal(vectors: Floats, space: Floats) -> Floats:
+def _orthonormal(vectors: NDArray[Any], space: NDArray[Any]) -> NDArray[Any]:
     """The part of vectors outside a space as orthonormal columns; again where rounding has left some of the space."""
-    outside = np.linalg.qr(vectors - space @ (space.T @ vectors))[0]
-    inside = space.T @ outside
+    outside = np.linalg.qr(vectors - space @ (space.conj().T @ vectors))[0]
+    inside = space.conj().T @ outside
     if np.abs(inside).max(initial=0.0) < ORTHOGONAL:
         return np.asarray(outside)
     return np.asarray(np.linalg.qr(outside - space @ inside)[0])

@@ -88,8 +88,8 @@ def test_levels_do_not_depend_on_the_frame():
         {"V3": 1e3 * CYCLOTENE["V3"], **{name: ram[name] for name in ("F", "rho", "Dab")}}, "RAM", vt_max=0
     )
     constants = rotor.Constants(**{name: ram[name] for name in "ABC"}, reduction="A", representation="Ir")
-    angle = turning_tops(top, top.internal_rotation).angle
-    turned = (0.1 * np.cos(angle) + 1.2 * np.sin(angle), 1.2 * np.cos(angle) - 0.1 * np.sin(angle), 0.0)
+    cosine, sine, _ = turning_tops(top, top.internal_rotation).frame.rows[0]
+    turned = (0.1 * cosine + 1.2 * sine, 1.2 * cosine - 0.1 * sine, 0.0)
     same = rotor.Top.from_constants(constants, dipole_abc_debye=turned, internal_rotation=internal)
     ours, others = (rotor.line_list(one, jmax=4, q=1.0, min_lgint=None) for one in (top, same))
     assert (
