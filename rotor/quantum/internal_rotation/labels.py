@@ -7,8 +7,8 @@ Where they do not (methanol), labels follow the torsional curves; largest coeffi
 nearly free top take the signed K of largest weight, one to one, because their curves cross without interaction.
 
 Kc of levels with σ = 0 follows from parity: C2 about the axis across the plane of symmetry is s p (-1)^J, p the parity of the torsional
-function at K = 0; it is (-1)^Kc for the axis c, (-1)^(Ka + Kc) for b. E levels have signed K; the lower level of a pair ±K is called Kc = J - K + 1, the upper Kc = J - K, as at a
-high barrier, where they are the levels of a rigid top.
+function at K = 0; it is (-1)^Kc for the axis c, (-1)^(Ka + Kc) for b. E levels have signed K; the lower level of a pair ±K is called
+Kc = J - K + 1, the upper Kc = J - K, as at a high barrier, where they are the levels of a rigid top.
 """
 
 from __future__ import annotations
