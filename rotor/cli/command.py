@@ -348,7 +348,8 @@ def scene_writer(outcome: Outcome, typed: Mapping[str, Any]) -> Any:
 
 def note(text: str) -> None:
     """Print a remark on standard error."""
-    print("note:", text, file=sys.stderr)
+    clear = "\r\x1b[2K" if sys.stderr.isatty() else ""  # of the time of work that goes on
+    print(f"{clear}note:", text, file=sys.stderr)
 
 
 def deliver(

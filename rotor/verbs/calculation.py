@@ -54,7 +54,8 @@ class Calculation:
         inputs = {name for name, value in entered.items() if value is not None}
         files = {f"{OUTPUTS}{name}" for name in work.files}
         refuse_misfits(verb.named, inputs | files, self.entries.style)
-        request, subject = verb.read(self.entries, Place(self.folder, work.note))
+        with _shown_time(work.progress):  # an .int file is predicted here
+            request, subject = verb.read(self.entries, Place(self.folder, work.note))
         if missing := next((each.flag for each in verb.outputs if each.required and each.name not in work.files), ""):
             raise ValueError(f"{missing} is missing; --help shows what the command takes")
         if verb.adapt is not None:
@@ -161,7 +162,9 @@ class Outcome:
         """Data of the report, the JSON and the files."""
         verb, work, answer = self.verb, self.calculation.work, self.answer
         head = self.calculation.provenance
-        content = {"rotor_version": version(), **head, **verb.facts(answer), **verb.content(answer, work.shown)}
+        with _shown_time(work.progress):
+            facts = {**verb.facts(answer), **verb.content(answer, work.shown)}
+        content = {"rotor_version": version(), **head, **facts}
         stated = {name: plain(content[name]) for name in ("errors", *verb.stated) if name in content}
         with_spins = f"rotor {verb.name if HYPERFINE in verb.fields else 'spectrum'} --hyperfine"
         sources = bool(getattr(work.shown, "sources", False))

@@ -57,6 +57,26 @@ def test_a_bar_takes_the_place_of_the_time(monkeypatch):
     assert progress._Display.bars == 0
 
 
+def test_a_prediction_from_an_int_file_shows_its_time_and_notes_begin_a_line(monkeypatch, folder):
+    """Such files are predicted where inputs are read: predictions of minutes showed nothing."""
+    from rotor import cli
+    from rotor.formats.spcat import predict
+
+    predict_file = predict.predict_file
+
+    def slow(*arguments, **basis):
+        time.sleep(0.3)
+        return predict_file(*arguments, **basis)
+
+    monkeypatch.setattr(predict, "predict_file", slow)
+    (folder / "a.var").write_text("linear\n 1 1\nl 1 1 0 0 0 1 1 1 0\n 100 6081.0 1e-37\n")
+    (folder / "a.int").write_text("linear\n0 1 0.5 0 3 -10. -10. 99.9 300.0\n 1 0.7\n")
+    terminal = on_terminal(monkeypatch)
+    assert cli.run(["spectrum", "a.int"]) == 0
+    assert "\rcomputing: 0 s " in terminal.getvalue()
+    assert "\r\x1b[2Knote: QROT = 0.5" in terminal.getvalue()
+
+
 def test_a_pipe_shows_nothing(monkeypatch):
     stream = io.StringIO()
     monkeypatch.setattr(sys, "stderr", stream)

@@ -38,10 +38,11 @@ class GroupLines(NamedTuple):
 
 
 def group_transitions(group: Group, levels: Levels, request: Request) -> Transitions:
-    """The transitions between existing levels of equal weight in a group that may pass the cut of an .int file.
+    """The transitions between existing levels in a group that may pass the cut of an .int file.
 
     group: the connected states. levels: their levels. request: temperature, partition function and limits.
-    Returns: frequencies in MHz and strengths in D². Lines between unequal weights are left out, as in SPCAT.
+    Returns: frequencies in MHz and strengths in D². Lines between unequal weights are left out, as in SPCAT;
+    with an n-fold axis those between Wang blocks without a common weight.
     """
     if not (group.effect.moments or group.effect.others):
         none = np.zeros(0, dtype=np.int32)  # int32 halves the memory of rows

@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import product
 
 from rotor.formats.spcat.hamiltonian.code_table import state_digits
-from rotor.formats.spcat.hamiltonian.codes import NO_NAME, PLURAL_NOT_YET, is_linear, is_oblate
+from rotor.formats.spcat.hamiltonian.codes import NO_NAME, is_linear, is_oblate
 from rotor.formats.spcat.hamiltonian.states import FOLDS, SPECIES, odd_under
 from rotor.formats.spcat.text.int_file import Dipole, IntensityFile, Request
 from rotor.formats.spcat.text.par import Options
@@ -64,8 +64,8 @@ def class_weights(options: Options, symmetric: bool = True) -> dict[str, int]:
 def _fold_weights(options: Options, plus: int, minus: int, symmetric: bool) -> dict[str, int]:
     """Twice the weights of K = 0 and of the E levels; of a threefold axis, Wang blocks whose WTPL or WTMN is 0 have no E levels."""
     factor = 100 if options.ewt >= 0 else 1000  # EWT has two or three digits for the weight, by its sign
-    if abs(options.ewt) >= factor - 1:
-        raise ValueError(f"EWT = {options.ewt}: l-doubled states, and E levels without a weight, {PLURAL_NOT_YET}")
+    if abs(options.ewt) >= factor:
+        raise ValueError(f"EWT = {options.ewt}: l-doubled states {NO_NAME}")
     if plus != minus and not symmetric:
         raise ValueError(f"IAX = {options.iax} of an asymmetric top with unlike WTPL and WTMN {NO_NAME}")
     # a negative weight marks missing levels: 0 of them

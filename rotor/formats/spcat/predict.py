@@ -87,8 +87,9 @@ def predict(
 ) -> Prediction:
     r"""The catalogue that SPCAT makes of its two input files, from true eigenvalues.
 
-    A line is listed when both its J (F, without nuclear spins) lie from FBGN to FEND, its two levels have one nuclear-spin
-    weight, its frequency lies below FQLIM, and its intensity, that of one component of a K doublet, is above
+    A line is listed when both its J (F, without nuclear spins) lie from FBGN to FEND, its two levels have the same nuclear-spin
+    weight (with an axis of threefold or higher symmetry: their Wang blocks have a weight in common, so that the two levels may weigh
+    WTPL and WTMN), its frequency lies below FQLIM, and its intensity, that of one component of a K doublet, is above
     10^STR0 + 10^STR1 (ν/300 GHz)² nm² MHz.
 
     parameters: the .var or .par file. intensities: the .int file. as_spcat: reproduce SPCAT's numbers even where it errs: QROT below 1,

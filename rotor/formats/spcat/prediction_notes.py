@@ -22,10 +22,12 @@ from rotor.formats.spcat.hamiltonian.phases import with_dipoles
 from rotor.formats.spcat.hamiltonian.states import StateOptions
 from rotor.formats.spcat.solved_groups import SolvedGroup, highest_n
 from rotor.formats.spcat.text.int_file import IntensityFile, Request
-from rotor.formats.spcat.text.par import ParameterFile, npar_notes
+from rotor.formats.spcat.text.par import Options, ParameterFile, npar_notes
 from rotor.quantum.levels import Levels
 
 SAME_MHZ = 1e-6  # round-off of energies
+UNSTATED = Options().ewt
+SHOWN = 3  # notes of one kind; up to 999 states of a file may have the same
 
 
 def prediction_notes(
@@ -39,8 +41,9 @@ def prediction_notes(
     coded, groups = coded_file(parameters), [each.group for each in solved]
     highest = highest_n(parameters, intensities.request)
     yield from npar_notes(parameters)
-    yield from coded.left_out
-    yield from _empty_states(coded)
+    yield from _abridged(list(coded.left_out), "parameters are left out likewise")
+    yield from _abridged(_empty_states(coded), "states have no parameters of their own either")
+    yield from _unstated_weights(coded)
     yield from _moment_notes(coded, intensities, as_spcat)
     if any(group.diag < 0 and not group.is_diagonal for group in groups):
         yield UNDIAGONALIZED_NOTE
@@ -53,6 +56,11 @@ def prediction_notes(
     yield from _request_notes(intensities.request, as_spcat)
 
 
+def _abridged(notes: list[str], further: str) -> list[str]:
+    """Notes of one kind: all of them, or the first few and the number of the others."""
+    return notes if len(notes) <= SHOWN + 1 else [*notes[:SHOWN], f"{len(notes) - SHOWN} more {further}"]
+
+
 def _empty_states(coded: CodedFile) -> list[str]:
     """A note for each state beyond the first without parameters of its own, whose levels are those of another state."""
     named = {v for digits in coded.digits for v in digits.states or ()} | coded.members
@@ -60,6 +68,16 @@ def _empty_states(coded: CodedFile) -> list[str]:
         f"state {v} has no parameter of its own, not even an energy (V1 = V2 = {v}), alone those of all states; NVIB says that it exists"
         for v in range(1, len(coded.states))
         if v not in named
+    ]
+
+
+def _unstated_weights(coded: CodedFile) -> list[str]:
+    """A note on E levels with the weight that SPCAT takes where an option line states none."""
+    unstated = [state for state in coded.states if state.has_e_levels and state.e_weight == UNSTATED]
+    return [
+        f"levels of E species weigh {UNSTATED}, which SPCAT takes where an option line has no EWT; the others weigh "
+        f"{max(state.plus, state.minus)}; state EWT if it is not {UNSTATED}"
+        for state in unstated[:1]
     ]
 
 
@@ -88,11 +106,12 @@ def _choice(program: str, as_spcat: bool) -> str:
 def _moment_notes(coded: CodedFile, intensities: IntensityFile, as_spcat: bool) -> list[str]:
     """Notes on dipole lines for which SPCAT deviates from its documentation, and on their phases."""
     count, oblate = len(coded.states), coded.oblate
-    notes = [
+    missing = [
         f"dipole {dipole.code} is left out, as SPCAT does: state {v} does not exist, NVIB = {count} counts from 0"
         for dipole in intensities.dipoles
         if (v := split_dipole(dipole.code, count).states[1]) >= count
     ]
+    notes = _abridged(missing, "dipoles are left out likewise")
     dipoles, others = split_dipoles(intensities.dipoles, count)
     wrong = [str(dipole.code) for dipole, code in others if deviates_in_spcat(code, coded.axes)]
     if wrong:
@@ -166,14 +185,24 @@ def _energies(solved: Iterable[tuple[Group, Levels]], twice_f: int) -> tuple[dic
 
 
 def _falling_diagonal_notes(groups: Iterable[Group], diag: int, highest_n: int) -> list[str]:
-    """A note for DIAG = 0 if the diagonal of the Hamiltonian falls with K, so that labels by energy differ from those by K."""
-    falls = [n for group in groups if (n := group.falls_from(highest_n)) is not None]
-    if diag or not falls:
-        return []
-    return [
-        f"from N = {min(falls)} on the diagonal of the Hamiltonian falls with K (rises, in an oblate basis): SPCAT with DIAG = 0 lists "
-        "diagonal elements there, or names levels by energy; these are eigenvalues, with the K of their largest share if it is above 1/2"
+    """A note if the diagonal of the Hamiltonian falls with K, so that labels by energy (DIAG 0 and 3) differ from those by K.
+
+    With DIAG = 3 it matters for the weights of an axis of threefold or higher symmetry, which follow the K of the label.
+    """
+    falls = [
+        n
+        for group in groups
+        if diag == 0 or (diag == 3 and any(state.has_e_levels for state in group.states))
+        if (n := group.falls_from(highest_n)) is not None
     ]
+    said = {
+        0: "SPCAT with DIAG = 0 lists diagonal elements there, or names levels by energy; these are eigenvalues, with the K of their "
+        "largest share if it is above 1/2",
+        3: "where K is mixed, DIAG = 3 names levels by energy, and the weights of A and E levels follow the K of these names; DIAG = 1 "
+        "has the K of the largest share",
+    }
+    where = "the diagonal of the Hamiltonian falls with K (rises, in an oblate basis)"
+    return [f"from N = {min(falls)} on {where}: {said[diag]}"] if falls else []
 
 
 def _full_basis_notes(states: Iterable[StateOptions], highest_n: int) -> list[str]:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import field, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -107,7 +108,7 @@ class StateConstants:
         >>> StateConstants({"E[1]": 5.0, "B[1]": 3.0}).for_state(1)
         {'E': 5.0, 'B': 3.0}
         """
-        return {name.partition("[")[0]: self.values[name] for name, states in self._states.items() if states == (v,)}
+        return {name.partition("[")[0]: self.values[name] for name in self._names.get((v,), ())}
 
     of_state = Renamed("for_state")
 
@@ -145,9 +146,17 @@ class StateConstants:
                 )
         return tuple(notes)
 
-    @property
+    @cached_property
     def _states(self) -> dict[str, tuple[int, ...]]:
         return {name: state_numbers(name) for name in self.values}
+
+    @cached_property
+    def _names(self) -> dict[tuple[int, ...], list[str]]:
+        """Names of the constants by their state or states."""
+        out = dict[tuple[int, ...], list[str]]()
+        for name, states in self._states.items():
+            out.setdefault(states, []).append(name)
+        return out
 
     def _refuse_unknown_states(self) -> None:
         numbers = {0} | {states[0] for states in self._states.values() if len(states) == 1}

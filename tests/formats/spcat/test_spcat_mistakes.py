@@ -99,6 +99,37 @@ def test_what_a_prediction_passes_over_is_said(call, par: str, request_text: str
     assert said in " ".join(err.split())
 
 
+def test_what_many_states_have_in_common_is_said_three_times_and_counted(call):
+    _files(PAR.replace("a 1 2", "a 1 9"), INT + "".join(f"1{v}1 1.2\n" for v in "9999999"), suffix=".var")
+    _, _, err = call("spectrum", "case.int", "--top", "0")
+    assert err.count("has no parameter of its own") == 3
+    assert "note: 4 more states have no parameters of their own either\n" in err
+    assert err.count("dipole 191 is left out") == 3
+    assert "note: 4 more dipoles are left out likewise\n" in err
+
+
+TOP = "ammonia\n 4 1\ns -1 1 0 20 0 6 4 4 {}\n 1000 300.0 1e-37\n 100 5000.0 1e-37\n 2000 -30.0 1e-37\n 60000 1e-6 1e-37\n"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("", "levels of E species weigh 99, which SPCAT takes where an option line has no EWT; the others weigh 4"),
+        (
+            "0 2 3",
+            "from N = 4 on the diagonal of the Hamiltonian falls with K (rises, in an oblate basis): where K is mixed, DIAG = 3",
+        ),
+        ("0 2 1", ""),
+    ],
+)
+def test_weights_of_a_threefold_axis_that_may_surprise_are_said(call, options: str, said: str):
+    _files(TOP.format(options), "x\n0 1 1000 0 6 -20. -20. 9000.0 300.0\n1 1.0\n", suffix=".var")
+    code, _, err = call("spectrum", "case.int", "--top", "0")
+    assert code == 0
+    assert said in " ".join(err.split())
+    assert bool(said) == ("weigh" in err)
+
+
 def test_correlations_behind_the_parameters_are_no_parameter(call):
     _files(PAR + " 1.0000000 0.1200000 0.9900000\n", suffix=".var")
     assert "does not count" not in call("spectrum", "case.int", "--top", "0")[2]

@@ -70,6 +70,11 @@ class StateOptions:
         return FOLDS[self.iax].n if self.iax in FOLDS else 0
 
     @property
+    def has_e_levels(self) -> bool:
+        """Whether the weights tell levels of E species from others."""
+        return self.iax in FOLDS and bool(FOLDS[self.iax].paired) and self.equivalent < 3
+
+    @property
     def equivalent(self) -> int:
         """Number of last spins that are coupled to a total first: 0, 2 or 3."""
         return (3 if self.fold == 3 else 2) if self.i_tot else 0

@@ -244,13 +244,16 @@ def test_weights_of_other_option_lines():
         (Options(iax=-6), "IAX = -6"),
         (Options(iax=4, wtmn=3), "IAX = 4"),
         (Options(iax=6, ewt=102), "EWT = 102: l-doubled"),
-        (Options(iax=6, ewt=99), "EWT = 99"),
         (Options(iax=2, wtmn=3, spind=-1), "IAX = 2 in a symmetric top"),
     ],
 )
 def test_weights_that_are_not_computed_yet_are_refused(options, words):
     with pytest.raises(ValueError, match=words):
         model.option_weights(options)
+
+
+def test_the_weight_that_an_option_line_without_ewt_has_is_a_weight():
+    assert model.option_weights(Options(iax=6, wtpl=4, wtmn=4, ewt=99)).to_mapping() == {"0": 4, "1": 99, "2": 99}
 
 
 def test_weights_of_a_threefold_axis_with_one_class_missing():
