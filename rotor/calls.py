@@ -132,10 +132,10 @@ class Result(Outcome):
         return saved_scene(self, Path(folder), {})
 
     def plan(self) -> Any:
-        """Method, cost and neglected effects, as `rotor plan` of the scene."""
-        from rotor.scenes.plan import plan_of
+        """Method, cost and neglected effects, as `rotor plan` of a scene."""
+        from rotor.scenes.plan import plan_of_calculation
 
-        return plan_of(self.scene())
+        return plan_of_calculation(self.calculation)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):

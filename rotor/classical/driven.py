@@ -16,12 +16,11 @@ from rotor.checks import require_between
 from rotor.classical.bodies import NamedBody
 from rotor.classical.effect import BODY_EFFECTS, DEFAULT_TOLERANCE, ClassicalEffect
 from rotor.classical.euler import checked_moments, checked_momentum, checked_velocity
-from rotor.classical.integrators.lie_runge_kutta import LieRungeKutta
+from rotor.classical.integrators.lie_runge_kutta import ORDER, LieRungeKutta
 from rotor.classical.integrators.method import Method, Motion, integrate
 from rotor.classical.motion import COHERENT, MotionTable, Units
 from rotor.classical.step_errors import driven_budget, step_truncation
 from rotor.classical.system import flatten_system, total_momentum
-from rotor.classical.tolerance_search import ORDER
 from rotor.classical.tumble import Three
 from rotor.requests.budget import ErrorBudget
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from rotor.classical.integrators.lie_runge_kutta import ORDER
 from rotor.classical.motion_steps import BEGINNINGS, MOST_STEPS, beginning, expected_steps, is_compiled
 from rotor.classical.step_errors import error_by_finer, step_rounding
 from rotor.requests.knob import Estimate, Prediction, Sought, first_by_proportion
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
 LOOSEST, FINEST, FINEST_REFERENCE = 3, 13, 14  # decades: tolerances of 1e-3, 1e-13 and 1e-14
 FINER = 2  # decades of a reference
-ORDER = 8  # of the adaptive method: steps go with the tolerance to the power -1/8
 CHAOS = "the motion is chaotic or too long for double precision"
 LONG_STEPS, LONG_PLAIN_STEPS = 1_000_000, 4000  # of a motion, compiled or not: about a second
 REGULAR = 2.0  # the power of the time with which the error of a regular motion grows at the most
@@ -90,7 +90,9 @@ def predicted_tolerance(sought: Sought) -> Prediction | None:
     if not _is_long(sought.request, sought.accuracy):
         return None
     _refuse_endless(sought.request, sought.accuracy)
-    return Prediction(*_pilot(sought.request, sought.accuracy), 1.0 + 10.0 ** (FINER / ORDER))
+    return Prediction(
+        *_pilot(sought.request, sought.accuracy), 1.0 + 10.0 ** (FINER / ORDER)
+    )  # steps go with the tolerance to the power -1/8
 
 
 def _is_long(request: DrivenRequest, allowed: float) -> bool:

@@ -22,6 +22,15 @@ from rotor.units import DEBYE_PER_E_ANGSTROM, QUADRUPOLE_MHZ_PER_BARN_AU
 _UNTURNED = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 ELECTRONIC = ("even", "odd")  # parity of the electronic state under half turns
+SIGMA_MINUS = (
+    "B",
+    "O",
+    "Si",
+    "S",
+    "Ge",
+    "Se",
+    "Te",
+)  # X2 with the ground state 3Σg- (K. P. Huber and G. Herzberg 1979)
 FEW_ATOMS = 100  # up to which all distances are as quick as a k-d tree
 CLOSEST_ANGSTROM = 0.1  # no two nuclei of a molecule come nearer; H2 has 0.74 Å
 
@@ -37,7 +46,8 @@ class Molecule:
     multiplicity : 2S + 1 of the electrons. None: not known
     electron_spin_mhz : largest constant of the electron spin, such as |lambda| of a triplet. None: not known
     electronic : "even" if half turns leave the electronic state unchanged, as for closed shells; "odd" if half turns that exchange
-        like nuclei change its sign, as for Σg- of O2. Used for nuclear-spin weights
+        like nuclei change its sign, as for Σg- of O2. Used for nuclear-spin weights. By default that of the ground state of O2, S2 and the
+        like, which are triplets then, and "even" for others
     dipole_debye : (3,) array in the frame of the positions, D, pointing from negative to positive; for an ion relative
         to its centre of mass. None: not known
     dipole_source : origin of the dipole
@@ -68,7 +78,7 @@ class Molecule:
     charge: int = 0
     multiplicity: int | None = None
     electron_spin_mhz: float | None = None
-    electronic: str = "even"
+    electronic: str = ""
     dipole_debye: Floats | None = None
     dipole_source: str = ""
     polarizability_angstrom3: Floats | None = None
@@ -91,10 +101,13 @@ class Molecule:
         _refuse_lopsided(self.polarizability_angstrom3)
         for key in ("quadrupole_mhz", "field_gradients_au"):
             object.__setattr__(self, key, _checked_tensors(getattr(self, key), len(nuclei), key))
+        object.__setattr__(self, "notes", tuple(self.notes))
         charge = float(_checked(self.charge, (), "charge"))
         if not charge.is_integer():
             raise ValueError(f"charge {charge:g}: expected a whole number of elementary charges")
 
+        if not self.electronic:
+            self._take_ground_state([nucleus.symbol for nucleus in nuclei], charge)
         _refuse_multiplicity(self.multiplicity, sum(nucleus.element_number for nucleus in nuclei) - int(charge))
         if self.electron_spin_mhz is not None and not 0 < self.electron_spin_mhz < np.inf:
             raise ValueError(f"electron_spin_mhz {self.electron_spin_mhz!r}: expected a finite number above 0")
@@ -105,7 +118,16 @@ class Molecule:
         object.__setattr__(self, "mass_numbers", tuple(nucleus.mass_number for nucleus in nuclei))
         object.__setattr__(self, "positions_angstrom", positions)
         object.__setattr__(self, "charge", int(charge))
-        object.__setattr__(self, "notes", tuple(self.notes))
+
+    def _take_ground_state(self, symbols: list[str], charge: float) -> None:
+        """Set parity and multiplicity where the elements alone tell the electronic ground state; even otherwise."""
+        first = symbols[0]
+        triplet = symbols == [first, first] and first in SIGMA_MINUS and not charge and self.multiplicity in (None, 3)
+        object.__setattr__(self, "electronic", "odd" if triplet else "even")
+        if triplet:
+            object.__setattr__(self, "multiplicity", 3)
+            text = f"{first}2 is taken in its ground state 3Σg-: spin weights and degeneracy of the electrons are those of this triplet"
+            object.__setattr__(self, "notes", (*self.notes, text))
 
     @cached_property
     def nuclei(self) -> tuple[Isotope, ...]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rotor.frozen import dataclass
 
 _ISOTOPE_SYMBOLS = {"D": ("H", 2), "T": ("H", 3)}
+DUMMIES = ("X", "Xx", "Du", "Bq", "Gh")  # of Z-matrices, ghost functions and fixed points
 _MASS_FIRST = re.compile(r"(\d+)-?([A-Za-z]{1,2})")
 _MASS_LAST = re.compile(r"([A-Za-z]{1,2})-?(\d+)")
 
@@ -143,6 +144,8 @@ def _split(name: str) -> tuple[str, int | None]:
         element, number = match[1], int(match[2])
     else:
         element, number = name, None
+    if element.capitalize() in DUMMIES:
+        raise ValueError(f"{name!r} is a dummy atom, without a nucleus: remove it")
     if element not in _lines():
         raise ValueError(f"{name!r} is not an element or isotope{_near(element)}; write 'C', '13C' or 'D'")
     return element, number
@@ -162,6 +165,8 @@ def element_symbol(number: int) -> str:
     >>> element_symbol(6)
     'C'
     """
+    if number == 0:
+        raise ValueError("an atom of number 0, 'X', is a dummy atom, without a nucleus: remove it")
     for symbol, lines in _lines().items():
         if lines[0].split(",", 2)[1] == str(number):
             return symbol

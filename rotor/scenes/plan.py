@@ -54,8 +54,12 @@ def plan_of(scene: Scene, folder: Where = ".", out: Where = ".") -> Plan:
     if is_sweep(scene, folder):
         raise ValueError("molecule: a list of molecules; a plan is of one: name a molecule of the list in its place")
     files_of(scene, out)
-    calculation = scene_calculation(scene, folder)
-    with naming(calculation.verb.named, "key"):
+    return plan_of_calculation(scene_calculation(scene, folder))
+
+
+def plan_of_calculation(calculation: Calculation) -> Plan:
+    """The plan of a verb with its inputs."""
+    with naming(calculation.verb.named, calculation.entries.style):
         plan, choice = _plan(calculation)
         if plan.seconds <= SHORT_RUN and plan.memory_mb <= SMALL_MB:
             plan = _with_outcome(plan, calculation, choice)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from rotor import units
 
 if TYPE_CHECKING:
@@ -15,8 +13,9 @@ if TYPE_CHECKING:
 
 LARGEST_DEFECT = 0.1  # relative to I_c; the largest in the library is 0.028, of water
 LARGEST_DIPOLE_DEBYE = 20.0  # the largest in the library is 4.5 D
-SHORTEST_BOND_TWICE = 1.3  # Å; H2 has 0.74 Å = 1.40 bohr: smaller numbers are not coordinates in bohr
 BOND_UP_TO = 1.3  # longest bond, relative to the sum of covalent radii (Cordero et al. 2008, as in ASE)
+SHORTEST_BOND_TWICE = 1.3  # Å; H2 has 0.74 Å = 1.40 bohr: smaller numbers are not coordinates in bohr
+FEW_PARTS = 4  # of a complex, whose numbers of atoms a note lists
 DEBYE_PER_ATOMIC_UNIT = 2.541746  # e a0, CODATA
 
 
@@ -47,17 +46,21 @@ def implausible(top: Top) -> tuple[str, ...]:
 
 
 def _far_apart(molecule: Molecule) -> list[str]:
-    """A note if no two atoms are close enough for a bond, but all would be if the coordinates were in bohr."""
-    distances = np.linalg.norm(molecule.positions_angstrom[:, None] - molecule.positions_angstrom, axis=2)
-    np.fill_diagonal(distances, np.inf)  # an atom has no bond with itself
-    if distances.min() < SHORTEST_BOND_TWICE:
+    """A note if the atoms form several parts that no bond joins; on bohr if that would bond every atom."""
+    from rotor.molecules.bonds import bonded_atoms, bonded_parts
+
+    if len(bonded_parts(bonded_atoms(molecule))) == 1:
         return []
     from ase.data import atomic_numbers, covalent_radii
 
-    radii = covalent_radii[[atomic_numbers[symbol] for symbol in molecule.symbols]]
-    longest = BOND_UP_TO * (radii[:, None] + radii)
-    # with coordinates in bohr every atom comes within the length of a bond
-    if (distances < longest).any() or not (units.BOHR_RADIUS_ANGSTROM * distances < longest).any(axis=1).all():
+    radii = {symbol: float(covalent_radii[atomic_numbers[symbol]]) for symbol in molecule.symbols}
+    parts = bonded_parts(bonded_atoms(molecule, radii, BOND_UP_TO))
+    if len(parts) == 1:
         return []
-    return [f"no two atoms are close enough for a bond, the closest are {distances.min():.3g} Å apart: coordinates are read in ångström; "
-            f"if they are in bohr, multiply them by {units.BOHR_RADIUS_ANGSTROM:.6f}"]  # fmt: skip
+    in_bohr = bonded_atoms(molecule, radii, BOND_UP_TO / units.BOHR_RADIUS_ANGSTROM)
+    too_short = bonded_atoms(molecule, dict.fromkeys(radii, SHORTEST_BOND_TWICE), 0.5)
+    if len(parts) == len(molecule.symbols) and all(map(len, in_bohr)) and not any(map(len, too_short)):
+        return ["no two atoms are close enough for a bond: coordinates are read in ångström; if they are in bohr, "
+                f"multiply them by {units.BOHR_RADIUS_ANGSTROM:.6f}"]  # fmt: skip
+    sizes = " + ".join(str(len(part)) for part in parts[:FEW_PARTS]) + (" + ..." if len(parts) > FEW_PARTS else "")
+    return [f"{len(parts)} parts ({sizes} atoms) without a bond between them: they are taken as a single rigid complex"]

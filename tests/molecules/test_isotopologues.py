@@ -12,6 +12,7 @@ from dataclasses import replace
 import force_fields
 import numpy as np
 import pytest
+from ase import Atoms
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from places import PROJECT
@@ -449,8 +450,23 @@ def test_isotopologues_of_oxygen_keep_its_odd_electronic_state(changes, weights)
     assert rotor.read("O2", isotopes=changes).spin_weights.to_mapping() == weights
 
 
+def test_two_atoms_of_a_triplet_ground_state_are_taken_in_it_and_say_so():
+    """O2, S2 and Si2 have the ground state 3Σg-, N2 and C2 1Σg+; even N does not exist in 16O2 and 32S2."""
+    for element, weights in {"O": (0, 1), "S": (0, 1), "Si": (0, 1), "C": (1, 0)}.items():
+        top = Top.from_molecule(Molecule((element, element), [[0, 0, 0], [0, 0, 1.5]]))
+        assert tuple(top.spin_weights.to_mapping().values()) == weights
+        assert any("ground state 3Σg-" in note for note in top.notes) == (weights == (0, 1))
+        assert top.molecule.multiplicity == (3 if weights == (0, 1) else None)
+    assert rotor.read("S2").spin_weights.to_mapping() == {"even": 0, "odd": 1}
+    singlet = Molecule(("O", "O"), [[0, 0, 0], [0, 0, 1.2156]], multiplicity=1)
+    assert (singlet.electronic, singlet.notes) == ("even", ())
+    assert Molecule(("O", "S"), [[0, 0, 0], [0, 0, 1.48]]).electronic == "even"  # nothing exchanges its nuclei
+    pair = Atoms("O2", [[0, 0, 0], [0, 0, 1.2075]])
+    assert rotor.thermo(pair, pressure_bar=1, temperatures_k=[300]).facts()["electronic"].startswith("degeneracy 3")
+
+
 def test_a_geometry_alone_is_taken_for_a_closed_shell_and_says_so():
-    pair = Molecule(("O", "O"), [[0, 0, 0], [0, 0, 1.2075]])
+    pair = Molecule(("O", "O"), [[0, 0, 0], [0, 0, 1.2075]], electronic="even")
     closed, odd = Top.from_molecule(pair), Top.from_molecule(replace(pair, electronic="odd"))
     assert closed.spin_weights.to_mapping() == {"even": 1, "odd": 0}
     assert "closed shell" in closed.weights_source

@@ -56,7 +56,9 @@ def test_ways_to_write_deuterium(name):
     ("name", "number", "message"),
     [
         ("CL", None, "near it: Cl"),
-        ("Xx", None, "not an element or isotope"),
+        ("Xy", None, "not an element or isotope"),
+        ("X", None, "'X' is a dummy atom, without a nucleus: remove it"),
+        ("Bq", None, "a dummy atom"),
         ("", None, "not an element or isotope"),
         ("45C", None, "near it are 12C, 13C, 14C"),
         ("13C", 12, "the two differ"),
@@ -83,7 +85,7 @@ def test_a_mass_of_zero_or_of_the_natural_mixture_is_no_isotope():
 
 def test_an_element_number_that_is_none():
     with pytest.raises(ValueError, match="not the atomic number"):
-        element_symbol(0)
+        element_symbol(200)
 
 
 def test_masses_of_many():

@@ -1,17 +1,21 @@
 """Input that hardly any molecule has is taken with a note."""
 
 import sys
+import tracemalloc
 
+import numpy as np
 import pytest
 from places import ORACLES
 
 import rotor
 from rotor.formats.molecules.library import names
+from rotor.molecules.molecule import Molecule
 from rotor.quantum.effects.of_top import effects_of
 from rotor.spectra.request import SpectrumRequest, _expected_q, answer_spectrum
 from rotor.thermodynamics.sums.partition import partition_function
-from rotor.tops.plausible import implausible
+from rotor.tops.plausible import _far_apart, implausible
 from rotor.tops.spins.spin_constants import SpinConstants
+from rotor.tops.top import Top
 
 
 def test_constants_beyond_a_rigid_body(call):
@@ -47,8 +51,9 @@ def test_coordinates_in_bohr(name):
 def test_atoms_that_form_no_molecule_anyway_are_not_taken_for_bohr():
     from ase import Atoms
 
-    assert implausible(rotor.read(Atoms("ArN2", [(0, 0, 0), (3.7, 0.55, 0), (3.7, -0.55, 0)]))) == ()
-    assert implausible(rotor.read(Atoms("He2", [(0, 0, 0), (5.0, 0, 0)]))) == ()
+    for atoms in (Atoms("ArN2", [(0, 0, 0), (3.7, 0.55, 0), (3.7, -0.55, 0)]), Atoms("He2", [(0, 0, 0), (5.0, 0, 0)])):
+        (note,) = implausible(rotor.read(atoms))
+        assert "single rigid complex" in note
 
 
 @pytest.mark.parametrize(("q", "noted"), [("5", True), ("178.1", False), ("400", False), ("5000", True)])
@@ -146,3 +151,24 @@ def test_the_note_on_q_takes_the_classical_limit_where_it_is_exact_enough(monkey
     summed = partition_function(answer.lines.top, 300.0).q
     monkeypatch.setattr(sys.modules["rotor.thermodynamics.sums.level_sums"], "_summed", None)
     assert _expected_q(answer.lines) == (pytest.approx(summed, rel=1e-5), False)
+
+
+def test_atoms_that_no_bond_joins_are_named_by_their_parts():
+    water = np.array([[0, 0, 0.117], [0, 0.757, -0.47], [0, -0.757, -0.47]])
+    pair = Molecule(("O", "H", "H") * 2, np.concatenate([water, water + np.array([5, 0, 0])]))
+    assert implausible(Top.from_molecule(pair)) == (
+        "2 parts (3 + 3 atoms) without a bond between them: they are taken as a single rigid complex",
+    )
+    hydrogen = implausible(Top.from_molecule(Molecule(("H", "H"), [[0, 0, 0], [0, 0, 740]])))
+    assert hydrogen[0].startswith("2 parts (1 + 1 atoms)")
+    caesium = Molecule(("Cs", "I"), [[0, 0, 0], [0, 0, 3.315]])  # the longest of ordinary bonds
+    assert implausible(Top.from_molecule(caesium)) == ()
+
+
+def test_thousands_of_atoms_need_no_matrix_of_distances():
+    grid = 1.5 * np.stack(np.meshgrid(*[np.arange(17.0)] * 3), axis=-1).reshape(-1, 3)
+    molecule = Molecule(("C",) * len(grid), grid)
+    tracemalloc.start()
+    assert _far_apart(molecule) == []
+    assert tracemalloc.get_traced_memory()[1] < 50e6  # bytes; the matrix has 8 * 4913² = 193e6
+    tracemalloc.stop()

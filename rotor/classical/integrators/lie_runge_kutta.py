@@ -22,7 +22,7 @@ from rotor.geometry.rotations import conjugate, rotate
 
 SHRINK, GROW, SAFETY = 0.2, 5.0, 0.9
 SMALLEST_STEP = 1e-13  # of the interval between two times asked for
-STAGES = 12
+STAGES, ORDER = 12, 8
 PLAIN_STEPS = 400  # a tenth of a second in numpy, as long as loading the compiled form of all further ones
 STEPS_OF_A_CALL = 20_000  # of one body: a compiled call obeys no signal
 MOST_STEPS = 3e9  # left at the present step: more than an hour of one body

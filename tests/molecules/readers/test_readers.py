@@ -106,7 +106,7 @@ def test_dipole_charge_and_cell_of_ase():
 
 
 def test_a_dummy_atom_is_refused():
-    with pytest.raises(ValueError, match="0 is not the atomic number"):
+    with pytest.raises(ValueError, match="dummy atom, without a nucleus"):
         from_ase(ase.Atoms("XO", [(0, 0, 0), (0, 0, 1)]))
 
 
